@@ -7,7 +7,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100
 RUN    := $(VENV)/bin/python
-SOURCES := $(shell find ranger_sim foundation datatable can_bus plant firmware_sim boards harness sysid tools \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null)
+SOURCES := $(shell find -L ranger_sim \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null) dev/declarations.py
 
 .PHONY: walk test test-interpreted test-vm docs lint setup bench lock clean
 
@@ -47,8 +47,8 @@ test-vm: $(VENV)/.all
 lint: $(VENV)/.tools
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check --quiet .
-	$(RUN) -m ranger_sim.tools.stubs --check
-	$(RUN) setup.py -q lay_types
+	rm -rf build/typed
+	CC=false $(RUN) setup.py -q build_py --build-lib build/typed 2>/dev/null
 	$(RUN) -m mypy
 
 bench: $(VENV)/.walk
@@ -77,5 +77,3 @@ lock:
 clean:
 	rm -rf $(VENV) build *.egg-info
 	find . -name '*.so' -not -path './$(VENV)/*' -delete
-	find . -name '*.c' -not -path './$(VENV)/*' -not -path './datatable/generated/*' -not -path './firmware_sim/native/*' -not -path './examples/*' -not -path './tests/*' -delete
-	rm -f ranger_sim/build_record.json

@@ -5,6 +5,8 @@
 Source: robot.md N4.2, N4.7-N4.9, N5. The two rooms hold their constants and their tables.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.boards.modules.foot_contact import FootContact
@@ -13,6 +15,9 @@ from ranger_sim.boards.modules.limit_switch import LimitSwitch
 from ranger_sim.boards.motor_board import CONVERSION_NS, PINS, MotorBoard
 from ranger_sim.datatable.generated import errors as codes
 
+if TYPE_CHECKING:
+    from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
+
 # (place, multiplexer code, gain code): differential 4-5 and 2-3 times 2, single-ended 0 and 1 times 1
 SEQUENCE = (
     ("motor_current", 2, 1),
@@ -20,10 +25,9 @@ SEQUENCE = (
     ("left_foot", 8, 0),
     ("right_foot", 9, 0),
 )
-if not cython.compiled:
-    # places in SEQUENCE
-    LEFT_FOOT = 2
-    RIGHT_FOOT = 3
+# places in SEQUENCE
+LEFT_FOOT: Final = 2
+RIGHT_FOOT: Final = 3
 LIMITS = dict(
     target_min=-1.0,
     target_max=6.0,
@@ -43,8 +47,19 @@ REZERO_RATE_RAD_S = 0.01
 SET_CYCLES = 2 * 4010
 
 
+@cython.cclass
 class AnkleBoard(MotorBoard):
     """Position and velocity of the compliant law: motor encoder / 34. `rezero_share` of the difference per call."""
+
+    joint: "QuadratureDecoder"
+    safety: AnkleSafety
+    left_foot: FootContact
+    right_foot: FootContact
+    left_switch: LimitSwitch
+    right_switch: LimitSwitch
+    rezero_share: cython.double
+    rezero_angle: cython.double
+    rezero_rate: cython.double
 
     def __init__(
         self,
@@ -101,6 +116,7 @@ class AnkleBoard(MotorBoard):
             getattr(codes, board + "_ANKL_HI"),
         )
 
+    @cython.ccall
     def set_start_values(self) -> None:
         """Both incremental encoders start at the absolute angle."""
         self.motor.set_position(self.encoder.angle)
@@ -122,10 +138,14 @@ class AnkleBoard(MotorBoard):
 
     # --- what is published ------------------------------------------------------------------------------
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def right_heel_sense(self) -> cython.longlong:
         """Counts of the right foot's sensor."""
         return self.adc_external.results[RIGHT_FOOT]
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def left_heel_sense(self) -> cython.longlong:
         """Counts of the left foot's sensor."""
         return self.adc_external.results[LEFT_FOOT]

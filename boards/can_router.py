@@ -6,48 +6,44 @@ Source: robot.md N1.4-N1.6, N3.7, N4.16; appendix 3.7, 3.11. Interrupts fill rin
 main loop moves frames whenever no slot runs: run the scheduler, then four times "route, flush one bus".
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards import counters
 from ranger_sim.boards.firmware_board import ALL_CAN_INTERRUPTS, FirmwareBoard
 from ranger_sim.boards.modules.can_errors import CanErrors
+from ranger_sim.boards.modules.can_link import FIRST_BUFFER, SECOND_BUFFER
 from ranger_sim.boards.modules.can_load import CanLoad
 from ranger_sim.boards.modules.mcu_led import Heartbeat
 from ranger_sim.boards.modules.network_clock import CYCLES_PER_SYNC, NetworkClock
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.boards.modules.publishing import Send, laid_out
-from ranger_sim.boards.modules.routing import Router, RoutingTable
+from ranger_sim.boards.modules.routing import TO_SEND, TRANSMIT_MASK, TRANSMIT_RING, Router, RoutingTable
 from ranger_sim.boards.modules.sender import Sender
-from ranger_sim.boards.modules.ssp_link import RouterSspLink
+from ranger_sim.boards.modules.ssp_link import SEGMENT_HALF_WORDS, RouterSspLink
 from ranger_sim.datatable.generated import csr as table
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import routes
 from ranger_sim.firmware_sim.board import EVERY_KIND
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, MOD_RESET, RFS_EIGHT_BYTES, CanController
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
-from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.peripherals.timer_capture import IR_MR0, TimerCapture
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import FIQ, FIQ_LATENCY, TIMER_MATCH
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, SSP_SEGMENT
+from ranger_sim.foundation.numbers import float32
 
-if not cython.compiled:
-    from ranger_sim.boards.modules.can_link import FIRST_BUFFER, SECOND_BUFFER
-    from ranger_sim.boards.modules.routing import TO_SEND, TRANSMIT_MASK, TRANSMIT_RING
-    from ranger_sim.boards.modules.ssp_link import SEGMENT_HALF_WORDS
-    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, MOD_RESET, RFS_EIGHT_BYTES
-    from ranger_sim.firmware_sim.peripherals.timer_capture import IR_MR0
-    from ranger_sim.foundation.numbers import float32
-
-    BUSES = 4
-    # lights of a bus, and from how many frames per ms on they show it (robot.md N1.10)
-    LED_OFF = 0
-    LED_TRAFFIC = 1
-    LED_WARNING = 2
-    LED_FULL = 3
-    WARNING_FRAMES_PER_MS = 20
-    FULL_FRAMES_PER_MS = 30
+BUSES: Final = 4
+# lights of a bus, and from how many frames per ms on they show it (robot.md N1.10)
+LED_OFF: Final = 0
+LED_TRAFFIC: Final = 1
+LED_WARNING: Final = 2
+LED_FULL: Final = 3
+WARNING_FRAMES_PER_MS: Final = 20
+FULL_FRAMES_PER_MS: Final = 30
 
 # Cycles of the interrupts and of the main loop, chosen by us, because no cycle count of this firmware is
 # known; each is an estimate of instructions and of accesses over the slow peripheral bus.
@@ -80,8 +76,13 @@ def supply_pins_V(current_A, voltage_V):
     )
 
 
+@cython.final
+@cython.cclass
 class BusReceiver:
     """The receive interrupt of one bus: its frames into the ring that all four share."""
+
+    controller: CanController
+    router: Router
 
     def __init__(self, controller: CanController, router: Router) -> None:
         self.controller = controller
@@ -99,8 +100,15 @@ class BusReceiver:
         controller.release()
 
 
+@cython.final
+@cython.cclass
 class OwnFrames(Sender):
     """The router's own variables, stamped with its own time, into its own ring. `lost`: frames that found it full."""
+
+    router: Router
+    report: object
+    report_full: cython.bint
+    lost: cython.longlong
 
     def __init__(self, router: Router, time: NetworkTime, report, report_full) -> None:
         Sender.__init__(self, time)
@@ -121,8 +129,39 @@ class OwnFrames(Sender):
         return False
 
 
+@cython.final
+@cython.cclass
 class CanRouterBoard(FirmwareBoard):
     """Slots of 1 ms, 10 rows. `phase_ns`: when its program starts; the first sync comes 1 ms later."""
+
+    # what the main loop and the interrupts touch
+    router: Router
+    link: RouterSspLink
+    controllers: list
+    load: CanLoad
+    idle_since: cython.longlong
+    flush_next: cython.longlong
+    pair_ns: cython.longlong
+    idle: cython.bint
+    route_ns: cython.longlong[4]
+    flush_ns: cython.longlong[3]
+    ssp: SspPort
+    timer1: TimerCapture
+    clock: NetworkClock
+    # tasks
+    own: OwnFrames
+    adc: AdcInternal
+    lost_before: cython.longlong
+    sync_cycles: cython.longlong
+    can_leds: cython.longlong[5]
+    # the rest
+    gpio: Gpio
+    heartbeat: Heartbeat
+    can1: CanController
+    can2: CanController
+    can3: CanController
+    can4: CanController
+    can_errors: list
 
     def __init__(self, crystal, quirks, phase_ns=0) -> None:
         board: object = self  # a compiled class would hand out wrappers of inherited methods
@@ -261,6 +300,8 @@ class CanRouterBoard(FirmwareBoard):
         """Any kind, but that a transmit buffer comes free when nothing waits for it."""
         return EVERY_KIND if self.router.waiting else EVERY_KIND & ~(1 << CAN_TX_DONE)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def nothing_waits(self) -> cython.bint:
         """True while the main loop has nothing to move, now or when a buffer gets free."""
         return (
@@ -269,6 +310,7 @@ class CanRouterBoard(FirmwareBoard):
             and self.link.received_read == self.link.received_write
         )
 
+    @cython.ccall
     def flush(self, controller: CanController, began: cython.longlong) -> cython.longlong:
         """Fill transmit buffers 1 and 2, those free when the turn `began` (ns), from the ring of the controller's bus.
 
@@ -300,6 +342,7 @@ class CanRouterBoard(FirmwareBoard):
             self.load.counts[channel] += moved
         return moved
 
+    @cython.ccall
     def can_flush(self, at: cython.longlong) -> cython.bint:
         """True when at `at` (ns) a frame waits for a bus that has a free transmit buffer and is not in reset.
 
@@ -410,14 +453,17 @@ class CanRouterBoard(FirmwareBoard):
             else:
                 self.can_leds[i] = LED_FULL
 
+    @cython.ccall
     def current_A(self) -> cython.double:
         """Supply current of the electronics by the converter."""
         return float32(CURRENT_GAIN_A * (self.adc.DR(0) + CURRENT_OFFSET))
 
+    @cython.ccall
     def voltage_V(self) -> cython.double:
         """Supply voltage of the electronics by the converter."""
         return float32(VOLTAGE_GAIN_V * (self.adc.DR(1) + VOLTAGE_OFFSET))
 
+    @cython.ccall
     def power_W(self) -> cython.double:
         """Power of the electronics: the product of both."""
         return self.current_A() * self.voltage_V()

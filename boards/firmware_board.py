@@ -34,11 +34,19 @@ TICK_CYCLES = 180 - IRQ_LATENCY
 CAN_RECEIVE_SLOT = 0  # of the VIC, on every satellite (robot.md N4.16)
 
 
+@cython.cclass
 class FirmwareBoard(Microcontroller):
     """A board with firmware. `table`: generated module of the board; `quirks`: switches, None for the defaults.
 
     `one_late`: the firmware's slip in the error rings of router and main brain, each report carries the one before.
     """
+
+    errors: ErrorModule
+    time: NetworkTime
+    errors_one_late: cython.bint
+    error_before: cython.longlong
+    table: object
+    quirks: object
 
     def __init__(self, table, crystal, quirks, one_late=False) -> None:
         board: object = self  # bound methods are looked up dynamically
@@ -64,6 +72,7 @@ class FirmwareBoard(Microcontroller):
         """The board's table; every room has its own."""
         raise UserError(f"{self.name}: this board has no schedule")
 
+    @cython.ccall
     def report(self, code: cython.longlong) -> None:
         """Note an error; one late, the first one is 0."""
         if self.errors_one_late:
@@ -85,11 +94,18 @@ class FirmwareBoard(Microcontroller):
         self.report(codes.SCHED_SLOT_NEAR_LIMIT)
 
 
+@cython.cclass
 class SatelliteBoard(FirmwareBoard):
     """A board on one CAN bus, an LPC2194: lights, execution times, and the link to its bus.
 
     `error_slot` of the VIC; `interrupts` that its CAN controller raises.
     """
+
+    can: CanLink
+    can_controller: CanController
+    execution: ExecutionTimer
+    heartbeat: Heartbeat
+    gpio: Gpio
 
     def __init__(self, table, crystal, quirks, error_slot, interrupts=ALL_CAN_INTERRUPTS) -> None:
         FirmwareBoard.__init__(self, table, crystal, quirks)

@@ -4,6 +4,8 @@ Source: robot.md N3.2 (schedule, laid out below line by line), N4.1, N4.2, N4.5,
 Positive hip angle: inner legs swung forward.
 """
 
+from typing import TYPE_CHECKING
+
 import cython
 
 from ranger_sim.boards.firmware_board import TICK_CYCLES
@@ -14,6 +16,9 @@ from ranger_sim.boards.motor_board import MotorBoard
 from ranger_sim.datatable.generated import mch as table
 from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BUS_ERROR, ICR_ERROR_WARNING, ICR_RI, ICR_TI1
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
+
+if TYPE_CHECKING:
+    from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
 
 CAN_INTERRUPTS = ICR_RI | ICR_TI1 | ICR_ERROR_WARNING | ICR_BUS_ERROR  # its TX1 bit reaches no handler
 
@@ -37,11 +42,15 @@ LIMITS = dict(
 )
 JOINT_ENCODER = (2048, 1.0)  # pulses, gear
 MOTOR_ENCODER = (192, 66.0)
-REZERO_SHARE = 0.05
+REZERO_SHARE: cython.double = 0.05
 
 
+@cython.cclass
 class HipBoard(MotorBoard):
     """Position of the compliant law: absolute encoder. Velocity: motor encoder / 66."""
+
+    joint: "QuadratureDecoder"
+    safety: HipSafety
 
     def __init__(self, crystal=None, quirks=None, phase_ns=0) -> None:
         MotorBoard.__init__(
@@ -114,12 +123,15 @@ class HipBoard(MotorBoard):
             ),
         )  # fmt: skip
 
+    @cython.ccall
     def set_start_values(self) -> None:
         """Encoders start at the absolute angle; the firmware of 2016 forgets the motor's."""
         self.joint.set_position(self.encoder.angle)
         if self.quirks.hip_motor_encoder_preset:
             self.motor.set_position(self.encoder.angle)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def controlled_position(self) -> cython.longlong:
         """The joint's own angle, rad x 65536."""
         return self.encoder.angle

@@ -4,6 +4,8 @@ Source: robot.md N3.4 (schedule, laid out below line by line), N4.1, N4.2, N4.5,
 Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 
+import cython
+
 from ranger_sim.boards.ankle_board import AnkleBoard
 from ranger_sim.boards.firmware_board import TICK_CYCLES
 from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
@@ -27,6 +29,7 @@ REZERO_SHARE = 0.05
 OPERATION_SIGN = 1
 
 
+@cython.cclass
 class InnerFeetBoard(AnkleBoard):
     """Inner ankle motor, two foot sensors, two limit switches."""
 

@@ -11,6 +11,8 @@ A task's limit is about a third above the most that was counted, or can be for a
 gains, ten errors at once; a Wait's is its converter's whole sequence.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.boards.firmware_board import ALL_CAN_INTERRUPTS, SatelliteBoard
@@ -42,6 +44,10 @@ from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.vic import ADC_DONE, EXTERNAL_INTERRUPT, IRQ_LATENCY, SPI_DONE, InterruptSource
 from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.numbers import fixed_of_float, float32
+
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
 
 # Processor pins by what hangs on them (robot.md N4.1, N4.4, N4.7, N4.9, N4.11); for the wiring table.
 PINS = {
@@ -78,10 +84,7 @@ START_VALUES, SLOTS_BEGIN = 0, 1
 # long as the logs' (robot.md T1). MCH keeps the data sheet's: its two end before anybody waits (T2).
 CONVERSION_NS = 31_000
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import fixed_of_float, float32
-
-    BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
+BATTERY_VOLTAGE_CHANNEL: Final = 1  # AIN1, P0.28
 
 # Receive lists, which are searched from the first entry: MCH's is told (robot.md N2.4). The others' order is chosen by
 # us: on MCFI the time and three gains take 632 instructions for MCH's 716 (T2), so they stand a place or two earlier.
@@ -100,6 +103,7 @@ CAN_ERROR_SLOT = 8
 SPI_SLOT = 10
 
 
+@cython.cclass
 class PowerUp(Peripheral):
     """The part of `main` before the scheduler's loop: one reading of the sensors, then start values.
 
@@ -107,12 +111,17 @@ class PowerUp(Peripheral):
     anyhow and the start values are those of a count of 0.
     """
 
+    board: "MotorBoard"
+    first: "Alarm"
+    second: "Alarm"
+
     def __init__(self, chip, board) -> None:
         Peripheral.__init__(self, chip)
         self.board = board
         self.first = chip.new_alarm(self, START_VALUES)
         self.second = chip.new_alarm(self, SLOTS_BEGIN)
 
+    @cython.ccall
     def begin(self, phase_ns: cython.longlong) -> None:
         """Power comes at `phase_ns`."""
         self.first.set(phase_ns + START_VALUES_NS)
@@ -126,11 +135,36 @@ class PowerUp(Peripheral):
         return None
 
 
+@cython.cclass
 class MotorBoard(SatelliteBoard):
     """A B2A board. `table`: generated module of the board; `quirks`: switches; `phase_ns`: when it gets power.
 
     `largest_duty` in counts of 600, `sign` of the motor's mounting, `gear` of the motor (0: no encoder).
     """
+
+    # what the tasks of every slot and the interrupts touch
+    adc_external: Ads7871
+    adc_internal: AdcInternal
+    spi: SpiEncoder
+    encoder: AbsoluteEncoder
+    motor: QuadratureDecoder
+    compliance: CompliantControl
+    limits: MotorLimits
+    current_control: CurrentControl
+    readings: AdcReadings
+    # the rest
+    pwm: Pwm
+    output: MotorOutput
+    cap01: QuadratureDecoder
+    cap23: QuadratureDecoder
+    capture01: EncoderCapture
+    capture23: EncoderCapture
+    wraps: WrapCounter
+    timer0: TimerCapture
+    encoder_select: cython.longlong
+    rezero_count: cython.longlong
+    rezeroing: cython.bint
+    power_up: PowerUp
 
     def __init__(
         self,
@@ -269,6 +303,7 @@ class MotorBoard(SatelliteBoard):
 
     # --- start-up ---------------------------------------------------------------------------------------
 
+    @cython.ccall
     def read_sensors_once(self) -> None:
         """Before the first slot: low sides on, multiplexer set, and one reading of the joint's angle."""
         self.output.enable_low_side(1)
@@ -276,6 +311,7 @@ class MotorBoard(SatelliteBoard):
             self.gpio.write(PINS["absolute_encoder_select"], self.encoder_select)
             self.spi.start()
 
+    @cython.ccall
     def set_start_values(self) -> None:
         """When that reading has come."""
 
@@ -302,10 +338,14 @@ class MotorBoard(SatelliteBoard):
         if not self.adc_external.start_sequence():
             self.errors.report(codes.ADCX_DNF)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def controlled_position(self) -> cython.longlong:
         """Position in the compliant law, rad x 65536: of the motor, unless a room says otherwise."""
         return self.motor.position
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def controlled_velocity(self) -> cython.longlong:
         """Velocity in the compliant law, rad/s x 65536."""
         return self.motor.rate
@@ -318,6 +358,7 @@ class MotorBoard(SatelliteBoard):
         self.compliance.target = target
         self.current_control.update(target, self.readings.motor_current_fixed())
 
+    @cython.ccall
     def rezero_motor(self, share: cython.double) -> None:
         """Move the motor's angle towards the joint's by `share` of their difference, in single floats.
 

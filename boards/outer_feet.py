@@ -4,6 +4,8 @@ Source: robot.md N3.3 (schedule, laid out below line by line), N4.1, N4.2, N4.5,
 Ankle angle: 0 with the foot flipped up, growing as the foot is pushed down.
 """
 
+import cython
+
 from ranger_sim.boards.ankle_board import FOOT_OFF_LEVEL, AnkleBoard
 from ranger_sim.boards.firmware_board import TICK_CYCLES
 from ranger_sim.boards.modules.can_link import TRANSMIT_CYCLES
@@ -26,6 +28,7 @@ REZERO_SHARE = 0.2
 OPERATION_SIGN = -1  # the motor is mounted the other way round
 
 
+@cython.cclass
 class OuterFeetBoard(AnkleBoard):
     """Outer ankle motor, two foot sensors, two limit switches."""
 

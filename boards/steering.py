@@ -35,21 +35,29 @@ LIMITS = dict(
     thermal_time=10.1,
     excess_limit=10,
 )
-CENTRE_COUNTS = 4803  # of the limit check
-LIMIT_COUNTS = 200
+CENTRE_COUNTS: cython.longlong = 4803
+LIMIT_COUNTS: cython.longlong = 200
 # mc_compliant_control was counted at 465 instructions, all values 0; with others it takes up to 764 on the other boards
 # (robot.md T2). With 765 the slot is as long as the logs' 142-145 us (T1).
 CONTROL_CYCLES = 2 * 765
-SENSOR = 0  # place in SEQUENCE
+SENSOR: cython.longlong = 0
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def whole(value: cython.longlong) -> cython.longlong:
     """The whole part of a 16.16 number, towards zero."""
     return value >> 16 if value >= 0 else -(-value >> 16)
 
 
+@cython.cclass
 class SteeringBoard(MotorBoard):
     """`zero`: sensor counts at power-up, subtracted from what is published and controlled."""
+
+    zero: cython.longlong
+    direct: cython.bint
+    closed_loop: cython.bint
+    check_limits: cython.bint
 
     def __init__(self, crystal=None, quirks=None, phase_ns=0) -> None:
         MotorBoard.__init__(
@@ -114,19 +122,25 @@ class SteeringBoard(MotorBoard):
             ),
         )  # fmt: skip
 
+    @cython.ccall
     def read_sensors_once(self) -> None:
         """Before the first slot: one sequence of the converter."""
         self.output.enable_low_side(1)
         self.start_external_adc()
 
+    @cython.ccall
     def set_start_values(self) -> None:
         """The present steering angle is the zero."""
         self.zero = self.adc_external.results[SENSOR]
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def controlled_position(self) -> cython.longlong:
         """Steering angle in counts x 65536: there is no other unit on this board."""
         return (self.adc_external.results[SENSOR] - self.zero) << 16
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def controlled_velocity(self) -> cython.longlong:
         """No velocity is measured."""
         return 0
@@ -160,6 +174,7 @@ class SteeringBoard(MotorBoard):
         elif self.current_control.supervise(self.readings.motor_current_fixed()) and self.output.off:
             self.errors.report(self.current_control.code_stopped)
 
+    @cython.ccall
     def check(self) -> None:
         """The limit check of the firmware, which never calls it: +/-200 counts about 4803.
 
@@ -175,6 +190,8 @@ class SteeringBoard(MotorBoard):
         self.current_control.block_positive = high
         self.current_control.block_negative = low
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def steer_angle_counts(self) -> cython.longlong:
         """MCSI_STEER_ANGLE: counts from the zero."""
         return self.adc_external.results[SENSOR] - self.zero

@@ -65,8 +65,25 @@ IMU_CYCLES = 2 * 60  # both indices, the search for a header
 IMU_BYTE_CYCLES = 2 * 30  # a byte is taken from the ring twice, for the sum and for its word
 
 
+@cython.final
+@cython.cclass
 class UserInterfaceBoard(SatelliteBoard):
     """Slots of 1 ms, 3 rows. `phase_ns`: when it gets power, and its first slot begins."""
+
+    # what the tasks of every slot and the interrupts touch
+    imu: ImuParser
+    uart1: Uart
+    lcd: Lcd
+    sync_light: SyncLight
+    buzzer: Buzzer
+    slots: cython.longlong
+    imu_start_slots: cython.longlong
+    # the rest
+    timer0: TimerCapture
+    rc: RcReceiver
+    keypad: Keypad
+    leds: ColourLeds
+    imu_command: bytes
 
     def __init__(self, crystal, quirks, phase_ns=0) -> None:
         board: object = self  # a compiled class would hand out wrappers of inherited methods

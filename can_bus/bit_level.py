@@ -11,27 +11,30 @@ between are decided at once. So nothing depends on how time is cut, and mostly a
 at its start, as a plain one is.
 """
 
+from typing import TYPE_CHECKING
+
 import cython
 
-from ranger_sim.can_bus.medium_access import MediumAccess
+from ranger_sim.can_bus.frame import (
+    FIELD_RTR,
+    FIELD_SRTR,
+    MEASURED_BITS,
+    RECEIVERS_SEE,
+    RECESSIVE,
+    arbitration_key,
+    measure,
+)
+from ranger_sim.can_bus.medium_access import MAC_FRAME, MAC_IDLE, MET_ERROR, MET_FAILURE, MediumAccess
+from ranger_sim.can_bus.node import BUS_OFF, ICR_FIELD_MASK, ICR_FIELD_SHIFT, RESET, SEQUENCE_BITS
+from ranger_sim.can_bus.transmit_buffers import FLAGS, HIGH, IDENTIFIER, LOW, NEXT, NODE_SHIFT, READY, TransmitBuffers
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.can_bus.frame import (
-        FIELD_RTR,
-        FIELD_SRTR,
-        MEASURED_BITS,
-        RECEIVERS_SEE,
-        RECESSIVE,
-        arbitration_key,
-        measure,
-    )
-    from ranger_sim.can_bus.medium_access import MAC_FRAME, MAC_IDLE, MET_ERROR, MET_FAILURE
-    from ranger_sim.can_bus.node import BUS_OFF, ICR_FIELD_MASK, ICR_FIELD_SHIFT, RESET, SEQUENCE_BITS
-    from ranger_sim.can_bus.transmit_buffers import FLAGS, HIGH, IDENTIFIER, LOW, NEXT, NODE_SHIFT, READY
-    from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
+if TYPE_CHECKING:
+    from ranger_sim.can_bus.disturbance import Disturbance
 
 
+@cython.final
+@cython.cclass
 class BitLevel:
     """The medium access of all nodes (`machines`, by node number) and the bus between them.
 
@@ -42,6 +45,31 @@ class BitLevel:
     goes on, which began in the frame of `error_begun`; `counted`: so the bus has noted. `tampering`: what faults do to
     frames (`tampering.py`), or None. `bitrate`: of the bus.
     """
+
+    machines: list
+    levels: list
+    aborting: list
+    buffers: "TransmitBuffers"
+    disturbance: "Disturbance"
+    first_bit: cython.longlong
+    bit: cython.longlong
+    quiet: cython.longlong
+    heard_bit: cython.longlong
+    sent_bit: cython.longlong
+    bitrate: cython.longlong
+    tampering: object
+    open: cython.bint
+    at_rest: cython.bint
+    away: cython.bint
+    # the frame that began last, and the error frame that goes on
+    identifier: cython.longlong
+    flags: cython.longlong
+    sender: cython.longlong
+    in_error: cython.bint
+    counted: cython.bint
+    error_field: cython.longlong
+    error_begun: cython.longlong
+    error_position: cython.longlong
 
     def __init__(self, buffers, disturbance, bitrate) -> None:
         self.buffers = buffers
@@ -77,6 +105,7 @@ class BitLevel:
         self.machines.append(machine)
         machine.place(self.bit, self.bit)
 
+    @cython.cfunc
     def begin(self, bit: cython.longlong, free_bit: cython.longlong) -> None:
         """The bus is idle up to `bit` and has been since `free_bit`."""
         self.first_bit = bit
@@ -88,6 +117,7 @@ class BitLevel:
         for machine in self.machines:
             cython.cast(MediumAccess, machine).place(bit, free_bit)
 
+    @cython.cfunc
     def look(self) -> None:
         """Set `open`, `at_rest` and `away` for the next bit."""
         machine: MediumAccess
@@ -107,6 +137,7 @@ class BitLevel:
 
     # ---- frames that begin
 
+    @cython.cfunc
     def start_frames(self) -> None:
         """In an open bit: who may and has a frame for it begins it."""
         machine: MediumAccess
@@ -127,17 +158,20 @@ class BitLevel:
         if best >= 0:
             self._note_start(best, self.bit)
 
+    @cython.cfunc
     def start_late(self, machine: MediumAccess) -> None:
         """The dominant last bit of intermission stands for the start of frame of what the node offers."""
         self._load(machine)
         self._note_start(machine.offered, machine.begun)
 
+    @cython.cfunc
     def _load(self, machine: MediumAccess) -> None:
         bits, fields = self.buffers.wire(machine.offered)
         extended = self.buffers.rows[machine.offered + FLAGS] & FLAG_EXTENDED
         # a stuff bit behind RTR belongs to the control field: rule (c) speaks of those before it
         machine.send(machine.offered, bits, fields.index(FIELD_RTR if extended else FIELD_SRTR) + 1)
 
+    @cython.cfunc
     def _note_start(self, row: cython.longlong, bit: cython.longlong) -> None:
         """The frame in `row` begins at `bit`, perhaps beside others."""
         slots: cython.p_longlong = self.buffers.slots
@@ -152,6 +186,8 @@ class BitLevel:
         if self.tampering is not None:
             self.tampering.frame_begins(self, row, bit)
 
+    @cython.cfunc
+    @cython.exceptval(-2, check=True)
     def _offer(self, machine: MediumAccess) -> cython.longlong:
         """The row of the lowest frame of a node that is ready for the next bit, -1 for none."""
         slots: cython.p_longlong = self.buffers.slots
@@ -170,6 +206,7 @@ class BitLevel:
 
     # ---- a bit
 
+    @cython.cfunc
     def pass_bit(self) -> None:
         """The next bit: what every node drives, what they sample, and what came of it (`MediumAccess.met`)."""
         machine: MediumAccess
@@ -199,6 +236,7 @@ class BitLevel:
         self.quiet = self.quiet + 1 if level == RECESSIVE else 0
         self.bit += 1
 
+    @cython.cfunc
     def _sample_at_own_rate(self, machine: MediumAccess) -> cython.longlong:
         """A node whose bits are longer or shorter than the bus's: none, one or more of them end in this bit.
 
@@ -217,6 +255,7 @@ class BitLevel:
             machine.own_bit += 1
         return met
 
+    @cython.cfunc
     def _note_error(self) -> None:
         """An error frame begins: of the first transmitter that saw why, else of the first node."""
         machine: MediumAccess
@@ -234,6 +273,7 @@ class BitLevel:
         self.error_begun = found.begun
         self.error_position = self.bit - found.begun
 
+    @cython.cfunc
     def error_is_over(self) -> cython.bint:
         """True when no node is in an error frame any more, and none still listens to what nobody sends any more.
 

@@ -24,88 +24,130 @@ written where the sender looks for it (`Node.connect`). That is so while nothing
 Receivers have the frame at the end of the sixth bit of EOF, its sender is done at the end of the seventh.
 """
 
+from typing import TYPE_CHECKING, Annotated, Final
+
 import cython
 
 from ranger_sim.can_bus.bit_level import BitLevel
 from ranger_sim.can_bus.bus_counters import BusCounters
 from ranger_sim.can_bus.disturbance import HIGHEST_RATE, Disturbance
-from ranger_sim.can_bus.frame import arbitration_key, first_difference, measure
-from ranger_sim.can_bus.frame_log import FrameLog
+from ranger_sim.can_bus.frame import (
+    ACK_DELIMITER_FROM_END,
+    EIGHT_BYTES,
+    HIGHEST_EXTENDED,
+    HIGHEST_STANDARD,
+    INTERMISSION_BITS,
+    LENGTH_CODE,
+    MEASURED_BITS,
+    RECEIVERS_SEE,
+    SENDABLE,
+    arbitration_key,
+    first_difference,
+    frame_bits,
+    measure,
+)
+from ranger_sim.can_bus.frame_log import SENDER_SHIFT, TIMES_BUFFER_SHIFT, FrameLog
 from ranger_sim.can_bus.load_meter import LoadMeter
-from ranger_sim.can_bus.medium_access import MediumAccess
-from ranger_sim.can_bus.node import Node
-from ranger_sim.can_bus.transmit_buffers import TransmitBuffers
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.can_bus.medium_access import (
+    MAC_JOINING,
+    MAC_SUSPENDED,
+    MET_COUNTER,
+    MET_FAILURE,
+    MET_JOIN,
+    MET_LOSS,
+    MET_RECEIVED,
+    MET_SENT,
+    MET_SETTLED,
+    MET_START,
+    MediumAccess,
+)
+from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, UNPLUGGED, Node
+from ranger_sim.can_bus.transmit_buffers import (
+    ASKED,
+    BUFFER_MASK,
+    BUFFER_SHIFT,
+    BUFFERS,
+    FLAGS,
+    FREE_AT,
+    HIGH,
+    IDENTIFIER,
+    LOW,
+    NEXT,
+    NODE_SHIFT,
+    READY,
+    ROW,
+    TransmitBuffers,
+)
+from ranger_sim.foundation.events import (
+    CAN_RX,
+    CAN_TX_DONE,
+    FLAG_EXTENDED,
+    FLAG_REMOTE,
+    FLAG_SINGLE_SHOT,
+    NEVER,
+    TX_ABORTED,
+    TX_LOST,
+    TX_SENT,
+    EventQueue,
+)
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.random_stream import RandomStream
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.can_bus.frame import (
-        ACK_DELIMITER_FROM_END,
-        EIGHT_BYTES,
-        HIGHEST_EXTENDED,
-        HIGHEST_STANDARD,
-        INTERMISSION_BITS,
-        LENGTH_CODE,
-        MEASURED_BITS,
-        RECEIVERS_SEE,
-        SENDABLE,
-        frame_bits,
-    )
-    from ranger_sim.can_bus.frame_log import SENDER_SHIFT, TIMES_BUFFER_SHIFT
-    from ranger_sim.can_bus.medium_access import (
-        MAC_JOINING,
-        MAC_SUSPENDED,
-        MET_COUNTER,
-        MET_FAILURE,
-        MET_JOIN,
-        MET_LOSS,
-        MET_RECEIVED,
-        MET_SENT,
-        MET_SETTLED,
-        MET_START,
-    )
-    from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, UNPLUGGED
-    from ranger_sim.can_bus.transmit_buffers import (
-        ASKED,
-        BUFFER_MASK,
-        BUFFER_SHIFT,
-        BUFFERS,
-        FLAGS,
-        FREE_AT,
-        HIGH,
-        IDENTIFIER,
-        LOW,
-        NEXT,
-        NODE_SHIFT,
-        READY,
-        ROW,
-    )
-    from ranger_sim.foundation.events import (
-        CAN_RX,
-        CAN_TX_DONE,
-        FLAG_EXTENDED,
-        FLAG_REMOTE,
-        FLAG_SINGLE_SHOT,
-        NEVER,
-        TX_ABORTED,
-        TX_LOST,
-        TX_SENT,
-    )
+if TYPE_CHECKING:
+    pass
 
-    # kinds of the messages in `Bus.commands`
-    COMMAND_ABORT = 1
-    COMMAND_MODE = 2
+# kinds of the messages in `Bus.commands`
+COMMAND_ABORT: Final = 1
+COMMAND_MODE: Final = 2
 
-    SECOND_NS = 1_000_000_000
+SECOND_NS: Final = 1_000_000_000
 
 
+@cython.final
+@cython.cclass
 class Bus:
     """A CAN bus. `bitrate` in bit/s; `seed` feeds the noise source of `set_bit_error_rate` only.
 
     What happened is in `counters`, `load` and `log`; what waits is in `buffers`.
     """
+
+    # what every request and frame touches stands in front: few lines of the processor's cache
+    next_time: cython.longlong
+    next_bit: cython.longlong
+    advanced: cython.longlong
+    free_time: cython.longlong
+    free_bit: cython.longlong
+    hindered_until: cython.longlong
+    next_change: cython.longlong
+    buffers: TransmitBuffers
+    bitrate: cython.longlong
+    node_count: cython.longlong
+    acknowledging: cython.longlong
+    wake_place: cython.longlong
+    due: cython.p_longlong
+    next_strike: cython.longlong
+    strike_bit: cython.longlong
+    second_bit: cython.longlong
+    second_ns: cython.longlong
+    disturbed: cython.bint
+    bit_ns: cython.longlong
+    bit_rest: cython.longlong
+    intermission_ns: cython.longlong
+    intermission_rest: cython.longlong
+    nodes: list
+    counters: BusCounters
+    load: LoadMeter
+    log: FrameLog
+    # what the address `due` leads into: exchanged only by `wake`, which sets both
+    wakes: Annotated[cython.longlong[::1], "readonly"]
+    name: str
+    disturbance: Disturbance
+    commands: EventQueue
+    bit_level: BitLevel
+    joining: cython.longlong
+    suspended_until: cython.longlong
+    rivals: cython.longlong
+    tampering: object
 
     def __init__(self, name, bitrate, seed=0, log_capacity=4096) -> None:
         if bitrate < 1000 or bitrate > 100_000_000:
@@ -189,11 +231,15 @@ class Bus:
 
     # ---- time
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def bit_of(self, time: cython.longlong) -> cython.longlong:
         """Number of the bit that runs at `time` (ns): floor(time * bitrate / 10^9)."""
         seconds: cython.longlong = time // SECOND_NS
         return seconds * self.bitrate + (time - seconds * SECOND_NS) * self.bitrate // SECOND_NS
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     @cython.cdivision(True)  # bits are not negative
     def edge_ns(self, bit: cython.longlong) -> cython.longlong:
         """First whole ns at which bit number `bit` has begun: ceil(bit * 10^9 / bitrate)."""
@@ -229,6 +275,7 @@ class Bus:
         self._note_changes()
         return index
 
+    @cython.ccall
     @cython.cdivision(True)  # instants are not negative
     def request(
         self,
@@ -309,11 +356,13 @@ class Bus:
                 self.due[self.wake_place] = start
         return True
 
+    @cython.cfunc
     def _no_such_buffer(self, node: cython.longlong, buffer: cython.longlong) -> None:
         if node < 0 or node >= self.node_count:
             raise ValueError(f"bus {self.name}: node {node} does not exist")
         raise ValueError(f"bus {self.name}: transmit buffer {buffer} is not one of 1, 2, 3")
 
+    @cython.cfunc
     def _check_frame(self, identifier: cython.longlong, flags: cython.longlong) -> None:
         """ValueError for a frame that cannot be sent."""
         if flags & FLAG_EXTENDED:
@@ -324,6 +373,7 @@ class Bus:
         if flags & ~SENDABLE:
             raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
 
+    @cython.cfunc
     def _refuse(self, node: cython.longlong, flags: cython.longlong) -> None:
         owner: Node = self.nodes[node]
         self.counters.refused += 1
@@ -332,6 +382,7 @@ class Bus:
             self.counters.single_shot_skipped += 1
             owner.single_shot_skipped += 1
 
+    @cython.cfunc
     def _hindered(
         self,
         node: cython.longlong,
@@ -351,6 +402,8 @@ class Bus:
             first = owner.suspend_bit
         return NEVER + first if owner.mode == JOINING else first
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def abort(self, node: cython.longlong, buffer: cython.longlong, time: cython.longlong) -> cython.void:
         """Take back, at `time` (ns), the frame waiting in a transmit buffer.
 
@@ -359,6 +412,8 @@ class Bus:
         """
         self._command(node, buffer, time, COMMAND_ABORT)
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def set_mode(self, node: cython.longlong, mode: cython.longlong, time: cython.longlong) -> cython.void:
         """Mode register of a node at `time` (ns): OPERATING (0) or RESET (1), as CAN_MODE messages carry.
 
@@ -428,6 +483,7 @@ class Bus:
 
     # ---- passing of time
 
+    @cython.ccall
     def advance(self, until: cython.longlong) -> cython.longlong:
         """Decide every bit that begins up to and including `until` (ns); returns the next instant of interest.
 
@@ -452,6 +508,7 @@ class Bus:
                 self._look_ahead()
         return self.next_time
 
+    @cython.cfunc
     def _look_ahead(self) -> cython.void:
         """Set `next_bit` and `next_time` from what waits; bit by bit, the next bit that waits for programs."""
         first: cython.longlong = self.buffers.first_ready()
@@ -480,6 +537,7 @@ class Bus:
         self.hindered_until = self.suspended_until if self.acknowledging == self.node_count else NEVER
         self._aim()
 
+    @cython.cfunc
     def _change(self, until: cython.longlong) -> cython.bint:
         """Carry out the abort or mode change, or let the nodes join, that come before the next frame, if any do."""
         node: Node
@@ -500,6 +558,7 @@ class Bus:
                 node.count_sequences(self.free_bit, start)
         return False
 
+    @cython.cfunc
     def _next_join(self) -> cython.longlong:
         """Bit at which the next joining node has seen its recessive sequences, if no frame comes before."""
         first: cython.longlong = NEVER
@@ -555,6 +614,7 @@ class Bus:
         node.aborted += 1
         self._drop(node, row, time, TX_ABORTED)
 
+    @cython.cfunc
     def _join(self, node: Node, bit: cython.longlong) -> None:
         """Let a node whose sequences are complete at `bit` take part."""
         self.joining -= 1
@@ -596,6 +656,7 @@ class Bus:
 
     # ---- one frame
 
+    @cython.cfunc
     @cython.cdivision(True)  # bits are not negative
     def _attempt(self, k: cython.longlong) -> cython.longlong:
         """The frame that starts at bit k: arbitration; then its results to everybody, when nothing disturbs it.
@@ -687,6 +748,7 @@ class Bus:
             self._note_times(k, asked, done, row, flags)
         return self.free_bit
 
+    @cython.cfunc
     def _note_times(
         self,
         k: cython.longlong,
@@ -703,6 +765,7 @@ class Bus:
             self.edge_ns(k), asked, done, slots[row + IDENTIFIER], sender, slots[row + LOW], slots[row + HIGH]
         )
 
+    @cython.cfunc
     def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
         """A sender that has had errors has sent a frame whole: to bit `end`, at `done` (ns).
 
@@ -717,10 +780,13 @@ class Bus:
 
     # ---- arbitration
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _key(self, row: cython.longlong) -> cython.longlong:
         """The arbitration field of the frame in a row: the lower one wins."""
         return arbitration_key(self.buffers.slots[row + IDENTIFIER], self.buffers.slots[row + FLAGS])
 
+    @cython.cfunc
     def _arbitrate(self, k: cython.longlong) -> cython.longlong:
         """The row that wins the frame that starts at bit k; negative when another node offers the very same field."""
         best: cython.longlong = -1
@@ -747,6 +813,7 @@ class Bus:
         self.rivals = ready - 1
         return -best if merged else best
 
+    @cython.cfunc
     def _contend(self, k: cython.longlong, best: cython.longlong) -> None:
         """Note who loses the arbitration against the row `best`."""
         slots: cython.p_longlong = self.buffers.slots
@@ -771,6 +838,8 @@ class Bus:
             for lost in sorted(skipped):
                 self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _is_offered(self, row: cython.longlong, key: cython.longlong, k: cython.longlong) -> cython.bint:
         """True when this is what its node puts on the bus at bit k: of its frames that are ready, the lowest."""
         slots: cython.p_longlong = self.buffers.slots
@@ -807,6 +876,7 @@ class Bus:
 
     # ---- several senders of one frame
 
+    @cython.cfunc
     def _is_disturbed(
         self, k: cython.longlong, best: cython.longlong, end: cython.longlong, merged: cython.bint
     ) -> cython.bint:
@@ -896,6 +966,7 @@ class Bus:
                 machine.node.join_from = level.bit - machine.count
         self._note_changes()
 
+    @cython.cfunc
     def _decided(self, bit: cython.longlong) -> None:
         """All bits before `bit` are."""
         self.load.take(self.free_bit, bit)
@@ -949,6 +1020,7 @@ class Bus:
             self.bit_level.start_late(machine)
             self._aim()
 
+    @cython.cfunc
     def _sent(self, node: Node, row: cython.longlong, bit: cython.longlong) -> None:
         """A node's frame is through: its last bit was the one before `bit`."""
         slots: cython.p_longlong = self.buffers.slots
@@ -1011,6 +1083,7 @@ class Bus:
         for row in self.buffers.waiting_of(node.index):
             self.buffers.hold(row, bit)
 
+    @cython.cfunc
     def _confine(self, node: Node, time: cython.longlong, interrupts: cython.longlong) -> None:
         """Error confinement of a node of which a counter has moved."""
         if node.confine(time, interrupts):
@@ -1019,6 +1092,7 @@ class Bus:
             self._note_changes()
         self._note_result(time)
 
+    @cython.cfunc
     def _note_result(self, time: cython.longlong) -> None:
         """Something was told with the stamp `time`."""
         if time <= self.advanced:

@@ -2,12 +2,16 @@
 # (every index below is made of a standard identifier, which `Bus.request` has checked)
 """What a bus counts of its frames."""
 
+from typing import Annotated
+
 import cython
 
 from ranger_sim.can_bus.frame import STANDARD_IDENTIFIERS
 from ranger_sim.foundation.numbers import integers
 
 
+@cython.final
+@cython.cclass
 class BusCounters:
     """Counted since the last `reset`.
 
@@ -19,6 +23,23 @@ class BusCounters:
     `late_requests` came with stamps before what had been decided. `late_results` were stamped at or before the `until`
     that found them: with steps of `Bus.advance` shorter than the shortest frame and no errors there are none.
     """
+
+    frames: cython.longlong
+    counts: cython.p_longlong
+    merged: cython.longlong
+    lost: cython.longlong
+    single_shot_skipped: cython.longlong
+    single_shot_dropped: cython.longlong
+    retries: cython.longlong
+    errors: cython.longlong
+    refused: cython.longlong
+    arbitrations_lost: cython.longlong
+    aborted: cython.longlong
+    flushed: cython.longlong
+    late_results: cython.longlong
+    late_requests: cython.longlong
+    # what the address `counts` leads into: exchanged only by `reset`, which sets both
+    identifiers: Annotated[cython.longlong[::1], "readonly"]
 
     def __init__(self) -> None:
         self.reset()
@@ -41,6 +62,7 @@ class BusCounters:
         self.identifiers = integers(2 * STANDARD_IDENTIFIERS)  # of each: frames, longest response in ns
         self.counts = cython.address(self.identifiers[0]) if cython.compiled else self.identifiers
 
+    @cython.cfunc
     def note_answer(self, identifier: cython.longlong, response_ns: cython.longlong) -> cython.void:
         """A frame with a standard identifier was sent whole, so long after its request."""
         place: cython.longlong = 2 * identifier

@@ -1,16 +1,21 @@
 """Bits of a bus whose level is inverted, for everybody: of chosen frames, chosen ones, and noise; or for one node."""
 
+from typing import TYPE_CHECKING
+
 import cython
+from cython.cimports.libc.math import log
 
-if not cython.compiled:
-    from math import log
+from ranger_sim.can_bus.frame import ARBITRATION_END, EXTENDED_ARBITRATION_END
+from ranger_sim.foundation.events import FLAG_EXTENDED, NEVER
 
-    from ranger_sim.can_bus.frame import ARBITRATION_END, EXTENDED_ARBITRATION_END
-    from ranger_sim.foundation.events import FLAG_EXTENDED, NEVER
+if TYPE_CHECKING:
+    from ranger_sim.foundation.random_stream import RandomStream
 
 HIGHEST_RATE = 0.1  # bit error rate; chosen by us: beyond it no frame gets through
 
 
+@cython.final
+@cython.cclass
 class Disturbance:
     """What disturbs a bus. Bits are counted since power-up.
 
@@ -18,6 +23,16 @@ class Disturbance:
     hit, at `position` each, negative: in their middle. `noise`: the RandomStream of the bit error rate. `misread`: bits
     that single nodes sample wrongly, as (bit, node), of which the first is `next_misread`.
     """
+
+    next_bit: cython.longlong
+    frames_left: cython.longlong
+    position: cython.longlong
+    planned_bits: list
+    noise: "RandomStream"
+    bit_error_rate: cython.double
+    next_noise_bit: cython.longlong
+    next_misread: cython.longlong
+    misread: list
 
     def __init__(self, noise) -> None:
         self.noise = noise
@@ -36,6 +51,7 @@ class Disturbance:
         self.misread.sort()
         self.next_misread = self.misread[0][0]
 
+    @cython.cfunc
     def misreading(self, bit: cython.longlong) -> cython.longlong:
         """Nodes that sample `bit` wrongly, as bits by node number; what was planned up to there is over."""
         nodes: cython.longlong = 0
@@ -66,10 +82,12 @@ class Disturbance:
         self._draw_noise()
         self._aim()
 
+    @cython.cfunc
     def _aim(self) -> None:
         planned: cython.longlong = self.planned_bits[0] if self.planned_bits else NEVER
         self.next_bit = min(planned, self.next_noise_bit)
 
+    @cython.cfunc
     def _draw_noise(self) -> None:
         """The next disturbed bit: distances between them are exponential with mean 1 / rate."""
         u: cython.double
@@ -81,6 +99,7 @@ class Disturbance:
         else:
             self.next_noise_bit = NEVER
 
+    @cython.cfunc
     def meet_frame(self, start: cython.longlong, bits: cython.longlong, flags: cython.longlong) -> None:
         """A frame of so many bits begins at bit `start`: if it is one of those to be hit, its bit is planned."""
         middle: cython.longlong = (bits - 1) // 2
@@ -90,6 +109,7 @@ class Disturbance:
                 middle = max(middle, EXTENDED_ARBITRATION_END if flags & FLAG_EXTENDED else ARBITRATION_END)
             self.hit_bit(start + (middle if self.position < 0 else self.position))
 
+    @cython.cfunc
     def strike(self, bit: cython.longlong) -> None:
         """`bit`, which is hit, passes."""
         while self.planned_bits and self.planned_bits[0] <= bit:

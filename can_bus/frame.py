@@ -10,96 +10,98 @@ The three bits of intermission belong to the bus, not to the frame: `INTERMISSIO
 The rules of both chains, CRC and stuffing, stand in `_feed`, bit by bit; tables made from them do it piece by piece.
 """
 
+from typing import Final
+
 import cython
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT
 
-    # The flags of a frame beside the FLAG_* of foundation.events.
-    LENGTH_CODE = 15  # bits 0-3
-    EIGHT_BYTES = 8  # the flags of a standard data frame of eight bytes, as the robot sends them
-    SENDABLE = 0x7F  # all that a request may have: length code, remote, single shot, extended
-    RECEIVERS_SEE = 0x5F  # of these, what is on the wire: no single shot
+# The flags of a frame beside the FLAG_* of foundation.events.
+LENGTH_CODE: Final = 15  # bits 0-3
+EIGHT_BYTES: Final = 8  # the flags of a standard data frame of eight bytes, as the robot sends them
+SENDABLE: Final = 0x7F  # all that a request may have: length code, remote, single shot, extended
+RECEIVERS_SEE: Final = 0x5F  # of these, what is on the wire: no single shot
 
-    HIGHEST_STANDARD = 0x7FF  # identifiers of 11 bits
-    HIGHEST_EXTENDED = 0x1FFFFFFF  # identifiers of 29 bits
+HIGHEST_STANDARD: Final = 0x7FF  # identifiers of 11 bits
+HIGHEST_EXTENDED: Final = 0x1FFFFFFF  # identifiers of 29 bits
 
-    INTERMISSION_BITS = 3  # ISO 11898-1: recessive bits between two frames
-    TAIL_BITS = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
-    ACK_DELIMITER_FROM_END = 8  # the ACK delimiter is the eighth bit from the end
-    STANDARD_BITS = 44  # a frame without data and without stuff bits
-    EXTENDED_BITS = 64
-    ARBITRATION_END = 17  # bits up to RTR and IDE, with the most stuff bits that they can have: 14 + 3
-    EXTENDED_ARBITRATION_END = 41  # the same up to the RTR of an extended frame: 33 + 8
+INTERMISSION_BITS: Final = 3  # ISO 11898-1: recessive bits between two frames
+TAIL_BITS: Final = 10  # CRC delimiter, ACK slot, ACK delimiter, 7 bits end of frame
+ACK_DELIMITER_FROM_END: Final = 8  # the ACK delimiter is the eighth bit from the end
+STANDARD_BITS: Final = 44  # a frame without data and without stuff bits
+EXTENDED_BITS: Final = 64
+ARBITRATION_END: Final = 17  # bits up to RTR and IDE, with the most stuff bits that they can have: 14 + 3
+EXTENDED_ARBITRATION_END: Final = 41  # the same up to the RTR of an extended frame: 33 + 8
 
-    CRC_POLYNOMIAL = 0x4599  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)
-    CRC_BITS = 15
-    CRC_MASK = 0x7FFF
+CRC_POLYNOMIAL: Final = 0x4599  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)
+CRC_BITS: Final = 15
+CRC_MASK: Final = 0x7FFF
 
-    # What `measure` gives: bits 0-15 the length, from bit 16 the CRC.
-    MEASURED_BITS = 0xFFFF
-    MEASURED_CRC_SHIFT = 16
+# What `measure` gives: bits 0-15 the length, from bit 16 the CRC.
+MEASURED_BITS: Final = 0xFFFF
+MEASURED_CRC_SHIFT: Final = 16
 
-    DOMINANT = 0
-    RECESSIVE = 1
+DOMINANT: Final = 0
+RECESSIVE: Final = 1
 
-    # Where in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
-    FIELD_ID_28_21 = 2
-    FIELD_START = 3
-    FIELD_SRTR = 4
-    FIELD_IDE = 5
-    FIELD_ID_20_18 = 6
-    FIELD_ID_17_13 = 7
-    FIELD_CRC = 8
-    FIELD_R0 = 9
-    FIELD_DATA = 10
-    FIELD_DLC = 11
-    FIELD_RTR = 12
-    FIELD_R1 = 13
-    FIELD_ID_4_0 = 14
-    FIELD_ID_12_5 = 15
-    FIELD_CRC_DELIMITER = 24
-    FIELD_ACK_SLOT = 25
-    FIELD_END = 26
-    FIELD_ACK_DELIMITER = 27
-    # the same, outside frames
-    FIELD_ACTIVE_FLAG = 17  # active error flag
-    FIELD_INTERMISSION = 18
-    FIELD_TOLERATED = 19  # dominant bits behind a flag
-    FIELD_PASSIVE_FLAG = 22  # passive error flag
-    FIELD_DELIMITER = 23  # of an error or overload frame
-    FIELD_OVERLOAD_FLAG = 28
+# Where in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
+FIELD_ID_28_21: Final = 2
+FIELD_START: Final = 3
+FIELD_SRTR: Final = 4
+FIELD_IDE: Final = 5
+FIELD_ID_20_18: Final = 6
+FIELD_ID_17_13: Final = 7
+FIELD_CRC: Final = 8
+FIELD_R0: Final = 9
+FIELD_DATA: Final = 10
+FIELD_DLC: Final = 11
+FIELD_RTR: Final = 12
+FIELD_R1: Final = 13
+FIELD_ID_4_0: Final = 14
+FIELD_ID_12_5: Final = 15
+FIELD_CRC_DELIMITER: Final = 24
+FIELD_ACK_SLOT: Final = 25
+FIELD_END: Final = 26
+FIELD_ACK_DELIMITER: Final = 27
+# the same, outside frames
+FIELD_ACTIVE_FLAG: Final = 17  # active error flag
+FIELD_INTERMISSION: Final = 18
+FIELD_TOLERATED: Final = 19  # dominant bits behind a flag
+FIELD_PASSIVE_FLAG: Final = 22  # passive error flag
+FIELD_DELIMITER: Final = 23  # of an error or overload frame
+FIELD_OVERLOAD_FLAG: Final = 28
 
-    # Both chains in one number, as `_feed` takes and returns it: bits 0-14 the CRC register; bits 15-17 the state of
-    # the stuffing, level * 4 + run - 1 with run 1 ... 4 equal bits seen last; from bit 18 the stuff bits so far.
-    STATE_SHIFT = 15
-    STATE_MASK = 7
-    RUN_MASK = 3
-    LEVEL_SHIFT = 17
-    STUFFED_SHIFT = 18
-    IDLE = 0x20000  # before a frame: an empty register, and a recessive bit, so that the start of frame begins a run
-    STUFF_AFTER = 5  # ISO 11898-1: equal bits that are followed by their complement
+# Both chains in one number, as `_feed` takes and returns it: bits 0-14 the CRC register; bits 15-17 the state of
+# the stuffing, level * 4 + run - 1 with run 1 ... 4 equal bits seen last; from bit 18 the stuff bits so far.
+STATE_SHIFT: Final = 15
+STATE_MASK: Final = 7
+RUN_MASK: Final = 3
+LEVEL_SHIFT: Final = 17
+STUFFED_SHIFT: Final = 18
+IDLE: Final = 0x20000  # before a frame: an empty register, and a recessive bit, so that the start of frame begins a run
+STUFF_AFTER: Final = 5  # ISO 11898-1: equal bits that are followed by their complement
 
-    # The frame of eight bytes, which goes through tables.
-    STANDARD_HEADER_BITS = 19  # start of frame ... data length code
-    DATA_BITS = 64
-    STATES = 8
-    BYTES = 256  # values of a byte
-    TABLE_BYTES = 2048  # eight places of BYTES
-    STANDARD_IDENTIFIERS = 2048
-    # an entry of BEGUN
-    BEGUN_CRC_SHIFT = 16
-    BEGUN_STUFFED_SHIFT = 8
-    BEGUN_STUFFED_MASK = 0xFF00
-    # an entry of STUFF: eight steps of eight bits; a step: bits 3-5 the next state, bits 6-7 stuff bits
-    STEP_STATE_SHIFT = 3
-    STEP_STATE_MASK = 56
-    STEP_STUFFED_SHIFT = 6
-    STEP_STUFFED_MASK = 192
-    STEP_PLACE_MASK = 63
+# The frame of eight bytes, which goes through tables.
+STANDARD_HEADER_BITS: Final = 19  # start of frame ... data length code
+DATA_BITS: Final = 64
+STATES: Final = 8
+BYTES: Final = 256  # values of a byte
+TABLE_BYTES: Final = 2048  # eight places of BYTES
+STANDARD_IDENTIFIERS: Final = 2048
+# an entry of BEGUN
+BEGUN_CRC_SHIFT: Final = 16
+BEGUN_STUFFED_SHIFT: Final = 8
+BEGUN_STUFFED_MASK: Final = 0xFF00
+# an entry of STUFF: eight steps of eight bits; a step: bits 3-5 the next state, bits 6-7 stuff bits
+STEP_STATE_SHIFT: Final = 3
+STEP_STATE_MASK: Final = 56
+STEP_STUFFED_SHIFT: Final = 6
+STEP_STUFFED_MASK: Final = 192
+STEP_PLACE_MASK: Final = 63
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def _feed(chain: cython.longlong, value: cython.longlong, count: cython.longlong) -> cython.longlong:
     """Both chains after the `count` low bits of `value`, the highest of them first: the rules, bit by bit.
 
@@ -127,11 +129,15 @@ def _feed(chain: cython.longlong, value: cython.longlong, count: cython.longlong
     return stuffed << STUFFED_SHIFT | level << LEVEL_SHIFT | (run - 1) << STATE_SHIFT | register
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def _state(chain: cython.longlong) -> cython.longlong:
     """The state of the stuffing, 0 ... 7."""
     return chain >> STATE_SHIFT & STATE_MASK
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def _header(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
     """The bits from the start of frame to the data length code: 19, extended 39."""
     low: cython.longlong = (flags & FLAG_REMOTE) << 2 | (flags & LENGTH_CODE)
@@ -140,6 +146,8 @@ def _header(identifier: cython.longlong, flags: cython.longlong) -> cython.longl
     return (identifier & 0x7FF) << 7 | low  # SOF id10-0 RTR IDE r0 DLC
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def _measure_bitwise(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
@@ -170,8 +178,9 @@ def _measure_bitwise(
 #
 # Interpreted, the states are lists: by byte what comes behind it, the last item is the number of stuff bits so far.
 # CRC_LISTS: by place, by byte. WALK: by stuff bits, by state. WALKS: by identifier, as `_begin`.
-if not cython.compiled:
-    CRC_OF_BYTE, STUFF, BEGUN = [0] * TABLE_BYTES, [0] * BYTES, [0] * STANDARD_IDENTIFIERS
+CRC_OF_BYTE: cython.short[TABLE_BYTES] = [0] * TABLE_BYTES
+STUFF: cython.ulonglong[BYTES] = [0] * BYTES
+BEGUN: cython.int[STANDARD_IDENTIFIERS] = [0] * STANDARD_IDENTIFIERS
 CRC_LISTS: list = []
 WALK: list = []
 WALKS: dict = {}
@@ -225,6 +234,8 @@ def _begin(identifier):
     return WALKS[identifier]
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 @cython.boundscheck(False)  # bytes are masked to 8 bits
 @cython.wraparound(False)
 def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cython.longlong) -> cython.longlong:
@@ -251,6 +262,8 @@ def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cyth
     return crc << MEASURED_CRC_SHIFT | (STANDARD_BITS + DATA_BITS + (stuffed >> STEP_STUFFED_SHIFT))
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def measure(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
@@ -272,6 +285,8 @@ def measure(
         return crc << MEASURED_CRC_SHIFT | (STANDARD_BITS + DATA_BITS + stuffed)
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def crc15(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
@@ -279,6 +294,8 @@ def crc15(
     return measure(identifier, flags, lo, hi) >> MEASURED_CRC_SHIFT
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def frame_bits(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
@@ -305,6 +322,8 @@ def fill_frame_bits(identifiers, flags, lows, highs, bits) -> None:
         found[place] = measure(ids[place], flag[place], low[place], high[place]) & MEASURED_BITS
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cython.longlong:
     """The arbitration field as a 32-bit number in the order of its bits: the lower key wins the bus.
 

@@ -2,25 +2,27 @@
 # (every index below is a column of a row)
 """What passed on a bus, frame by frame."""
 
+from typing import Final
+
 import cython
 
-from ranger_sim.foundation.row_stream import RowStream
+from ranger_sim.foundation.row_stream import FrameStream, RowStream
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    TIMES_COLUMNS = 7
-    # numbers of a FrameTimes row
-    TIMES_START = 0  # first bit of the frame, ns
-    TIMES_ASKED = 1  # its program asked for it, ns; TIMES_START where nobody had
-    TIMES_END = 2  # its last bit is over, or its error frame is, ns
-    TIMES_IDENTIFIER = 3
-    TIMES_SENDER = 4  # (node + 1) << SENDER_SHIFT | transmit buffer << TIMES_BUFFER_SHIFT | flags; node -1: nobody
-    TIMES_LOW = 5  # data bytes 0-3, or the field in which an error was detected (FIELD_*)
-    TIMES_HIGH = 6  # data bytes 4-7, or the position of that bit in the frame
-    TIMES_BUFFER_SHIFT = 8
-    SENDER_SHIFT = 16
+TIMES_COLUMNS: Final = 7
+# numbers of a FrameTimes row
+TIMES_START: Final = 0  # first bit of the frame, ns
+TIMES_ASKED: Final = 1  # its program asked for it, ns; TIMES_START where nobody had
+TIMES_END: Final = 2  # its last bit is over, or its error frame is, ns
+TIMES_IDENTIFIER: Final = 3
+TIMES_SENDER: Final = 4  # (node + 1) << SENDER_SHIFT | transmit buffer << TIMES_BUFFER_SHIFT | flags; node -1: nobody
+TIMES_LOW: Final = 5  # data bytes 0-3, or the field in which an error was detected (FIELD_*)
+TIMES_HIGH: Final = 6  # data bytes 4-7, or the position of that bit in the frame
+TIMES_BUFFER_SHIFT: Final = 8
+SENDER_SHIFT: Final = 16
 
 
+@cython.final
+@cython.cclass
 class FrameTimes(RowStream):
     """When each frame of a bus was asked for, began and ended: whole numbers, TIMES_COLUMNS a row.
 
@@ -30,6 +32,7 @@ class FrameTimes(RowStream):
     def __init__(self) -> None:
         RowStream.__init__(self, "q", TIMES_COLUMNS, False)
 
+    @cython.ccall
     def add(
         self,
         start: cython.longlong,
@@ -52,6 +55,8 @@ class FrameTimes(RowStream):
         self.finish_row(end)
 
 
+@cython.final
+@cython.cclass
 class FrameLog:
     """The first `capacity` frames since the last `take`; `dropped` counts those beyond. A `stream` takes them instead.
 
@@ -63,6 +68,12 @@ class FrameLog:
     `times`: None, or a FrameTimes that takes requests, starts and ends beside.
     """
 
+    stream: "FrameStream"
+    times: FrameTimes
+    frames: list
+    capacity: cython.longlong
+    dropped: cython.longlong
+
     def __init__(self, capacity) -> None:
         self.capacity = capacity
         self.frames = []
@@ -70,6 +81,7 @@ class FrameLog:
         self.stream = None  # a FrameStream
         self.times = None
 
+    @cython.cfunc
     def add(
         self,
         time: cython.longlong,

@@ -3,21 +3,32 @@
 """How much of a bus is taken: over all, and in windows of 10 ms. Everything here counts bits since power-up."""
 
 import array
+from typing import Final
 
 import cython
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    WINDOWS_KEPT = 1024  # closed windows, 10.24 s
+WINDOWS_KEPT: Final = 1024  # closed windows, 10.24 s
 
 WINDOWS_PER_SECOND = 100
 
 
+@cython.final
+@cython.cclass
 class LoadMeter:
     """Counts the bits for which a bus is taken: stuff bits, intermission and error frames included.
 
     `bits`: so many since `start`. `count`: windows closed since then. `window_busy`: bits of the open window.
     """
+
+    bits: cython.longlong
+    window_busy: cython.longlong
+    window_end: cython.longlong
+    taken_until: cython.longlong
+    origin_bit: cython.longlong
+    window_bits: cython.longlong
+    busiest: cython.longlong
+    count: cython.longlong
+    ring: cython.longlong[::1]
 
     def __init__(self, bitrate) -> None:
         self.window_bits = max(bitrate // WINDOWS_PER_SECOND, 1)
@@ -34,6 +45,7 @@ class LoadMeter:
         self.count = 0
         self.ring = array.array("q", [0]) * WINDOWS_KEPT
 
+    @cython.cfunc
     def take(self, first: cython.longlong, free: cython.longlong) -> cython.void:
         """The bus is taken from bit `first` until it is free at bit `free`."""
         self.bits += free - first
@@ -43,6 +55,7 @@ class LoadMeter:
         else:
             self.window_busy += free - first
 
+    @cython.cfunc
     def _split(self, first: cython.longlong, last: cython.longlong) -> cython.void:
         """Bits `first` ... `last` - 1 are taken and reach beyond the open window."""
         if first >= self.window_end:
@@ -53,6 +66,7 @@ class LoadMeter:
             self._roll(first)
         self.window_busy += last - first
 
+    @cython.cfunc
     def _roll(self, bit: cython.longlong) -> cython.void:
         """Close windows until `bit` lies in the open one."""
         idle: cython.longlong

@@ -18,94 +18,95 @@ Specification 2.0 give them:
     127.
 """
 
+from typing import Final
+
 import cython
 
-from ranger_sim.can_bus.node import Node
+from ranger_sim.can_bus.frame import (
+    CRC_BITS,
+    CRC_MASK,
+    CRC_POLYNOMIAL,
+    DATA_BITS,
+    DOMINANT,
+    FIELD_ACK_DELIMITER,
+    FIELD_ACK_SLOT,
+    FIELD_ACTIVE_FLAG,
+    FIELD_CRC,
+    FIELD_CRC_DELIMITER,
+    FIELD_DATA,
+    FIELD_DELIMITER,
+    FIELD_DLC,
+    FIELD_END,
+    FIELD_ID_4_0,
+    FIELD_ID_12_5,
+    FIELD_ID_17_13,
+    FIELD_ID_20_18,
+    FIELD_ID_28_21,
+    FIELD_IDE,
+    FIELD_INTERMISSION,
+    FIELD_OVERLOAD_FLAG,
+    FIELD_PASSIVE_FLAG,
+    FIELD_R0,
+    FIELD_R1,
+    FIELD_RTR,
+    FIELD_SRTR,
+    FIELD_START,
+    FIELD_TOLERATED,
+    INTERMISSION_BITS,
+    LENGTH_CODE,
+    RECESSIVE,
+    STUFF_AFTER,
+)
+from ranger_sim.can_bus.node import (
+    ICR_BUS_ERROR,
+    ICR_FIELD_SHIFT,
+    ICR_KIND_SHIFT,
+    ICR_RECEIVING,
+    JOINING,
+    KIND_BIT,
+    KIND_FORM,
+    KIND_OTHER,
+    KIND_STUFF,
+    OPERATING,
+    SENDER_PENALTY,
+    SEQUENCE_BITS,
+    SUSPEND_BITS,
+    Node,
+)
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.can_bus.frame import (
-        CRC_BITS,
-        CRC_MASK,
-        CRC_POLYNOMIAL,
-        DATA_BITS,
-        DOMINANT,
-        FIELD_ACK_DELIMITER,
-        FIELD_ACK_SLOT,
-        FIELD_ACTIVE_FLAG,
-        FIELD_CRC,
-        FIELD_CRC_DELIMITER,
-        FIELD_DATA,
-        FIELD_DELIMITER,
-        FIELD_DLC,
-        FIELD_END,
-        FIELD_ID_4_0,
-        FIELD_ID_12_5,
-        FIELD_ID_17_13,
-        FIELD_ID_20_18,
-        FIELD_ID_28_21,
-        FIELD_IDE,
-        FIELD_INTERMISSION,
-        FIELD_OVERLOAD_FLAG,
-        FIELD_PASSIVE_FLAG,
-        FIELD_R0,
-        FIELD_R1,
-        FIELD_RTR,
-        FIELD_SRTR,
-        FIELD_START,
-        FIELD_TOLERATED,
-        INTERMISSION_BITS,
-        LENGTH_CODE,
-        RECESSIVE,
-        STUFF_AFTER,
-    )
-    from ranger_sim.can_bus.node import (
-        ICR_BUS_ERROR,
-        ICR_FIELD_SHIFT,
-        ICR_KIND_SHIFT,
-        ICR_RECEIVING,
-        JOINING,
-        KIND_BIT,
-        KIND_FORM,
-        KIND_OTHER,
-        KIND_STUFF,
-        OPERATING,
-        SENDER_PENALTY,
-        SEQUENCE_BITS,
-        SUSPEND_BITS,
-    )
-    from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+# States.
+MAC_AWAY: Final = 0  # in reset or bus-off
+MAC_JOINING: Final = 1  # waits for recessive sequences
+MAC_IDLE: Final = 2
+MAC_FRAME: Final = 3
+MAC_ACTIVE_FLAG: Final = 4
+MAC_PASSIVE_FLAG: Final = 5
+MAC_OVERLOAD_FLAG: Final = 6
+MAC_TOLERATING: Final = 7  # behind a flag, until a bit is recessive: the first one of the delimiter
+MAC_DELIMITER: Final = 8  # of an error frame or an overload frame
+MAC_INTERMISSION: Final = 9
+MAC_SUSPENDED: Final = 10  # suspend transmission
 
-    # States.
-    MAC_AWAY = 0  # in reset or bus-off
-    MAC_JOINING = 1  # waits for recessive sequences
-    MAC_IDLE = 2
-    MAC_FRAME = 3
-    MAC_ACTIVE_FLAG = 4
-    MAC_PASSIVE_FLAG = 5
-    MAC_OVERLOAD_FLAG = 6
-    MAC_TOLERATING = 7  # behind a flag, until a bit is recessive: the first one of the delimiter
-    MAC_DELIMITER = 8  # of an error frame or an overload frame
-    MAC_INTERMISSION = 9
-    MAC_SUSPENDED = 10  # suspend transmission
+# What came of a bit, as `sample` tells it.
+MET_RECEIVED: Final = 1  # the sixth bit of EOF: a receiver has the frame
+MET_SENT: Final = 2  # the last bit of EOF: a transmitter is done
+MET_LOSS: Final = 4  # arbitration lost
+MET_ERROR: Final = 8  # an error detected: an error flag begins with the next bit
+MET_FAILURE: Final = 16  # with it: that was an attempt to send a frame
+MET_COUNTER: Final = 32  # something of error confinement to tell; `capture` is its ICR_*
+MET_SETTLED: Final = 64  # the error frame after a failure is over
+MET_START: Final = 128  # the dominant last bit of intermission stands for the start of frame of `offered`
+MET_JOIN: Final = 256  # all recessive sequences seen
 
-    # What came of a bit, as `sample` tells it.
-    MET_RECEIVED = 1  # the sixth bit of EOF: a receiver has the frame
-    MET_SENT = 2  # the last bit of EOF: a transmitter is done
-    MET_LOSS = 4  # arbitration lost
-    MET_ERROR = 8  # an error detected: an error flag begins with the next bit
-    MET_FAILURE = 16  # with it: that was an attempt to send a frame
-    MET_COUNTER = 32  # something of error confinement to tell; `capture` is its ICR_*
-    MET_SETTLED = 64  # the error frame after a failure is over
-    MET_START = 128  # the dominant last bit of intermission stands for the start of frame of `offered`
-    MET_JOIN = 256  # all recessive sequences seen
-
-    RECEIVER_PENALTY = 1  # rule (a)
-    FLAG_BITS = 6  # of an error or overload flag
-    DELIMITER_BITS = 8  # recessive, behind the last flag
-    TOLERATED_BITS = 8  # rule (f)
+RECEIVER_PENALTY: Final = 1  # rule (a)
+FLAG_BITS: Final = 6  # of an error or overload flag
+DELIMITER_BITS: Final = 8  # recessive, behind the last flag
+TOLERATED_BITS: Final = 8  # rule (f)
 
 
+@cython.final
+@cython.cclass
 class MediumAccess:
     """What `node` does on the bus. Counts its errors in the node; the bus has the node take its error state from them.
 
@@ -118,6 +119,40 @@ class MediumAccess:
     seen last. `own_rate`: its bits per second where they are not the bus's (0: they are); then `own_bit` counts its own
     bits, and `own_rest` is what has passed of the next one.
     """
+
+    node: Node
+    state: cython.longlong
+    count: cython.longlong
+    driven: cython.longlong
+    sending: cython.bint
+    failed: cython.bint
+    after_error: cython.bint
+    unacknowledged: cython.bint
+    unheeded: cython.bint
+    # the frame
+    begun: cython.longlong
+    position: cython.longlong
+    field: cython.longlong
+    left: cython.longlong
+    stuff_run: cython.longlong
+    stuff_level: cython.longlong
+    register: cython.longlong
+    identifier: cython.longlong
+    flags: cython.longlong
+    lo: cython.longlong
+    hi: cython.longlong
+    # what it sends
+    row: cython.longlong
+    offered: cython.longlong
+    arbitration_bits: cython.longlong
+    bits: list
+    run_level: cython.longlong
+    capture: cython.longlong
+    met: cython.longlong
+    # a node at a wrong bit rate
+    own_rate: cython.longlong
+    own_bit: cython.longlong
+    own_rest: cython.longlong
 
     def __init__(self, node) -> None:
         self.node = node
@@ -143,6 +178,7 @@ class MediumAccess:
         self.own_bit = 0
         self.own_rest = 0
 
+    @cython.cfunc
     def _forget_frame(self) -> cython.void:
         """Nothing of a frame has been seen."""
         self.position = 0
@@ -155,6 +191,7 @@ class MediumAccess:
         self.hi = 0
         self.unheeded = False
 
+    @cython.ccall
     def place(self, bit: cython.longlong, free_bit: cython.longlong) -> cython.void:
         """Where the node stands at `bit`, when nothing has been on the bus since `free_bit`."""
         node: Node = self.node
@@ -175,14 +212,20 @@ class MediumAccess:
         else:
             self.state = MAC_AWAY
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def may_start(self) -> cython.bint:
         """True when a request could make it begin a frame in this bit."""
         return self.state == MAC_IDLE or (self.state == MAC_INTERMISSION and self.count == INTERMISSION_BITS - 1)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def is_at_rest(self) -> cython.bint:
         """True when it sees an idle bus, or takes no part."""
         return self.state <= MAC_IDLE or self.state == MAC_SUSPENDED
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def signals_error(self) -> cython.bint:
         """True in an error frame."""
         if self.state == MAC_ACTIVE_FLAG or self.state == MAC_PASSIVE_FLAG:
@@ -191,6 +234,7 @@ class MediumAccess:
 
     # ---- sending
 
+    @cython.cfunc
     def send(self, row: cython.longlong, bits: list, arbitration_bits: cython.longlong) -> cython.void:
         """The frame in `row` is what it sends: `bits` on the wire, of which so many to the end of arbitration."""
         self.row = row
@@ -198,6 +242,7 @@ class MediumAccess:
         self.arbitration_bits = arbitration_bits
         self.sending = True
 
+    @cython.cfunc
     def start(self, bit: cython.longlong) -> cython.void:
         """A frame begins at `bit`: its start of frame is what comes next."""
         self.state = MAC_FRAME
@@ -206,6 +251,8 @@ class MediumAccess:
         self.left = 1
         self._forget_frame()
 
+    @cython.cfunc
+    @cython.exceptval(-2, check=True)
     def drive(self) -> cython.longlong:
         """The level that it drives in this bit."""
         level: cython.longlong = RECESSIVE
@@ -221,6 +268,7 @@ class MediumAccess:
 
     # ---- sampling
 
+    @cython.ccall
     def sample(self, wire_level: cython.longlong, bit: cython.longlong) -> cython.longlong:
         """The bus was at `wire_level` during `bit`: what came of that (MET_*).
 
@@ -249,6 +297,8 @@ class MediumAccess:
         self.position = bit + 1 - self.begun
         return met
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _sample_joining(self, level: cython.longlong) -> cython.longlong:
         """Recessive sequences are counted; the last one lets it take part."""
         self.count = self.count + 1 if level == RECESSIVE else 0
@@ -260,6 +310,8 @@ class MediumAccess:
                 return MET_JOIN
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _sample_idle(self, level: cython.longlong, bit: cython.longlong) -> cython.longlong:
         """On an idle bus, and while transmission is suspended, a dominant bit is a start of frame."""
         if level == DOMINANT:
@@ -275,6 +327,7 @@ class MediumAccess:
 
     # ---- a frame
 
+    @cython.cfunc
     def _sample_frame(self, level: cython.longlong, wire_level: cython.longlong) -> cython.longlong:
         """A bit of a frame, which its transmitter compares with what it sent."""
         stuffed: cython.bint = self.stuff_run == STUFF_AFTER
@@ -303,6 +356,8 @@ class MediumAccess:
             return self._error(KIND_OTHER, SENDER_PENALTY, 0)
         return met | self._receive(level)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _receive(self, level: cython.longlong) -> cython.longlong:
         """The next bit of a frame, as every node reads it."""
         if self.stuff_run == STUFF_AFTER:
@@ -319,6 +374,7 @@ class MediumAccess:
         self._take(level)
         return 0
 
+    @cython.cfunc
     def _next_field(self) -> cython.void:
         """A field is over: the one that follows it, and its length in bits."""
         field: cython.longlong = self.field
@@ -369,6 +425,7 @@ class MediumAccess:
             self.field = FIELD_END
             self.left = 7
 
+    @cython.cfunc
     def _take(self, level: cython.longlong) -> cython.void:
         """A bit that is neither stuffed nor of fixed form: to the CRC register, and to the field where it belongs."""
         field: cython.longlong = self.field
@@ -395,6 +452,8 @@ class MediumAccess:
         else:
             self.identifier = self.identifier << 1 | level
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _fixed_form(self, level: cython.longlong) -> cython.longlong:
         """A bit behind the CRC: recessive, but for the ACK slot. `register` is 0 when the CRC was right."""
         if self.field == FIELD_ACK_SLOT:
@@ -426,6 +485,8 @@ class MediumAccess:
 
     # ---- error and overload frames
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _sample_dominant_flag(self, level: cython.longlong) -> cython.longlong:
         """An active error flag or an overload flag: six dominant bits."""
         if level == RECESSIVE:  # rules (d) and (e)
@@ -435,6 +496,8 @@ class MediumAccess:
             self._end_flag()
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _sample_passive_flag(self, level: cython.longlong) -> cython.longlong:
         """A passive error flag is complete when six equal bits, whatever their level, have been seen."""
         met: cython.longlong = 0
@@ -447,12 +510,15 @@ class MediumAccess:
             self._end_flag()
         return met
 
+    @cython.cfunc
     def _end_flag(self) -> cython.void:
         """A flag is complete."""
         self.state = MAC_TOLERATING
         self.field = FIELD_TOLERATED
         self.count = 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _tolerate(self, level: cython.longlong) -> cython.longlong:
         """Dominant bits behind a flag are other nodes'; the first recessive one begins the delimiter."""
         self.unacknowledged = False
@@ -468,6 +534,8 @@ class MediumAccess:
             return self._count_domination(KIND_OTHER)
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _sample_delimiter(self, level: cython.longlong) -> cython.longlong:
         """Eight recessive bits; the last one may be dominant where another node is a bit ahead."""
         self.count += 1
@@ -477,6 +545,8 @@ class MediumAccess:
             return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
         return self._intermission() if self.count == DELIMITER_BITS else 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _error(
         self, kind: cython.longlong, sender_penalty: cython.longlong, receiver_penalty: cython.longlong
     ) -> cython.longlong:
@@ -501,6 +571,8 @@ class MediumAccess:
         self.unacknowledged = False
         return met
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _count_domination(self, kind: cython.longlong) -> cython.longlong:
         """Dominant bits where none should be cost eight: rules (b) and (f), and (c) without its exception 1."""
         self._note_error(kind)
@@ -510,11 +582,14 @@ class MediumAccess:
             self.node.count_receive_errors(SENDER_PENALTY)
         return MET_COUNTER
 
+    @cython.cfunc
     def _note_error(self, kind: cython.longlong) -> cython.void:
         self.capture = ICR_BUS_ERROR | self.field << ICR_FIELD_SHIFT | kind << ICR_KIND_SHIFT
         if not self.sending:
             self.capture |= ICR_RECEIVING
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _overload(self) -> cython.longlong:
         """An overload condition, which is no error: the overload flag begins with the next bit."""
         settled: cython.longlong = MET_SETTLED if self.failed else 0
@@ -527,6 +602,8 @@ class MediumAccess:
 
     # ---- between frames
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _intermission(self) -> cython.longlong:
         """Intermission begins with the next bit."""
         settled: cython.longlong = MET_SETTLED if self.failed else 0
@@ -536,6 +613,8 @@ class MediumAccess:
         self.failed = False
         return settled
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _sample_intermission(self, level: cython.longlong, bit: cython.longlong) -> cython.longlong:
         """Three recessive bits. A dominant one is an overload condition, but the third a start of frame.
 

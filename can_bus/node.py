@@ -6,47 +6,50 @@ bus-off and takes no part. The bus decides what happened to a frame and tells th
 state and tell their programs.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
+from ranger_sim.foundation.events import CAN_STATUS, CAN_TX_DONE, EventQueue
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.foundation.events import CAN_STATUS, CAN_TX_DONE
+# Modes: `Bus.set_mode` takes the first two, `Node.mode` shows all.
+OPERATING: Final = 0
+RESET: Final = 1  # off the bus: neither sends, receives nor acknowledges
+BUS_OFF: Final = 2  # thrown off by its transmit error counter
+JOINING: Final = 3  # waits for recessive sequences before it takes part
+UNPLUGGED: Final = 4  # no wire leads from it to this bus (`Bus.unplug`)
 
-    # Modes: `Bus.set_mode` takes the first two, `Node.mode` shows all.
-    OPERATING = 0
-    RESET = 1  # off the bus: neither sends, receives nor acknowledges
-    BUS_OFF = 2  # thrown off by its transmit error counter
-    JOINING = 3  # waits for recessive sequences before it takes part
-    UNPLUGGED = 4  # no wire leads from it to this bus (`Bus.unplug`)
+# Interrupt bits of a CAN_STATUS message: CxICR of the LPC2194 (user manual UM10114, table of CANICR).
+ICR_ERROR_WARNING: Final = 0x4  # bit 2, EI: the warning limit was crossed either way, or bus-off entered or left
+ICR_ERROR_PASSIVE: Final = 0x20  # bit 5, EPI: error passive entered or left
+ICR_BUS_ERROR: Final = 0x80  # bit 7, BEI: an error frame; the capture fields below are valid
+ICR_FIELD_SHIFT: Final = 16  # bits 16-20: FIELD_* of can_bus.frame
+ICR_FIELD_MASK: Final = 31
+ICR_RECEIVING: Final = 0x200000  # bit 21, ERRDIR: the error was met while receiving
+ICR_KIND_SHIFT: Final = 22  # bits 22-23: KIND_*
+KIND_BIT: Final = 0
+KIND_FORM: Final = 1
+KIND_STUFF: Final = 2
+KIND_OTHER: Final = 3
 
-    # Interrupt bits of a CAN_STATUS message: CxICR of the LPC2194 (user manual UM10114, table of CANICR).
-    ICR_ERROR_WARNING = 0x4  # bit 2, EI: the warning limit was crossed either way, or bus-off entered or left
-    ICR_ERROR_PASSIVE = 0x20  # bit 5, EPI: error passive entered or left
-    ICR_BUS_ERROR = 0x80  # bit 7, BEI: an error frame; the capture fields below are valid
-    ICR_FIELD_SHIFT = 16  # bits 16-20: FIELD_* of can_bus.frame
-    ICR_FIELD_MASK = 31
-    ICR_RECEIVING = 0x200000  # bit 21, ERRDIR: the error was met while receiving
-    ICR_KIND_SHIFT = 22  # bits 22-23: KIND_*
-    KIND_BIT = 0
-    KIND_FORM = 1
-    KIND_STUFF = 2
-    KIND_OTHER = 3
-
-    # Error confinement: ISO 11898-1, where nothing else is said.
-    WARNING_LIMIT = 96  # CxEWL after reset; ISO 11898-1 recommends the same
-    PASSIVE_LIMIT = 128  # error passive from here
-    BUS_OFF_LIMIT = 256  # bus-off from here (transmit errors)
-    RECEIVE_ERRORS_MOST = 255  # RXERR of the LPC2194 has eight bits; beyond the passive limit more means nothing more
-    RECEIVER_CALMED = 119  # an error-passive receiver after a good frame; the standard allows 119 ... 127
-    SENDER_PENALTY = 8  # transmit errors that an error costs the sender; the heavier ones cost a receiver as much
-    SUSPEND_BITS = 8  # suspend transmission: how long an error-passive sender waits after the intermission
-    SEQUENCE_BITS = 11  # a recessive sequence, as it stands between two frames
-    RECOVERY_SEQUENCES = 128  # of which a bus-off node waits for so many before it returns
-    TRANSMIT_ERRORS_OFF = 127  # what the transmit counter of an LPC2194 reads while it is bus-off
+# Error confinement: ISO 11898-1, where nothing else is said.
+WARNING_LIMIT: Final = 96  # CxEWL after reset; ISO 11898-1 recommends the same
+PASSIVE_LIMIT: Final = 128  # error passive from here
+BUS_OFF_LIMIT: Final = 256  # bus-off from here (transmit errors)
+RECEIVE_ERRORS_MOST: Final = (
+    255  # RXERR of the LPC2194 has eight bits; beyond the passive limit more means nothing more
+)
+RECEIVER_CALMED: Final = 119  # an error-passive receiver after a good frame; the standard allows 119 ... 127
+SENDER_PENALTY: Final = 8  # transmit errors that an error costs the sender; the heavier ones cost a receiver as much
+SUSPEND_BITS: Final = 8  # suspend transmission: how long an error-passive sender waits after the intermission
+SEQUENCE_BITS: Final = 11  # a recessive sequence, as it stands between two frames
+RECOVERY_SEQUENCES: Final = 128  # of which a bus-off node waits for so many before it returns
+TRANSMIT_ERRORS_OFF: Final = 127  # what the transmit counter of an LPC2194 reads while it is bus-off
 
 
+@cython.final
+@cython.cclass
 class Node:
     """A controller on a bus, with its error counters and what it did so far.
 
@@ -58,6 +61,35 @@ class Node:
     back. `sending_end`: the last bit of a frame that it sent together with another node. While it is joining,
     `sequences_left` recessive sequences, of which the first begins at bit `join_from` or later, are missing.
     """
+
+    # what every frame touches stands in front: few lines of the processor's cache
+    inbox: "EventQueue"
+    following: "Node"
+    ends: TransmitEnds
+    index: cython.longlong
+    order: cython.longlong
+    controller: cython.longlong
+    mode: cython.longlong
+    transmit_errors: cython.longlong
+    receive_errors: cython.longlong
+    listening: cython.bint
+    passive: cython.bint
+    silent: cython.bint
+    sent: cython.longlong
+    received: cython.longlong
+    warning: cython.bint
+    name: str
+    sequences_left: cython.longlong
+    join_from: cython.longlong
+    suspend_bit: cython.longlong
+    off_ns: cython.longlong
+    sending_end: cython.longlong
+    refused: cython.longlong
+    aborted: cython.longlong
+    single_shot_skipped: cython.longlong
+    flushed: cython.longlong
+    arbitrations_lost: cython.longlong
+    retries: cython.longlong
 
     def __init__(self, name, index, inbox, controller, order) -> None:
         self.inbox = inbox
@@ -108,18 +140,22 @@ class Node:
         self.passive = False
         self.warning = False
 
+    @cython.cfunc
     def count_success(self) -> None:
         """A frame of its own, sent when it had transmit errors, is through."""
         self.transmit_errors -= 1
 
+    @cython.cfunc
     def count_reception(self) -> None:
         """A good frame came in when it had receive errors."""
         self.receive_errors = self.receive_errors - 1 if self.receive_errors < PASSIVE_LIMIT else RECEIVER_CALMED
 
+    @cython.ccall
     def count_receive_errors(self, penalty: cython.longlong) -> None:
         """An error that it met as a receiver."""
         self.receive_errors = min(self.receive_errors + penalty, RECEIVE_ERRORS_MOST)
 
+    @cython.ccall
     def confine(self, time: cython.longlong, interrupts: cython.longlong) -> cython.bint:
         """Take the error state that belongs to the counters, and tell it at `time` (ns) with `interrupts` (ICR_*).
 
@@ -139,6 +175,7 @@ class Node:
         self.tell(time, interrupts)
         return off
 
+    @cython.cfunc
     def tell(self, time: cython.longlong, interrupts: cython.longlong) -> None:
         """CAN_STATUS to the node's program."""
         off: cython.longlong = 1 if self.mode == BUS_OFF else 0
@@ -171,6 +208,8 @@ class Node:
         self.join_from = bit
         self.mode = JOINING
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def joins_at(self, free_bit: cython.longlong) -> cython.longlong:
         """Bit at which the last recessive sequence is over, if no frame comes before.
 

@@ -7,38 +7,45 @@ number of that place is the name of the buffer, `row`. Of equal arbitration fiel
 node, then the lower buffer.
 """
 
+from typing import Annotated, Final
+
 import cython
 
 from ranger_sim.can_bus.frame import wire
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER
-
-    BUFFERS = 3  # transmit buffers of an LPC2194 CAN controller
-    # what stands in a row
-    FREE_AT = 0  # instant from which the buffer takes a frame, ns; NEVER while it holds one
-    READY = 1  # bit at which its frame may start; NEVER + that bit while its node is joining
-    ASKED = 2  # instant of the request, ns
-    NEXT = 3  # the row that waits behind this one, -1 for none
-    IDENTIFIER = 4
-    FLAGS = 5
-    LOW = 6  # data bytes 0-3
-    HIGH = 7  # data bytes 4-7
-    ROW = 8  # numbers in a row
-    # the parts of a row's name
-    BUFFER_SHIFT = 3
-    BUFFER_MASK = 3
-    NODE_SHIFT = 5
+BUFFERS: Final = 3  # transmit buffers of an LPC2194 CAN controller
+# what stands in a row
+FREE_AT: Final = 0  # instant from which the buffer takes a frame, ns; NEVER while it holds one
+READY: Final = 1  # bit at which its frame may start; NEVER + that bit while its node is joining
+ASKED: Final = 2  # instant of the request, ns
+NEXT: Final = 3  # the row that waits behind this one, -1 for none
+IDENTIFIER: Final = 4
+FLAGS: Final = 5
+LOW: Final = 6  # data bytes 0-3
+HIGH: Final = 7  # data bytes 4-7
+ROW: Final = 8  # numbers in a row
+# the parts of a row's name
+BUFFER_SHIFT: Final = 3
+BUFFER_MASK: Final = 3
+NODE_SHIFT: Final = 5
 
 
+@cython.final
+@cython.cclass
 class TransmitBuffers:
     """`rows`: the numbers. `first`: of the rows that wait, in no order, -1 for none; `waiting_count`: how many.
 
     `slots` is how `rows` is read and written: compiled an address, in a line of the processor's cache with the other
     fields, where a memoryview takes 208 bytes.
     """
+
+    slots: cython.p_longlong
+    first: cython.longlong
+    waiting_count: cython.longlong
+    # what the address `slots` leads into: exchanged only by `add_node`, which sets both
+    rows: Annotated[cython.longlong[::1], "readonly"]
 
     def __init__(self) -> None:
         self.rows = integers(ROW)
@@ -56,6 +63,7 @@ class TransmitBuffers:
 
     # ---- the list of those that wait
 
+    @cython.cfunc
     def remove(self, row: cython.longlong) -> cython.void:
         """Take a row off the list."""
         before: cython.longlong = self.first
@@ -94,6 +102,8 @@ class TransmitBuffers:
         """The bits of the frame in a row and their fields."""
         return wire(self.rows[row + IDENTIFIER], self.rows[row + FLAGS], self.rows[row + LOW], self.rows[row + HIGH])
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def first_ready(self) -> cython.longlong:
         """The first bit at which a frame may start; NEVER or later when none may."""
         first: cython.longlong = NEVER

@@ -9,12 +9,13 @@ processes.
 
 import cython
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.events import NEVER
 
 BY_MESSAGE = NEVER + 1
 
 
+@cython.final
+@cython.cclass
 class TransmitEnds:
     """By transmit buffer 1 ... 3: `times`, the instant (ns) from which it is free again, and `statuses`, TX_*.
 
@@ -22,12 +23,18 @@ class TransmitEnds:
     bus shall send a message. `order`: of such messages.
     """
 
+    times: cython.longlong[4]
+    statuses: cython.longlong[4]
+    order: cython.longlong
+
     def __init__(self, by_message=False) -> None:
         unknown: cython.longlong = BY_MESSAGE if by_message else NEVER
         self.times = [unknown] * 4
         self.statuses = [0] * 4
         self.order = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def write(self, buffer: cython.longlong, time: cython.longlong, status: cython.longlong) -> cython.bint:
         """The bus: the transmission from `buffer` ends at `time`. False when it shall send a message instead."""
         if self.times[buffer] != NEVER:

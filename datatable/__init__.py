@@ -6,9 +6,6 @@ imports only generated modules (``from datatable.generated import mch as table``
 
 from typing import TYPE_CHECKING
 
-if __name__ != "ranger_sim.datatable":
-    raise ImportError("datatable is a room of ranger_sim: import ranger_sim.datatable")
-
 if TYPE_CHECKING:
     from ranger_sim.datatable.model import Table
     from ranger_sim.datatable.schedule import PublishedSchedule
@@ -30,6 +27,24 @@ def table_hash(folder: str | None = None) -> str:
     from ranger_sim.datatable.loader import hash_of_master_files
 
     return hash_of_master_files(folder)
+
+
+def place_of_generated(ours: list[str]) -> list[str]:
+    """Where the generated modules are: the folder of the user's own table (RANGER_SIM_TABLE), or else `ours`.
+
+    UserError when nothing was generated for the user's own table.
+    """
+    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.loading import OWN_TABLE
+
+    if OWN_TABLE is None:
+        return ours
+    if not (OWN_TABLE / "generated" / "__init__.py").is_file():
+        raise UserError(
+            f"RANGER_SIM_TABLE: nothing was generated in {OWN_TABLE}: unset RANGER_SIM_TABLE, then "
+            f"ranger-sim table generate --master {OWN_TABLE}"
+        )
+    return [str(OWN_TABLE / "generated")]
 
 
 def check_own_table() -> None:

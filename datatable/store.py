@@ -25,12 +25,22 @@ FSM = 6
 SUBSCRIBERS = ("BLUETOOTH", "SSP", "LABVIEW", "LCD", "MB_ERR_DIST", "ESTIMATOR", "FSM")
 
 TIMESTAMP = 0  # the id whose stamp is the network time
-# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_MASK = 0xFFFFFFFF
+# A C variable when compiled: Cython makes a Python object of every literal above 31 bits.
+_MASK: cython.longlong = 4294967295
 
 
+@cython.final
+@cython.cclass
 class DataStore:
     """Records 0 ... size-1. At the start all words and stamps are 0 and every record is unread by everyone."""
+
+    size: cython.longlong
+    words: cython.longlong[::1]
+    stamps: cython.longlong[::1]
+    unread: cython.uchar[::1]
+    out_of_range_count: cython.longlong
+    out_of_range_id: cython.longlong
+    on_out_of_range: object
 
     def __init__(self, size) -> None:
         self.size = size
@@ -41,11 +51,13 @@ class DataStore:
         self.out_of_range_id = -1
         self.on_out_of_range = None
 
+    @cython.ccall
     def move(self, words) -> None:
         """The words of the records stand in `words` from now on, as they are: memory that processes share."""
         words[:] = memoryview(self.words)
         self.words = words
 
+    @cython.ccall
     def has(self, number: cython.longlong) -> cython.bint:
         """True when `number` is an id of the table; otherwise the miss is told and False returned."""
         if 0 <= number < self.size:
@@ -58,6 +70,7 @@ class DataStore:
 
     # ---- frames: word and stamp together
 
+    @cython.ccall
     def set_word(self, number: cython.longlong, word: cython.longlong, stamp: cython.longlong) -> cython.bint:
         """Store the two words of a frame as they are; new for every subscriber. True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
@@ -67,6 +80,7 @@ class DataStore:
             return True
         return False
 
+    @cython.ccall
     def get_word(self, number: cython.longlong) -> cython.longlong:
         """The value word, 0 ... 2^32-1."""
         if 0 <= number < self.size or self.has(number):
@@ -75,6 +89,7 @@ class DataStore:
 
     # ---- typed access: the stamp is the network time the main brain heard last
 
+    @cython.ccall
     def set_float(self, number: cython.longlong, value: cython.double) -> cython.bint:
         """Store a number, rounded to single precision; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
@@ -84,12 +99,14 @@ class DataStore:
             return True
         return False
 
+    @cython.ccall
     def get_float(self, number: cython.longlong) -> cython.double:
         """The word read as a single-precision number."""
         if 0 <= number < self.size or self.has(number):
             return float_of_word(self.words[number])
         return 0.0
 
+    @cython.ccall
     def set_int(self, number: cython.longlong, value: cython.longlong) -> cython.bint:
         """Store a signed integer, of which only the low 32 bits are kept; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
@@ -99,32 +116,39 @@ class DataStore:
             return True
         return False
 
+    @cython.ccall
     def get_int(self, number: cython.longlong) -> cython.longlong:
         """The word read as a signed integer, -2^31 ... 2^31-1."""
         if 0 <= number < self.size or self.has(number):
             return wrap_i32(self.words[number])
         return 0
 
+    @cython.ccall
     def set_u32(self, number: cython.longlong, value: cython.longlong) -> cython.bint:
         """Store an unsigned integer, of which only the low 32 bits are kept; True when the table has the id."""
         return self.set_int(number, value)
 
+    @cython.ccall
     def get_u32(self, number: cython.longlong) -> cython.longlong:
         """The word read as an unsigned integer, 0 ... 2^32-1."""
         return self.get_word(number)
 
     # ---- time
 
+    @cython.ccall
     def stamp(self, number: cython.longlong) -> cython.longlong:
         """Network time of the last write in ms, 0 ... 2^32-1."""
         if 0 <= number < self.size or self.has(number):
             return self.stamps[number]
         return 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def network_time_ms(self) -> cython.longlong:
         """The network time heard last, 0 ... 2^32-1 ms."""
         return self.stamps[0]
 
+    @cython.ccall
     def age_ms(self, number: cython.longlong, now: cython.longlong) -> cython.longlong:
         """How long before `now` (ms) the value was written; right across one wrap of the 32-bit count."""
         if 0 <= number < self.size or self.has(number):
@@ -133,12 +157,14 @@ class DataStore:
 
     # ---- read flags
 
+    @cython.ccall
     def is_unread(self, number: cython.longlong, subscriber: cython.longlong) -> cython.bint:
         """True when the value was written after `subscriber` read it last."""
         if 0 <= number < self.size or self.has(number):
             return (self.unread[number] >> subscriber) & 1 == 1
         return False
 
+    @cython.ccall
     def mark_read(self, number: cython.longlong, subscriber: cython.longlong) -> cython.bint:
         """`subscriber` has read the value, the others are not concerned; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
@@ -146,6 +172,7 @@ class DataStore:
             return True
         return False
 
+    @cython.ccall
     def mark_unread(self, number: cython.longlong) -> cython.bint:
         """The value counts as new for every subscriber though it was not written; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
@@ -153,6 +180,7 @@ class DataStore:
             return True
         return False
 
+    @cython.ccall
     def next_unread(
         self, numbers: cython.longlong[::1], start: cython.longlong, subscriber: cython.longlong
     ) -> cython.longlong:

@@ -43,34 +43,36 @@ was added to the list, once.
 """
 
 import array
+from typing import Final
 
 import cython
 
 from ranger_sim.foundation.row_stream import RowStream
 
-if not cython.compiled:
-    TASK_RAN = 1
-    WAIT_RAN = 2
-    INTERRUPT_RAN = 3
-    MAIN_LOOP_RAN = 4
-    SLOT_BEGAN = 5
-    SLOT_ENDED = 6
-    SLOT_OVERRAN = 7
-    TASK_DROPPED = 8
-    COLUMN_KIND = 0
-    COLUMN_NUMBER = 1
-    COLUMN_START = 2
-    COLUMN_END = 3
-    COLUMN_CYCLES = 4
-    COLUMN_LATENCY = 5
-    COLUMN_ROW = 6
-    COLUMN_ITEMS = 7
-    ACTIVITY_COLUMNS = 8
+TASK_RAN: Final = 1
+WAIT_RAN: Final = 2
+INTERRUPT_RAN: Final = 3
+MAIN_LOOP_RAN: Final = 4
+SLOT_BEGAN: Final = 5
+SLOT_ENDED: Final = 6
+SLOT_OVERRAN: Final = 7
+TASK_DROPPED: Final = 8
+COLUMN_KIND: Final = 0
+COLUMN_NUMBER: Final = 1
+COLUMN_START: Final = 2
+COLUMN_END: Final = 3
+COLUMN_CYCLES: Final = 4
+COLUMN_LATENCY: Final = 5
+COLUMN_ROW: Final = 6
+COLUMN_ITEMS: Final = 7
+ACTIVITY_COLUMNS: Final = 8
 
 # 2 MiB: about half a second of a motor board that walks (56 rows a millisecond)
 USUAL_ROWS = 32_768
 
 
+@cython.final
+@cython.cclass
 class ActivityLog(RowStream):
     """The newest `rows` rows in a ring; `sinks` get all of them. `laps`: how often the ring was full.
 
@@ -80,6 +82,28 @@ class ActivityLog(RowStream):
     What runs is open until its end is known: the task (with its occasional list) or turn of the main loop in `code_*`
     and `list_*`, the IRQ in `irq_*`. A FIQ cannot be interrupted, so its end is known at once.
     """
+
+    sinks: list
+    handed: cython.longlong
+    laps: cython.longlong
+    keep_ns: cython.longlong
+    code_open: cython.bint
+    list_open: cython.bint
+    irq_open: cython.bint
+    code_kind: cython.longlong
+    code_number: cython.longlong
+    code_start: cython.longlong
+    code_cycles: cython.longlong
+    code_row: cython.longlong
+    code_items: cython.longlong
+    list_number: cython.longlong
+    list_cycles: cython.longlong
+    irq_number: cython.longlong
+    irq_start: cython.longlong
+    irq_cycles: cython.longlong
+    irq_latency: cython.longlong
+    irq_row: cython.longlong
+    irq_items: cython.longlong
 
     def __init__(self, rows=USUAL_ROWS) -> None:
         RowStream.__init__(self, "q", ACTIVITY_COLUMNS, False, block_rows=rows)
@@ -140,6 +164,7 @@ class ActivityLog(RowStream):
 
     # --- writing ------------------------------------------------------------------------------------------
 
+    @cython.ccall
     def put(
         self,
         kind: cython.longlong,
@@ -163,6 +188,7 @@ class ActivityLog(RowStream):
         self.numbers[at + COLUMN_ITEMS] = items
         self.finish_row(end)
 
+    @cython.ccall
     def begin_code(
         self,
         kind: cython.longlong,
@@ -186,6 +212,7 @@ class ActivityLog(RowStream):
         self.code_row = row
         self.code_items = items
 
+    @cython.ccall
     def end_code(self, time: cython.longlong) -> None:
         """The code that is open, if any, was through at `time` (ns)."""
         if self.code_open:
@@ -204,6 +231,7 @@ class ActivityLog(RowStream):
                 self.list_open = False
                 self.put(TASK_RAN, self.list_number, self.code_start, time, self.list_cycles, 0, self.code_row, 0)
 
+    @cython.ccall
     def begin_irq(
         self,
         number: cython.longlong,
@@ -222,6 +250,7 @@ class ActivityLog(RowStream):
         self.irq_row = row
         self.irq_items = items
 
+    @cython.ccall
     def end_irq(self, time: cython.longlong) -> None:
         """The IRQ that is open, if any, was through at `time` (ns)."""
         if self.irq_open:

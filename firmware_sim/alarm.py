@@ -4,20 +4,26 @@
 
 import cython
 
+from ranger_sim.firmware_sim.chip import ALARMS, Chip
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
-
-if not cython.compiled:
-    from ranger_sim.firmware_sim.chip import ALARMS
-    from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.events import NEVER
 
 
+@cython.final
+@cython.cclass
 class Alarm:
     """An alarm of a chip: when it is due, `owner.on_alarm(number, time)` runs.
 
     The chip keeps those that are set in the order of their instants, the first one last; of two at one instant the
     one that was made first comes first.
     """
+
+    chip: "Chip"
+    owner: Peripheral
+    number: cython.longlong
+    place: cython.longlong
+    time: cython.longlong
 
     def __init__(self, chip, owner: Peripheral, number, place) -> None:
         self.chip = chip
@@ -26,6 +32,8 @@ class Alarm:
         self.place = place  # in the order of making
         self.time = NEVER
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def set(self, time: cython.longlong) -> cython.longlong:
         """It is due at `time` (ns); NEVER takes it back. Returns the instant of the chip's first alarm."""
         at: cython.longlong = self.chip.alarms_set
@@ -49,6 +57,8 @@ class Alarm:
                     self.chip.stop_time = time
         return self.chip.alarm_time
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     @cython.final
     def _set_again(self, time: cython.longlong) -> cython.longlong:
         """It is set already: take it out, and set it."""
@@ -63,12 +73,14 @@ class Alarm:
         self.time = NEVER
         return self.set(time)
 
+    @cython.cfunc
     @cython.final
     def _move(self, a: cython.longlong, b: cython.longlong) -> cython.void:
         """What stands at `a` in the chip's order goes to `b`."""
         self.chip.alarm_times[b] = self.chip.alarm_times[a]
         self.chip.alarm_places[b] = self.chip.alarm_places[a]
 
+    @cython.cfunc
     @cython.final
     def ring(self, time: cython.longlong) -> InterruptSource | None:
         """It is the chip's first one, and due. Returns what its owner does."""
@@ -83,8 +95,12 @@ class Alarm:
         return self.owner.on_alarm(self.number, time)
 
 
+@cython.final
+@cython.cclass
 class SlotTimer(Peripheral):
     """The timer whose match interrupt steps the scheduler; its alarm is the last of those at one instant."""
+
+    alarm: Alarm
 
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)

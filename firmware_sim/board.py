@@ -10,15 +10,13 @@ import cython
 
 from ranger_sim.firmware_sim.analog import AnalogPins
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
-from ranger_sim.foundation.events import EventQueue
-
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.events import NEVER, EventQueue, Outbox
 
 WORDS = 16
 EVERY_KIND = 0xFFFF  # bits of the message kinds to a board
 
 
+@cython.cclass
 class Board:
     """A board called `name`. `advance` is what a kind of board must have; the rest has a meaning for any board.
 
@@ -30,6 +28,17 @@ class Board:
     may begin as well.
     `memory`: the words of its program's memory that others may read at any instant (None: none are shown).
     """
+
+    next_time: cython.longlong
+    edge_time: cython.longlong
+    horizon: cython.longlong
+    inbox: EventQueue
+    outbox: "Outbox"
+    analog: AnalogPins
+    words: cython.longlong[::1]
+    name: str
+    apart: cython.bint
+    memory: object
 
     def __init__(self, name) -> None:
         self.name = name
@@ -45,59 +54,79 @@ class Board:
 
     # --- passing time -------------------------------------------------------------------------------------
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def begin(self, until: cython.longlong) -> cython.void:
         """`advance(until)` will follow: a board that runs apart starts now."""
 
+    @cython.ccall
     def advance(self, until: cython.longlong) -> cython.longlong:
         """Run everything before `until` (ns), or less far where an output asks for it; returns `next_time`."""
         raise NotImplementedError(f"{self.name}: a board must say how it advances")
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def stop_at(self, time: cython.longlong) -> cython.longlong:
         """While it runs: run no further than to `time` (ns), which is later than now. Returns where it stops."""
         if time < self.horizon:
             self.horizon = time
         return self.horizon
 
+    @cython.ccall
     def speaks_from(self) -> cython.longlong:
         """Before this instant (ns) the board puts nothing on a bus, unless an urgent message comes in."""
         return self.next_time
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def quiet_until(self) -> cython.longlong:
         """Before this instant (ns) the board puts nothing out at all, whatever comes in of a kind that can wait."""
         return 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def urgent_kinds(self) -> cython.longlong:
         """Bits of the message kinds that it may answer at once: they cannot wait."""
         return EVERY_KIND
 
     # --- what is connected to it --------------------------------------------------------------------------
 
+    @cython.ccall
     def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
         """Edges of `buffer` arrive on `pin`, each with the level of `partner_pin`; tell by `edges_came`."""
         raise NotImplementedError(f"{self.name}: this kind of board has no pins for an encoder")
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def edges_came(self) -> cython.longlong:
         """The buffers of encoders may hold new edges; returns `edge_time`."""
         return self.edge_time
 
+    @cython.ccall
     def transmit_ends(self, controller: cython.longlong) -> object:
         """Where a bus writes the ends of the transmissions of a CAN controller; None: it sends them as messages."""
         return None
 
     # --- looking in ---------------------------------------------------------------------------------------
 
+    @cython.ccall
     def move_memory(self, words) -> None:
         """What `memory` shows stands in `words` from now on, as it is: memory that processes share."""
         raise NotImplementedError(f"{self.name} shows no memory")
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def watched(self) -> cython.longlong:
         """One number of its program, as a debugger would watch it; which, the kind of board says."""
         return 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def latest_slot(self) -> cython.longlong:
         """Start of its latest slot (ns); 0 before the first."""
         return 0
 
+    @cython.ccall
     def counters(self) -> object:
         """What it counted, by name."""
         raise NotImplementedError(f"{self.name}: this kind of board counts nothing")

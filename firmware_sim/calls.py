@@ -1,7 +1,7 @@
-"""Calls of what stands in a schedule or at an interrupt, when the robot runs interpreted.
+"""Calls of the functions in a schedule and at an interrupt.
 
-Compiled, the functions of the same names in scheduler.pxd and vic.pxd are used: they call methods of compiled classes
-by the addresses of their C functions.
+Interpreted, the functions below are used. Compiled modules use those of the same names in calls.pxd, which call a
+method of a compiled class by the address of its C function.
 """
 
 from collections.abc import Callable
@@ -13,21 +13,21 @@ def call(function: Callable[[], Any]) -> Any:
     return function()
 
 
-def run(scheduler: Any, number: int) -> Any:
-    """What the task of this number in a scheduler's table returns, None as 0."""
-    return scheduler.functions[number]() or 0
+def code_of(function: Callable[..., Any], arguments: int) -> Any:
+    """The first of the two values by which a function of `arguments` (0 or 1) is called: here the function itself."""
+    return function
 
 
-def handle(source: Any, queue: Any) -> Any:
-    """What the handler of an interrupt source returns for the message in the fields of `queue`."""
-    return source.service(queue)
+def owner_of(function: Callable[..., Any], arguments: int) -> Any:
+    """The second of them; compiled, the object to which a method belongs."""
+    return None
 
 
-def code_of(function: Callable[..., Any], arguments: int) -> int:
-    """The first of the two addresses by which compiled code calls a function; interpreted there is none."""
-    return 0
+def call_with(code: Any, owner: Any, argument: Any) -> Any:
+    """What the function returns for one argument."""
+    return code(argument)
 
 
-def owner_of(function: Callable[..., Any], arguments: int) -> int:
-    """The second of them."""
-    return 0
+def run(code: Any, owner: Any) -> Any:
+    """What the function without arguments returns, None as 0."""
+    return code() or 0

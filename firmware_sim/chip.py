@@ -1,22 +1,22 @@
 """What a chip's peripherals and its processor share: time, interrupts, pins, and the order of the alarms."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.firmware_sim.clock import Crystal, TickTrain
-from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController
+from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER
-
-    PINS = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
-    ALARMS = 16  # of peripherals
-    ALARM_PLACES = 18  # with the slot timer's, and one that never comes
+PINS: Final = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
+ALARMS: Final = 16  # of peripherals
+ALARM_PLACES: Final = 18  # with the slot timer's, and one that never comes
 
 
+@cython.cclass
 class Chip(Board):
     """The hardware of a microcontroller of `hz` core clock on `crystal`, as its peripherals see it.
 
@@ -24,6 +24,33 @@ class Chip(Board):
     messages that nobody listened to. The slot timer matched at `match_time` and will match at `tick_time`.
     `panel`: what a person sees of the board, or None (`carry`).
     """
+
+    # Fields that nearly every event touches come first, close together.
+    now: cython.longlong
+    instant: cython.longlong
+    code_time: cython.longlong
+    stop_time: cython.longlong
+    alarm_time: cython.longlong
+    alarms_set: cython.longlong
+    waiting: cython.bint
+    check_wait: cython.bint
+    vic: InterruptController
+    ns_per_cycle: cython.double
+    cycles_per_ns: cython.double
+    ticks: TickTrain
+    tick_source: "InterruptSource"
+    tick_time: cython.longlong
+    match_time: cython.longlong
+    pins: cython.longlong[::1]
+    alarm_times: cython.longlong[ALARM_PLACES]
+    alarm_places: cython.longlong[ALARM_PLACES]
+    hz: cython.longlong
+    crystal: Crystal
+    unclaimed: cython.longlong
+    peripherals: list
+    followers: list
+    pwm_follower: object
+    panel: object
 
     def __init__(self, name, hz, crystal=None) -> None:
         if hz <= 0:

@@ -14,34 +14,43 @@ How time passes inside:
 Each busy time is rounded down to whole ns; cycle counts are exact integers.
 """
 
+from typing import Final
+
 import cython
 
-from ranger_sim.firmware_sim.activity import ActivityLog
+from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, MAIN_LOOP_RAN, TASK_RAN, WAIT_RAN, ActivityLog
 from ranger_sim.firmware_sim.alarm import Alarm, SlotTimer
-from ranger_sim.firmware_sim.chip import Chip
+from ranger_sim.firmware_sim.calls import call, call_with, run
+from ranger_sim.firmware_sim.chip import ALARMS, PINS, Chip
 from ranger_sim.firmware_sim.clock import Crystal, TickTrain
 from ranger_sim.firmware_sim.counters import BoardCounters
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
 from ranger_sim.firmware_sim.peripheral import Peripheral, Unclaimed
-from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, SlotScheduler, Task, Wait
-from ranger_sim.firmware_sim.vic import FIQ, SLOT_TIMER, InterruptController, InterruptSource
+from ranger_sim.firmware_sim.scheduler import (
+    ENTRY,
+    ENTRY_CALLS,
+    ENTRY_CODE,
+    ENTRY_NS,
+    ENTRY_OWNER,
+    OCCASIONAL_TASK,
+    WAIT_TASK,
+    Occasional,
+    Schedule,
+    SlotScheduler,
+    Task,
+    Wait,
+)
+from ranger_sim.firmware_sim.vic import FIQ, FIRST_FIQ, SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.events import CAN_TX_DONE, NEVER, PIN_EDGE, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, MAIN_LOOP_RAN, TASK_RAN, WAIT_RAN
-    from ranger_sim.firmware_sim.calls import call, handle, run
-    from ranger_sim.firmware_sim.chip import ALARMS, PINS
-    from ranger_sim.firmware_sim.scheduler import ENTRY, ENTRY_CALLS, ENTRY_NS, OCCASIONAL_TASK, WAIT_TASK
-    from ranger_sim.firmware_sim.vic import FIRST_FIQ
-    from ranger_sim.foundation.events import CAN_TX_DONE, NEVER, PIN_EDGE
-
-    MESSAGE_KINDS = 32  # to a board
-    INDICES_PER_KIND = 16
+MESSAGE_KINDS: Final = 32  # to a board
+INDICES_PER_KIND: Final = 16
 
 
+@cython.cclass
 class Microcontroller(Chip):
     """A chip of `hz` core clock on `crystal`, and what its processor does: messages, interrupts, the schedule.
 
@@ -53,6 +62,31 @@ class Microcontroller(Chip):
     next input, interrupt or slot. It may move `now` forward for its effects, and must return once it is past
     `horizon`, the next input, alarm or slot, so that steps of any size give the same run.
     """
+
+    # Fields that nearly every event touches come first, close together; then those of messages and edges.
+    extra_cycles: cython.longlong
+    irq_free: cython.longlong
+    fiq_free: cython.longlong
+    stolen_cycles: cython.longlong
+    background_wanted: cython.bint
+    scheduler: SlotScheduler
+    background: object
+    alarms: list
+    message_table: list
+    others: Peripheral
+    slot_timer: SlotTimer
+    on_timer_tick: object
+    wait_task: Wait
+    wait_start: cython.longlong
+    wait_stolen: cython.longlong
+    first_line: EdgeLine
+    second_line: EdgeLine
+    pin_channels: cython.longlong[PINS]
+    pin_owners: list
+    pin_sources: list
+    on_overrun: object
+    on_limit: object
+    on_near_limit: object
 
     def __init__(self, name="chip", hz=60_000_000, crystal=None) -> None:
         Chip.__init__(self, name, hz, crystal)
@@ -210,6 +244,7 @@ class Microcontroller(Chip):
         self.alarms[place] = Alarm(self, peripheral, number, place)
         return self.alarms[place]
 
+    @cython.ccall
     def start(self, schedule: Schedule, phase_ns: cython.longlong) -> None:
         """Run `schedule`: the first slot begins at `phase_ns`, the later ones by this chip's crystal."""
         cycles: cython.longlong = schedule.slot_ns * self.hz // 1000000000
@@ -249,14 +284,17 @@ class Microcontroller(Chip):
 
     # --- what firmware calls ------------------------------------------------------------------------------
 
+    @cython.ccall
     def spend(self, cycles: cython.longlong) -> cython.void:
         """Add modelled cycles to the task or handler that runs now."""
         self.extra_cycles += cycles
 
+    @cython.ccall
     def cycles_since_tick(self) -> cython.longlong:
         """Core cycles at `now` since the slot timer's last match (its count register)."""
         return int((self.now - self.match_time) * self.cycles_per_ns)
 
+    @cython.ccall
     def request(self, source: InterruptSource) -> cython.longlong:
         """Raise an interrupt line; it is served as soon as its priority allows. 1 if newly pending."""
         if self.now > self.instant:  # a task asks, and it began after others of its row
@@ -275,12 +313,14 @@ class Microcontroller(Chip):
                 self.stop_time = time
         return self.horizon
 
+    @cython.ccall
     def main_loop(self) -> cython.longlong:
         """One turn of `background`; a board may put its main loop here instead of naming a function."""
         return call(self.background)
 
     # --- the event loop -----------------------------------------------------------------------------------
 
+    @cython.ccall
     def due(self, until: cython.longlong) -> cython.bint:
         """True when something happens here before `until`, inputs that wait included."""
         return self.next_time < until or self.inbox.head_time < until or self.edge_time < until
@@ -338,7 +378,8 @@ class Microcontroller(Chip):
                     usual_ns = scheduler.table[ENTRY * number + ENTRY_NS]
                     self.now = self.code_time
                     if usual_ns >= 0:
-                        items = run(scheduler, number) if cython.compiled else scheduler.functions[number]() or 0
+                        entry = ENTRY * number
+                        items = run(scheduler.table[entry + ENTRY_CODE], scheduler.table[entry + ENTRY_OWNER])
                         if items == 0 and self.extra_cycles == 0:
                             self.code_time += usual_ns
                             scheduler.table[ENTRY * number + ENTRY_CALLS] += 1
@@ -399,6 +440,7 @@ class Microcontroller(Chip):
             return 0
         return self.alarm_time  # the slot timer's match is one, too
 
+    @cython.cfunc
     @cython.final
     def _edges(self) -> cython.longlong:
         """Edges from the first one on, each with its fast interrupt, until something else comes first.
@@ -443,8 +485,9 @@ class Microcontroller(Chip):
                 if not self.waiting or self.check_wait:
                     return time
 
+    @cython.cfunc
     @cython.final
-    def _input(self, queue) -> InterruptSource | None:
+    def _input(self, queue: EventQueue) -> InterruptSource | None:
         """The message just taken: hardware first. Returns the interrupt source that it makes ask for service."""
         self.now = self.instant
         self.background_wanted = True
@@ -454,8 +497,9 @@ class Microcontroller(Chip):
             return cython.cast(Peripheral, self.message_table[queue.a * MESSAGE_KINDS + queue.kind]).on_message(queue)
         return self.others.on_message(queue)
 
+    @cython.cfunc
     @cython.final
-    def _pin_edge(self, queue) -> InterruptSource | None:
+    def _pin_edge(self, queue: EventQueue) -> InterruptSource | None:
         """An edge that came as a message."""
         pin: cython.longlong = queue.a
         channel: cython.longlong = self.pin_channels[pin]
@@ -470,6 +514,7 @@ class Microcontroller(Chip):
             return cython.cast(InterruptSource, self.pin_sources[pin])
         return None
 
+    @cython.ccall
     def on_slot_timer(self, queue: EventQueue) -> object:
         """Handler of the slot timer: publish the next row."""
         if self.on_timer_tick is not None:
@@ -479,6 +524,7 @@ class Microcontroller(Chip):
                 self.on_overrun()
         return None
 
+    @cython.cfunc
     @cython.final
     def _background(self) -> cython.longlong:
         """One turn of the main loop beside the scheduler."""
@@ -502,8 +548,9 @@ class Microcontroller(Chip):
         self.code_time = done
         return done
 
+    @cython.cfunc
     @cython.final
-    def _serve(self, source, queue, time: cython.longlong) -> None:
+    def _serve(self, source: InterruptSource, queue: EventQueue, time: cython.longlong) -> None:
         """Run the handler of `source`, which waits no longer, at `time` and let its cycles pass."""
         busy: cython.longlong
         requested: cython.longlong = source.requested  # the handler may ask for the next service
@@ -511,7 +558,7 @@ class Microcontroller(Chip):
         self.background_wanted = True
         self.now = time + source.latency_ns
         self.extra_cycles = 0
-        items = handle(source, queue) if cython.compiled else source.service(queue)
+        items = call_with(source.code, source.owner, queue)
         if items is None and self.extra_cycles == 0 and not self.scheduler.recording:
             self.stolen_cycles += source.base_cycles
             busy = source.base_ns
@@ -525,8 +572,9 @@ class Microcontroller(Chip):
         self.code_time = (self.code_time if self.code_time > time else time) + busy
         self.check_wait = True
 
+    @cython.cfunc
     @cython.final
-    def _note_service(self, source, items: cython.longlong) -> cython.longlong:
+    def _note_service(self, source: InterruptSource, items: cython.longlong) -> cython.longlong:
         """A service that handled `items`, took extra cycles or is recorded; returns how long it took (ns)."""
         cycles: cython.longlong = source.base_cycles + source.per_item * items + self.extra_cycles
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
@@ -534,9 +582,10 @@ class Microcontroller(Chip):
         source.note(cycles)
         return busy
 
+    @cython.cfunc
     @cython.final
     def _log_service(
-        self, source, items: cython.longlong, time: cython.longlong, requested: cython.longlong
+        self, source: InterruptSource, items: cython.longlong, time: cython.longlong, requested: cython.longlong
     ) -> cython.longlong:
         """Write a service of `source` from `time` on into the log; returns its latency (ns)."""
         log: ActivityLog = self.scheduler.log
@@ -555,6 +604,7 @@ class Microcontroller(Chip):
             log.begin_irq(source.number, time, cycles, latency, row, items)
         return latency
 
+    @cython.cfunc
     @cython.final
     def _log_end_of_code(self) -> cython.longlong:
         """What ran until now is through, and the interrupts in it; returns `code_time`."""
@@ -562,6 +612,7 @@ class Microcontroller(Chip):
         self.scheduler.log.end_code(self.code_time)
         return self.code_time
 
+    @cython.cfunc
     @cython.final
     def _resume(self) -> cython.bint:
         """Tasks go on after one that spins, or after one that was completed behind its slot's end.
@@ -583,6 +634,7 @@ class Microcontroller(Chip):
             self._close_slot(scheduler.late_time)
         return True
 
+    @cython.cfunc
     @cython.final
     def _end_row(self) -> cython.longlong:
         """The row's last task has run; returns the cycles of its slot."""
@@ -592,15 +644,17 @@ class Microcontroller(Chip):
         self.scheduler.finished_time = self.code_time
         return self._close_slot(self.scheduler.slot_time)
 
+    @cython.cfunc
     @cython.final
-    def _spent(self, task, items: cython.longlong) -> cython.longlong:
+    def _spent(self, task: Task, items: cython.longlong) -> cython.longlong:
         """A task that has just run handled `items`; returns the cycles it took."""
         cycles: cython.longlong = task.base_cycles + task.per_item * items + self.extra_cycles
         self.extra_cycles = 0
         return self._charge(task, cycles, items)
 
+    @cython.cfunc
     @cython.final
-    def _special_task(self, task) -> cython.bint:
+    def _special_task(self, task: Task) -> cython.bint:
         """A task of which not every call is alike, or whose calls are recorded. False when it has to spin."""
         entry: Task
         items: cython.longlong = 0
@@ -623,6 +677,7 @@ class Microcontroller(Chip):
         self._spent(task, items)
         return True
 
+    @cython.cfunc
     @cython.final
     def _begin_wait(self, task: Wait) -> cython.bint:
         """A task that spins begins; False when it has to."""
@@ -637,6 +692,7 @@ class Microcontroller(Chip):
         self.check_wait = False
         return False
 
+    @cython.cfunc
     @cython.final
     def _wait_over(self) -> cython.longlong:
         """The condition of the spinning task came true: its cycles are the spinning, less what was stolen."""
@@ -654,8 +710,9 @@ class Microcontroller(Chip):
         self.code_time = before + spun
         return spun
 
+    @cython.cfunc
     @cython.final
-    def _charge(self, task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
+    def _charge(self, task: Task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
         """Let the cycles of a task that handled `items` pass and hold them against its limit."""
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         if self.scheduler.recording:
@@ -668,8 +725,9 @@ class Microcontroller(Chip):
                 self.on_limit(task)
         return cycles
 
+    @cython.cfunc
     @cython.final
-    def _log_task(self, task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
+    def _log_task(self, task: Task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
         """Write into the log that a task has the processor; returns since when (ns)."""
         scheduler: SlotScheduler = self.scheduler
         kind: cython.longlong = TASK_RAN
@@ -681,6 +739,7 @@ class Microcontroller(Chip):
         scheduler.log.begin_code(kind, task.number, since, cycles, row, items)
         return since
 
+    @cython.cfunc
     @cython.final
     def _close_slot(self, since: cython.longlong) -> cython.longlong:
         """Record the slot that began at `since` and ends now."""

@@ -11,30 +11,30 @@ Cost and limit are two things: a task spends `cost + per_item * items` modelled 
 against `limit`. The event loop that spends the time is in microcontroller.py; here is the book-keeping.
 """
 
+from typing import Annotated, Final
+
 import cython
 
-from ranger_sim.firmware_sim.activity import ActivityLog
+from ranger_sim.firmware_sim.activity import SLOT_BEGAN, SLOT_ENDED, SLOT_OVERRAN, TASK_DROPPED, ActivityLog
+from ranger_sim.firmware_sim.calls import code_of, owner_of
 from ranger_sim.firmware_sim.counters import SlotCounters
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.activity import SLOT_BEGAN, SLOT_ENDED, SLOT_OVERRAN, TASK_DROPPED
-    from ranger_sim.firmware_sim.calls import code_of, owner_of
-    from ranger_sim.foundation.events import NEVER
-
-    NORMAL_TASK = 0
-    OCCASIONAL_TASK = 1
-    WAIT_TASK = 2
-    HISTOGRAM_BINS = 21  # twenty of 5 % of a slot, the last for overruns
-    # the table laid out: numbers per task, and which is which
-    ENTRY = 4
-    ENTRY_CODE = 0  # the two addresses by which its function is called
-    ENTRY_OWNER = 1
-    ENTRY_NS = 2  # of a call without items, or -1: every call must be looked at more closely
-    ENTRY_CALLS = 3  # calls that took that
+NORMAL_TASK: Final = 0
+OCCASIONAL_TASK: Final = 1
+WAIT_TASK: Final = 2
+HISTOGRAM_BINS: Final = 21  # twenty of 5 % of a slot, the last for overruns
+# the table laid out: numbers per task, and which is which
+ENTRY: Final = 4
+ENTRY_CODE: Final = 0  # the two addresses by which its function is called
+ENTRY_OWNER: Final = 1
+ENTRY_NS: Final = 2  # of a call without items, or -1: every call must be looked at more closely
+ENTRY_CALLS: Final = 3  # calls that took that
 
 
+@cython.cclass
 class Task:
     """One line of a schedule: `function()` returns None or the number of items it handled (an int).
 
@@ -42,6 +42,23 @@ class Task:
     what is counted ("frame", "edge"). limit 0: not held against anything. Ground truth: `calls`, `hits`
     (calls over the limit), `last_cycles`, `max_cycles`, `total_cycles` (interrupts not included).
     """
+
+    kind: cython.longlong
+    base_cycles: cython.longlong
+    per_item: cython.longlong
+    most_cycles: cython.longlong
+    noted_calls: cython.longlong
+    noted_cycles: cython.longlong
+    noted_most: cython.longlong
+    noted_last: cython.longlong
+    noted_when: cython.longlong
+    number: cython.longlong
+    scheduler: "SlotScheduler"
+    routine: object
+    speaks: cython.bint
+    hits: cython.longlong
+    name: str
+    item: str
 
     def __init__(self, function, cost=0, limit=0, per_item=0, item="", name=None) -> None:
         title = name if name is not None else getattr(function, "__name__", type(function).__name__)
@@ -68,6 +85,7 @@ class Task:
         self.scheduler = None
         self.number = -1
 
+    @cython.cfunc
     @cython.final
     def note(self, cycles: cython.longlong) -> cython.void:
         """Count a call that took `cycles`."""
@@ -78,6 +96,7 @@ class Task:
         self.noted_last = cycles
         self.noted_when = self.scheduler.table[ENTRY * self.number + ENTRY_CALLS]
 
+    @cython.ccall
     def usual_calls(self) -> cython.longlong:
         """Calls that took exactly `cost`, since that was last changed."""
         return 0 if self.scheduler is None else self.scheduler.table[ENTRY * self.number + ENTRY_CALLS]
@@ -149,6 +168,8 @@ class Task:
         return f"{type(self).__name__}({self.name}, cost={self.cost}, limit={self.limit})"
 
 
+@cython.final
+@cython.cclass
 class Wait(Task):
     """A task that spins until `function()` is true, as `while (!done);` does in C.
 
@@ -157,18 +178,26 @@ class Wait(Task):
     not end the spinning (the task in progress always finishes).
     """
 
+    waits: cython.longlong
+
     def __init__(self, function, cost=0, limit=0, name=None) -> None:
         Task.__init__(self, function, cost=cost, limit=limit, name=name)
         self.kind = WAIT_TASK
         self.waits = 0
 
 
+@cython.final
+@cython.cclass
 class Occasional(Task):
     """A task that runs one task of its list per call. `cost` is that of choosing (the static counter).
 
     After the last entry one extra idle call resets the counter, so n entries come round every n + 1 calls,
     as the robot's code does; `extra_idle_call=False` leaves that call out.
     """
+
+    tasks: list
+    position: cython.longlong
+    extra_idle_call: cython.bint
 
     def __init__(self, tasks, cost=20, limit=0, name="occasional", extra_idle_call=True) -> None:
         # cost 20: a counter, a comparison and an indirect call (chosen by us, no measurement is known)
@@ -181,7 +210,8 @@ class Occasional(Task):
             if not isinstance(task, Task) or task.kind != NORMAL_TASK:
                 raise UserError(f"occasional list {name}: {task!r} is not a plain Task")
 
-    def next_task(self):
+    @cython.ccall
+    def next_task(self) -> Task:
         """The entry whose turn it is, or None in the idle call."""
         count: cython.longlong = len(self.tasks)
         if self.position >= count:
@@ -193,6 +223,8 @@ class Occasional(Task):
         return task
 
 
+@cython.final
+@cython.cclass
 class Schedule:
     """The table of one board.
 
@@ -206,6 +238,17 @@ class Schedule:
     sends. It lets the rest of the robot run ahead of a board that has nothing to say, and changes no result.
     `tick_slot`: VIC slot of the timer interrupt (or FIQ); `tick_cost`: its cycles.
     """
+
+    slot_ns: cython.longlong
+    divider: cython.longlong
+    tick_cost: cython.longlong
+    tick_slot: cython.longlong
+    tick_latency: cython.longlong
+    every: list
+    rows: list
+    last: list
+    completion_flag: cython.bint
+    announces: cython.bint
 
     def __init__(
         self,
@@ -274,6 +317,8 @@ class Schedule:
         return found
 
 
+@cython.final
+@cython.cclass
 class SlotScheduler:
     """Row and position of a running schedule, and its records.
 
@@ -283,6 +328,51 @@ class SlotScheduler:
     what the present row still has to run. More than 40 fields, because a task's end touches position and records alike:
     apart they would cost every task a second look-up.
     """
+
+    # Fields that a slot touches come first, close together; a memoryview has its address in its first bytes.
+    position: cython.longlong
+    end: cython.longlong
+    done: cython.bint
+    late: cython.bint
+    recording: cython.bint
+    started: cython.bint
+    table: cython.p_longlong
+    leads: cython.p_longlong
+    row: cython.longlong
+    row_count: cython.longlong
+    announces: cython.bint
+    tasks: list
+    numbers: Annotated[cython.uchar[::1], "readonly"]
+    divider_count: cython.longlong
+    divider: cython.longlong
+    row_start: cython.longlong
+    run_before: cython.longlong
+    slot_count: cython.longlong
+    listed_tasks: cython.longlong
+    slot_time: cython.longlong
+    tick_time: cython.longlong
+    finished_time: cython.longlong
+    slot_cycles: cython.longlong
+    near_limit_cycles: cython.longlong
+    histogram_step: cython.longlong
+    last_slot_cycles: cython.longlong
+    total_slot_cycles: cython.longlong
+    max_slot_cycles: cython.longlong
+    row_starts: cython.longlong[::1]
+    histogram: cython.longlong[21]
+    # what the two addresses lead into
+    table_kept: Annotated[cython.longlong[::1], "readonly"]
+    leads_kept: Annotated[cython.longlong[::1], "readonly"]
+    schedule: Schedule
+    ns_per_cycle: cython.double
+    slot_ns: cython.longlong
+    overruns: cython.longlong
+    dropped_tasks: cython.longlong
+    near_limits: cython.longlong
+    late_time: cython.longlong
+    late_count: cython.longlong
+    late_row: cython.longlong
+    log: ActivityLog
 
     def __init__(self, schedule, slot_cycles, ns_per_cycle=0.0) -> None:
         self.schedule = schedule
@@ -324,7 +414,7 @@ class SlotScheduler:
     def layout(self) -> None:
         """The schedule as flat lists; row r has the places from row_starts[r] on, and one more that is its end.
 
-        `numbers`: of the task at each place, among `tasks` and their `functions`. `table` has ENTRY numbers for each
+        `numbers`: of the task at each place, among `tasks`. `table` has ENTRY numbers for each
         task: the two addresses by which its function is called when compiled, usual_ns, and how many calls took that.
         usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
         `leads`: ns from the start of the task at a place to that of the first one from there that may speak, at least;
@@ -335,7 +425,6 @@ class SlotScheduler:
         self.tasks = schedule.all_tasks()
         if len(self.tasks) > 256:
             raise UserError(f"schedule: {len(self.tasks)} different tasks; at most 256 are possible")
-        self.functions = [task.routine for task in self.tasks]
         self.row_starts = integers(self.row_count + 1)
         places: list = []
         for row in range(self.row_count):
@@ -367,7 +456,6 @@ class SlotScheduler:
         at: cython.longlong = ENTRY * task.number
         within = task.base_cycles <= task.most_cycles or task.most_cycles == 0
         plain = task.kind == NORMAL_TASK and within and not self.recording
-        self.functions[task.number] = task.routine
         self.table[at + ENTRY_CODE] = code_of(task.routine, 0)
         self.table[at + ENTRY_OWNER] = owner_of(task.routine, 0)
         self.table[at + ENTRY_NS] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
@@ -385,6 +473,7 @@ class SlotScheduler:
                     lead += int(task.base_cycles * self.ns_per_cycle)
                 self.leads_kept[place] = lead
 
+    @cython.ccall
     def speaks_from(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
         """Before this instant (ns) no task puts anything on a bus.
 
@@ -417,6 +506,7 @@ class SlotScheduler:
         """Tasks that were begun since power-up."""
         return self.run_before + self.position - self.row_start
 
+    @cython.ccall
     def tick(self, timer_time: cython.longlong) -> cython.bint:
         """Timer tick (its hardware instant, ns): step to the next row. True: the old row was unfinished."""
         overrun: cython.bint = False
@@ -454,6 +544,7 @@ class SlotScheduler:
         # would not notice the tick and would finish the old pass instead. Its tables all have several rows.
         return overrun
 
+    @cython.ccall
     def close(self, cycles: cython.longlong) -> cython.bint:
         """A row (or the last task of an overrun one) ended `cycles` after its tick. True: near the limit."""
         index: cython.longlong = cycles // self.histogram_step
@@ -472,6 +563,7 @@ class SlotScheduler:
             self.near_limits += 1
         return near
 
+    @cython.ccall
     def attach_log(self, log: ActivityLog | None) -> None:
         """Every slot from the next one on is written into `log`; None: into none."""
         self.log = log
@@ -479,12 +571,14 @@ class SlotScheduler:
         for task in self.schedule.all_tasks():
             self.lay(task)
 
+    @cython.ccall
     def log_begin(self) -> None:
         """Write that the slot of the present row began."""
         log: ActivityLog = self.log
         listed: cython.longlong = self.end - self.position
         log.put(SLOT_BEGAN, self.slot_count, self.slot_time, self.slot_time, 0, 0, self.row, listed)
 
+    @cython.ccall
     def log_overrun(self, time: cython.longlong) -> None:
         """Write what the tick of `time` (ns) found unfinished, before it steps on."""
         log: ActivityLog = self.log
@@ -494,6 +588,7 @@ class SlotScheduler:
         place = self.end - self.position
         log.put(SLOT_OVERRAN, self.slot_count, self.slot_time, time, 0, 0, self.row, place)
 
+    @cython.ccall
     def log_end(self, since: cython.longlong, time: cython.longlong, cycles: cython.longlong) -> None:
         """Write that the slot that began at `since` ended at `time` (ns): the present one, or one that overran."""
         log: ActivityLog = self.log

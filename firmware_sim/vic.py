@@ -6,17 +6,17 @@ served in the order in which they were attached. IRQs do not nest; FIQ pre-empts
 loop in microcontroller.py serves; this file only keeps who waits.
 """
 
+from typing import Final
+
 import cython
 
+from ranger_sim.firmware_sim.calls import code_of, owner_of
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, PIN_EDGE, SSP_SEGMENT, UART_BYTE, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.calls import code_of, owner_of
-
-    FIQ = -1
-    IRQ_SLOTS = 16
-    FIRST_FIQ = 1 << 16  # in the word of pending sources the FIQ sources stand above the slots
+FIQ: Final = -1
+IRQ_SLOTS: Final = 16
+FIRST_FIQ: Final = 1 << 16  # in the word of pending sources the FIQ sources stand above the slots
 
 MOST_FIQ_SOURCES = 46  # bits of a word of 64, without the sign and the slots
 
@@ -54,6 +54,8 @@ FIQ_LATENCY = 12
 IRQ_LATENCY = 25
 
 
+@cython.final
+@cython.cclass
 class InterruptSource:
     """One interrupt line. Cycle counts and `requests`, `merged`, `served` are ground truth for tests.
 
@@ -62,6 +64,41 @@ class InterruptSource:
     peripheral stores keeps that one message (`keep_message`): while it waits, a newer message overwrites the older
     one (counted in `merged`).
     """
+
+    # In both classes the fields that every request and every service touches come first, close together.
+    bit: cython.longlong
+    code: cython.longlong
+    owner: cython.longlong
+    latency_ns: cython.longlong
+    base_ns: cython.longlong
+    base_cycles: cython.longlong
+    served: cython.longlong
+    per_item: cython.longlong
+    requested: cython.longlong
+    noted: cython.longlong
+    noted_cycles: cython.longlong
+    noted_most: cython.longlong
+    merged: cython.longlong
+    forgotten: cython.longlong
+    handler: object
+    service: object
+    controller: "InterruptController"
+    kind: cython.longlong
+    index: cython.longlong
+    number: cython.longlong
+    cost: cython.longlong
+    latency: cython.longlong
+    slot: cython.longlong
+    name: str
+    time: cython.longlong
+    order: cython.longlong
+    a: cython.longlong
+    b: cython.longlong
+    c: cython.longlong
+    d: cython.longlong
+    e: cython.longlong
+    f: cython.longlong
+    ref: object
 
     def __init__(self, kind, index, controller=None) -> None:
         self.controller = controller
@@ -130,6 +167,7 @@ class InterruptSource:
         self.code = code_of(service, 1)
         self.owner = owner_of(service, 1)
 
+    @cython.cfunc
     @cython.final
     def note(self, cycles: cython.longlong) -> cython.void:
         """Note a service that took `cycles`."""
@@ -143,6 +181,7 @@ class InterruptSource:
         self.noted_cycles, self.noted_most = self.total_cycles, self.max_cycles
         self.noted = self.served
 
+    @cython.ccall
     def keep_message(self, queue: EventQueue) -> None:
         """Keep the message in the fields of `queue` until it is served."""
         if self.service is self.handler:
@@ -157,6 +196,7 @@ class InterruptSource:
         self.f = queue.f
         self.ref = queue.ref
 
+    @cython.ccall
     def give_message(self, queue: EventQueue) -> None:
         """Put the kept message into the fields of `queue`, where a handler looks for it."""
         queue.time = self.time
@@ -177,8 +217,17 @@ class InterruptSource:
         return self.handler(queue)
 
 
+@cython.final
+@cython.cclass
 class InterruptController:
     """Sources by (kind, index), who is pending, and who comes first. `ns_per_cycle`: of this CPU."""
+
+    pending: cython.longlong
+    newest: InterruptSource
+    fiq_list: list
+    irq_list: list
+    ns_per_cycle: cython.double
+    sources: dict
 
     def __init__(self, ns_per_cycle=1000.0 / 60.0) -> None:
         self.ns_per_cycle = ns_per_cycle
@@ -189,7 +238,8 @@ class InterruptController:
         self.pending = 0
         self.newest = None
 
-    def source(self, kind: cython.longlong, index: cython.longlong):
+    @cython.ccall
+    def source(self, kind: cython.longlong, index: cython.longlong) -> InterruptSource:
         """The line of (kind, index); made on first use, silent until a handler is attached."""
         found = self.sources.get((kind, index))
         if found is None:
@@ -254,6 +304,8 @@ class InterruptController:
             self.irq_list[source.slot] = None
         source.bit = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def raise_source(self, source: InterruptSource, time: cython.longlong) -> cython.bint:
         """Request service at `time` (ns); False when nobody listens or the request merged with a pending one."""
         if self.pending & source.bit:
@@ -266,9 +318,10 @@ class InterruptController:
         source.requested = time
         return True
 
+    @cython.ccall
     @cython.boundscheck(False)
     @cython.wraparound(False)
-    def take_first(self):
+    def take_first(self) -> InterruptSource:
         """Who is served now, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
         first: InterruptSource = self.newest
         place: cython.longlong

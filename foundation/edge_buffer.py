@@ -6,11 +6,15 @@ The plant writes a step's edges, the chip on whose pins they arrive reads them o
 hold the same buffer: an edge is the most frequent thing on the robot, and never becomes a message.
 """
 
+from typing import Annotated
+
 import cython
 
 from ranger_sim.foundation.numbers import integers
 
 
+@cython.final
+@cython.cclass
 class EdgeBuffer:
     """Edges of channel A: `packed`, each time (ns) x 4 + the level that A takes x 2 + the level of B then. `count` are
     valid, of which the first `read` have been taken.
@@ -18,12 +22,19 @@ class EdgeBuffer:
     It grows when it is full, so no edge is ever lost; `clear` keeps the storage.
     """
 
+    count: cython.longlong
+    read: cython.longlong
+    packed: cython.p_longlong
+    capacity: cython.longlong
+    kept: Annotated[cython.longlong[::1], "readonly"]
+
     def __init__(self, capacity=64) -> None:
         self.capacity = capacity
         self.count = 0
         self.read = 0
         self._keep(integers(capacity))
 
+    @cython.ccall
     def _keep(self, storage) -> None:
         """Hold the array `storage` under `kept`, and its address, in the line of the other fields, as `packed`."""
         self.kept = storage
@@ -32,11 +43,13 @@ class EdgeBuffer:
         else:
             self.packed = storage
 
+    @cython.ccall
     def clear(self) -> cython.void:
         """Forget the edges."""
         self.count = 0
         self.read = 0
 
+    @cython.ccall
     def grow(self) -> None:
         """Double the storage, keeping what is there."""
         old = self.kept
@@ -46,6 +59,7 @@ class EdgeBuffer:
         self.capacity = 2 * self.capacity
         self._keep(grown)
 
+    @cython.ccall
     def push(self, time: cython.longlong, level_a: cython.longlong, level_b: cython.longlong) -> cython.void:
         """Add an edge; the caller keeps the order of time."""
         if self.count == self.capacity:
@@ -59,8 +73,15 @@ class EdgeBuffer:
         return packed >> 2, packed >> 1 & 1, packed & 1
 
 
+@cython.final
+@cython.cclass
 class ByteBuffer:
     """Bytes on a serial line: `times` (ns, end of the stop bit) and `values` (0 ... 255). `count` are valid."""
+
+    capacity: cython.longlong
+    count: cython.longlong
+    times: cython.longlong[::1]
+    values: cython.longlong[::1]
 
     def __init__(self, capacity=128) -> None:
         self.capacity = capacity
@@ -68,10 +89,12 @@ class ByteBuffer:
         self.times = integers(capacity)
         self.values = integers(capacity)
 
+    @cython.ccall
     def clear(self) -> cython.void:
         """Forget the bytes."""
         self.count = 0
 
+    @cython.ccall
     def grow(self) -> None:
         """Double the storage, keeping what is there."""
         self.capacity = 2 * self.capacity
@@ -82,6 +105,7 @@ class ByteBuffer:
                 grown[place] = old[place]
             setattr(self, name, grown)
 
+    @cython.ccall
     def push(self, time: cython.longlong, value: cython.longlong) -> cython.void:
         """Add a byte; the caller keeps the order of time."""
         if self.count == self.capacity:

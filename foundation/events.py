@@ -8,62 +8,62 @@ what happens at one instant has a written order: plant, pins, bus, interrupts, s
 The same messages travel in one process or between several.
 """
 
+from typing import Annotated, Final
+
 import cython
 
 from ranger_sim.foundation.numbers import integers
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    NEVER = 1 << 62  # ns; later than any instant of a run (146 years)
+NEVER: Final = 1 << 62  # ns; later than any instant of a run (146 years)
 
-    STAGE_PLANT = 0
-    STAGE_PINS = 1
-    STAGE_BUS = 2
-    STAGE_INTERRUPTS = 3
-    STAGE_SLOTS = 4
-    # the `order` of the first source of a stage
-    ORDER_PINS = 256
-    ORDER_BUS = 512
-    ORDER_INTERRUPTS = 768
+STAGE_PLANT: Final = 0
+STAGE_PINS: Final = 1
+STAGE_BUS: Final = 2
+STAGE_INTERRUPTS: Final = 3
+STAGE_SLOTS: Final = 4
+# the `order` of the first source of a stage
+ORDER_PINS: Final = 256
+ORDER_BUS: Final = 512
+ORDER_INTERRUPTS: Final = 768
 
-    # Messages to a board (inputs).
-    PIN_EDGE = 1  # a pin, b level 0/1, c partner pin (or -1), d level of the partner
-    CAN_RX = 2  # a controller 1..4, b identifier, c flags, d word 0 (bytes 0-3), e word 1 (bytes 4-7)
-    CAN_TX_DONE = 3  # a controller, b buffer 1..3, c TX_* status
-    CAN_STATUS = 4  # a controller, b interrupt bits, c transmit errors, d receive errors, e bus-off 0/1
-    UART_BYTE = 5  # a UART number, b byte; or c 2-8 bytes at once, d the first four, e the rest, low byte first
-    SSP_SEGMENT = 6  # a 0, ref SspSegment received
+# Messages to a board (inputs).
+PIN_EDGE: Final = 1  # a pin, b level 0/1, c partner pin (or -1), d level of the partner
+CAN_RX: Final = 2  # a controller 1..4, b identifier, c flags, d word 0 (bytes 0-3), e word 1 (bytes 4-7)
+CAN_TX_DONE: Final = 3  # a controller, b buffer 1..3, c TX_* status
+CAN_STATUS: Final = 4  # a controller, b interrupt bits, c transmit errors, d receive errors, e bus-off 0/1
+UART_BYTE: Final = 5  # a UART number, b byte; or c 2-8 bytes at once, d the first four, e the rest, low byte first
+SSP_SEGMENT: Final = 6  # a 0, ref SspSegment received
 
-    # Messages from a board (outputs).
-    CAN_REQUEST = 32  # a controller, b buffer 1..3, c identifier, d flags, e word 0, f word 1
-    CAN_ABORT = 33  # a controller, b buffer
-    CAN_MODE = 34  # a controller, b 0 operating / 1 reset
-    PWM_UPDATE = 35  # a MR2, b MR6, c MR0 (counts)
-    PIN_OUTPUT = 36  # a pin, b level
-    SSP_START = 37  # a 0, ref SspSegment sent by the master; the exchange starts at the stamp
-    SSP_LOAD = 38  # a 0, ref SspSegment that the slave will send in the next exchange
-    UART_OUTPUT = 39  # a UART number, b byte; the stamp is the end of its last bit
+# Messages from a board (outputs).
+CAN_REQUEST: Final = 32  # a controller, b buffer 1..3, c identifier, d flags, e word 0, f word 1
+CAN_ABORT: Final = 33  # a controller, b buffer
+CAN_MODE: Final = 34  # a controller, b 0 operating / 1 reset
+PWM_UPDATE: Final = 35  # a MR2, b MR6, c MR0 (counts)
+PIN_OUTPUT: Final = 36  # a pin, b level
+SSP_START: Final = 37  # a 0, ref SspSegment sent by the master; the exchange starts at the stamp
+SSP_LOAD: Final = 38  # a 0, ref SspSegment that the slave will send in the next exchange
+UART_OUTPUT: Final = 39  # a UART number, b byte; the stamp is the end of its last bit
 
-    # Flags of a frame: bits 0-3 data length code, then:
-    FLAG_REMOTE = 16
-    FLAG_SINGLE_SHOT = 32
-    FLAG_EXTENDED = 64
-    FLAG_ERROR = 128
+# Flags of a frame: bits 0-3 data length code, then:
+FLAG_REMOTE: Final = 16
+FLAG_SINGLE_SHOT: Final = 32
+FLAG_EXTENDED: Final = 64
+FLAG_ERROR: Final = 128
 
-    # Status of CAN_TX_DONE.
-    TX_SENT = 0
-    TX_ABORTED = 1  # aborted on request before it started
-    TX_LOST = 2  # single shot that lost arbitration or met an error
+# Status of CAN_TX_DONE.
+TX_SENT: Final = 0
+TX_ABORTED: Final = 1  # aborted on request before it started
+TX_LOST: Final = 2  # single shot that lost arbitration or met an error
 
-    ROW = 10  # numbers in a row of a queue
-    ROW_KIND = 2  # where the kind stands in it
-else:
-    globals()["NEVER"] = 1 << 62  # too long for an enum: a macro in C, so Python gets it here
+ROW: Final = 10  # numbers in a row of a queue
+ROW_KIND: Final = 2  # where the kind stands in it
 
 
+@cython.cclass
 class Outbox:
     """What takes the stamped messages of a board: a queue, or the wires of the robot, which carry them on at once."""
 
+    @cython.ccall
     def push(
         self,
         time: cython.longlong,
@@ -79,6 +79,7 @@ class Outbox:
     ) -> None:
         """Take a message: its stamp (ns), `order`, kind, six integers, and an object where the kind has one."""
 
+    @cython.ccall
     def request(
         self,
         time: cython.longlong,
@@ -93,12 +94,41 @@ class Outbox:
         self.push(time, 0, CAN_REQUEST, controller, buffer, identifier, flags, lo, hi)
 
 
+@cython.final
+@cython.cclass
 class EventQueue(Outbox):
     """Messages sorted by (time, order, arrival), as rows that follow each other in one array.
 
     A new message mostly belongs at the end; else those after it move up by one row. `take` moves the first message
     into the fields `time, order, kind, a ... f, ref` of the queue itself.
     """
+
+    # what a message touches
+    head: cython.longlong
+    tail: cython.longlong
+    head_time: cython.longlong
+    size: cython.longlong
+    rows: cython.p_longlong
+    place: cython.longlong
+    pushed: cython.longlong
+    came: cython.p_longlong
+    ref: object
+    time: cython.longlong
+    order: cython.longlong
+    kind: cython.longlong
+    a: cython.longlong
+    b: cython.longlong
+    c: cython.longlong
+    d: cython.longlong
+    e: cython.longlong
+    f: cython.longlong
+    due: cython.p_longlong
+    urgent_until: cython.longlong
+    refs: list
+    # what the three addresses lead into: kept here, exchanged only by methods that set them too
+    rows_kept: Annotated[cython.longlong[::1], "readonly"]
+    came_kept: Annotated[cython.longlong[::1], "readonly"]
+    due_kept: Annotated[cython.longlong[::1], "readonly"]
 
     def __init__(self, capacity=256) -> None:
         # a row is ROW numbers: time, order, kind, a ... f, and the place in `refs` of its object (0: it has none)
@@ -125,6 +155,7 @@ class EventQueue(Outbox):
         self.urgent_until = -1
         self._find_numbers()
 
+    @cython.cfunc
     def _find_numbers(self) -> None:
         """Set `rows`, `came` and `due`, by which the arrays kept under their names are read and written.
 
@@ -193,6 +224,8 @@ class EventQueue(Outbox):
             self.refs[place] = ref
             self.rows[at + 9] = place
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def put(
         self,
         time: cython.longlong,
@@ -240,12 +273,15 @@ class EventQueue(Outbox):
         self.pushed += 1
         return at
 
+    @cython.cfunc
     def _move_up(self, at: cython.longlong) -> cython.void:
         """The row that ends at `at` makes room for one before it."""
         i: cython.longlong
         for i in range(at, at + 10):
             self.rows[i] = self.rows[i - 10]
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def take(self) -> cython.bint:
         """Move the first message into the fields of the queue; False when the queue is empty."""
         at: cython.longlong = self.head
@@ -282,6 +318,7 @@ class EventQueue(Outbox):
             self.head_time = self.rows[at]
         return True
 
+    @cython.ccall
     def clear(self) -> cython.void:
         """Forget every queued message."""
         while self.take():

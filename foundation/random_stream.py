@@ -5,9 +5,7 @@ stream is one integer of state and two streams differ as soon as their names or 
 """
 
 import cython
-
-if not cython.compiled:
-    from math import log, sqrt
+from cython.cimports.libc.math import log, sqrt
 
 _MASK = 0xFFFFFFFFFFFFFFFF
 
@@ -20,8 +18,17 @@ def stream_key(seed: int, name: str) -> int:
     return key
 
 
+@cython.cclass
 class RandomStream:
     """Random numbers of one noise source. `seed`: any integer; `name`: unique per source."""
+
+    name: str
+    state: cython.ulonglong
+    increment: cython.ulonglong
+    multiplier_1: cython.ulonglong
+    multiplier_2: cython.ulonglong
+    spare: cython.double
+    has_spare: cython.bint
 
     def __init__(self, seed, name) -> None:
         self.name = name
@@ -32,6 +39,7 @@ class RandomStream:
         self.spare = 0.0
         self.has_spare = False
 
+    @cython.ccall
     def bits(self) -> cython.ulonglong:
         """The next 64 random bits."""
         z: cython.ulonglong
@@ -48,15 +56,18 @@ class RandomStream:
             z = ((z ^ (z >> 27)) * self.multiplier_2) & 0xFFFFFFFFFFFFFFFF
         return z ^ (z >> 31)
 
+    @cython.ccall
     def uniform(self) -> cython.double:
         """Uniform in [0, 1), a multiple of 2^-53."""
         return (self.bits() >> 11) * (1.0 / 9007199254740992.0)
 
+    @cython.ccall
     def integer(self, n: cython.longlong) -> cython.longlong:
         """Uniform in 0 ... n-1 for n below 2^53."""
         scaled: cython.double = self.uniform() * n
         return cython.cast(cython.longlong, scaled) if cython.compiled else int(scaled)
 
+    @cython.ccall
     def normal(self) -> cython.double:
         """Standard normal (Marsaglia's polar method, two values per round)."""
         u: cython.double

@@ -4,6 +4,7 @@
 
 import array
 import hashlib
+from typing import Annotated
 
 import cython
 
@@ -11,12 +12,25 @@ import cython
 DIGEST_BYTES = 32
 
 
+@cython.cclass
 class RowStream:
     """Rows of 64-bit values collected into blocks. `hashed`: feed the blocks to BLAKE2b as well.
 
     code: "q" for whole numbers, "d" for doubles. A row is written into `integers` or `reals` from `used` on, then
     told by `finish_row`. `number` tells streams of one kind apart.
     """
+
+    used: cython.longlong
+    capacity: cython.longlong
+    last_time_ns: cython.longlong
+    number: cython.longlong
+    numbers: cython.p_longlong
+    columns: cython.longlong
+    integers: Annotated[cython.longlong[::1], "readonly"]
+    reals: cython.double[::1]
+    is_real: cython.bint
+    digest: object
+    sink: object
 
     def __init__(self, code, columns, hashed, block_rows=512, number=0) -> None:
         self.number = number
@@ -32,6 +46,7 @@ class RowStream:
         self.digest = hashlib.blake2b(digest_size=DIGEST_BYTES) if hashed else None
         self.sink = None
 
+    @cython.ccall
     def finish_row(self, time_ns: cython.longlong) -> None:
         """Close the row that was just written from `used` on."""
         self.used += self.columns
@@ -39,7 +54,8 @@ class RowStream:
         if self.used == self.capacity:
             self.flush()
 
-    def flush(self) -> None:
+    @cython.ccall
+    def flush(self) -> object:
         """Hash and hand over what the block holds."""
         if self.used == 0:
             return
@@ -52,6 +68,8 @@ class RowStream:
         self.used = 0
 
 
+@cython.final
+@cython.cclass
 class FrameStream(RowStream):
     """The frames of bus `bus` (0 ... 15), hashed: three numbers a row, in order of their start.
 
@@ -61,6 +79,7 @@ class FrameStream(RowStream):
     def __init__(self, bus) -> None:
         RowStream.__init__(self, "q", 3, True, number=bus)
 
+    @cython.ccall
     def add(
         self,
         time_ns: cython.longlong,

@@ -32,11 +32,13 @@ to 250 us late. Sensors show a straight line over a step (voltages) or stand thr
 """
 
 import array
+from typing import Final
 
 import cython
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.board import Board
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.records.sampler import Sampler
@@ -44,22 +46,43 @@ from ranger_sim.harness.step_watch import SerialDevice, StepEnd, StepWatch
 from ranger_sim.harness.wiring.board_wires import BoardWires, SspWire, WordWire
 from ranger_sim.plant.plant import Plant
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER
-
-    # Why `run` returned.
-    REACHED_TIME = 0
-    REACHED_STEPS = 1
-    REACHED_DISTANCE = 2
-    FELL = 3
-    A_WATCHER_STOPPED = 4
+# Why `run` returned.
+REACHED_TIME: Final = 0
+REACHED_STEPS: Final = 1
+REACHED_DISTANCE: Final = 2
+FELL: Final = 3
+A_WATCHER_STOPPED: Final = 4
 
 WINDOW_NS = 31_000  # the lookahead
 ANY_DISTANCE_M = 1e300
 
 
+@cython.final
+@cython.cclass
 class Lockstep:
     """Boards, buses and plant on one clock. Built by `harness.machine.Machine`, which wires it."""
+
+    plant: Plant
+    boards: list
+    buses: list
+    wires: list
+    word_wires: list
+    encoder_wires: list
+    time: cython.longlong
+    window_ns: cython.longlong
+    stop_steps: cython.longlong
+    stop_distance_m: cython.double
+    sampler: Sampler
+    strikes: StepEnd
+    watchers: list
+    serial_device: SerialDevice
+    encoder_boards: cython.longlong[::1]
+    due: cython.longlong[::1]
+    came: cython.longlong[::1]
+    prompt: cython.longlong[::1]
+    step_times: cython.longlong[::1]
+    side_by_side: cython.bint
+    stop_wanted: cython.bint
 
     def __init__(self, plant, boards, buses, sampler, start_ns) -> None:
         # the compiled loop takes these for what they should be without asking again
@@ -204,6 +227,7 @@ class Lockstep:
         self.stop_steps = NEVER if steps is None else steps
         self.stop_distance_m = ANY_DISTANCE_M if distance_m is None else distance_m
 
+    @cython.ccall
     def run(self, until: cython.longlong) -> cython.longlong:
         """Advance to `until` (ns) or until the walk is over; returns one of the reasons above."""
         plant: Plant = self.plant
@@ -252,6 +276,7 @@ class Lockstep:
         due[board_count] = self._decide(self.time - 1)
         return reason
 
+    @cython.cfunc
     @cython.final
     def _run_in_turn(self, end: cython.longlong, last: cython.bint) -> cython.longlong:
         """Run boards and buses to `end` (ns), always the one that is due first; returns when the next one is.
@@ -297,6 +322,7 @@ class Lockstep:
                     due[i] = self._advance(i, end)
         return first
 
+    @cython.cfunc
     @cython.final
     def _run_side_by_side(self, end: cython.longlong) -> cython.longlong:
         """Run boards that run apart, and buses, to `end` (ns) in windows; returns how many there were."""
@@ -331,6 +357,7 @@ class Lockstep:
             windows += 1
         return windows
 
+    @cython.cfunc
     @cython.final
     def _advance(self, place: cython.longlong, until: cython.longlong) -> cython.longlong:
         """Run a board to `until` (ns) or less; returns when it is due again."""
@@ -348,6 +375,7 @@ class Lockstep:
             wires.silent_until = following
         return following
 
+    @cython.cfunc
     def _walk_is_over(self) -> cython.longlong:
         """One of the reasons above why the walk ends here, or 0."""
         if self.plant.fell:
@@ -358,6 +386,7 @@ class Lockstep:
             return REACHED_DISTANCE
         return REACHED_TIME
 
+    @cython.cfunc
     def _decide(self, until: cython.longlong) -> cython.longlong:
         """Let every bus decide what starts up to and including `until` (ns); returns their next instant of interest."""
         bus: Bus
@@ -374,6 +403,7 @@ class Lockstep:
                 first = next_time
         return first
 
+    @cython.cfunc
     def _sense(self) -> None:
         """What the plant's sensors showed during the step that was just integrated."""
         plant: Plant = self.plant
@@ -396,6 +426,7 @@ class Lockstep:
         if self.serial_device is not None:
             cython.cast(SerialDevice, self.serial_device).deliver()
 
+    @cython.cfunc
     def _watch_before(self, now: cython.longlong) -> cython.bint:
         """Every watcher once per step, before it; True when one of them wants to stop here."""
         watch: StepWatch
@@ -408,12 +439,14 @@ class Lockstep:
             return True
         return False
 
+    @cython.cfunc
     def _watch_after(self, start: cython.longlong, end: cython.longlong) -> None:
         """Every watcher once per step, when the sensors of that step are known and no board has seen them."""
         watch: StepWatch
         for watch in list(self.watchers):
             watch.after_step(start, end)
 
+    @cython.cfunc
     def _show_words(self) -> cython.void:
         """What the absolute encoders hold at the start of the step: their words stand until the next one."""
         plant: Plant = self.plant

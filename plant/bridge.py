@@ -3,19 +3,23 @@
 import cython
 
 
+@cython.cclass
 class Bridge:
     """Takes what a board writes, with the instant. Ranger's H-bridge is `plant.electrics.drive.Drive`."""
 
+    @cython.ccall
     def write_pwm(
         self, time: cython.longlong, mr2: cython.longlong, mr6: cython.longlong, mr0: cython.longlong
-    ) -> None:
+    ) -> object:
         """Match values of both leads and of the period, in counts, from `time` (ns) on."""
         return
 
-    def watchdog_edge(self, time: cython.longlong) -> None:
+    @cython.ccall
+    def watchdog_edge(self, time: cython.longlong) -> object:
         """The watchdog line changed its level at `time` (ns)."""
         return
 
-    def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> None:
+    @cython.ccall
+    def low_side(self, time: cython.longlong, enable2: cython.bint, enable6: cython.bint) -> object:
         """The low-side enables of both leads from `time` (ns) on."""
         return

@@ -20,6 +20,7 @@ import cython
 from ranger_sim.foundation.numbers import integers
 
 
+@cython.cclass
 class Plant:
     """A body that moves in steps of `step_ns`. Subclasses fill in `step` and `fill_sample`.
 
@@ -32,6 +33,20 @@ class Plant:
 
     Towards faults, for those that a machine's places take: `encoder_rad`, `analog_line`, `analog_value`.
     """
+
+    # what every step looks at stands first, beside each other
+    time_ns: cython.longlong
+    step_ns: cython.longlong
+    steps: cython.longlong
+    distance_m: cython.double
+    fell: cython.bint
+    words: cython.longlong[::1]
+    analog_start: cython.double[::1]
+    analog_end: cython.double[::1]
+    fall_cause: str
+    bridges: list
+    encoders: list
+    sample_names: object
 
     def __init__(self, step_ns, start_ns=0, voltages=0, words=0, samples=None) -> None:
         self.step_ns = step_ns
@@ -47,7 +62,8 @@ class Plant:
         self.fell = False
         self.fall_cause = ""
 
-    def step(self) -> None:
+    @cython.ccall
+    def step(self) -> object:
         """Integrate over [time_ns, time_ns + step_ns], then show it: time_ns, edges, voltages, words."""
         raise NotImplementedError
 
@@ -63,6 +79,7 @@ class Plant:
         """What that sensor measures now, in its unit."""
         raise NotImplementedError
 
+    @cython.ccall
     def fill_sample(self, row: cython.double[::1]) -> object:
         """Write the values named in `sample_names` into `row`, in their order."""
         return None

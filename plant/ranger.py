@@ -13,9 +13,9 @@ import numpy as np
 
 from ranger_sim.plant.electrics.electrics import Electrics
 from ranger_sim.plant.electrics.motor_unit import MotorUnit
-from ranger_sim.plant.mechanics.body import Body
+from ranger_sim.plant.mechanics.body import FALLEN, Body
 from ranger_sim.plant.mechanics.floor import Floor
-from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.plant.mechanics.steering import Steering
 from ranger_sim.plant.mechanics.walk_record import RING
@@ -24,13 +24,9 @@ from ranger_sim.plant.sensors.absolute_encoder import AbsoluteEncoder
 from ranger_sim.plant.sensors.imu import Imu
 from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
 from ranger_sim.plant.walking import handling
-
-if not cython.compiled:
-    from ranger_sim.plant.mechanics.body import FALLEN
-    from ranger_sim.plant.mechanics.leg import INNER, OUTER
-    from ranger_sim.plant.walking.motion import advance
-    from ranger_sim.plant.walking.watch import fall
-    from ranger_sim.plant.wiring_points import HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
+from ranger_sim.plant.walking.motion import advance
+from ranger_sim.plant.walking.watch import fall
+from ranger_sim.plant.wiring_points import HIP_WORD, INNER_ANKLE_WORD, OUTER_ANKLE_WORD
 
 STEP_NS = 250_000  # the plant's step; its error is measured in EQUATIONS 15
 
@@ -81,12 +77,45 @@ SAMPLES = {
 HIP_BOUNCE = 0.01
 
 
+@cython.final
+@cython.cclass
 class RangerPlant(Plant):
     """The robot's physics. `seed`: of every noise and foothold; `model_file`: additional named terms (plant/terms.py).
 
     `parameters`: BodyParameters, `electrics`: ElectricsParameters, `floor`: Floor (built from slope and roughness
     when None). `start_ns`: virtual time at power-up.
     """
+
+    # what every step looks at stands first, beside each other
+    changes: cython.longlong
+    step_s: cython.double
+    zero: cython.double
+    body: Body
+    electrics: Electrics
+    steering: Steering
+    hip: MotorUnit
+    outer_ankle: MotorUnit
+    inner_ankle: MotorUnit
+    steering_motor: MotorUnit
+    hip_joint: IncrementalEncoder
+    hip_motor: IncrementalEncoder
+    outer_motor: IncrementalEncoder
+    outer_joint: IncrementalEncoder
+    inner_motor: IncrementalEncoder
+    inner_joint: IncrementalEncoder
+    hip_word: AbsoluteEncoder
+    outer_word: AbsoluteEncoder
+    inner_word: AbsoluteEncoder
+    imu: Imu
+    jumped: cython.bint
+    strike_time_ns: cython.longlong
+    lift_off_time_ns: cython.longlong
+    step_length_m: cython.double
+    motors: list
+    parameters: object
+    floor: object
+    record: object
+    model_file: object
 
     def __init__(
         self,
@@ -153,6 +182,8 @@ class RangerPlant(Plant):
 
     # ---- what the operator does -------------------------------------------------------------------------------
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def hold(
         self,
         stance: object = "outer",
@@ -180,6 +211,8 @@ class RangerPlant(Plant):
             handling.hold_standing(b, outer, hip_angle_rad, OUTER if stance == "outer" else INNER)
         self._settle()
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def release(self, rate_rad_s: cython.double, hip_rate_rad_s: cython.double = 0.0) -> cython.void:
         """Let go at this rate of the legs, forward; the standing foot rolls along with its ankle at rest."""
         b: Body = self.body
@@ -188,6 +221,8 @@ class RangerPlant(Plant):
         handling.release(b, rate_rad_s, b.stance.side, rate_rad_s, hip_rate_rad_s)
         self.begin()
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def begin(self) -> cython.void:
         """Everything that counts from the moment the robot is let go."""
         for motor in self.motors:
@@ -195,6 +230,8 @@ class RangerPlant(Plant):
         self.steering.begin(self.body.hip_x)
         self._note()
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def _settle(self) -> cython.void:
         """Sensors as if the robot had stood like this for long, from here on."""
         b: Body = self.body
@@ -314,6 +351,7 @@ class RangerPlant(Plant):
         if b.changes != self.changes:
             self._note()
 
+    @cython.ccall
     def _note(self) -> None:
         """Copy what a harness asks for every step out of the record; only after something happened."""
         r = self.record

@@ -3,58 +3,58 @@
 Plain numbers, no behaviour: the plant fills arrays in this order and the assembly wires them to pins.
 """
 
-import cython
+from typing import Final
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    # Motors, drives and boards.
-    HIP = 0
-    OUTER_ANKLE = 1
-    INNER_ANKLE = 2
-    STEERING = 3
-    MOTOR_COUNT = 4
+import cython  # noqa: F401  (compiled: its constants are C constants for other modules)
 
-    # Voltages (V at the converter's pin; differential inputs: the difference). Per motor three in a row, so
-    # index = PER_MOTOR x motor + one of the first three numbers.
-    MOTOR_CURRENT = 0
-    BATTERY_CURRENT = 1
-    BATTERY_VOLTAGE = 2
-    PER_MOTOR = 3
-    HIP_MOTOR_CURRENT = 0
-    HIP_BATTERY_CURRENT = 1
-    HIP_BATTERY_VOLTAGE = 2
-    OUTER_ANKLE_MOTOR_CURRENT = 3
-    OUTER_ANKLE_BATTERY_CURRENT = 4
-    OUTER_ANKLE_BATTERY_VOLTAGE = 5
-    INNER_ANKLE_MOTOR_CURRENT = 6
-    INNER_ANKLE_BATTERY_CURRENT = 7
-    INNER_ANKLE_BATTERY_VOLTAGE = 8
-    STEERING_MOTOR_CURRENT = 9
-    STEERING_BATTERY_CURRENT = 10
-    STEERING_BATTERY_VOLTAGE = 11
-    OUTER_FOOT_LEFT = 12
-    OUTER_FOOT_RIGHT = 13
-    INNER_FOOT_LEFT = 14
-    INNER_FOOT_RIGHT = 15
-    STEERING_ANGLE = 16
-    ROUTER_CURRENT = 17
-    ROUTER_VOLTAGE = 18
-    ANALOG_COUNT = 19
+# Motors, drives and boards.
+HIP: Final = 0
+OUTER_ANKLE: Final = 1
+INNER_ANKLE: Final = 2
+STEERING: Final = 3
+MOTOR_COUNT: Final = 4
 
-    # Absolute encoders: 13-bit words.
-    HIP_WORD = 0
-    OUTER_ANKLE_WORD = 1
-    INNER_ANKLE_WORD = 2
-    WORD_COUNT = 3
+# Voltages (V at the converter's pin; differential inputs: the difference). Per motor three in a row, so
+# index = PER_MOTOR x motor + one of the first three numbers.
+MOTOR_CURRENT: Final = 0
+BATTERY_CURRENT: Final = 1
+BATTERY_VOLTAGE: Final = 2
+PER_MOTOR: Final = 3
+HIP_MOTOR_CURRENT: Final = 0
+HIP_BATTERY_CURRENT: Final = 1
+HIP_BATTERY_VOLTAGE: Final = 2
+OUTER_ANKLE_MOTOR_CURRENT: Final = 3
+OUTER_ANKLE_BATTERY_CURRENT: Final = 4
+OUTER_ANKLE_BATTERY_VOLTAGE: Final = 5
+INNER_ANKLE_MOTOR_CURRENT: Final = 6
+INNER_ANKLE_BATTERY_CURRENT: Final = 7
+INNER_ANKLE_BATTERY_VOLTAGE: Final = 8
+STEERING_MOTOR_CURRENT: Final = 9
+STEERING_BATTERY_CURRENT: Final = 10
+STEERING_BATTERY_VOLTAGE: Final = 11
+OUTER_FOOT_LEFT: Final = 12
+OUTER_FOOT_RIGHT: Final = 13
+INNER_FOOT_LEFT: Final = 14
+INNER_FOOT_RIGHT: Final = 15
+STEERING_ANGLE: Final = 16
+ROUTER_CURRENT: Final = 17
+ROUTER_VOLTAGE: Final = 18
+ANALOG_COUNT: Final = 19
 
-    # Incremental encoders: edges of channel A (robot.md N4.1: which capture input each one has).
-    HIP_JOINT_EDGES = 0  # MCH capture 0
-    HIP_MOTOR_EDGES = 1  # MCH capture 2
-    OUTER_MOTOR_EDGES = 2  # MCFO capture 0
-    OUTER_ANKLE_EDGES = 3  # MCFO capture 2
-    INNER_MOTOR_EDGES = 4  # MCFI capture 0
-    INNER_ANKLE_EDGES = 5  # MCFI capture 2
-    ENCODER_COUNT = 6
+# Absolute encoders: 13-bit words.
+HIP_WORD: Final = 0
+OUTER_ANKLE_WORD: Final = 1
+INNER_ANKLE_WORD: Final = 2
+WORD_COUNT: Final = 3
+
+# Incremental encoders: edges of channel A (robot.md N4.1: which capture input each one has).
+HIP_JOINT_EDGES: Final = 0  # MCH capture 0
+HIP_MOTOR_EDGES: Final = 1  # MCH capture 2
+OUTER_MOTOR_EDGES: Final = 2  # MCFO capture 0
+OUTER_ANKLE_EDGES: Final = 3  # MCFO capture 2
+INNER_MOTOR_EDGES: Final = 4  # MCFI capture 0
+INNER_ANKLE_EDGES: Final = 5  # MCFI capture 2
+ENCODER_COUNT: Final = 6
 
 # In the order of these numbers.
 MOTOR_NAMES = ("hip", "outer_ankle", "inner_ankle", "steering")

@@ -1,37 +1,56 @@
-"""Where the rooms are, and whether they run compiled: decided once, when `ranger_sim` is imported.
+"""Whether the compiled modules run, decided once, when `ranger_sim` is imported.
 
-The rooms are folders beside this package in a checkout and inside it when installed. Their compiled modules are all in
-one shared library, `ranger_sim._compiled` (setup.py builds it, and says why one). It is not used when the environment
-variable ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``, not when the last build failed
-(setup.py leaves a record of it), and not when the sources of a checkout have changed since they were built: then what
-stands there runs. A finder then loads a module of the rooms from the library, or else from its plain Python source, and
-from nothing else that may lie beside it. ``RANGER_SIM_TABLE`` names a folder with a user's own master
-table: what is generated from the table is then found there.
+A module that says `import cython` is compiled where a C compiler is found (setup.py). In an installation its library
+lies next to its source, where Python finds it by itself. In a checkout the libraries are below `build/compiled`; they
+are used while they are those of the sources as they are, and not when the environment variable
+``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``. All of them or none: a compiled module reads
+the fields of another one's classes at fixed places.
+
+``RANGER_SIM_TABLE`` names a folder with a user's own master table (`datatable/__init__.py`).
 """
 
-import importlib
-import importlib.machinery
-import importlib.util
+import hashlib
 import json
 import os
+import re
 import sys
-from collections.abc import Iterator, Sequence
+import sysconfig
+from collections.abc import Iterator
+from importlib.machinery import (
+    EXTENSION_SUFFIXES,
+    SOURCE_SUFFIXES,
+    ExtensionFileLoader,
+    FileFinder,
+    ModuleSpec,
+    SourceFileLoader,
+)
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ranger_sim import rooms
-from ranger_sim.declared_fields import DeclaredFieldsLoader
-from ranger_sim.rooms import ROOMS
-
-SHARED = "ranger_sim._shared"  # Cython's helpers, which all compiled modules use
-PACKAGE = Path(__file__).resolve().parent
-# in a checkout the rooms stand beside this package
-HOUSE = PACKAGE if (PACKAGE / ROOMS[0]).is_dir() else PACKAGE.parent
-BUILD_RECORD = PACKAGE / "build_record.json"
+PACKAGE = Path(__file__).parent
+# In a checkout the packages are links to the folders next to this one.
+CHECKOUT = PACKAGE.resolve().parent if (PACKAGE / "foundation").is_symlink() else None
+COMPILED = CHECKOUT / "build" / "compiled" / sysconfig.get_config_var("SOABI") if CHECKOUT is not None else None
+RECORD = "build_record.json"
+IS_COMPILED = re.compile(rb"^import cython\b", re.MULTILINE)
 # a folder with a master table of the user's own and, in `generated`, what was made from it (`ranger-sim table copy`)
 OWN_TABLE = Path(os.environ["RANGER_SIM_TABLE"]).resolve() if os.environ.get("RANGER_SIM_TABLE") else None
-GENERATED = "ranger_sim.datatable.generated"
+
+
+def packages() -> tuple[str, ...]:
+    """Names of the packages of Python code inside `ranger_sim`, sorted."""
+    return tuple(sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py")))
+
+
+def refuse_files_for_links() -> None:
+    """ImportError where a checkout or an unpacking program has made files of the links to the packages."""
+    for path in PACKAGE.iterdir():
+        if path.is_file() and path.suffix == "" and path.read_bytes() == f"../{path.name}".encode():
+            raise ImportError(
+                f"{path} is a file and not a link to the folder ../{path.name}: check out again with links "
+                "(git config core.symlinks true, on Windows in developer mode), or install a wheel"
+            )
 
 
 def interpreted_is_forced() -> bool:
@@ -39,90 +58,119 @@ def interpreted_is_forced() -> bool:
     return os.environ.get("RANGER_SIM_INTERPRETED", "") not in ("", "0")
 
 
-def why_not_compiled() -> str:
-    """Why there are no compiled modules to use, in one line; empty when the last build compiled everything."""
+def declared_modules() -> Iterator[str]:
+    """Names of the modules that are compiled where a compiler is found."""
+    for place, (_, _, mark) in sources({}).items():
+        if mark and place.endswith(".py"):
+            yield module_at(place)
+
+
+def module_at(place: str) -> str:
+    """Name of the module whose source is at a place inside the package, as "boards/hip.py"."""
+    return f"ranger_sim.{place.removesuffix('.py').replace('/', '.')}"
+
+
+def sources(known: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    """{place inside the package: [time of its change in ns, size, mark of its content]} of all sources, sorted.
+
+    The mark is empty for a module that is not compiled. known: the same of an earlier time; a file whose time and size
+    are equal is not read again.
+    """
+    found = {}
+    for package in packages():
+        for folder, inside, files in os.walk(PACKAGE / package):
+            inside[:] = [each for each in inside if each != "__pycache__"]
+            for file in files:
+                if file.endswith((".py", ".pxd")):
+                    path = Path(folder, file)
+                    place = path.relative_to(PACKAGE).as_posix()
+                    status = path.stat()
+                    before = known.get(place)
+                    if before is not None and before[:2] == [status.st_mtime_ns, status.st_size]:
+                        found[place] = before
+                        continue
+                    content = path.read_bytes()
+                    mark = ""
+                    if file.endswith(".pxd") or IS_COMPILED.search(content):
+                        mark = hashlib.blake2b(content, digest_size=6).hexdigest()
+                    found[place] = [status.st_mtime_ns, status.st_size, mark]
+    return dict(sorted(found.items()))
+
+
+def read_record(folder: Path | None) -> dict[str, Any]:
+    """What the build wrote: {"compiled": bool, "reason": why not, "sources": as `sources` gives them}."""
+    record: dict[str, Any] = {"compiled": False, "sources": {}}
+    if folder is None:
+        return record | {"reason": "nothing was built here"}
+    try:
+        written = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        record |= written | {
+            "sources": {place: [*map(int, each[:2]), each[2]] for place, each in written["sources"].items()}
+        }
+        return record | {"reason": f"not compiled when it was built: {record['reason']}"}
+    except FileNotFoundError:
+        return record | {"reason": "nothing was built here"}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        return {
+            "compiled": False,
+            "sources": {},
+            "reason": f"{folder / RECORD} is not readable ({error!r}): build again",
+        }
+
+
+def why_interpreted(record: dict[str, Any]) -> str:
+    """Why the sources run, in one line; empty when the compiled modules do."""
     if interpreted_is_forced():
         return "RANGER_SIM_INTERPRETED is set"
-    try:
-        record = json.loads(BUILD_RECORD.read_text(encoding="utf-8"))
-        return "" if record["compiled"] else f"not compiled when it was built: {record['reason']}"
-    except FileNotFoundError:
-        return "nothing was built here"
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        return f"{BUILD_RECORD} is not readable ({error!r}): build again"
-
-
-def load_library() -> tuple[Any, str]:
-    """The library of compiled modules, or None; why the plain sources run, or an empty string."""
-    reason = why_not_compiled()
-    if reason:
-        return None, reason
-    try:
-        library = importlib.import_module("ranger_sim._compiled")
-    except ImportError as error:
-        return None, f"the compiled modules cannot be loaded ({error}): build again"
-    reason = why_out_of_date(library) if HOUSE != PACKAGE else ""
-    return (None, reason) if reason else (library, "")
-
-
-def why_out_of_date(library: Any) -> str:
-    """Which sources of a checkout are not those of the library, in one line; empty when all are."""
-    built = dict(mark.split("=") for mark in getattr(library, "sources", "").split())
-    now = rooms.marks_of_sources(HOUSE)
-    other = sorted(path for path in built.keys() | now.keys() if built.get(path) != now.get(path))
+    if not record["compiled"]:
+        return str(record["reason"])
+    if CHECKOUT is None:
+        return ""
+    built, now = (
+        {place: each[2] for place, each in of.items()} for of in (record["sources"], sources(record["sources"]))
+    )
+    other = sorted(place for place in built.keys() | now.keys() if built.get(place, "") != now.get(place, ""))
     if not other:
         return ""
     more = f" and {len(other) - 1} more" if len(other) > 1 else ""
-    return f"{other[0]}{more} changed since the library was built: `make setup` builds it again"
+    return f"{other[0]}{more} changed since the build: `make setup` builds again"
 
 
-class LibraryLoader(importlib.machinery.ExtensionFileLoader):
-    """Loads one module out of the library; CPython's own loader knows only libraries that hold a single module."""
+class OneOfTwo(FileFinder):
+    """Finds the modules of one folder of the package: the source, or its library in another folder first."""
 
-    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
-        """The module that the spec names, not yet executed (PEP 489)."""
-        return LIBRARY.create(spec)
+    def __init__(self, folder: str, libraries: Path | None) -> None:
+        super().__init__(folder, (SourceFileLoader, SOURCE_SUFFIXES))
+        self.libraries = libraries and FileFinder(str(libraries), (ExtensionFileLoader, EXTENSION_SUFFIXES))
 
-
-class RoomFinder:
-    """Meta-path finder for the rooms and their modules: from the library if that holds them, or from .py files."""
-
-    @staticmethod
-    def find_spec(
-        fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> importlib.machinery.ModuleSpec | None:
-        """The spec of a room or of a module inside one; None for everything else."""
-        package, _, rest = fullname.partition(".")
-        room, _, inside = rest.partition(".")
-        if fullname in COMPILED_MODULES or fullname == SHARED:
-            loader = LibraryLoader(fullname, LIBRARY.__file__)
-            return importlib.util.spec_from_file_location(fullname, LIBRARY.__file__, loader=loader)
-        if package != "ranger_sim" or room not in ROOMS:
-            return None
-        sources = (DeclaredFieldsLoader, importlib.machinery.SOURCE_SUFFIXES)
-        if fullname == GENERATED and OWN_TABLE is not None:
-            path = (str(OWN_TABLE),)
-        for folder in (path or ()) if inside else (str(HOUSE),):
-            spec = importlib.machinery.FileFinder(folder, sources).find_spec(fullname)
-            if spec is not None:
-                return spec
-        if fullname == GENERATED and OWN_TABLE is not None:
-            from ranger_sim.foundation.user_error import UserError
-
-            raise UserError(
-                f"RANGER_SIM_TABLE: nothing was generated in {OWN_TABLE}: unset RANGER_SIM_TABLE, then "
-                f"ranger-sim table generate --master {OWN_TABLE}"
-            )
-        return None
+    def find_spec(self, fullname: str, target: ModuleType | None = None) -> ModuleSpec | None:
+        """The library's spec where there is one, or else the source's."""
+        spec = self.libraries.find_spec(fullname, target) if self.libraries else None
+        return spec if spec is not None and spec.loader is not None else super().find_spec(fullname, target)
 
 
-def declared_modules() -> Iterator[str]:
-    """Names of the modules that are compiled where a compiler is found."""
-    return rooms.declared_modules(HOUSE)
+def choose(libraries: Path | None) -> None:
+    """Let every folder of the package have its compiled modules in `libraries`, or none for None."""
+
+    def finder(folder: str) -> OneOfTwo:
+        path = Path(folder)
+        if path != PACKAGE and PACKAGE not in path.parents:
+            raise ImportError  # not ours: the next one in sys.path_hooks
+        return OneOfTwo(folder, libraries and libraries / "ranger_sim" / path.relative_to(PACKAGE))
+
+    sys.path_hooks.insert(0, finder)
+    sys.path_importer_cache.pop(str(PACKAGE), None)
 
 
 # decided once: modules are not exchanged while a process runs
-LIBRARY, RUNS_INTERPRETED_BECAUSE = load_library()
-COMPILED_MODULES = frozenset(LIBRARY.names.split() if LIBRARY else ()) - {SHARED}
+refuse_files_for_links()
+BUILD = read_record(COMPILED if CHECKOUT is not None else PACKAGE)
+RUNS_INTERPRETED_BECAUSE = why_interpreted(BUILD)
 RUNS_COMPILED = not RUNS_INTERPRETED_BECAUSE
-sys.meta_path.insert(0, RoomFinder)
+COMPILED_MODULES = frozenset(
+    module_at(place)
+    for place, (_, _, mark) in BUILD["sources"].items()
+    if RUNS_COMPILED and mark and place.endswith(".py")
+)
+if (CHECKOUT is not None) == RUNS_COMPILED:  # else Python's own way is right: libraries next to sources, or no library
+    choose(COMPILED if RUNS_COMPILED else None)

@@ -8,7 +8,7 @@ The line to the computer is one of two ports (robot.md N4.15): HS-UART1 with a w
 Bluetooth module, 464.3 kbaud and hardware flow control; `quirks.computer_link` says which.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import cython
 
@@ -33,11 +33,10 @@ from ranger_sim.firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
 from ranger_sim.foundation.events import SSP_SEGMENT, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    EXECUTION_TIMER_HZ = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
-    EXECUTION_TIMER_MHZ = 13
-    HEARTBEAT_BIT = 8  # of the network time
-    HEARTBEAT_MS = 50
+EXECUTION_TIMER_HZ: Final = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
+EXECUTION_TIMER_MHZ: Final = 13
+HEARTBEAT_BIT: Final = 8  # of the network time
+HEARTBEAT_MS: Final = 50
 
 # Both edges of slave select: stop and restart two DMA channels; about 300 instructions of C (chosen by us).
 SEGMENT_CYCLES = 450
@@ -61,11 +60,29 @@ DMA_CYCLES = 450
 RESTART_CYCLES = 500
 
 
+@cython.cclass
 class MainBrainBoard(FirmwareBoard):
     """`controller`: name of a parameter set, path of a .toml file, or a loaded Controller.
 
     Open to the harness and to tests: `store` (the data table), `estimator`, `modes`, `errors`, `distribution`.
     """
+
+    distribution: object
+    controller: object
+    program: str
+    store: DataStore
+    ssp: SspPort
+    link: MainBrainSspLink
+    io: IoData
+    computer_uart: HsUart
+    computer: DataLink
+    estimator: Estimator
+    modes: ModeMachine
+    heartbeat_on: cython.bint
+    execution_time_folds: cython.bint
+    heartbeat_bit: cython.longlong
+    heartbeat_until: cython.longlong
+    execution_time_id: cython.longlong
 
     def __init__(self, crystal, quirks, phase_ns=0, controller="record-2011") -> None:
         board: object = self  # a compiled class would hand out wrappers of inherited methods
@@ -119,7 +136,8 @@ class MainBrainBoard(FirmwareBoard):
         self.ssp.load(self.link.next_segment())
         self.start(self.schedule(), phase_ns)
 
-    def load_controller(self, controller) -> None:
+    @cython.ccall
+    def load_controller(self, controller) -> object:
         """Take over a parameter set; also while walking, as the computer's parameter page could.
 
         UserError for a set of another program: that one is chosen at power-up, as code would be loaded.

@@ -14,53 +14,58 @@ the return to the start of the cycle. The end of the fast or the medium list cos
 """
 
 import array
+from typing import TYPE_CHECKING, Final
 
 import cython
 
 from ranger_sim.datatable.generated import all_variables, errors
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
-from ranger_sim.firmware_sim.vic import SOFTWARE
+from ranger_sim.firmware_sim.vic import SOFTWARE, InterruptSource
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.foundation.numbers import float_of_word, wrap_i32
 
-if not cython.compiled:
-    POINTS_PER_SEGMENT = 9
-    POINT_BYTES = 10
-    SEGMENT_BYTES = 92
-    SEGMENT_SUM = 90  # where its checksum stands
-    RING_SEGMENTS = 20
-    MOST_FULL = 18  # of them: one is being filled, and one stays between writer and reader
-    HALF_FULL = 10  # what the rate controller aims at, with the one being filled
-    PACKET_BYTES = 8
-    PACKET_SUM = 6  # where its checksum stands
-    RECEIVE_RING = 500  # one place stays empty, as in all rings of the firmware
-    CHANNELS = 48
-    # Added to the identifier in a channel's value; below 2 x FAST it is such a value.
-    MEDIUM = 65536
-    FAST = 131072
-    IDENTIFIER = 65535
-    # The rate controller's sum, clipped to this, either way; its steps are the sum by 4096.
-    LARGEST_SUM = 40960
-    STEP_SHIFT = 12
-    # Phases of a cycle.
-    FAST_LIST = 0
-    MEDIUM_LIST = 1
-    ALL_VARIABLES = 2
-    RETURN = 3
-    # Bits of what is unread: BLUETOOTH, by which this link goes; and LABVIEW, which the error distribution asks.
-    NEW_FOR_COMPUTER = 1
-    COMPUTERS_BITS = 5
-    BYTE = 0xFF
-    # How a word that the computer writes is to be read.
-    NOT_ITS_OWN = 0
-    SINGLE = 1
-    SIGNED = 2
-    UNSIGNED = 3
+if TYPE_CHECKING:
+    from ranger_sim.datatable.store import DataStore
+    from ranger_sim.firmware_sim.microcontroller import Microcontroller
+
+POINTS_PER_SEGMENT: Final = 9
+POINT_BYTES: Final = 10
+SEGMENT_BYTES: Final = 92
+SEGMENT_SUM: Final = 90  # where its checksum stands
+RING_SEGMENTS: Final = 20
+MOST_FULL: Final = 18  # of them: one is being filled, and one stays between writer and reader
+HALF_FULL: Final = 10  # what the rate controller aims at, with the one being filled
+PACKET_BYTES: Final = 8
+PACKET_SUM: Final = 6  # where its checksum stands
+RECEIVE_RING: Final = 500  # one place stays empty, as in all rings of the firmware
+CHANNELS: Final = 48
+# Added to the identifier in a channel's value; below 2 x FAST it is such a value.
+MEDIUM: Final = 65536
+FAST: Final = 131072
+IDENTIFIER: Final = 65535
+# The rate controller's sum, clipped to this, either way; its steps are the sum by 4096.
+LARGEST_SUM: Final = 40960
+STEP_SHIFT: Final = 12
+# Phases of a cycle.
+FAST_LIST: Final = 0
+MEDIUM_LIST: Final = 1
+ALL_VARIABLES: Final = 2
+RETURN: Final = 3
+# Bits of what is unread: BLUETOOTH, by which this link goes; and LABVIEW, which the error distribution asks.
+NEW_FOR_COMPUTER: Final = 1
+COMPUTERS_BITS: Final = 5
+BYTE: Final = 0xFF
+# How a word that the computer writes is to be read.
+NOT_ITS_OWN: Final = 0
+SINGLE: Final = 1
+SIGNED: Final = 2
+UNSIGNED: Final = 3
 
 KINDS = {"f32": SINGLE, "i32": SIGNED, "u32": UNSIGNED}
 
 
+@cython.cclass
 class DataLink:
     """Both directions. `report(code)` hears the errors; `checked`: only parameters can be written, each
     within its limits (ROBOT PARITY: the real robot takes any value for any variable).
@@ -70,6 +75,52 @@ class DataLink:
     Counters: points, segments, steps, packets (good ones), bad_packets (bytes skipped), refused (writes to what is no
     parameter, or beyond its limits), ring_full (bytes lost because they came faster than they were parsed).
     """
+
+    chip: "Microcontroller"
+    uart: HsUart
+    store: "DataStore"
+    report: object
+    checked: cython.bint
+    dma_was_off: cython.bint
+    restart_source: "InterruptSource"
+    code_full: cython.longlong
+    code_buffer_full: cython.longlong
+    code_dma_off: cython.longlong
+    code_checksum: cython.longlong
+    code_no_parameter: cython.longlong
+    code_limit: cython.longlong
+    code_id_out_of_range: cython.longlong
+    last_id: cython.longlong
+    first_channel: cython.longlong
+    kinds: cython.longlong[::1]
+    fast: cython.longlong[::1]
+    medium: cython.longlong[::1]
+    ring: cython.longlong[::1]
+    least: cython.double[::1]
+    most: cython.double[::1]
+    segments: cython.uchar[::1]
+    filling: cython.longlong
+    sending: cython.longlong
+    used: cython.longlong
+    in_segment: cython.longlong
+    checksum: cython.longlong
+    fast_count: cython.longlong
+    medium_count: cython.longlong
+    phase: cython.longlong
+    fast_place: cython.longlong
+    medium_place: cython.longlong
+    slow_id: cython.longlong
+    rate_sum: cython.longlong
+    calls_to_wait: cython.longlong
+    points: cython.longlong
+    segments_sent: cython.longlong
+    steps: cython.longlong
+    ring_write: cython.longlong
+    ring_read: cython.longlong
+    packets: cython.longlong
+    bad_packets: cython.longlong
+    refused: cython.longlong
+    ring_full: cython.longlong
 
     def __init__(self, chip, uart, store, report, checked=True, dma_off_at_start=False) -> None:
         self.chip = chip
@@ -126,6 +177,7 @@ class DataLink:
 
     # --- to the computer --------------------------------------------------------------------------------
 
+    @cython.ccall
     def build_lists(self) -> None:
         """Row task: what the 48 channels ask for. Identifiers beyond the table are reported and left out."""
         i: cython.longlong
@@ -150,6 +202,7 @@ class DataLink:
                 self.fast[self.fast_count] = number
                 self.fast_count += 1
 
+    @cython.ccall
     def allowed_steps(self) -> cython.longlong:
         """The rate controller: steps of this call, 0 ... 10; with a sum not above 0 one, and then calls without."""
         self.rate_sum += MOST_FULL - self.used - HALF_FULL
@@ -165,6 +218,7 @@ class DataLink:
         self.calls_to_wait = -(self.rate_sum >> STEP_SHIFT)  # a shift rounds down: -1 is one call
         return 1
 
+    @cython.ccall
     def send_data(self) -> object:
         """Slot task: as many steps as are allowed; returns how many were done. A full ring ends the call."""
         allowed: cython.longlong = self.allowed_steps()
@@ -175,6 +229,8 @@ class DataLink:
         self.steps += done
         return done
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _step(self) -> cython.void:
         number: cython.longlong
         if self.phase == FAST_LIST:
@@ -206,6 +262,7 @@ class DataLink:
             if self.medium_place >= self.medium_count:
                 self.medium_place = 0
 
+    @cython.cfunc
     def _put(self, number: cython.longlong) -> None:
         """One point into the segment being filled; the computer has now read that variable."""
         at: cython.longlong = self.filling * SEGMENT_BYTES + self.in_segment * POINT_BYTES
@@ -227,10 +284,12 @@ class DataLink:
             if not self.uart.busy:
                 self.chip.request(self.restart_source)
 
+    @cython.cfunc
     def _byte(self, at: cython.longlong, byte: cython.longlong) -> None:
         self.segments[at] = byte
         self.checksum += byte
 
+    @cython.cfunc
     def _word(self, at: cython.longlong, word: cython.longlong) -> None:
         self._byte(at, word >> 24 & BYTE)
         self._byte(at + 1, word >> 16 & BYTE)
@@ -249,6 +308,7 @@ class DataLink:
         self.segments_sent += 1
         self._start()
 
+    @cython.cfunc
     def _start(self) -> None:
         at: cython.longlong = self.sending * SEGMENT_BYTES
         if self.used > 0:
@@ -256,6 +316,7 @@ class DataLink:
 
     # --- from the computer ------------------------------------------------------------------------------
 
+    @cython.ccall
     def swap_buffers(self) -> object:
         """Row task: the other DMA buffer receives, what the first one has goes into the ring; returns the bytes."""
         uart: HsUart = self.uart
@@ -279,10 +340,12 @@ class DataLink:
             self.ring_write = following
         return count
 
+    @cython.ccall
     def waiting(self) -> cython.longlong:
         """Bytes in the ring."""
         return (self.ring_write - self.ring_read) % RECEIVE_RING
 
+    @cython.ccall
     def parse(self) -> object:
         """Row task: every whole packet in the ring; returns how many places it looked at."""
         tested: cython.longlong = 0
@@ -313,6 +376,8 @@ class DataLink:
         self.ring_read = read
         return tested
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _write(self, number: cython.longlong, word: cython.longlong) -> cython.void:
         """A good packet: the value into the table, if the computer may set it."""
         self.packets += 1
@@ -327,6 +392,8 @@ class DataLink:
                 return
         self.store.set_word(number, word, self.store.stamps[0])
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _number(self, number: cython.longlong, word: cython.longlong) -> cython.double:
         """What a word stands for in the variable `number`."""
         if self.kinds[number] == SINGLE:

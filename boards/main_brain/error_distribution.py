@@ -10,7 +10,7 @@ from typing import Any
 
 import cython
 
-from ranger_sim.boards.modules.error_module import error_word
+from ranger_sim.boards.modules.error_module import ErrorModule, error_word
 from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import LABVIEW, MB_ERR_DIST, SSP, DataStore
 
@@ -20,14 +20,21 @@ DISPLAY_RING = 16
 UNREAD_LIMIT_MS = 1000  # chosen by us: without a computer on the line the next error replaces an unread one
 
 
+@cython.final
+@cython.cclass
 class ErrorRing:
     """Errors waiting for one reader, oldest first: {(board, code): [count, stamp]}; the oldest goes when full."""
+
+    size: cython.longlong
+    dropped: cython.longlong
+    waiting: dict
 
     def __init__(self, size: int) -> None:
         self.size = size
         self.waiting: dict[tuple[int, int], Any] = {}
         self.dropped = 0
 
+    @cython.ccall
     def add(
         self, board: cython.longlong, code: cython.longlong, count: cython.longlong, stamp: cython.longlong
     ) -> None:
@@ -41,6 +48,7 @@ class ErrorRing:
                 self.dropped += 1
             self.waiting[board, code] = [count, stamp]
 
+    @cython.ccall
     def take(self) -> Any:
         """(word, stamp) of the oldest, or None."""
         if not self.waiting:
@@ -50,8 +58,22 @@ class ErrorRing:
         return error_word(code, board, count), stamp
 
 
+@cython.final
+@cython.cclass
 class ErrorDistribution:
     """`distribute()` is the task. `totals`: {(board number, code): count} of everything that came through."""
+
+    store: DataStore
+    errors: "ErrorModule"
+    inverted: cython.bint
+    source_ids: list
+    id_own: cython.longlong
+    id_computer: cython.longlong
+    id_display: cython.longlong
+    computer: ErrorRing
+    display: ErrorRing
+    computer_time_ms: cython.longlong
+    totals: dict
 
     def __init__(self, store: Any, errors: Any, inverted: Any) -> None:
         self.store = store

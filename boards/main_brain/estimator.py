@@ -8,7 +8,10 @@ The table holds single-precision words; inside, the estimator computes in double
 ROBOT PARITY: the LPC3250 computed in single precision in part; its angle integral is double here.
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import cos
 
 from ranger_sim.boards.main_brain.command import table_id
 from ranger_sim.boards.main_brain.filters import ButterworthFilter
@@ -16,19 +19,16 @@ from ranger_sim.boards.main_brain.geometry import FloorGeometry
 from ranger_sim.datatable.generated import errors
 from ranger_sim.datatable.store import DataStore
 
-if not cython.compiled:
-    from math import cos
+# Stages of the strike detector.
+SWING_BEHIND: Final = 0
+AVERAGING: Final = 1
+ARMED: Final = 2
+# Of FSM_RESET: the machines run.
+WALKING: Final = 2
 
-    # Stages of the strike detector.
-    SWING_BEHIND = 0
-    AVERAGING = 1
-    ARMED = 2
-    # Of FSM_RESET: the machines run.
-    WALKING = 2
-
-# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_MASK = 0xFFFFFFFF
-_NEWEST = 0x7FFFFFFF  # a stamp further ahead than this is behind
+# C variables when compiled: Cython makes a Python object of every literal above 31 bits.
+_MASK: cython.longlong = 4294967295
+_NEWEST: cython.longlong = 2147483647
 # Counts of a pair's two sensors that mean contact. The robot's of 2016 is 850, where both together have 700 in swing
 # (robot.md C3.2); the emulated sensors have 700 each (plant/sensors/foot_sensor.py), so it is twice as much here.
 CONTACT_SUM = 1700.0
@@ -97,8 +97,14 @@ WRITES = (
 )
 
 
+@cython.cclass
 class EnergyMeter:
     """Trapezoidal integral of one published power over its own stamps; `energy_J`, `power_W`."""
+
+    started: cython.bint
+    stamp: cython.longlong
+    power_W: cython.double
+    energy_J: cython.double
 
     def __init__(self) -> None:
         self.started = False
@@ -106,7 +112,8 @@ class EnergyMeter:
         self.power_W = 0.0
         self.energy_J = 0.0
 
-    def update(self, power_W: float, stamp_ms: cython.longlong) -> cython.bint:
+    @cython.ccall
+    def update(self, power_W: cython.double, stamp_ms: cython.longlong) -> cython.bint:
         """True when the datum was new. Gaps above 1 s are left out (chosen by us: nothing is known then)."""
         gap: cython.longlong
         if not self.started:
@@ -124,21 +131,30 @@ class EnergyMeter:
         return True
 
 
+@cython.cclass
 class HeelSensor:
     """One foot's contact sensor against its own baseline (counts), the running mean at the moment it flipped down."""
+
+    baseline: cython.double
+    count: cython.longlong
 
     def __init__(self) -> None:
         self.baseline = 0.0
         self.count = 0
 
-    def restart(self, raw: float) -> None:
+    @cython.ccall
+    def restart(self, raw: cython.double) -> None:
         self.baseline = raw
         self.count = 0
 
-    def average(self, raw: float) -> None:
+    @cython.ccall
+    def average(self, raw: cython.double) -> None:
         self.baseline = 0.9 * self.baseline + 0.1 * raw
 
-    def touches(self, raw: float, threshold: float, ticks: float, base_limit: float) -> cython.bint:
+    @cython.ccall
+    def touches(
+        self, raw: cython.double, threshold: cython.double, ticks: cython.double, base_limit: cython.double
+    ) -> cython.bint:
         """One tick; True when raised above the baseline for `ticks` ticks and not judged faulty."""
         if raw >= self.baseline + threshold:
             self.count += 1
@@ -147,12 +163,116 @@ class HeelSensor:
         return self.count >= ticks and self.baseline < base_limit
 
 
+@cython.cclass
 class Estimator:
     """update() once per slot. report(code): callable told of an error that was noticed.
 
     More than 40 fields, because half are the numbers of its variables in the data table, which compiled code then finds
     without a look into a dictionary.
     """
+
+    store: DataStore
+    report: object
+    code_time_violation: cython.longlong
+    code_stutter: cython.longlong
+    code_fall: cython.longlong
+    # variables of the data table
+    TIMESTAMP: cython.longlong
+    MCH_ANGLE: cython.longlong
+    MCH_ANG_RATE: cython.longlong
+    MCH_MOTOR_VELOCITY: cython.longlong
+    MCFO_RIGHT_ANKLE_ANGLE: cython.longlong
+    MCFI_MID_ANKLE_ANGLE: cython.longlong
+    MCFO_LEFT_HEEL_SENSE: cython.longlong
+    MCFO_RIGHT_HEEL_SENSE: cython.longlong
+    MCFI_LEFT_HEEL_SENSE: cython.longlong
+    MCFI_RIGHT_HEEL_SENSE: cython.longlong
+    UI_ANG_RATE_X: cython.longlong
+    UI_ROLL: cython.longlong
+    MCH_BATT_POWER: cython.longlong
+    MCFO_BATT_POWER: cython.longlong
+    MCFI_BATT_POWER: cython.longlong
+    MCSI_BATT_POWER: cython.longlong
+    CSR_MCU_POWER: cython.longlong
+    FSM_RESET: cython.longlong
+    P_E_GYRO_BIAS: cython.longlong
+    P_E_ROLL_BIAS: cython.longlong
+    P_E_RESET: cython.longlong
+    P_E_HS_THRESHOLD: cython.longlong
+    P_E_HS_BASE_LIMIT: cython.longlong
+    P_E_HS_TICKS: cython.longlong
+    P_E_HS_H_ANG: cython.longlong
+    P_E_HS_F_ANG: cython.longlong
+    P_E_MIN_STEP_TIME: cython.longlong
+    P_E_FALL_ANG: cython.longlong
+    E_MCH_ANG_RATE: cython.longlong
+    E_H_MOTOR_RATE: cython.longlong
+    E_LO_ANGLE: cython.longlong
+    E_LI_ANGLE: cython.longlong
+    E_LO_RATE: cython.longlong
+    E_LI_RATE: cython.longlong
+    E_FO_ABSANG: cython.longlong
+    E_FI_ABSANG: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_T_AFTER_HS: cython.longlong
+    E_HS_TIME: cython.longlong
+    E_STEP_COUNT: cython.longlong
+    E_DISTANCE: cython.longlong
+    E_ANKLE_HEIGHT: cython.longlong
+    E_SWING_HEIGHT: cython.longlong
+    E_LO_ERROR: cython.longlong
+    E_HEEL_BASE_LEFT: cython.longlong
+    E_HEEL_BASE_RIGHT: cython.longlong
+    E_HEEL_STAGE: cython.longlong
+    EST_CONTACT_OUTER: cython.longlong
+    EST_CONTACT_INNER: cython.longlong
+    EST_LAST_STEP_LENGTH: cython.longlong
+    EST_LAST_STEP_ANGLE: cython.longlong
+    EST_LAST_STEP_DURATION: cython.longlong
+    EST_TOTAL_BATT_POWER: cython.longlong
+    EST_ENERGY_MCH: cython.longlong
+    EST_ENERGY_MCFO: cython.longlong
+    EST_ENERGY_MCFI: cython.longlong
+    EST_ENERGY_MCSI: cython.longlong
+    EST_ENERGY_OVERHEAD: cython.longlong
+    per_tick_filter: cython.bint
+    use_filtered_sum: cython.bint
+    use_imu_roll: cython.bint
+    first_reset_is_full: cython.bint
+    hip_rate: ButterworthFilter
+    hip_motor_rate: ButterworthFilter
+    gyro_rate: ButterworthFilter
+    roll: ButterworthFilter
+    outer_left_sense: ButterworthFilter
+    outer_right_sense: ButterworthFilter
+    inner_left_sense: ButterworthFilter
+    inner_right_sense: ButterworthFilter
+    floor: FloorGeometry
+    sweet_spot_m: cython.double
+    ankle_zero: cython.double
+    foot_offset: cython.double
+    left: HeelSensor
+    right: HeelSensor
+    stage: cython.longlong
+    swing_leg: cython.longlong
+    last_reset: cython.longlong
+    gyro_stamp: cython.longlong
+    strike_time: cython.longlong
+    steps: cython.longlong
+    violations: cython.longlong
+    outer_angle: cython.double
+    outer_raw_rate: cython.double
+    distance_m: cython.double
+    front_foot: cython.double
+    gyro_started: cython.bint
+    first_step: cython.bint
+    fallen: cython.bint
+    meters: list
+    hip_energy: EnergyMeter
+    outer_energy: EnergyMeter
+    inner_energy: EnergyMeter
+    steer_energy: EnergyMeter
+    mcu_energy: EnergyMeter
 
     def __init__(self, store, quirks, report) -> None:
         self.store = store
@@ -206,6 +326,7 @@ class Estimator:
         self.hip_energy, self.outer_energy, self.inner_energy, self.steer_energy, self.mcu_energy = self.meters
         store.set_int(self.E_SWING_LEG, 1)
 
+    @cython.ccall
     def restart(self) -> None:
         """The beginning of a walk: inner legs swing, angle 0, steps and distance from zero.
 
@@ -222,6 +343,7 @@ class Estimator:
         self.store.set_int(self.E_SWING_LEG, 1)
         self.zero_way()
 
+    @cython.ccall
     def zero_way(self) -> None:
         """Steps and distance from zero."""
         self.steps = 0
@@ -229,6 +351,7 @@ class Estimator:
         self.store.set_int(self.E_STEP_COUNT, 0)
         self.store.set_float(self.E_DISTANCE, 0.0)
 
+    @cython.ccall
     def zero_counters(self) -> None:
         """Steps, distance and energies from zero."""
         meter: EnergyMeter
@@ -238,6 +361,8 @@ class Estimator:
             meter.energy_J = 0.0
         self.zero_way()
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def update(self) -> cython.void:
         """One slot."""
         store: DataStore = self.store
@@ -265,6 +390,7 @@ class Estimator:
         if reset == WALKING:
             self.judge_fall(hip)
 
+    @cython.ccall
     def update_rates(self) -> None:
         store: DataStore = self.store
         bad: cython.longlong
@@ -285,6 +411,8 @@ class Estimator:
         store.set_float(self.E_MCH_ANG_RATE, self.hip_rate.output)
         store.set_float(self.E_H_MOTOR_RATE, self.hip_motor_rate.output)
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def update_outer_angle(self) -> cython.void:
         """Trapezoid over the unfiltered gyro and its own ms stamps (or the IMU's roll, by quirk)."""
         store: DataStore = self.store
@@ -305,7 +433,9 @@ class Estimator:
         self.gyro_stamp = stamp
         self.outer_raw_rate = rate
 
-    def detect_strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> cython.void:
+    @cython.ccall
+    @cython.exceptval(check=True)
+    def detect_strike(self, hip: cython.double, outer_ankle: cython.double, inner_ankle: cython.double) -> cython.void:
         """Watch the swing feet; on contact flip the swing flag and reset the angle from the pose.
 
         A slot takes one stage at most. The inner legs' means begin a little ahead of the outer ones, the outer legs'
@@ -363,10 +493,12 @@ class Estimator:
         if left_touches or right_touches:
             self.strike(hip, outer_ankle, inner_ankle)
 
+    @cython.ccall
     def set_stage(self, stage: cython.longlong) -> None:
         self.stage = stage
         self.store.set_int(self.E_HEEL_STAGE, stage)
 
+    @cython.ccall
     def update_contact_sums(self) -> None:
         """The four heel sensors through 10 Hz filters, once per slot (robot.md N4.17)."""
         store: DataStore = self.store
@@ -377,12 +509,14 @@ class Estimator:
         store.set_float(self.EST_CONTACT_OUTER, self.contact_sum(False))
         store.set_float(self.EST_CONTACT_INNER, self.contact_sum(True))
 
-    def contact_sum(self, inner: cython.bint) -> float:
+    @cython.ccall
+    def contact_sum(self, inner: cython.bint) -> cython.double:
         if inner:
             return self.inner_left_sense.output + self.inner_right_sense.output
         return self.outer_left_sense.output + self.outer_right_sense.output
 
-    def strike(self, hip: float, outer_ankle: float, inner_ankle: float) -> None:
+    @cython.ccall
+    def strike(self, hip: cython.double, outer_ankle: cython.double, inner_ankle: cython.double) -> None:
         """A heel strike: exchange the legs, correct the angle, count the step."""
         store: DataStore = self.store
         now: cython.longlong = store.stamp(self.TIMESTAMP)
@@ -416,7 +550,8 @@ class Estimator:
         store.set_int(self.E_SWING_LEG, self.swing_leg)
         self.set_stage(SWING_BEHIND)
 
-    def update_heights(self, hip: float, outer_ankle: float, inner_ankle: float) -> None:
+    @cython.ccall
+    def update_heights(self, hip: cython.double, outer_ankle: cython.double, inner_ankle: cython.double) -> None:
         """Height of the swing ankle over the stance ankle, and of the swing foot over the floor."""
         store: DataStore = self.store
         lo: float = self.outer_angle
@@ -433,6 +568,7 @@ class Estimator:
             store.set_float(self.E_ANKLE_HEIGHT, -rise)
             store.set_float(self.E_SWING_HEIGHT, -rise + inner_sole - outer_sole)
 
+    @cython.ccall
     def update_energy(self) -> None:
         """Battery energy of each motor stage and of the electronics, from their published powers."""
         store: DataStore = self.store
@@ -462,7 +598,9 @@ class Estimator:
                 + self.mcu_energy.power_W,
             )
 
-    def judge_fall(self, hip: float) -> cython.void:
+    @cython.ccall
+    @cython.exceptval(check=True)
+    def judge_fall(self, hip: cython.double) -> cython.void:
         """A leg beyond 45 degrees is a fall (robot.md N4.17); told once per walk."""
         limit: float = self.store.get_float(self.P_E_FALL_ANG)
         lo: float = self.outer_angle

@@ -5,25 +5,42 @@ b0 = 1/(1 + sqrt(2) c + c^2), b1 = 2 b0, b2 = b0, a1 = -2 (c^2 - 1) b0, a2 = (1 
 (robot.md C3.2; at 10 Hz and 1 kHz it gives the record walk's coefficients of robot.md C3.1).
 """
 
+from math import pi
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import sqrt, tan
 
-if not cython.compiled:
-    from math import pi, sqrt, tan
+# ms after which the slowest filter rests to the last bit of a double: its poles lie at radius 0.957
+SETTLED: Final = 2000
 
-    # ms after which the slowest filter rests to the last bit of a double: its poles lie at radius 0.957
-    SETTLED = 2000
-
-# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_MASK = 0xFFFFFFFF
-_NEWEST = 0x7FFFFFFF  # a stamp further ahead than this is behind
+# C variables when compiled: Cython makes a Python object of every literal above 31 bits.
+_MASK: cython.longlong = 4294967295
+_NEWEST: cython.longlong = 2147483647
 
 
+@cython.cclass
 class ButterworthFilter:
     """A filter for data that arrive with ms stamps or once per tick.
 
     cutoff_hz, sample_hz: corner and rate of the design. `output` holds the filtered value; the first
     datum sets the filter to rest at that value. `violations` counts stamps that ran backwards.
     """
+
+    b0: cython.double
+    b1: cython.double
+    b2: cython.double
+    a1: cython.double
+    a2: cython.double
+    violations: cython.longlong
+    stamp: cython.longlong
+    started: cython.bint
+    x1: cython.double
+    x2: cython.double
+    y1: cython.double
+    y2: cython.double
+    output: cython.double
+    held: cython.double
 
     def __init__(self, cutoff_hz: cython.double, sample_hz: cython.double) -> None:
         c: cython.double = tan(0.5 * pi * (1.0 - 2.0 * cutoff_hz / sample_hz))
@@ -43,6 +60,7 @@ class ButterworthFilter:
         self.y2 = 0.0
         self.output = 0.0
 
+    @cython.ccall
     def rest_at(self, value: cython.double) -> None:
         """Forget the past as if the input had always been `value`."""
         self.x1 = value
@@ -52,6 +70,7 @@ class ButterworthFilter:
         self.output = value
         self.started = True
 
+    @cython.ccall
     def push(self, value: cython.double) -> cython.double:
         """One sample; returns the output."""
         y: cython.double
@@ -66,6 +85,7 @@ class ButterworthFilter:
         self.output = y
         return y
 
+    @cython.ccall
     def push_stamped(self, value: cython.double, stamp_ms: cython.longlong) -> cython.double:
         """A datum with its u32 ms stamp: a stamp n ms later means n - 1 samples of the old, one of the new.
 

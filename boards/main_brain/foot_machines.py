@@ -47,11 +47,68 @@ COMMON = (
 OF_ONE_PAIR = ("P_FO_PP_THEIGHT", "P_FI_PP_THEIGHT")
 
 
+@cython.cclass
 class FootMachine:
     """inner: True for the inner ankles. `machine` is stepped after the hip machine, inner feet first.
 
     States 0 start ... 6 stop; the start state is startflipdown (inner) or startstance (outer).
     """
+
+    store: DataStore
+    inner: cython.bint
+    wait_for_strike: cython.bint
+    strike_logged: cython.bint
+    hip_sign: cython.double
+    hip_margin: cython.double
+    push_gain: cython.double
+    push_base: cython.double
+    push_angle: cython.double
+    push_start: cython.double
+    turned: cython.double
+    own_swing: cython.longlong
+    push_ms: cython.longlong
+    passive_ms: cython.longlong
+    # variables of the data table
+    MCH_ANGLE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_ANKLE_HEIGHT: cython.longlong
+    E_AM_L_ABSRATE: cython.longlong
+    FSM_RESET: cython.longlong
+    C_F_ST_F_ANG: cython.longlong
+    C_F_ST_F_RATE: cython.longlong
+    P_F_ST_F_TANG: cython.longlong
+    C_F_PP_F_ANG: cython.longlong
+    C_F_PP_F_RATE: cython.longlong
+    P_F_PP_F_TANG: cython.longlong
+    P_F_PP_FRAC_ANG: cython.longlong
+    P_F_PP_F_ABSANG: cython.longlong
+    C_F_FU_F_ANG: cython.longlong
+    C_F_FU_F_RATE: cython.longlong
+    P_F_FU_F_TANG: cython.longlong
+    P_F_FU_H_ANG: cython.longlong
+    P_F_FU_F_CABL_STRETCH: cython.longlong
+    C_F_FD_F_ANG: cython.longlong
+    C_F_FD_F_RATE: cython.longlong
+    P_F_FD_F_TANG: cython.longlong
+    C_F_SST_F_ANG: cython.longlong
+    C_F_SST_F_RATE: cython.longlong
+    P_F_SST_F_TANG: cython.longlong
+    P_F_AP_TIME: cython.longlong
+    D_F_ON: cython.longlong
+    DP_F_PP_L_ABSRATE: cython.longlong
+    DP_H_AM_L_ABSRATE: cython.longlong
+    DC_F_PP_L_ABSRATE: cython.longlong
+    DC_F_PP_L_ABSRATE2: cython.longlong
+    motor_position: cython.longlong
+    ankle_angle: cython.longlong
+    own_absolute: cython.longlong
+    other_absolute: cython.longlong
+    push_height: cython.longlong
+    push_to_strike: cython.longlong
+    missed_pushes: cython.longlong
+    state_number: cython.longlong
+    motor: MotorCommand
+    machine: StateMachine
 
     def __init__(self, store, quirks, inner: cython.bint) -> None:
         own, other, board, ankle = (
@@ -109,12 +166,14 @@ class FootMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.state_number, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
-    def track_absolute(self, target: float, stiffness: float, dampness: float) -> None:
+    @cython.ccall
+    def track_absolute(self, target: cython.double, stiffness: cython.double, dampness: cython.double) -> None:
         """Hold the foot's angle to the floor: the target is renewed from the pose each tick."""
         self.motor.send(
             stiffness * (target + self.store.get_float(self.motor_position) - self.store.get_float(self.own_absolute)),
@@ -122,10 +181,12 @@ class FootMachine:
             dampness,
         )
 
-    def track_motor(self, target: float, stiffness: float, dampness: float) -> None:
+    @cython.ccall
+    def track_motor(self, target: cython.double, stiffness: cython.double, dampness: cython.double) -> None:
         """Hold the motor's angle to the leg."""
         self.motor.send(stiffness * target, stiffness, dampness)
 
+    @cython.ccall
     def hold_flipped_down(self) -> None:
         """Inner start: foot parallel to the floor by the hip angle alone, no use of the IMU."""
         store: DataStore = self.store
@@ -135,6 +196,7 @@ class FootMachine:
             store.get_float(self.C_F_FD_F_RATE),
         )
 
+    @cython.ccall
     def hold_standing(self) -> None:
         """Outer start: stiff, by the hip angle alone."""
         store: DataStore = self.store
@@ -144,6 +206,7 @@ class FootMachine:
             store.get_float(self.C_F_SST_F_RATE),
         )
 
+    @cython.ccall
     def track_stance(self) -> None:
         store: DataStore = self.store
         self.track_absolute(
@@ -152,6 +215,7 @@ class FootMachine:
             store.get_float(self.C_F_ST_F_RATE),
         )
 
+    @cython.ccall
     def enter_prepush(self) -> None:
         """Fix this push: stronger and longer after a slow mid-stance.
 
@@ -175,6 +239,7 @@ class FootMachine:
         if self.other_foot_struck():
             store.set_int(self.missed_pushes, store.get_int(self.missed_pushes) + 1)
 
+    @cython.ccall
     def push(self) -> None:
         store: DataStore = self.store
         if not self.strike_logged and self.other_foot_struck():
@@ -188,23 +253,28 @@ class FootMachine:
             store.get_float(self.C_F_PP_F_RATE),
         )
 
+    @cython.ccall
     def correction_applies(self) -> cython.bint:
         """A variant dated 25 April 2011 lets the correction wait for the heel strike."""
         return self.strike_logged or not self.wait_for_strike
 
-    def push_target(self) -> float:
+    @cython.ccall
+    def push_target(self) -> cython.double:
         """How far beyond the stance angle the foot is to turn, rad."""
         if self.correction_applies():
             return self.push_base + self.push_angle
         return self.push_base
 
+    @cython.ccall
     def enter_afterpush(self) -> None:
         self.passive_ms = 0
 
+    @cython.ccall
     def go_limp(self) -> None:
         self.passive_ms += 2
         self.motor.off()
 
+    @cython.ccall
     def flip_up(self) -> None:
         store: DataStore = self.store
         self.track_motor(
@@ -213,6 +283,7 @@ class FootMachine:
             store.get_float(self.C_F_FU_F_RATE),
         )
 
+    @cython.ccall
     def flip_down(self) -> None:
         store: DataStore = self.store
         self.track_absolute(
@@ -223,15 +294,19 @@ class FootMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def own_foot_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) != self.own_swing
 
+    @cython.ccall
     def other_foot_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == self.own_swing
 
+    @cython.ccall
     def push_is_due(self) -> cython.bint:
         """Own legs well behind, and the other foot about to land (flipped down and low) or landed."""
         store: DataStore = self.store
@@ -243,6 +318,7 @@ class FootMachine:
             self.other_absolute
         ) > store.get_float(self.P_F_PP_F_ABSANG)
 
+    @cython.ccall
     def push_is_done(self) -> cython.bint:
         """Struck, and turned by a part of the push when last looked at.
 
@@ -253,6 +329,7 @@ class FootMachine:
             whole = whole + self.push_angle
         return self.other_foot_struck() and self.turned > self.store.get_float(self.P_F_PP_FRAC_ANG) * whole
 
+    @cython.ccall
     def cable_is_slack_enough(self) -> cython.bint:
         store: DataStore = self.store
         stretch: float = store.get_float(self.motor_position) - store.get_float(self.ankle_angle)
@@ -260,6 +337,7 @@ class FootMachine:
             self.P_F_AP_TIME
         )
 
+    @cython.ccall
     def own_leg_is_ahead(self) -> cython.bint:
         store: DataStore = self.store
         return self.hip_sign * store.get_float(self.MCH_ANGLE) > store.get_float(self.P_F_FU_H_ANG)

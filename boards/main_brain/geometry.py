@@ -6,13 +6,23 @@ ROBOT PARITY: the firmware took sines from tables and arcsines from a quartic fi
 """
 
 import cython
-
-if not cython.compiled:
-    from math import asin, atan, cos, sin, sqrt
+from cython.cimports.libc.math import asin, atan, cos, sin, sqrt
 
 
+@cython.cclass
 class FloorGeometry:
     """Pose at heel strike. Lengths in m, angles in rad, leg angles positive leaning forward."""
+
+    leg_m: cython.double
+    inner_radius_m: cython.double
+    inner_ankle_m: cython.double
+    outer_radius_m: cython.double
+    outer_ankle_m: cython.double
+    front_foot: cython.double
+    rear_foot: cython.double
+    front_leg: cython.double
+    rear_leg: cython.double
+    ankle_distance_m: cython.double
 
     def __init__(self) -> None:
         self.leg_m = 0.960
@@ -26,6 +36,7 @@ class FloorGeometry:
         self.rear_leg = 0.0
         self.ankle_distance_m = 0.0
 
+    @cython.ccall
     def solve(self, hip: cython.double, outer: cython.double, inner: cython.double) -> cython.bint:
         """Pose for hip angle h and the two ankle angles less 1.68 rad; False when there is none.
 

@@ -13,14 +13,12 @@ Leans are the estimator's, positive forward (robot.md C1.1); the firmware's angl
 """
 
 import cython
+from cython.cimports.libc.math import sin
 
 from ranger_sim.boards.main_brain.command import MotorCommand, table_id
 from ranger_sim.boards.main_brain.head_walk import FLIGHT, INNER_PUSH, INNER_SWING, OUTER_PUSH, OUTER_SWING
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
 from ranger_sim.datatable.store import DataStore
-
-if not cython.compiled:
-    from math import sin
 
 HIP_NM_PER_A = 1.188  # 0.018 N m/A times 66 (robot.md C2.2)
 ANKLE_NM_PER_A = 0.612  # 0.018 N m/A times 34
@@ -58,8 +56,28 @@ ANKLE_READS = (
 READS = HIP_READS + ANKLE_READS
 
 
+@cython.cclass
 class HeadHip:
     """Scissors while a leg swings, holds an angle while a foot pushes, off in flight."""
+
+    store: DataStore
+    # variables of the data table
+    E_LO_ANGLE: cython.longlong
+    E_LI_ANGLE: cython.longlong
+    E_LO_RATE: cython.longlong
+    E_LI_RATE: cython.longlong
+    FSM_LEG: cython.longlong
+    FSM_RESET: cython.longlong
+    CTRL_HIP_KP: cython.longlong
+    CTRL_HIP_KD: cython.longlong
+    CTRL_WALK_SCISSOR_GAIN: cython.longlong
+    CTRL_WALK_SCISSOR_OFFSET: cython.longlong
+    HD_H_HOLD: cython.longlong
+    HD_H_SPRING: cython.longlong
+    HD_H_GRAVITY: cython.longlong
+    state_number: cython.longlong
+    motor: MotorCommand
+    machine: StateMachine
 
     def __init__(self, store) -> None:
         self.store = store
@@ -75,15 +93,19 @@ class HeadHip:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.state_number, number)
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def walking(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) != 1
 
+    @cython.ccall
     def track(self) -> None:
         """The law of the walk machine's state. Setup: legs held side by side, chosen by us."""
         store: DataStore = self.store
@@ -102,14 +124,16 @@ class HeadHip:
         else:
             self.follow(0.0, 0.0, 0.0)
 
-    def scissor(self, sign: float, lean: float, rate: float) -> None:
+    @cython.ccall
+    def scissor(self, sign: cython.double, lean: cython.double, rate: cython.double) -> None:
         """The swing leg mirrors the standing one. `sign`: 1 while the outer legs stand; `lean`, `rate`: of those that
         stand. h_ref = sign (offset + (gain + 1) lean)."""
         store: DataStore = self.store
         gain: float = sign * (store.get_float(self.CTRL_WALK_SCISSOR_GAIN) + 1.0)
         self.follow(sign * store.get_float(self.CTRL_WALK_SCISSOR_OFFSET) + gain * lean, gain * rate, sign)
 
-    def follow(self, target: float, rate: float, sign: float) -> None:
+    @cython.ccall
+    def follow(self, target: cython.double, rate: cython.double, sign: cython.double) -> None:
         """Track a hip angle. `sign`: 1 while the inner legs swing, -1 while the outer ones do, 0 for none."""
         store: DataStore = self.store
         kp: float = store.get_float(self.CTRL_HIP_KP)
@@ -123,8 +147,33 @@ class HeadHip:
         )
 
 
+@cython.cclass
 class HeadAnkle:
     """Foot angles against the floor: a = zero - target - lean. Stands, pushes, or is flipped up."""
+
+    store: DataStore
+    flips_in_flight: cython.bint
+    # variables of the data table
+    FSM_LEG: cython.longlong
+    FSM_RESET: cython.longlong
+    CTRL_ANK_PUSH_KP: cython.longlong
+    CTRL_ANK_PUSH_KD: cython.longlong
+    CTRL_ANK_STANCE_KP: cython.longlong
+    CTRL_ANK_STANCE_KD: cython.longlong
+    CTRL_ANK_SWING_KP: cython.longlong
+    CTRL_ANK_SWING_KD: cython.longlong
+    HD_F_SPRING: cython.longlong
+    HD_F_ZERO: cython.longlong
+    HD_F_HOLD: cython.longlong
+    HD_F_PUSH: cython.longlong
+    HD_F_FLIP: cython.longlong
+    own_swing: cython.longlong
+    own_push: cython.longlong
+    own_lean: cython.longlong
+    own_rate: cython.longlong
+    state_number: cython.longlong
+    motor: MotorCommand
+    machine: StateMachine
 
     def __init__(self, store, inner) -> None:
         self.store = store
@@ -146,15 +195,19 @@ class HeadAnkle:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.state_number, number)
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def walking(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) != 1
 
+    @cython.ccall
     def track(self) -> None:
         """The law of the walk machine's state. Setup: the foot stands, chosen by us."""
         store: DataStore = self.store
@@ -178,7 +231,8 @@ class HeadAnkle:
                 store.get_float(self.CTRL_ANK_STANCE_KD),
             )
 
-    def follow(self, foot_target: float, kp: float, kd: float) -> None:
+    @cython.ccall
+    def follow(self, foot_target: cython.double, kp: cython.double, kd: cython.double) -> None:
         """Track the foot's angle against the floor, positive with the toe up."""
         store: DataStore = self.store
         target: float = store.get_float(self.HD_F_ZERO) - foot_target - store.get_float(self.own_lean)

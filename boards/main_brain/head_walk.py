@@ -10,21 +10,25 @@ tick: commands are those of the state at the tick's start (robot.md C2.2).
 Chosen by us, because the log does not tell: setup ends by a time, and flight as in C2.2 when the outer feet stand.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.boards.main_brain.command import table_id
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
 
-if not cython.compiled:
-    # of FSM_LEG, as logged on 20 August 2015
-    SETUP = 0
-    INNER_SWING = 1
-    OUTER_PUSH = 2
-    OUTER_SWING = 3
-    INNER_PUSH = 4
-    FLIGHT = 5
+if TYPE_CHECKING:
+    from ranger_sim.datatable.store import DataStore
 
-    TICK_MS = 2
+# of FSM_LEG, as logged on 20 August 2015
+SETUP: Final = 0
+INNER_SWING: Final = 1
+OUTER_PUSH: Final = 2
+OUTER_SWING: Final = 3
+INNER_PUSH: Final = 4
+FLIGHT: Final = 5
+
+TICK_MS: Final = 2
 
 READS = (
     "E_LO_ANGLE",
@@ -39,8 +43,24 @@ READS = (
 WRITES = ("FSM_LEG",)
 
 
+@cython.cclass
 class HeadWalkMachine:
     """States SETUP ... FLIGHT. `machine` is stepped before hip and ankles."""
+
+    store: "DataStore"
+    # variables of the data table
+    E_LO_ANGLE: cython.longlong
+    EST_CONTACT_OUTER: cython.longlong
+    EST_CONTACT_INNER: cython.longlong
+    FSM_RESET: cython.longlong
+    HD_TRANS_ANG: cython.longlong
+    HD_CONTACT: cython.longlong
+    HD_FLIGHT_TICKS: cython.longlong
+    HD_SETUP_TIME: cython.longlong
+    FSM_LEG: cython.longlong
+    setup_ms: cython.longlong
+    ticks_in_the_air: cython.longlong
+    machine: StateMachine
 
     def __init__(self, store) -> None:
         self.store = store
@@ -74,24 +94,30 @@ class HeadWalkMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def preset(self) -> None:
         """Nothing is remembered from step to step."""
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_LEG, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
+    @cython.ccall
     def enter_setup(self) -> None:
         self.setup_ms = 0
         self.ticks_in_the_air = 0
 
+    @cython.ccall
     def wait(self) -> None:
         self.setup_ms += TICK_MS
 
+    @cython.ccall
     def enter_flight(self) -> None:
         self.ticks_in_the_air = 0
 
+    @cython.ccall
     def count_flight(self) -> None:
         """Ticks running in which no foot touches."""
         if self.outer_feet_stand() or self.inner_feet_stand():
@@ -101,25 +127,32 @@ class HeadWalkMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def is_set_up(self) -> cython.bint:
         return self.setup_ms >= self.store.get_float(self.HD_SETUP_TIME)
 
+    @cython.ccall
     def flies(self) -> cython.bint:
         return self.ticks_in_the_air >= self.store.get_float(self.HD_FLIGHT_TICKS)
 
+    @cython.ccall
     def outer_feet_stand(self) -> cython.bint:
         return self.store.get_float(self.EST_CONTACT_OUTER) > self.store.get_float(self.HD_CONTACT)
 
+    @cython.ccall
     def inner_feet_stand(self) -> cython.bint:
         return self.store.get_float(self.EST_CONTACT_INNER) > self.store.get_float(self.HD_CONTACT)
 
+    @cython.ccall
     def outer_leg_leans_forward(self) -> cython.bint:
         """th0 < -trans; th0 is minus the lean (robot.md C1.1)."""
         return self.store.get_float(self.E_LO_ANGLE) > self.store.get_float(self.HD_TRANS_ANG)
 
+    @cython.ccall
     def outer_leg_leans_back(self) -> cython.bint:
         """th0 > trans."""
         return self.store.get_float(self.E_LO_ANGLE) < -self.store.get_float(self.HD_TRANS_ANG)

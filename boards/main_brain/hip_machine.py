@@ -63,8 +63,67 @@ READS = (
 WRITES = ("E_H_DI1", "E_H_DI2", "FSM_HIP")
 
 
+@cython.cclass
 class HipMachine:
     """States 0 HI_starthold ... 9 stop; `machine` is stepped after the leg machine."""
+
+    store: DataStore
+    # variables of the data table
+    MCH_ANGLE: cython.longlong
+    E_MCH_ANG_RATE: cython.longlong
+    E_LO_ANGLE: cython.longlong
+    E_LI_ANGLE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_T_AFTER_HS: cython.longlong
+    E_AM_L_ABSRATE: cython.longlong
+    E_AM_H_ANG: cython.longlong
+    E_AM_H_RATE: cython.longlong
+    E_AM_TIMER: cython.longlong
+    MCFO_RIGHT_ANKLE_RATE: cython.longlong
+    MCFI_ANKLE_RATE: cython.longlong
+    FSM_LEG: cython.longlong
+    FSM_RESET: cython.longlong
+    C_H_OUTER_STIFFNESS: cython.longlong
+    C_H_PM_H_RATE: cython.longlong
+    P_H_PM_H_TRATE: cython.longlong
+    P_H_PM_TIME: cython.longlong
+    P_H_PM_F_RATE: cython.longlong
+    C_HI_SH_H_ANG: cython.longlong
+    C_HI_SH_H_RATE: cython.longlong
+    P_HI_SH_H_TANG: cython.longlong
+    C_H_EH_H_ANG: cython.longlong
+    C_H_EH_H_RATE: cython.longlong
+    P_H_EH_H_TANG: cython.longlong
+    P_H_EHOLD_ANG: cython.longlong
+    P_H_EHOLD_ANG2: cython.longlong
+    P_H_EH_L_TRATE: cython.longlong
+    D_H_ON: cython.longlong
+    DP_F_PP_L_ABSRATE: cython.longlong
+    DP_H_AM_H_ANG: cython.longlong
+    DP_H_AM_L_ABSRATE: cython.longlong
+    DP_H_AM_H_RATE: cython.longlong
+    DP_H_AM_TIME1: cython.longlong
+    DP_H_AM_TIME2: cython.longlong
+    DC2_H_AM_H_ANG1: cython.longlong
+    DC2_H_AM_H_ANG2: cython.longlong
+    DC2_H_AM_H_RATE1: cython.longlong
+    DC2_H_AM_H_RATE2: cython.longlong
+    DC3_H_AM_H_ANG1: cython.longlong
+    DC3_H_AM_H_ANG2: cython.longlong
+    DC3_H_AM_L_ABSRATE1: cython.longlong
+    DC3_H_AM_L_ABSRATE2: cython.longlong
+    DC3_H_AM_H_RATE1: cython.longlong
+    DC3_H_AM_H_RATE2: cython.longlong
+    E_H_DI1: cython.longlong
+    E_H_DI2: cython.longlong
+    FSM_HIP: cython.longlong
+    motor: MotorCommand
+    premid_time: cython.longlong
+    leg_lo_aftermid: cython.longlong
+    leg_li_aftermid: cython.longlong
+    first_correction: cython.double
+    second_correction: cython.double
+    machine: StateMachine
 
     def __init__(self, store) -> None:
         self.store = store
@@ -108,11 +167,13 @@ class HipMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_HIP, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
+    @cython.ccall
     def hold_start(self) -> None:
         """Hold the inner legs ahead until the first heel strike."""
         stiffness: float = self.store.get_float(self.C_HI_SH_H_ANG)
@@ -122,6 +183,7 @@ class HipMachine:
             self.store.get_float(self.C_HI_SH_H_RATE),
         )
 
+    @cython.ccall
     def hold_inner_ahead(self) -> None:
         stiffness: float = self.store.get_float(self.C_H_EH_H_ANG)
         self.motor.send(
@@ -130,6 +192,7 @@ class HipMachine:
             self.store.get_float(self.C_H_EH_H_RATE),
         )
 
+    @cython.ccall
     def hold_outer_ahead(self) -> None:
         stiffness: float = self.store.get_float(self.C_H_EH_H_ANG)
         self.motor.send(
@@ -138,9 +201,11 @@ class HipMachine:
             self.store.get_float(self.C_H_EH_H_RATE),
         )
 
+    @cython.ccall
     def enter_premid(self) -> None:
         self.premid_time = self.store.get_int(self.E_T_AFTER_HS)
 
+    @cython.ccall
     def enter_aftermid(self) -> None:
         """The discrete corrections of this step from the figures of mid-stance."""
         store: DataStore = self.store
@@ -180,7 +245,8 @@ class HipMachine:
         store.set_float(self.E_H_DI1, self.first_correction)
         store.set_float(self.E_H_DI2, self.second_correction)
 
-    def correction(self) -> float:
+    @cython.ccall
+    def correction(self) -> cython.double:
         """The correction in force now, A."""
         timer: float = self.store.get_int(self.E_AM_TIMER)
         if timer < self.store.get_float(self.DP_H_AM_TIME1):
@@ -189,7 +255,8 @@ class HipMachine:
             return self.second_correction
         return 0.0
 
-    def base_current(self, direction: float) -> float:
+    @cython.ccall
+    def base_current(self, direction: cython.double) -> cython.double:
         """Rate control of the swing, one-sided, within the window after premid began; A.
 
         direction: +1 for the inner legs swinging, -1 for the outer ones.
@@ -206,15 +273,19 @@ class HipMachine:
             return 0.0
         return current
 
+    @cython.ccall
     def swing_inner(self) -> None:
         self.motor.send(self.base_current(1.0), 0.0, 0.0)
 
+    @cython.ccall
     def swing_inner_corrected(self) -> None:
         self.motor.send(self.base_current(1.0) + self.correction(), 0.0, 0.0)
 
+    @cython.ccall
     def swing_outer(self) -> None:
         self.motor.send(self.base_current(-1.0), self.store.get_float(self.C_H_OUTER_STIFFNESS), 0.0)
 
+    @cython.ccall
     def swing_outer_corrected(self) -> None:
         self.motor.send(
             self.base_current(-1.0) - self.correction(),
@@ -224,28 +295,36 @@ class HipMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def inner_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 0
 
+    @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1
 
+    @cython.ccall
     def inner_foot_flips_up(self) -> cython.bint:
         return self.store.get_float(self.MCFI_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
 
+    @cython.ccall
     def outer_foot_flips_up(self) -> cython.bint:
         return self.store.get_float(self.MCFO_RIGHT_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
 
+    @cython.ccall
     def outer_stance_past_mid(self) -> cython.bint:
         return self.store.get_float(self.E_LO_ANGLE) > 0.0 and self.store.get_int(self.FSM_LEG) == self.leg_lo_aftermid
 
+    @cython.ccall
     def inner_stance_past_mid(self) -> cython.bint:
         return self.store.get_float(self.E_LI_ANGLE) > 0.0 and self.store.get_int(self.FSM_LEG) == self.leg_li_aftermid
 
-    def hangs(self, direction: float) -> cython.bint:
+    @cython.ccall
+    def hangs(self, direction: cython.double) -> cython.bint:
         """The swing leg is far ahead in a slow walk, or is on its way back."""
         store: DataStore = self.store
         ahead: float = direction * store.get_float(self.MCH_ANGLE)
@@ -258,9 +337,11 @@ class HipMachine:
             and direction * store.get_float(self.E_MCH_ANG_RATE) < 0.0
         )
 
+    @cython.ccall
     def inner_leg_hangs(self) -> cython.bint:
         return self.hangs(1.0)
 
+    @cython.ccall
     def outer_leg_hangs(self) -> cython.bint:
         return self.hangs(-1.0)
 

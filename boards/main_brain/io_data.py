@@ -18,8 +18,21 @@ from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.user_error import UserError
 
 
+@cython.cclass
 class IoData:
     """`send_ids`: what may leave by the link, ascending. `time` follows the network time."""
+
+    store: DataStore
+    link: MainBrainSspLink
+    time: NetworkTime
+    subscriber: cython.longlong
+    timestamp: cython.longlong
+    turn: cython.longlong
+    turn_every: cython.longlong
+    slots: cython.longlong
+    send_ids: cython.longlong[::1]
+    dividers: cython.longlong[::1]
+    turn_ids: cython.longlong[::1]
 
     def __init__(self, store, link, time, send_ids) -> None:
         self.store = store

@@ -41,12 +41,27 @@ WRITES = (
 )
 
 
+@cython.cclass
 class StanceLeg:
     """What is remembered of the steps in which one leg pair stands, and the actions that gather it.
 
     angle_id: the pair's absolute angle in the table; hip_sign: +1 for the outer pair, so that
     hip_sign * h is positive while the swing leg is ahead of the standing one. The figures outlive a walk.
     """
+
+    owner: "LegMachine"
+    store: DataStore
+    other: "StanceLeg"
+    angle_id: cython.longlong
+    preswing_ms: cython.longlong
+    hip_sign: cython.double
+    strike_angle: cython.double
+    ss0_angle: cython.double
+    ss0_rate: cython.double
+    mid_rate: cython.double
+    mid_hip: cython.double
+    mid_hip_rate: cython.double
+    mid_time: cython.double
 
     def __init__(self, owner, angle_id, hip_sign: float) -> None:
         self.owner = owner
@@ -63,24 +78,30 @@ class StanceLeg:
         self.mid_hip_rate = 0.0
         self.mid_time = 0.0
 
-    def angle_before_vertical(self) -> float:
+    @cython.ccall
+    def angle_before_vertical(self) -> cython.double:
         """Stance leg angle A, positive before vertical, rad."""
         return -self.store.get_float(self.angle_id)
 
-    def hip_ahead(self) -> float:
+    @cython.ccall
+    def hip_ahead(self) -> cython.double:
         """Hip angle, positive while the swing leg is ahead, rad."""
         return self.hip_sign * self.store.get_float(self.owner.MCH_ANGLE)
 
+    @cython.ccall
     def enter_preswing(self) -> None:
         self.strike_angle = self.angle_before_vertical()
         self.preswing_ms = 0
 
+    @cython.ccall
     def count_preswing(self) -> None:
         self.preswing_ms += 2
 
+    @cython.ccall
     def leave_preswing(self) -> None:
         self.store.set_float(self.owner.E_PS_TIME, self.preswing_ms)
 
+    @cython.ccall
     def enter_premid(self) -> None:
         """Single stance begins (SS0): remember the pose, publish the means over both legs."""
         self.ss0_angle = self.angle_before_vertical()
@@ -93,6 +114,8 @@ class StanceLeg:
         self.store.set_float(self.owner.E_SS_L_ANG, 0.5 * (self.ss0_angle + self.other.ss0_angle))
         self.store.set_float(self.owner.E_SS_L_ABSRATE, 0.5 * (self.ss0_rate + self.other.ss0_rate))
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def enter_aftermid(self) -> cython.void:
         """Mid-stance: rates by finite differences since SS0, averaged with the other leg's last ones.
 
@@ -126,8 +149,41 @@ class StanceLeg:
         store.set_float(owner.E_AM_TIME, 0.5 * (self.mid_time + self.other.mid_time))
 
 
+@cython.cclass
 class LegMachine:
     """States 0 LI_preswing ... 6 stop; "LO" means that the outer legs stand. `machine` is stepped."""
+
+    store: DataStore
+    # variables of the data table
+    E_LO_ANGLE: cython.longlong
+    E_LI_ANGLE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_T_AFTER_HS: cython.longlong
+    MCH_ANGLE: cython.longlong
+    MCFO_RIGHT_ANKLE_RATE: cython.longlong
+    MCFI_ANKLE_RATE: cython.longlong
+    FSM_RESET: cython.longlong
+    P_H_PM_F_RATE: cython.longlong
+    P_L_START_ABSRATE: cython.longlong
+    P_L_START_H_RATE: cython.longlong
+    E_AM_L_ABSRATE: cython.longlong
+    E_AM_H_ANG: cython.longlong
+    E_AM_H_RATE: cython.longlong
+    E_AM_TIME: cython.longlong
+    E_AM_TIMER: cython.longlong
+    E_PS_TIME: cython.longlong
+    E_SS_L_ANG: cython.longlong
+    E_SS_L_ABSRATE: cython.longlong
+    FSM_LEG: cython.longlong
+    outer: StanceLeg
+    inner: StanceLeg
+    ss0_angle: cython.double
+    ss0_hip: cython.double
+    ss0_time: cython.longlong
+    aftermid_ms: cython.longlong
+    ss0_known: cython.bint
+    rate_of_previous_step: cython.bint
+    machine: StateMachine
 
     def __init__(self, store, quirks) -> None:
         self.store = store
@@ -171,6 +227,7 @@ class LegMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def preset(self) -> None:
         """A walk begins: the published rate; in the first walk also what both legs remember.
 
@@ -188,34 +245,44 @@ class LegMachine:
             self.inner.mid_hip_rate = hip_rate
             self.store.set_float(self.E_AM_H_RATE, hip_rate)
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_LEG, number)
 
+    @cython.ccall
     def count_aftermid(self) -> None:
         self.aftermid_ms += 2
         self.store.set_int(self.E_AM_TIMER, self.aftermid_ms)
 
+    @cython.ccall
     def leave_aftermid(self) -> None:
         self.aftermid_ms = 0
         self.store.set_int(self.E_AM_TIMER, 0)
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def inner_foot_flips_up(self) -> cython.bint:
         return self.store.get_float(self.MCFI_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
 
+    @cython.ccall
     def outer_foot_flips_up(self) -> cython.bint:
         return self.store.get_float(self.MCFO_RIGHT_ANKLE_RATE) < -self.store.get_float(self.P_H_PM_F_RATE)
 
+    @cython.ccall
     def outer_leg_past_vertical(self) -> cython.bint:
         return self.store.get_float(self.E_LO_ANGLE) > 0.0
 
+    @cython.ccall
     def inner_leg_past_vertical(self) -> cython.bint:
         return self.store.get_float(self.E_LI_ANGLE) > 0.0
 
+    @cython.ccall
     def inner_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 0
 
+    @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1

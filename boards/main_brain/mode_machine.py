@@ -6,6 +6,8 @@ leads from walk to stop (the 2016 firmware goes to its safe mode), keys 0 and 2 
 light 1 as in 2016 (robot.md N6.4) where the mode exists there.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.boards.main_brain import programs
@@ -13,15 +15,16 @@ from ranger_sim.boards.main_brain.command import table_id
 from ranger_sim.boards.main_brain.state_machine import State, StateMachine
 from ranger_sim.boards.main_brain.steering_machine import SteeringMachine
 from ranger_sim.datatable.store import DataStore
+from ranger_sim.foundation.numbers import elapsed_u32
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import elapsed_u32
+if TYPE_CHECKING:
+    from ranger_sim.boards.main_brain.estimator import Estimator
 
-    # Bits of UI_BUTTONS.
-    KEY_0 = 1
-    KEY_1 = 2
-    KEY_2 = 4
-    PAGES = 3  # of the display while walking
+# Bits of UI_BUTTONS.
+KEY_0: Final = 1
+KEY_1: Final = 2
+KEY_2: Final = 4
+PAGES: Final = 3  # of the display while walking
 
 READS = (
     "TIMESTAMP",
@@ -64,12 +67,52 @@ def lcd_words(upper, lower):
     return [int.from_bytes(text[i : i + 4], "little") for i in (0, 4, 8, 12)]
 
 
+@cython.cclass
 class ModeMachine:
     """update() once per slot, after the estimator. Holds every machine of the walk: those of `program` (programs.py)
     and steering.
 
     More than 40 fields: half are the numbers of its variables in the data table, as in the estimator.
     """
+
+    store: DataStore
+    estimator: "Estimator"
+    # variables of the data table
+    TIMESTAMP: cython.longlong
+    UI_BUTTONS: cython.longlong
+    MCH_BATT_VOLTAGE: cython.longlong
+    E_STEP_COUNT: cython.longlong
+    E_DISTANCE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_FO_PP2HS_TIME: cython.longlong
+    E_FI_PP2HS_TIME: cython.longlong
+    P_UI_LCD_TIME: cython.longlong
+    P_UI_SONG_STEPS: cython.longlong
+    P_UI_PP2HS_TTIME: cython.longlong
+    D_UI_STOP_ON_FALL: cython.longlong
+    FSM_UI: cython.longlong
+    FSM_RESET: cython.longlong
+    EST_UI_FSM_MODE: cython.longlong
+    UI_SET_LED_1: cython.longlong
+    UI_SET_LED_3: cython.longlong
+    UI_EMPTY_TX2: cython.longlong
+    MCSI_COMMAND_CURRENT: cython.longlong
+    MCSI_STIFFNESS: cython.longlong
+    MCSI_DAMPNESS: cython.longlong
+    lcd_ids: list
+    # of whichever program
+    leg: object
+    hip: object
+    inner_foot: object
+    outer_foot: object
+    steering: SteeringMachine
+    buttons: cython.longlong
+    pressed: cython.longlong
+    last_song_steps: cython.longlong
+    page: cython.longlong
+    page_time: cython.longlong
+    late_push_light: cython.longlong
+    machine: StateMachine
 
     def __init__(self, store, quirks, estimator, program="record") -> None:
         self.store = store
@@ -111,6 +154,7 @@ class ModeMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def update(self) -> None:
         """One slot: keys, then the machines."""
         buttons: cython.longlong = self.store.get_int(self.UI_BUTTONS)
@@ -118,23 +162,27 @@ class ModeMachine:
         self.buttons = buttons
         self.machine.step()
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_UI, number)
         self.store.set_float(self.EST_UI_FSM_MODE, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
+    @cython.ccall
     def motors_off(self) -> None:
         """All commands and gains 0, rewritten in every slot as in the standby of 2016."""
         self.hip.motor.off()
         self.outer_foot.motor.off()
         self.inner_foot.motor.off()
 
+    @cython.ccall
     def steering_off(self) -> None:
         self.steering.off()
         self.store.set_float(self.MCSI_STIFFNESS, 0.0)
         self.store.set_float(self.MCSI_DAMPNESS, 0.0)
 
+    @cython.ccall
     def enter_calibrate(self) -> None:
         """Power-up mode: motors off, counters to zero."""
         self.store.set_int(self.FSM_RESET, 0)
@@ -143,16 +191,19 @@ class ModeMachine:
         self.show_mode("CALIBRAT", PURPLE)
         self.last_song_steps = 0
 
+    @cython.ccall
     def enter_standby(self) -> None:
         self.store.set_int(self.FSM_RESET, 0)
         self.steering_off()
         self.show_mode("STANDBY", GREEN)
 
+    @cython.ccall
     def enter_stop(self) -> None:
         self.store.set_int(self.FSM_RESET, 0)
         self.steering_off()
         self.show_mode("STOP", RED)
 
+    @cython.ccall
     def enter_walk(self) -> None:
         self.store.set_int(self.FSM_RESET, 2)
         self.store.set_int(self.E_SWING_LEG, 1)
@@ -161,6 +212,7 @@ class ModeMachine:
         self.page = 0
         self.page_time = self.store.stamp(self.TIMESTAMP)
 
+    @cython.ccall
     def leave_walk(self) -> None:
         """Motors to zero, then one tick of every machine with the reset flag: all return to their starts."""
         machine: StateMachine
@@ -172,6 +224,7 @@ class ModeMachine:
             machine = walk.machines[i]
             machine.step()
 
+    @cython.ccall
     def walk_display(self) -> None:
         """Every 4 s the next of battery, steps, metres; a song every 3000 steps; a light for late pushes."""
         store: DataStore = self.store
@@ -195,6 +248,7 @@ class ModeMachine:
             self.late_push_light = late
             store.set_int(self.UI_SET_LED_3, RED if late else DARK)
 
+    @cython.ccall
     def show_page(self) -> None:
         if self.page == 0:
             self.show("BATTERY", f"{self.store.get_float(self.MCH_BATT_VOLTAGE):.1f} V")
@@ -204,10 +258,12 @@ class ModeMachine:
             self.show("METRES", f"{self.store.get_float(self.E_DISTANCE):.1f}")
         self.page = (self.page + 1) % PAGES
 
+    @cython.ccall
     def show_mode(self, name, colour) -> None:
         self.show(name, "")
         self.store.set_int(self.UI_SET_LED_1, colour)
 
+    @cython.ccall
     def show(self, upper, lower) -> None:
         """Two lines of eight characters to the display of the user interface board."""
         for number, word in zip(self.lcd_ids, lcd_words(upper, lower), strict=True):
@@ -215,14 +271,18 @@ class ModeMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def key_0(self) -> cython.bint:
         return (self.pressed & KEY_0) != 0
 
+    @cython.ccall
     def key_1(self) -> cython.bint:
         return (self.pressed & KEY_1) != 0
 
+    @cython.ccall
     def key_2(self) -> cython.bint:
         return (self.pressed & KEY_2) != 0
 
+    @cython.ccall
     def robot_fell(self) -> cython.bint:
         return self.estimator.fallen and self.store.get_float(self.D_UI_STOP_ON_FALL) != 0.0

@@ -45,11 +45,56 @@ READS = (
 )
 
 
+@cython.cclass
 class ReflexFootMachine:
     """inner: True for the inner ankles. `machine` is stepped after the hip machine, inner feet first.
 
     States 0 start ... 5 flipdown.
     """
+
+    store: DataStore
+    inner: cython.bint
+    hip_sign: cython.double
+    zero: cython.double
+    own_swing: cython.longlong
+    prepush_ms: cython.longlong
+    push_ms: cython.longlong
+    # variables of the data table
+    MCH_ANGLE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_R_DW: cython.longlong
+    FSM_RESET: cython.longlong
+    C_F_SST_F_ANG: cython.longlong
+    C_F_SST_F_RATE: cython.longlong
+    P_F_SST_F_TANG: cython.longlong
+    R_F_ST_I0: cython.longlong
+    R_F_ST_KP: cython.longlong
+    R_F_ST_KV: cython.longlong
+    R_F_PP_PHI: cython.longlong
+    R_F_PP_I0: cython.longlong
+    R_F_PP_DW: cython.longlong
+    R_F_PP_KV: cython.longlong
+    R_F_PU_I0: cython.longlong
+    R_F_PU_DW: cython.longlong
+    R_F_PU_KV: cython.longlong
+    R_F_PU_ANG: cython.longlong
+    R_F_PU_TIME: cython.longlong
+    R_F_FU_I0: cython.longlong
+    R_F_FU_KP: cython.longlong
+    R_F_FU_KV: cython.longlong
+    R_F_FD_PHI: cython.longlong
+    R_F_FD_Q3: cython.longlong
+    R_F_FD_I0: cython.longlong
+    R_F_FD_KP: cython.longlong
+    R_F_FD_KV: cython.longlong
+    motor_position: cython.longlong
+    own_angle: cython.longlong
+    other_angle: cython.longlong
+    push_to_strike: cython.longlong
+    missed_pushes: cython.longlong
+    state_number: cython.longlong
+    motor: MotorCommand
+    machine: StateMachine
 
     def __init__(self, store, inner: cython.bint) -> None:
         own, board = ("FI", "MCFI") if inner else ("FO", "MCFO")
@@ -94,15 +139,18 @@ class ReflexFootMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.state_number, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
-    def send(self, I0: float, Kp: float, Kv: float) -> None:
+    @cython.ccall
+    def send(self, I0: cython.double, Kp: cython.double, Kv: cython.double) -> None:
         """I = I0 + Kp q_m + Kv q_m', in A, A/rad, A s/rad."""
         self.motor.send(I0 - Kp * self.zero, -Kp, -Kv)
 
+    @cython.ccall
     def hold_standing(self) -> None:
         """Outer start: stiff, by the hip angle alone."""
         store: DataStore = self.store
@@ -113,6 +161,7 @@ class ReflexFootMachine:
             store.get_float(self.C_F_SST_F_RATE),
         )
 
+    @cython.ccall
     def stand(self) -> None:
         store: DataStore = self.store
         self.send(
@@ -121,9 +170,11 @@ class ReflexFootMachine:
             store.get_float(self.R_F_ST_KV),
         )
 
+    @cython.ccall
     def enter_prepush(self) -> None:
         self.prepush_ms = 0
 
+    @cython.ccall
     def prepare_push(self) -> None:
         """The ankle pushes while the other foot comes down."""
         store: DataStore = self.store
@@ -134,6 +185,7 @@ class ReflexFootMachine:
             store.get_float(self.R_F_PP_KV),
         )
 
+    @cython.ccall
     def enter_push(self) -> None:
         """The other foot has landed; a push that was not prepared is counted as missed, as in the record walk."""
         store: DataStore = self.store
@@ -143,6 +195,7 @@ class ReflexFootMachine:
         store.set_int(self.push_to_strike, self.prepush_ms)
         self.prepush_ms = 0
 
+    @cython.ccall
     def push(self) -> None:
         store: DataStore = self.store
         self.push_ms += 2
@@ -152,6 +205,7 @@ class ReflexFootMachine:
             store.get_float(self.R_F_PU_KV),
         )
 
+    @cython.ccall
     def flip_up(self) -> None:
         store: DataStore = self.store
         self.send(
@@ -160,6 +214,7 @@ class ReflexFootMachine:
             store.get_float(self.R_F_FU_KV),
         )
 
+    @cython.ccall
     def flip_down(self) -> None:
         store: DataStore = self.store
         self.send(
@@ -170,19 +225,24 @@ class ReflexFootMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def own_foot_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) != self.own_swing
 
+    @cython.ccall
     def other_foot_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == self.own_swing
 
+    @cython.ccall
     def leg_leans_far_enough(self) -> cython.bint:
         """phi < b."""
         return -self.store.get_float(self.own_angle) < self.store.get_float(self.R_F_PP_PHI)
 
+    @cython.ccall
     def push_is_done(self) -> cython.bint:
         """The motor has turned far enough, or for long enough."""
         store: DataStore = self.store
@@ -190,6 +250,7 @@ class ReflexFootMachine:
             self.R_F_PU_ANG
         ) or self.push_ms >= store.get_float(self.R_F_PU_TIME)
 
+    @cython.ccall
     def leg_swung_far_enough(self) -> cython.bint:
         """phi < c and q3 < e, of the leg that stands now."""
         store: DataStore = self.store

@@ -32,8 +32,30 @@ READS = (
 WRITES = ("FSM_HIP",)
 
 
+@cython.cclass
 class ReflexHipMachine:
     """States 0 HI_starthold ... 4 HO_place; HI: the inner legs swing. `machine` is stepped after the leg machine."""
+
+    store: DataStore
+    # variables of the data table
+    E_LO_ANGLE: cython.longlong
+    E_LI_ANGLE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    E_R_DW: cython.longlong
+    FSM_RESET: cython.longlong
+    C_HI_SH_H_ANG: cython.longlong
+    C_HI_SH_H_RATE: cython.longlong
+    P_HI_SH_H_TANG: cython.longlong
+    R_H_SW_I0: cython.longlong
+    R_H_SW_DW: cython.longlong
+    R_H_PL_PHI: cython.longlong
+    R_H_PL_I0: cython.longlong
+    R_H_PL_DW: cython.longlong
+    R_H_PL_KP: cython.longlong
+    R_H_PL_KV: cython.longlong
+    FSM_HIP: cython.longlong
+    motor: MotorCommand
+    machine: StateMachine
 
     def __init__(self, store) -> None:
         self.store = store
@@ -62,11 +84,13 @@ class ReflexHipMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_HIP, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
+    @cython.ccall
     def hold_start(self) -> None:
         """Hold the inner legs ahead until the first heel strike, as the record walk's program does."""
         stiffness: float = self.store.get_float(self.C_HI_SH_H_ANG)
@@ -76,7 +100,8 @@ class ReflexHipMachine:
             self.store.get_float(self.C_HI_SH_H_RATE),
         )
 
-    def swing(self, sign: float) -> None:
+    @cython.ccall
+    def swing(self, sign: cython.double) -> None:
         """`sign`: of the hip angle against q3, -1 while the outer legs stand."""
         store: DataStore = self.store
         self.motor.send(
@@ -85,7 +110,8 @@ class ReflexHipMachine:
             0.0,
         )
 
-    def place(self, sign: float) -> None:
+    @cython.ccall
+    def place(self, sign: cython.double) -> None:
         store: DataStore = self.store
         self.motor.send(
             sign * (store.get_float(self.R_H_PL_I0) + store.get_float(self.R_H_PL_DW) * store.get_float(self.E_R_DW)),
@@ -93,31 +119,40 @@ class ReflexHipMachine:
             -store.get_float(self.R_H_PL_KV),
         )
 
+    @cython.ccall
     def swing_inner(self) -> None:
         self.swing(-1.0)
 
+    @cython.ccall
     def swing_outer(self) -> None:
         self.swing(1.0)
 
+    @cython.ccall
     def place_inner(self) -> None:
         self.place(-1.0)
 
+    @cython.ccall
     def place_outer(self) -> None:
         self.place(1.0)
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def inner_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 0
 
+    @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1
 
+    @cython.ccall
     def outer_stance_far_enough(self) -> cython.bint:
         return -self.store.get_float(self.E_LO_ANGLE) < self.store.get_float(self.R_H_PL_PHI)
 
+    @cython.ccall
     def inner_stance_far_enough(self) -> cython.bint:
         return -self.store.get_float(self.E_LI_ANGLE) < self.store.get_float(self.R_H_PL_PHI)

@@ -8,10 +8,15 @@ Signs are the appendix's, as in the table of P4: phi is a leg's angle, positive 
 estimator's leg angles (robot.md C1.1); its rate is negative while the robot walks forward.
 """
 
+from typing import TYPE_CHECKING
+
 import cython
 
 from ranger_sim.boards.main_brain.command import table_id
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+
+if TYPE_CHECKING:
+    from ranger_sim.datatable.store import DataStore
 
 READS = (
     "E_LO_ANGLE",
@@ -26,8 +31,24 @@ READS = (
 WRITES = ("E_AM_L_ABSRATE", "E_R_DW", "FSM_LEG")
 
 
+@cython.cclass
 class ReflexLegMachine:
     """States 0 start ... 5 LO_aftermid, those after it with the record walk's numbers; "LO": the outer legs stand."""
+
+    store: "DataStore"
+    # variables of the data table
+    E_LO_ANGLE: cython.longlong
+    E_LI_ANGLE: cython.longlong
+    E_LO_RATE: cython.longlong
+    E_LI_RATE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    FSM_RESET: cython.longlong
+    R_W_REF: cython.longlong
+    R_DW_MAX: cython.longlong
+    E_AM_L_ABSRATE: cython.longlong
+    E_R_DW: cython.longlong
+    FSM_LEG: cython.longlong
+    machine: StateMachine
 
     def __init__(self, store) -> None:
         self.store = store
@@ -54,23 +75,28 @@ class ReflexLegMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def preset(self) -> None:
         """Before the first step: as fast as aimed at."""
         self.store.set_float(self.E_R_DW, 0.0)
         self.store.set_float(self.E_AM_L_ABSRATE, -self.store.get_float(self.R_W_REF))
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_LEG, number)
 
     # -- actions ---------------------------------------------------------------------------------
 
+    @cython.ccall
     def judge_inner(self) -> None:
         self.judge(self.store.get_float(self.E_LI_RATE))
 
+    @cython.ccall
     def judge_outer(self) -> None:
         self.judge(self.store.get_float(self.E_LO_RATE))
 
-    def judge(self, forward_rate: float) -> None:
+    @cython.ccall
+    def judge(self, forward_rate: cython.double) -> None:
         """dw of this mid-stance; `forward_rate`: of the stance leg, as the estimator has it, rad/s."""
         limit: float = self.store.get_float(self.R_DW_MAX)
         dw: float = -forward_rate - self.store.get_float(self.R_W_REF)
@@ -83,17 +109,22 @@ class ReflexLegMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def outer_leg_past_vertical(self) -> cython.bint:
         return self.store.get_float(self.E_LO_ANGLE) > 0.0
 
+    @cython.ccall
     def inner_leg_past_vertical(self) -> cython.bint:
         return self.store.get_float(self.E_LI_ANGLE) > 0.0
 
+    @cython.ccall
     def inner_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 0
 
+    @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1

@@ -14,12 +14,21 @@ Conditions and actions are callables without arguments; conditions must not chan
 
 import cython
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.calls import call
+from ranger_sim.firmware_sim.calls import call
 
 
+@cython.final
+@cython.cclass
 class State:
     """One state. `entry`, `main`, `exit`: callables or None; `machines`: the machines nested in it."""
+
+    number: cython.longlong
+    name: str
+    entry: object
+    main: object
+    exit: object
+    machines: list
+    transitions: list
 
     def __init__(self, number, name, entry=None, main=None, exit=None, machines=()) -> None:
         self.number = number
@@ -30,6 +39,7 @@ class State:
         self.machines = list(machines)
         self.transitions = []
 
+    @cython.ccall
     def run_main(self) -> None:
         """The main action, then one tick of every nested machine."""
         machine: StateMachine
@@ -39,14 +49,21 @@ class State:
             machine.step()
 
 
+@cython.final
+@cython.cclass
 class Transition:
     """What `condition` leads to; made by StateMachine from its table."""
+
+    target: State
+    condition: object
 
     def __init__(self, target, condition) -> None:
         self.target = target
         self.condition = condition
 
 
+@cython.final
+@cython.cclass
 class StateMachine:
     """A machine built from two tables.
 
@@ -55,6 +72,15 @@ class StateMachine:
     order of precedence. on_change: callable told the present state's number at the beginning of the first tick and of
     each tick after a change, or None.
     """
+
+    name: str
+    states: list
+    on_change: object
+    changes: cython.longlong
+    start: State
+    current: State
+    told: State
+    entered: cython.bint
 
     def __init__(self, name, states, transitions, on_change=None) -> None:
         self.name = name
@@ -85,6 +111,7 @@ class StateMachine:
         self.told = None
         self.entered = False
 
+    @cython.ccall
     def put(self, name) -> object:
         """Place the machine in a state whose entry action has yet to run."""
         for state in self.states:
@@ -95,11 +122,13 @@ class StateMachine:
                 return
         raise ValueError(f"machine {self.name}: no state {name!r}")
 
+    @cython.ccall
     def _tell(self) -> object:
         self.told = self.current
         if self.on_change is not None:
             self.on_change(self.current.number)
 
+    @cython.ccall
     def step(self) -> None:
         """One tick."""
         state: State = self.current

@@ -5,10 +5,15 @@ steering board writes straight to its drive. The radio's channel 0 says how much
 the motor is shut down.
 """
 
+from typing import TYPE_CHECKING
+
 import cython
 
 from ranger_sim.boards.main_brain.command import table_id
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+
+if TYPE_CHECKING:
+    from ranger_sim.datatable.store import DataStore
 
 READS = (
     "MCH_ANGLE",
@@ -25,8 +30,34 @@ READS = (
 WRITES = ("MCSI_COMMAND_CURRENT", "MCSI_STIFFNESS", "MCSI_DAMPNESS", "MCSI_SHUTDOWN", "E_RC_STEER", "FSM_STEER")
 
 
+@cython.cclass
 class SteeringMachine:
     """States 0 front, 1 stance, 2 back, 3 swing of the inner legs; stepped last of the walk's machines."""
+
+    store: "DataStore"
+    # variables of the data table
+    MCH_ANGLE: cython.longlong
+    E_SWING_LEG: cython.longlong
+    UI_RC_0: cython.longlong
+    FSM_RESET: cython.longlong
+    P_S_NULL_H_TANG: cython.longlong
+    P_S_MAX_CUR: cython.longlong
+    P_S_ILST_TWITCH_FRAC: cython.longlong
+    P_S_ILST_TWITCH_TIME: cython.longlong
+    P_S_RC_DEADBAND: cython.longlong
+    D_S_SHUT_DOWN: cython.longlong
+    MCSI_COMMAND_CURRENT: cython.longlong
+    MCSI_STIFFNESS: cython.longlong
+    MCSI_DAMPNESS: cython.longlong
+    MCSI_SHUTDOWN: cython.longlong
+    E_RC_STEER: cython.longlong
+    FSM_STEER: cython.longlong
+    twist: cython.double
+    ramp_start: cython.double
+    ramp_change: cython.double
+    ramp_fraction: cython.double
+    shut_down: cython.longlong
+    machine: StateMachine
 
     def __init__(self, store) -> None:
         self.store = store
@@ -57,25 +88,30 @@ class SteeringMachine:
             on_change=self.publish_state,
         )
 
+    @cython.ccall
     def publish_state(self, number) -> None:
         self.store.set_int(self.FSM_STEER, number)
 
-    def send(self, counts: float) -> None:
+    @cython.ccall
+    def send(self, counts: cython.double) -> None:
         self.store.set_float(self.MCSI_COMMAND_CURRENT, counts)
 
+    @cython.ccall
     def switch(self, shut_down: cython.longlong) -> None:
         """Tell the board once per change to drive or to shut down."""
         if shut_down != self.shut_down:
             self.shut_down = shut_down
             self.store.set_int(self.MCSI_SHUTDOWN, shut_down)
 
+    @cython.ccall
     def off(self) -> None:
         """No twist; motor shut down where the parameter says so."""
         self.twist = 0.0
         self.send(0.0)
         self.switch(1 if self.store.get_float(self.D_S_SHUT_DOWN) != 0.0 else 0)
 
-    def radio_command(self) -> float:
+    @cython.ccall
+    def radio_command(self) -> cython.double:
         """-1 ... 1 from the pulse width of channel 0 in 1/60 us (85 000 is the centre).
 
         A radio that never sent a pulse (width 0) means straight on: no source gives a rule, chosen by us,
@@ -92,6 +128,7 @@ class SteeringMachine:
             return -1.0
         return command
 
+    @cython.ccall
     def enter_back(self) -> None:
         """Read the radio once per stride."""
         command: float = self.radio_command()
@@ -105,16 +142,20 @@ class SteeringMachine:
         else:
             self.off()
 
+    @cython.ccall
     def send_twist(self) -> None:
         self.send(self.twist)
 
+    @cython.ccall
     def enter_front(self) -> None:
         self.ramp_start = self.twist
         self.ramp_change = -(1.0 + self.store.get_float(self.P_S_ILST_TWITCH_FRAC)) * self.twist
 
+    @cython.ccall
     def enter_stance(self) -> None:
         self.ramp_fraction = 0.0
 
+    @cython.ccall
     def ramp_to_other_side(self) -> None:
         """From S to -S * twitch in steps of 1/twitch time per tick (1.0: in one tick), then hold."""
         time: float = self.store.get_float(self.P_S_ILST_TWITCH_TIME)
@@ -126,17 +167,22 @@ class SteeringMachine:
 
     # -- conditions ------------------------------------------------------------------------------
 
+    @cython.ccall
     def reset_wanted(self) -> cython.bint:
         return self.store.get_int(self.FSM_RESET) == 1
 
+    @cython.ccall
     def inner_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 0
 
+    @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1
 
+    @cython.ccall
     def inner_falls_behind(self) -> cython.bint:
         return self.store.get_float(self.MCH_ANGLE) < self.store.get_float(self.P_S_NULL_H_TANG)
 
+    @cython.ccall
     def inner_comes_forward(self) -> cython.bint:
         return self.store.get_float(self.MCH_ANGLE) > -self.store.get_float(self.P_S_NULL_H_TANG)

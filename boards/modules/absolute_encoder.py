@@ -1,28 +1,40 @@
 """Absolute joint encoder AM8192B: 13 bits per turn, its spike limiter, zero and sign
 (robot.md N4.7)."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.error_module import ErrorModule
-from ranger_sim.foundation.numbers import float_of_word, word_of_float
+from ranger_sim.foundation.numbers import fixed_of_float, float32, float_of_word, word_of_float
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import fixed_of_float, float32
-
-    WORD_MASK = 0x1FFF  # 13 bits
-    COUNTS_PER_TURN = 8192
-    SLOTS_PER_MINUTE = 120_000
-    SPARE_COUNTS = 5  # that a step may be larger than the fastest joint's
+WORD_MASK: Final = 0x1FFF  # 13 bits
+COUNTS_PER_TURN: Final = 8192
+SLOTS_PER_MINUTE: Final = 120_000
+SPARE_COUNTS: Final = 5  # that a step may be larger than the fastest joint's
 
 RAD_PER_COUNT = float_of_word(word_of_float(0.0007669922))  # a single float; 2 pi / 8192 would be 0.00076699039
 
 
+@cython.final
+@cython.cclass
 class AbsoluteEncoder:
     """Angle of a joint. `zero`: raw count at angle 0; `sign`: of the mounting; `rpm`: fastest joint speed.
 
     `counts` is sign x (value - zero) without any wrap-around; `radians` the same as a single float, `angle` that in rad
     x 65536, truncated toward zero. `value` is what the spike limiter let through, 0 before the first reading.
     """
+
+    value: cython.longlong
+    counts: cython.longlong
+    angle: cython.longlong
+    largest_step: cython.longlong
+    sign: cython.longlong
+    zero: cython.longlong
+    radians: cython.double
+    rad_per_count: cython.double
+    errors: ErrorModule
+    spike_code: cython.longlong
 
     def __init__(self, zero, sign, rpm, errors: ErrorModule, spike_code) -> None:
         self.zero = zero
@@ -36,6 +48,7 @@ class AbsoluteEncoder:
         self.radians = 0.0
         self.angle = 0
 
+    @cython.ccall
     def accept(self, word: cython.longlong) -> cython.void:
         """A transfer of the serial interface ended: keep its low 13 bits, limited in their step."""
         new: cython.longlong = word & WORD_MASK
@@ -54,6 +67,8 @@ class AbsoluteEncoder:
         self.radians = float32(self.counts * self.rad_per_count)
         self.angle = fixed_of_float(self.radians)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def angle_rad(self) -> cython.double:
         """Angle in rad as it is published."""
         return self.radians

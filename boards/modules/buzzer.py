@@ -11,10 +11,7 @@ import array
 import cython
 
 from ranger_sim.boards.modules.receiver import Receiver
-from ranger_sim.firmware_sim.peripherals.pwm import Pwm
-
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.pwm import LER_MR0, LER_MR5
+from ranger_sim.firmware_sim.peripherals.pwm import LER_MR0, LER_MR5, Pwm
 
 # Our own tune, a rising and falling fifth: the robot played a song that belongs to others. (Hz, ms)
 TUNE = ((523, 200), (784, 200), (659, 200), (988, 200), (784, 400), (587, 200), (523, 400), (0, 200))
@@ -30,8 +27,29 @@ PERIOD_AT_START = 100_000  # counts of MR0, as the firmware sets it up
 LOWEST_HZ, HIGHEST_HZ = 1, 30_000
 
 
+@cython.cclass
 class Buzzer:
     """`update` runs once per slot of 1 ms; `hertz` is the tone that the PWM unit was last told, 0 for silence."""
+
+    pwm: Pwm
+    beeps: cython.bint
+    repeats: cython.bint
+    playing: cython.bint
+    silence_left_ms: cython.longlong
+    beep_left_ms: cython.longlong
+    beeps_waiting: cython.longlong
+    hertz: cython.longlong
+    frequency_hertz: cython.longlong
+    note: cython.longlong
+    note_left_ms: cython.longlong
+    beep_hertz: cython.longlong
+    beep_next: cython.longlong
+    tune_hertz: cython.longlong[::1]
+    tune_ms: cython.longlong[::1]
+    pitches: cython.longlong[::1]
+    beep_queue: cython.longlong[::1]
+    tunes_started: cython.longlong
+    beeps_made: cython.longlong
 
     def __init__(self, pwm: Pwm, beeps=True, repeats=False) -> None:
         self.pwm = pwm
@@ -54,6 +72,7 @@ class Buzzer:
         self.tunes_started = 0
         self.beeps_made = 0
 
+    @cython.ccall
     def tone(self, hertz: cython.longlong) -> cython.int:
         """Sound `hertz` (1-30 000; anything else is silence) by writing MR0 and MR5."""
         if hertz < LOWEST_HZ or hertz > HIGHEST_HZ:
@@ -70,6 +89,7 @@ class Buzzer:
             self.pwm.latch(LER_MR0 | LER_MR5)
         return 0
 
+    @cython.ccall
     def start_tune(self) -> cython.void:
         """From the first note; a tune that plays goes on."""
         if self.playing:
@@ -79,6 +99,7 @@ class Buzzer:
         self.note = 0
         self.note_left_ms = self.tune_ms[0]
 
+    @cython.ccall
     def error_sound(self, code: cython.longlong) -> cython.void:
         """Queue a beep for an error code, if beeps are switched on."""
         if not self.beeps or self.beeps_waiting >= MOST_WAITING:
@@ -86,6 +107,7 @@ class Buzzer:
         self.beep_queue[(self.beep_next + self.beeps_waiting) % MOST_WAITING] = self.pitches[code % len(PITCHES_HZ)]
         self.beeps_waiting += 1
 
+    @cython.ccall
     def update(self) -> cython.longlong:
         """One millisecond: a beep goes before the tune, and without either the buzzer is silent.
 
@@ -127,8 +149,11 @@ class Buzzer:
         return 0
 
 
+@cython.cclass
 class BuzzerFrequency(Receiver):
     """Takes UI_SET_BUZZER_FREQ, Hz."""
+
+    buzzer: Buzzer
 
     def __init__(self, buzzer: Buzzer) -> None:
         Receiver.__init__(self)
@@ -140,8 +165,11 @@ class BuzzerFrequency(Receiver):
         self.buzzer.frequency_hertz = value_word
 
 
+@cython.cclass
 class TuneStart(Receiver):
     """Takes UI_SET_BUZZER_AMPL and UI_EMPTY_TX2: anything but 0 starts the tune."""
+
+    buzzer: Buzzer
 
     def __init__(self, buzzer: Buzzer) -> None:
         Receiver.__init__(self)
@@ -154,11 +182,14 @@ class TuneStart(Receiver):
             self.buzzer.start_tune()
 
 
+@cython.cclass
 class ErrorSound(Receiver):
     """Takes ERROR_LCD, an error of any board: code in bits 0-15, and 0 is none.
 
     ROBOT PARITY: the 2016 user interface has no receiver for it; appendix 3.8 has it beep on errors.
     """
+
+    buzzer: Buzzer
 
     def __init__(self, buzzer: Buzzer) -> None:
         Receiver.__init__(self)

@@ -8,6 +8,8 @@ Sending: frames are built with the last network time, wait in a ring of 8 and go
 buffers 1 and 2 as these fall free: looked after whenever a frame is queued, and in every slot.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.can_errors import CanErrors
@@ -17,25 +19,22 @@ from ranger_sim.boards.modules.receiver import Receiver
 from ranger_sim.boards.modules.sender import Sender
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, RFS_EIGHT_BYTES, CanController
 from ranger_sim.firmware_sim.vic import IRQ_LATENCY
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, RFS_EIGHT_BYTES
-
-    IDENTIFIERS = 2048
-    # rings: places are masked; one place stays empty
-    RECEIVE_RING = 64
-    RECEIVE_MASK = 63
-    RECEIVED = 4  # numbers in a place: RFS, identifier, value and time
-    SEND_RING = 8
-    SEND_MASK = 7
-    QUEUED = 3  # identifier, value and time
-    # transmit buffers of the controller, in the order in which they are filled; the third is the router's, for sync
-    FIRST_BUFFER = 1
-    SECOND_BUFFER = 2
+IDENTIFIERS: Final = 2048
+# rings: places are masked; one place stays empty
+RECEIVE_RING: Final = 64
+RECEIVE_MASK: Final = 63
+RECEIVED: Final = 4  # numbers in a place: RFS, identifier, value and time
+SEND_RING: Final = 8
+SEND_MASK: Final = 7
+QUEUED: Final = 3  # identifier, value and time
+# transmit buffers of the controller, in the order in which they are filled; the third is the router's, for sync
+FIRST_BUFFER: Final = 1
+SECOND_BUFFER: Final = 2
 
 # Two cycles per instruction (robot.md T2), latency included: 10 + 17 instructions for a frame received.
 RECEIVE_CYCLES = 2 * 27
@@ -52,12 +51,46 @@ TRANSMIT_CYCLES = 2 * 30
 PLACE_CYCLES = 2 * 12
 
 
+@cython.final
+@cython.cclass
 class CanLink(Sender):
     """The one CAN controller that a satellite uses.
 
     Ground truth for tests: `received`, `delivered`, `ignored` (no receiver, remote, or not 8 bytes),
     `receive_lost`, `queued`, `send_lost`, `most_waiting`. `report_full`: a full ring raises an error.
     """
+
+    # what a frame touches
+    controller: CanController
+    time_identifier: cython.longlong
+    search_cycles: cython.longlong
+    receivers: list
+    rx_write: cython.longlong
+    rx_read: cython.longlong
+    tx_write: cython.longlong
+    tx_read: cython.longlong
+    received: cython.longlong
+    delivered: cython.longlong
+    queued: cython.longlong
+    ignored: cython.longlong
+    most_waiting: cython.longlong
+    rx_rows: cython.longlong[256]
+    tx_rows: cython.longlong[24]
+    # the rest
+    chip: Microcontroller
+    errors: ErrorModule
+    controller_errors: object
+    report_full: cython.bint
+    full_ring_kills: cython.bint
+    stuck: cython.bint
+    receive_lost: cython.longlong
+    send_lost: cython.longlong
+    code_receive_full: cython.longlong
+    code_send_full: cython.longlong
+    built: cython.bint
+    built_identifier: cython.longlong
+    built_value: cython.longlong
+    built_time: cython.longlong
 
     def __init__(
         self,
@@ -207,6 +240,7 @@ class CanLink(Sender):
         self.built_value = value_word
         self.built_time = time_word
 
+    @cython.ccall
     def transmit(self) -> None:
         """Slot task, the end of can_transmit: put the frame that the row made, if it made one, into the ring."""
         if self.built:
@@ -247,6 +281,7 @@ class CanLink(Sender):
         self.feed()
         return True
 
+    @cython.ccall
     def feed(self) -> object:
         """Slot task, and after each queued frame: fill free hardware buffers, 1 before 2.
 

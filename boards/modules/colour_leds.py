@@ -8,14 +8,11 @@ firmware_sim/peripherals/led_drivers.py.
 
 import cython
 
-from ranger_sim.boards.modules.front_panel import BLUE, GREEN, LIGHTS_SELECT, RED
+from ranger_sim.boards.modules.front_panel import BLUE, GREEN, LIGHTS_PER_DRIVER, LIGHTS_SELECT, PORTS_USED, RED
 from ranger_sim.boards.modules.receiver import Receiver
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.led_drivers import CONFIGURATION, RUN
 from ranger_sim.firmware_sim.peripherals.ssp import SspMaster
-
-if not cython.compiled:
-    from ranger_sim.boards.modules.front_panel import LIGHTS_PER_DRIVER, PORTS_USED
 
 TRANSFERS_PER_LED = 3
 DARK, WHITE = 0, 0xFFFFFF  # command words
@@ -27,8 +24,13 @@ ALL_PORTS, NO_OPERATION = 0x0A, 0x2000  # a register, and a whole word
 CYCLES_PER_WRITE = 200
 
 
+@cython.cclass
 class ColourLeds:
     """The firmware's side: `ssp` is the port as a master, `gpio` has the drivers' select pin."""
+
+    ssp: SspMaster
+    gpio: Gpio
+    select_pin: cython.longlong
 
     def __init__(self, ssp: SspMaster, gpio: Gpio) -> None:
         self.ssp = ssp
@@ -38,6 +40,7 @@ class ColourLeds:
         self._send(CONFIGURATION << 8 | RUN, CONFIGURATION << 8 | RUN)
         self._send(ALL_PORTS << 8 | OFF, ALL_PORTS << 8 | OFF)
 
+    @cython.cfunc
     def _send(self, far: cython.longlong, near: cython.longlong) -> cython.int:
         """One transfer: 16 bits for each driver."""
         self.gpio.write(self.select_pin, 0)
@@ -46,6 +49,7 @@ class ColourLeds:
         self.gpio.write(self.select_pin, 1)
         return 0
 
+    @cython.ccall
     def write(self, device: cython.longlong, register: cython.longlong, value: cython.longlong) -> cython.int:
         """`register` of one device gets `value`, the other device a no-operation."""
         word: cython.longlong = register << 8 | value & 0xFF
@@ -55,6 +59,7 @@ class ColourLeds:
             self._send(word, NO_OPERATION)
         return 0
 
+    @cython.ccall
     def set_colour(self, led: cython.longlong, colour: cython.longlong, level: cython.longlong) -> cython.longlong:
         """Brightness 0-255 of one colour of light 0-5; returns the number of transfers, 1."""
         value: cython.longlong = level
@@ -65,6 +70,7 @@ class ColourLeds:
         self.write(led // LIGHTS_PER_DRIVER, (3 * led + colour) % PORTS_USED, value)
         return 1
 
+    @cython.ccall
     def set_led(self, led: cython.longlong, word: cython.longlong) -> cython.longlong:
         """The three colours of light 0-5 from a command word; returns the number of transfers, 3."""
         self.set_colour(led, RED, word & 0xFF)
@@ -73,8 +79,12 @@ class ColourLeds:
         return TRANSFERS_PER_LED
 
 
+@cython.cclass
 class LedReceiver(Receiver):
     """Takes UI_SET_LED_n: the colour of light `led` 0-5. Its cycles are those of the transfers."""
+
+    leds: ColourLeds
+    led: cython.longlong
 
     def __init__(self, leds: ColourLeds, led) -> None:
         Receiver.__init__(self, TRANSFERS_PER_LED * CYCLES_PER_WRITE)

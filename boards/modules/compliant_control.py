@@ -4,9 +4,7 @@
 import cython
 
 from ranger_sim.boards.modules.receiver import Receiver
-
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float, float_of_word
+from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float, float_of_word
 
 COMMAND = 0
 STIFFNESS = 1
@@ -19,12 +17,23 @@ TARGET = 3
 GAIN_CYCLES = 2 * 28
 
 
+@cython.final
+@cython.cclass
 class CompliantControl:
     """command + sign (K position + D velocity), K the stiffness, D the dampness; all 16.16: A, A/rad, A s/rad.
 
     `sign` is -1 on the robot. `latch_with_current`: the two gains come into force only when the next command
     current arrives (firmware of 2016), otherwise at once.
     """
+
+    sign: cython.longlong
+    latch_with_current: cython.bint
+    command: cython.longlong
+    stiffness: cython.longlong
+    dampness: cython.longlong
+    received_stiffness: cython.longlong
+    received_dampness: cython.longlong
+    target: cython.longlong
 
     def __init__(self, sign=-1, latch_with_current=False) -> None:
         self.sign = sign
@@ -36,24 +45,29 @@ class CompliantControl:
         self.received_dampness = 0
         self.target = 0
 
+    @cython.ccall
     def set_command(self, current: cython.longlong) -> cython.void:
         """Constant term, A x 65536; the gains received so far come into force."""
         self.command = current
         self.stiffness = self.received_stiffness
         self.dampness = self.received_dampness
 
+    @cython.ccall
     def set_stiffness(self, gain: cython.longlong) -> cython.void:
         """Position gain, A/rad x 65536."""
         self.received_stiffness = gain
         if not self.latch_with_current:
             self.stiffness = gain
 
+    @cython.ccall
     def set_dampness(self, gain: cython.longlong) -> cython.void:
         """Velocity gain, A s/rad x 65536."""
         self.received_dampness = gain
         if not self.latch_with_current:
             self.dampness = gain
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def update(self, position: cython.longlong, velocity: cython.longlong) -> cython.longlong:
         """The current wanted now (A x 65536) at `position` (rad x 65536) and `velocity` (rad/s x 65536)."""
         return self.command + self.sign * (
@@ -61,11 +75,16 @@ class CompliantControl:
         )
 
 
+@cython.final
+@cython.cclass
 class GainReceiver(Receiver):
     """Delivers a received float to one setter of a CompliantControl: `what` is one of the four above.
 
     TARGET writes the target itself, which the law overwrites in the same slot, as on the robot.
     """
+
+    control: CompliantControl
+    what: cython.longlong
 
     def __init__(self, control: CompliantControl, what) -> None:
         Receiver.__init__(self, GAIN_CYCLES)

@@ -1,19 +1,17 @@
 """The inner loop: proportional-integral control of the motor current, 2 kHz, duty in counts of 600
 (appendix 4.7; robot.md N4.3)."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.error_module import ErrorModule
-from ranger_sim.boards.modules.mcu_led import McuLed
+from ranger_sim.boards.modules.mcu_led import GREEN, McuLed
 from ranger_sim.boards.modules.motor_limits import MotorLimits
-from ranger_sim.boards.modules.motor_output import MotorOutput
+from ranger_sim.boards.modules.motor_output import STOPPED, MotorOutput
 
-if not cython.compiled:
-    from ranger_sim.boards.modules.mcu_led import GREEN
-    from ranger_sim.boards.modules.motor_output import STOPPED
-
-    START_CALLS = 2  # the first calls only feed the watchdog
-    ONE = 65536  # in 16.16
+START_CALLS: Final = 2  # the first calls only feed the watchdog
+ONE: Final = 65536  # in 16.16
 
 # Counts per A and sample, all four boards (robot.md N4.2). The current settles within one sample, so the motor is a
 # gain of 1/31 A per count (1.34 ohm at 25.9 V): the integral alone has its pole at 1 - 20/31 = 0.35.
@@ -23,11 +21,30 @@ INTEGRAL_GAIN = 20
 PROPORTIONAL_GAIN = 4
 
 
+@cython.final
+@cython.cclass
 class CurrentControl:
     """Current loop of one motor. Gains in counts per A; 16.16 inside. `duty` is the last sum, in counts.
 
     `block_positive`, `block_negative`: directions closed by the joint's safety check.
     """
+
+    limits: MotorLimits
+    output: MotorOutput
+    block_positive: cython.bint
+    block_negative: cython.bint
+    calls: cython.longlong
+    integral: cython.longlong
+    integral_limit: cython.longlong
+    proportional_gain: cython.longlong
+    integral_gain: cython.longlong
+    duty: cython.longlong
+    leds: McuLed
+    errors: ErrorModule
+    code_saturated: cython.longlong
+    code_sum: cython.longlong
+    code_duty: cython.longlong
+    code_stopped: cython.longlong
 
     def __init__(
         self,
@@ -56,6 +73,7 @@ class CurrentControl:
         self.block_positive = False
         self.block_negative = False
 
+    @cython.ccall
     def supervise(self, current: cython.longlong) -> cython.bint:
         """First part of a sample: feed the watchdog, advance the monitors, switch the motor off or on.
 
@@ -74,6 +92,7 @@ class CurrentControl:
             self.leds.off(GREEN)
         return True
 
+    @cython.ccall
     def update(self, target: cython.longlong, current: cython.longlong) -> None:
         """One sample: drive the measured `current` towards `target` (A x 65536, the latter already limited)."""
         error: cython.longlong

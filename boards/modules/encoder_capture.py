@@ -7,6 +7,8 @@ The capture channel is armed for one edge of channel A at a time; its handler co
 that edge leaves, looks at channel B for the direction, and arms the other edge.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
@@ -15,15 +17,14 @@ from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.vic import FIQ, TIMER_MATCH
 from ranger_sim.foundation.events import EventQueue
 
-if not cython.compiled:
-    LONGEST_TIME = 0x7F000000  # cycles, about 35 s: longer silences count as this
-    # Bits of T0IR: the match that wraps the timer, the first capture channel. Of T0CCR: both edges of that channel.
-    IR_MR0 = 1
-    IR_CR0 = 16
-    CCR_BOTH_EDGES = 3
-    CCR_BITS = 3  # per channel
-    WRAP = 30_000  # cycles from wrap to wrap
-    EARLY = 15_000  # a capture below this is of after the wrap
+LONGEST_TIME: Final = 0x7F000000  # cycles, about 35 s: longer silences count as this
+# Bits of T0IR: the match that wraps the timer, the first capture channel. Of T0CCR: both edges of that channel.
+IR_MR0: Final = 1
+IR_CR0: Final = 16
+CCR_BOTH_EDGES: Final = 3
+CCR_BITS: Final = 3  # per channel
+WRAP: Final = 30_000  # cycles from wrap to wrap
+EARLY: Final = 15_000  # a capture below this is of after the wrap
 
 # Counted in the images, two cycles per instruction (robot.md T2), latency included; appendix 4.6: about 150.
 EDGE_CYCLES = 2 * 47
@@ -31,8 +32,13 @@ WRAP_CYCLES = 2 * 9
 LATENCY_CYCLES = 12
 
 
+@cython.final
+@cython.cclass
 class WrapCounter:
     """Counts the wraps of the capture timer (every 0.5 ms) in the fast interrupt: `cycles` of them since power-up."""
+
+    timer: TimerCapture
+    cycles: cython.longlong
 
     def __init__(self, timer: TimerCapture) -> None:
         self.timer = timer
@@ -56,8 +62,22 @@ class WrapCounter:
         self.cycles += WRAP
 
 
+@cython.final
+@cython.cclass
 class EncoderCapture:
     """One encoder on capture `channel`: A on `pin`, B on `partner_pin`."""
+
+    chip: Microcontroller
+    timer: TimerCapture
+    wraps: WrapCounter
+    decoder: QuadratureDecoder
+    armed_level: cython.longlong
+    channel: cython.longlong
+    flag: cython.longlong
+    edge_bits: cython.longlong
+    pin: cython.longlong
+    partner_pin: cython.longlong
+    last: cython.longlong
 
     def __init__(
         self, chip: Microcontroller, wraps: WrapCounter, channel, pin, partner_pin, decoder: QuadratureDecoder

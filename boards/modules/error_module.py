@@ -6,22 +6,23 @@ An error frame's value word holds the code (bits 0-15), the board's number (16-2
 since it was last sent (22-31, modulo 1024); its time word is when it first came (robot.md N1.7, N4.12, T4.2).
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.foundation.numbers import integers
 
-if not cython.compiled:
-    CODES = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
-    # Errors that wait to be sent: a ring of 32, which knows by a flag of its own whether it is empty.
-    RING_MASK = 31
-    MOST_WAITING = 32
-    # Fields of an error word: code, number of the board, count.
-    COUNT_MASK = 1023
-    CODE_MASK = 0xFFFF
-    BOARD_MASK = 0x3F
-    BOARD_SHIFT = 16
-    COUNT_SHIFT = 22
+CODES: Final = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
+# Errors that wait to be sent: a ring of 32, which knows by a flag of its own whether it is empty.
+RING_MASK: Final = 31
+MOST_WAITING: Final = 32
+# Fields of an error word: code, number of the board, count.
+COUNT_MASK: Final = 1023
+CODE_MASK: Final = 0xFFFF
+BOARD_MASK: Final = 0x3F
+BOARD_SHIFT: Final = 16
+COUNT_SHIFT: Final = 22
 
 
 def error_word(code, board, count):
@@ -29,12 +30,33 @@ def error_word(code, board, count):
     return (code & CODE_MASK) | (board & BOARD_MASK) << BOARD_SHIFT | (count & COUNT_MASK) << COUNT_SHIFT
 
 
+@cython.final
+@cython.cclass
 class ErrorModule:
     """The errors of board number `board`. Ground truth for tests and reports: `totals`, events per code.
 
     per_event: every recurrence counts (appendix); otherwise one per slot at most (firmware of 2016).
     lose_new_after_repeat: the firmware's fault that new errors of higher codes than a repeated one in a slot are lost.
     """
+
+    # what every slot looks at
+    flagged_count: cython.longlong
+    waiting: cython.longlong
+    # what an error touches
+    time: NetworkTime
+    per_event: cython.bint
+    lose_new_after_repeat: cython.bint
+    first: cython.longlong
+    dropped: cython.longlong
+    word: cython.longlong
+    stamp: cython.longlong
+    board: cython.longlong
+    codes: cython.longlong[32]
+    counts: cython.longlong[32]
+    stamps: cython.longlong[32]
+    totals: cython.longlong[::1]
+    flags: cython.longlong[::1]
+    flagged: cython.longlong[::1]
 
     def __init__(self, board, time: NetworkTime, per_event=True, lose_new_after_repeat=False) -> None:
         self.board = board
@@ -55,6 +77,7 @@ class ErrorModule:
         self.word = 0
         self.stamp = 0
 
+    @cython.ccall
     def report(self, code: cython.longlong) -> cython.void:
         """Note error `code`; it goes into the ring at the end of the slot. Codes above the table are taken
         as 0 (DEFAULT), so a wrong call is visible rather than lost."""
@@ -71,6 +94,7 @@ class ErrorModule:
             self.flagged_count += 1
         self.flags[code] += 1
 
+    @cython.ccall
     def update(self):
         """Slot task: move the flags of this slot into the ring; returns how many codes there were, None for none.
 
@@ -115,6 +139,8 @@ class ErrorModule:
         self.flagged_count = 0
         return moved
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def take(self) -> cython.bint:
         """Take the oldest waiting error into `word` and `stamp`; False when none waits."""
         if self.waiting == 0:

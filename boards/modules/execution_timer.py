@@ -1,25 +1,33 @@
 """How long the slots take: the variables EXECUTION_TIME and MAX_EXECUTION_TIME
 (robot.md N3.1)."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.foundation.numbers import float32
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import float32
-
-    ANEW_MASK = 255  # ms of the network time: the longest slot is looked for anew
+ANEW_MASK: Final = 255  # ms of the network time: the longest slot is looked for anew
 
 SECONDS_PER_CYCLE = 0.0000000166667  # of 60 MHz, as the firmware has it
 
 
+@cython.final
+@cython.cclass
 class ExecutionTimer:
     """`longest` and `longest_ever`: from the slot's start to the last entry of its row, as the slot timer counts it, in
     cycles of the core.
 
     `longest` starts anew while the low 8 bits of the network time are 0, about every 256 ms.
     """
+
+    chip: Microcontroller
+    time: NetworkTime
+    seconds_per_cycle: cython.double
+    longest: cython.longlong
+    longest_ever: cython.longlong
 
     def __init__(self, chip: Microcontroller, time: NetworkTime) -> None:
         self.chip = chip
@@ -36,10 +44,14 @@ class ExecutionTimer:
             if since > self.longest_ever:
                 self.longest_ever = since
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def seconds(self) -> cython.double:
         """EXECUTION_TIME, s."""
         return float32(self.longest * self.seconds_per_cycle)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def longest_seconds(self) -> cython.double:
         """MAX_EXECUTION_TIME, s."""
         return float32(self.longest_ever * self.seconds_per_cycle)

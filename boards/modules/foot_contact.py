@@ -4,11 +4,18 @@
 import cython
 
 
+@cython.cclass
 class Debounce:
     """A level is believed after `equal_samples` equal readings in a row (the first one counts).
 
     `settled`: the level whose next reading would change nothing, -1 when there is none: readings of it may be left out.
     """
+
+    settled: cython.longlong
+    state: cython.longlong
+    last: cython.longlong
+    run: cython.longlong
+    equal_samples: cython.longlong
 
     def __init__(self, equal_samples) -> None:
         self.equal_samples = equal_samples
@@ -17,6 +24,7 @@ class Debounce:
         self.state = 0
         self.settled = 0
 
+    @cython.ccall
     def sample(self, level: cython.longlong) -> cython.void:
         """One reading per slot, 0 or 1."""
         if level != self.last:
@@ -28,14 +36,22 @@ class Debounce:
             self.state = level
         self.settled = level if level == self.state else -1
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def contact(self) -> cython.longlong:
         """The level that is believed, as it is published."""
         return self.state
 
 
+@cython.final
+@cython.cclass
 class FootContact(Debounce):
     """A foot sensor's reading (counts) made into contact 0/1 (`state`): above `on_level` on, below `off_level`
     off."""
+
+    level: cython.longlong
+    on_level: cython.longlong
+    off_level: cython.longlong
 
     def __init__(self, on_level, off_level, equal_samples) -> None:
         Debounce.__init__(self, equal_samples)
@@ -43,6 +59,7 @@ class FootContact(Debounce):
         self.off_level = off_level
         self.level = 0
 
+    @cython.ccall
     def read(self, counts: cython.longlong) -> cython.void:
         """One reading per slot; between the two levels the old level stays."""
         if counts > self.on_level:

@@ -7,6 +7,7 @@ lights beside the processor that are lit (a bit each: green, red, blue).
 """
 
 import array
+from typing import Final
 
 import cython
 
@@ -17,18 +18,17 @@ from ranger_sim.firmware_sim.peripherals.gpio import p0, p1
 from ranger_sim.firmware_sim.peripherals.led_drivers import LedDrivers
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 
-if not cython.compiled:
-    CHARACTERS = 0
-    LIGHTS = 16
-    TONE_HZ = 22
-    SYNC = 23
-    KEYS = 24
-    LEDS = 25
-    WORDS = 26
-    CHARACTERS_PER_LINE = 8
-    LIGHT_COUNT = 6
-    LIGHTS_PER_DRIVER = 3
-    PORTS_USED = 9  # of each driver
+CHARACTERS: Final = 0
+LIGHTS: Final = 16
+TONE_HZ: Final = 22
+SYNC: Final = 23
+KEYS: Final = 24
+LEDS: Final = 25
+WORDS: Final = 26
+CHARACTERS_PER_LINE: Final = 8
+LIGHT_COUNT: Final = 6
+LIGHTS_PER_DRIVER: Final = 3
+PORTS_USED: Final = 9  # of each driver
 
 # The display: DB0 ... DB7 and its three lines of control
 DISPLAY_DATA = tuple(p0(bit) for bit in range(8))
@@ -44,8 +44,20 @@ LED_PINS = tuple(PINS_OF_LEDS[colour] for colour in ("green", "red", "blue"))  #
 BUZZER_CHANNEL = 5
 
 
+@cython.final
+@cython.cclass
 class FrontPanel(Peripheral):
     """What a person sees, hears and presses, at the pins of `chip`. `ssp`: what hangs on its SSP, the lights."""
+
+    display: CharacterDisplay
+    ssp: LedDrivers
+    words: cython.longlong[::1]
+    bit_of: cython.longlong[64]
+    enable_pin: cython.longlong
+    select_pin: cython.longlong
+    sync_pin: cython.longlong
+    first_led: cython.longlong
+    last_led: cython.longlong
 
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)
@@ -89,10 +101,12 @@ class FrontPanel(Peripheral):
         self.words[TONE_HZ] = hertz
         return 0
 
+    @cython.cfunc
     def _set_bit(self, word: cython.longlong, bit: cython.longlong, level: cython.longlong) -> cython.int:
         self.words[word] = self.words[word] | bit if level else self.words[word] & ~bit
         return 0
 
+    @cython.cfunc
     def _show_characters(self) -> cython.int:
         """The display has taken a byte."""
         i: cython.longlong
@@ -101,6 +115,7 @@ class FrontPanel(Peripheral):
             self.words[CHARACTERS + CHARACTERS_PER_LINE + i] = self.display.shown(1, i)
         return 0
 
+    @cython.cfunc
     def _show_lights(self) -> cython.int:
         """The drivers have taken what was sent."""
         light: cython.longlong
@@ -110,6 +125,7 @@ class FrontPanel(Peripheral):
             )
         return 0
 
+    @cython.cfunc
     def _level(self, light: cython.longlong, colour: cython.longlong) -> cython.longlong:
         """Brightness of one colour of a light, 0 ... 255."""
         return self.ssp.level(light // LIGHTS_PER_DRIVER, (3 * light + colour) % PORTS_USED)
@@ -127,6 +143,7 @@ class FrontPanel(Peripheral):
         shown = "".join(chr(code) if 0x20 <= code < 0x7F else " " for code in codes)
         return f"{shown[:CHARACTERS_PER_LINE]}\n{shown[CHARACTERS_PER_LINE:]}"
 
+    @cython.ccall
     def colour(self, light: cython.longlong) -> cython.longlong:
         """What light 0-5 shows, as a command word: 8 bits each of red (lowest), green and blue."""
         return self.words[LIGHTS + light]

@@ -13,21 +13,21 @@ the sum of the 29 bytes before it.
   0xC2 is chosen by us, because it is the device's documented packet with scaled rates and no angles.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.datatable.generated import errors
 from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.foundation.numbers import float_of_word
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import float_of_word
-
-    HEADER_ANGLES_AND_RATES = 0xCF
-    HEADER_RATES_ONLY = 0xC2
-    PACKET_BYTES = 31
-    PACKET_WORDS = 7  # six values and the timer
-    RING_BYTES = 128
-    RING_MASK = 127
-    CHECKSUM_MASK = 0xFFFF
+HEADER_ANGLES_AND_RATES: Final = 0xCF
+HEADER_RATES_ONLY: Final = 0xC2
+PACKET_BYTES: Final = 31
+PACKET_WORDS: Final = 7  # six values and the timer
+RING_BYTES: Final = 128
+RING_MASK: Final = 127
+CHECKSUM_MASK: Final = 0xFFFF
 
 
 def start_command(header) -> bytes:
@@ -35,12 +35,38 @@ def start_command(header) -> bytes:
     return bytes((0xC4, 0xC1, 0x29, header))
 
 
+@cython.final
+@cython.cclass
 class ImuParser:
     """Bytes in by `push` or `receive`, one packet out per `update`; values stay until the next good packet.
 
     `report(code)` hears MSIMU_RX_OF when the ring is full. `late_by_one_byte`: the firmware waits for
     more than 31 bytes, so a packet stays unread until its successor has begun.
     """
+
+    ring_write: cython.longlong
+    ring_read: cython.longlong
+    header: cython.longlong
+    needed: cython.longlong
+    ring: cython.longlong[128]
+    words: cython.longlong[7]
+    has_angles: cython.bint
+    rate_x: cython.double
+    rate_y: cython.double
+    rate_z: cython.double
+    roll: cython.double
+    pitch: cython.double
+    yaw: cython.double
+    acceleration_x: cython.double
+    acceleration_y: cython.double
+    acceleration_z: cython.double
+    timer: cython.longlong
+    packets: cython.longlong
+    bad_checksums: cython.longlong
+    skipped_bytes: cython.longlong
+    bytes_lost: cython.longlong
+    code_ring_full: cython.longlong
+    report: object
 
     def __init__(self, report, header=HEADER_ANGLES_AND_RATES, late_by_one_byte=False) -> None:
         self.report = report
@@ -67,6 +93,7 @@ class ImuParser:
         self.skipped_bytes = 0
         self.bytes_lost = 0
 
+    @cython.ccall
     def push(self, byte: cython.longlong) -> cython.bint:
         """Store a received byte; 127 fit, a byte more is lost and reported (MSIMU_RX_OF): False."""
         following: cython.longlong = (self.ring_write + 1) & RING_MASK
@@ -78,6 +105,7 @@ class ImuParser:
         self.ring_write = following
         return True
 
+    @cython.ccall
     def receive(self, uart: Uart) -> cython.longlong:
         """Store every byte that waits in the FIFO of `uart`; returns how many there were."""
         count: cython.longlong = uart.fifo_count
@@ -93,10 +121,14 @@ class ImuParser:
                 self.push(uart.RBR())
         return count
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def waiting(self) -> cython.longlong:
         """Bytes in the ring."""
         return (self.ring_write - self.ring_read) & RING_MASK
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def update(self) -> cython.longlong:
         """Look for one packet; return the number of bytes examined (the cost depends on it).
 

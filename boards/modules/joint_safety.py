@@ -1,28 +1,33 @@
 """Joint limits that close one direction of the motor (robot.md N4.8)."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.absolute_encoder import AbsoluteEncoder
 from ranger_sim.boards.modules.current_control import CurrentControl
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.limit_switch import LimitSwitch
-from ranger_sim.boards.modules.mcu_led import McuLed
+from ranger_sim.boards.modules.mcu_led import GREEN, RED, McuLed
 from ranger_sim.boards.modules.quadrature_decoder import QuadratureDecoder
+from ranger_sim.foundation.numbers import float32
 
-if not cython.compiled:
-    from ranger_sim.boards.modules.mcu_led import GREEN, RED
-    from ranger_sim.foundation.numbers import float32
-
-    HIP_LIMIT_COUNTS = 800  # 0.614 rad
-    FLASH_MS = 100
+HIP_LIMIT_COUNTS: Final = 800  # 0.614 rad
+FLASH_MS: Final = 100
 
 ANKLE_LOW_RAD = 0.2
 ANKLE_HIGH_RAD = 2.9
 CABLE_STRETCH_RAD = 0.3  # joint ahead of the motor by this: the cable has slipped or torn
 
 
+@cython.final
+@cython.cclass
 class HipSafety:
     """Beyond +800 counts positive current is blocked (red LED), beyond -800 negative current (green LED)."""
+
+    encoder: AbsoluteEncoder
+    control: CurrentControl
+    leds: McuLed
 
     def __init__(self, encoder: AbsoluteEncoder, control: CurrentControl, leds: McuLed) -> None:
         self.encoder = encoder
@@ -42,6 +47,8 @@ class HipSafety:
         self.control.block_negative = low
 
 
+@cython.final
+@cython.cclass
 class AnkleSafety:
     """Limit switches, cable stretch and the low end block negative current, the high end positive current.
 
@@ -52,6 +59,21 @@ class AnkleSafety:
     ones at 0.22 rad; with 0 A both boards raise it alike, with -0.05 A only the outer one does (measured). The
     2015 records of the robot tell the same: blocked below 0.2 rad, an ankle does not quite reach that target.
     """
+
+    encoder: AbsoluteEncoder
+    motor: QuadratureDecoder
+    left: LimitSwitch
+    right: LimitSwitch
+    control: CurrentControl
+    leds: McuLed
+    errors: ErrorModule
+    low: cython.double
+    high: cython.double
+    stretch: cython.double
+    code_switch: cython.longlong
+    code_stretch: cython.longlong
+    code_low: cython.longlong
+    code_high: cython.longlong
 
     def __init__(
         self,

@@ -7,8 +7,14 @@ from ranger_sim.datatable.generated import errors
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
 
+@cython.cclass
 class Keypad:
     """Levels of the keys through `gpio.level(pin)`; `report(code)` hears BUTTON_OOB."""
+
+    gpio: Gpio
+    pins: cython.longlong[6]
+    report: object
+    code_index: cython.longlong
 
     def __init__(self, gpio: Gpio, report) -> None:
         self.gpio = gpio
@@ -16,6 +22,7 @@ class Keypad:
         self.report = report
         self.code_index = errors.BUTTON_OOB
 
+    @cython.ccall
     def pressed(self, key: cython.longlong) -> cython.bint:
         """True while key 0-5 is down; another number is an error and counts as up."""
         if key < 0 or key > 5:
@@ -23,6 +30,7 @@ class Keypad:
             return False
         return self.gpio.level(self.pins[key]) != 0
 
+    @cython.ccall
     def buttons(self) -> cython.longlong:
         """Bit mask of UI_BUTTONS: a key that is held sets the bit of its number."""
         mask: cython.longlong = 0

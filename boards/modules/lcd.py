@@ -26,8 +26,29 @@ SET_ADDRESS = 0x80  # the command that moves the cursor
 SECOND_LINE = 0x40  # the address at which it begins
 
 
+@cython.cclass
 class Lcd:
     """The firmware's side. `tick` belongs into the millisecond interrupt; quarters come by LcdQuarter."""
+
+    countdown: cython.longlong
+    state: cython.longlong
+    waiting: cython.longlong
+    position: cython.longlong
+    character: cython.longlong
+    gpio: Gpio
+    data_pins: cython.longlong[8]
+    rs_pin: cython.longlong
+    rw_pin: cython.longlong
+    enable_pin: cython.longlong
+    report: object
+    positions: cython.longlong[::1]
+    characters: cython.longlong[::1]
+    reads: cython.longlong[::1]
+    counts: cython.longlong[::1]
+    code_full: cython.longlong
+    code_position: cython.longlong
+    written: cython.longlong
+    lost: cython.longlong
 
     def __init__(self, gpio: Gpio, report) -> None:
         self.gpio = gpio
@@ -50,6 +71,7 @@ class Lcd:
         self.written = 0
         self.lost = 0
 
+    @cython.ccall
     def put(self, position: cython.longlong, character: cython.longlong) -> cython.bint:
         """Queue one character for place 0-15; False and an error when the place or the queue is wrong."""
         queue: cython.longlong
@@ -69,6 +91,7 @@ class Lcd:
         self.waiting += 1
         return True
 
+    @cython.ccall
     def set_quarter(self, quarter: cython.longlong, word: cython.longlong) -> cython.longlong:
         """Queue the four characters of `word`, first in byte 0, for quarter 0-3; returns how many fit."""
         i: cython.longlong
@@ -78,6 +101,7 @@ class Lcd:
                 n += 1
         return n
 
+    @cython.cfunc
     def _write(self, rs: cython.longlong, byte: cython.longlong) -> cython.int:
         """A byte over the pins: a character with `rs`, else a command."""
         gpio: Gpio = self.gpio
@@ -90,6 +114,7 @@ class Lcd:
         gpio.write(self.enable_pin, 0)
         return 0
 
+    @cython.ccall
     def tick(self) -> cython.longlong:
         """One millisecond: at most one byte to the device; returns the bytes written."""
         queue: cython.longlong
@@ -122,8 +147,12 @@ class Lcd:
         return 1
 
 
+@cython.cclass
 class LcdQuarter(Receiver):
     """Takes UI_SET_LCD_QUAD_n: four characters for `quarter` 0-3 of the display."""
+
+    lcd: Lcd
+    quarter: cython.longlong
 
     def __init__(self, lcd: Lcd, quarter) -> None:
         Receiver.__init__(self)

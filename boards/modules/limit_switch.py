@@ -10,8 +10,13 @@ from ranger_sim.firmware_sim.microcontroller import Microcontroller
 EQUAL_SAMPLES = 3  # the firmware's limit of 2 repetitions: 1.5 ms
 
 
+@cython.final
+@cython.cclass
 class LimitSwitch(Debounce):
     """One switch on `pin`; `state` is 1 when closed. The pin has a pull-up: unconnected reads open."""
+
+    chip: Microcontroller
+    pin: cython.longlong
 
     def __init__(self, chip: Microcontroller, pin) -> None:
         Debounce.__init__(self, EQUAL_SAMPLES)
@@ -19,6 +24,7 @@ class LimitSwitch(Debounce):
         self.pin = pin
         chip.pins[pin] = 1
 
+    @cython.ccall
     def read(self) -> cython.void:
         """One reading per slot."""
         closed: cython.longlong = 1 - self.chip.pins[self.pin]

@@ -1,26 +1,35 @@
 """The three LEDs beside the processor, and the heartbeat (robot.md N1.8, N4.11)."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p1
 
-if not cython.compiled:
-    GREEN = 0
-    RED = 1
-    BLUE = 2
-    FIRST_PIN = 55  # P1.23; the others follow
-    HEARTBEAT_MS = 50
-    HEARTBEAT_BIT = 8  # of the network time
+GREEN: Final = 0
+RED: Final = 1
+BLUE: Final = 2
+FIRST_PIN: Final = 55  # P1.23; the others follow
+HEARTBEAT_MS: Final = 50
+HEARTBEAT_BIT: Final = 8  # of the network time
 
 PINS = {"green": p1(23), "red": p1(24), "blue": p1(25)}  # active low
 
 
+@cython.cclass
 class McuLed:
     """Green, red and blue with software timers. `slot_us`: period of `update`, which is a slot task.
 
     `remaining` per LED: slots until it goes out; -1 stays on until switched off; 0 is off.
     """
+
+    lit: cython.longlong
+    remaining_green: cython.longlong
+    remaining_red: cython.longlong
+    remaining_blue: cython.longlong
+    gpio: Gpio
+    slots_per_ms: cython.double
 
     def __init__(self, gpio: Gpio, slot_us) -> None:
         self.gpio = gpio
@@ -30,10 +39,13 @@ class McuLed:
         self.remaining_blue = 0
         self.lit = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def pin(self, led: cython.longlong) -> cython.longlong:
         """Pin number of an LED."""
         return FIRST_PIN + led
 
+    @cython.ccall
     def set_remaining(self, led: cython.longlong, slots: cython.longlong) -> None:
         """Slots until `led` goes out (-1: never, 0: now)."""
         if led == GREEN:
@@ -50,15 +62,18 @@ class McuLed:
             self.lit &= ~(1 << led)
             self.gpio.write(self.pin(led), 1)
 
+    @cython.ccall
     def flash(self, led: cython.longlong, ms: cython.longlong) -> None:
         """Light `led` for `ms` from now; a running flash starts anew."""
         slots: cython.longlong = int(ms * self.slots_per_ms)
         self.set_remaining(led, slots)
 
+    @cython.ccall
     def on(self, led: cython.longlong) -> None:
         """Light `led` until it is switched off."""
         self.set_remaining(led, -1)
 
+    @cython.ccall
     def off(self, led: cython.longlong) -> None:
         """Put `led` out."""
         self.set_remaining(led, 0)
@@ -81,9 +96,15 @@ class McuLed:
                 self.set_remaining(BLUE, 0)
 
 
+@cython.final
+@cython.cclass
 class Heartbeat(McuLed):
     """The LEDs of a board, whose blue one flashes for 50 ms when the network time's bit 8 goes from 0 to 1, so every
     512 ms."""
+
+    time: NetworkTime
+    last_bit: cython.longlong
+    beats: cython.longlong
 
     def __init__(self, time: NetworkTime, gpio: Gpio, slot_us) -> None:
         McuLed.__init__(self, gpio, slot_us)

@@ -7,22 +7,23 @@ in the same slot, and the integral of the excess fades the duty and switches the
 """
 
 import math
+from typing import Final
 
 import cython
 
 from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import fixed_multiply, fixed_of_float
-
-    SLOT_S_FIXED = 32  # 0.5 ms x 65536, truncated (0.488 ms), as in the firmware
-    ONE = 65536  # in 16.16
+SLOT_S_FIXED: Final = 32  # 0.5 ms x 65536, truncated (0.488 ms), as in the firmware
+ONE: Final = 65536  # in 16.16
 
 RATED_SPEED_RAD_S = 659.734  # 6300 rpm at the motor shaft (appendix 4.7)
 SOFT_SPEED = 0.9  # the current fades from here to the rated speed (chosen by us: one tenth of the range)
 SOFT_THERMAL = 0.75  # of the thermal limit (robot.md N4.3)
 
 
+@cython.final
+@cython.cclass
 class MotorLimits:
     """Limits of one motor. Currents in A, `thermal_time` s, `gear` motor turns per joint turn (0: no speed).
 
@@ -30,6 +31,38 @@ class MotorLimits:
     sign acts on the duty, which never limits); `peak` cuts the duty of a slot whose current is beyond
     current_min ... current_max; `speed` is the speed limiter.
     """
+
+    # what every slot touches
+    thermal: cython.longlong
+    excess: cython.longlong
+    thermal_rate: cython.longlong
+    thermal_limit: cython.longlong
+    thermal_soft: cython.longlong
+    thermal_multiplier: cython.longlong
+    excess_multiplier: cython.longlong
+    current_min: cython.longlong
+    current_max: cython.longlong
+    target_min: cython.longlong
+    target_max: cython.longlong
+    speed_soft: cython.longlong
+    too_hot: cython.bint
+    overloaded: cython.bint
+    derating: cython.bint
+    peak: cython.bint
+    # the rest
+    errors: ErrorModule
+    thermal_slope: cython.longlong
+    excess_limit: cython.longlong
+    excess_fade: cython.longlong
+    speed_max: cython.longlong
+    code_target: cython.longlong
+    code_warm: cython.longlong
+    code_hot: cython.longlong
+    code_cooled: cython.longlong
+    code_excess: cython.longlong
+    code_excess_over: cython.longlong
+    code_speed: cython.longlong
+    code_peak: cython.longlong
 
     def __init__(
         self,
@@ -83,6 +116,8 @@ class MotorLimits:
         self.excess_multiplier = ONE
         self.overloaded = False
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def monitor(self, current: cython.longlong) -> cython.bint:
         """Every slot, also while the motor is off: advance both monitors with the measured current. True when the motor
         must be off."""
@@ -121,6 +156,8 @@ class MotorLimits:
             self.errors.report(self.code_excess)  # in every slot
         return self.too_hot or self.overloaded
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def limit_target(self, target: cython.longlong, velocity: cython.longlong) -> cython.longlong:
         """The target current the motor may have now, at `velocity` (rad/s x 65536, joint side).
 
@@ -157,6 +194,8 @@ class MotorLimits:
             return low
         return target
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def limit_duty(self, duty: cython.longlong, current: cython.longlong) -> cython.longlong:
         """The controller's sum (counts x 65536) after what the measured current asks for.
 

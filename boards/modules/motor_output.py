@@ -3,21 +3,21 @@
 """The H-bridge seen from the processor: two PWM leads, two low-side enables, the watchdog pin
 (robot.md N4.4; appendix 3.8 on the alternating leads)."""
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.receiver import IntReceiver
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio, p0, p1
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.foundation.numbers import wrap_i32
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import wrap_i32
-
-    PERIOD_COUNTS = 600  # 100 kHz at 60 MHz
-    # Bits of `off`.
-    SLEEP = 1
-    SHUTDOWN = 2
-    STOPPED = 4
-    OFF_UNLESS_0 = 0x7FFF  # what SLEEP and SHUTDOWN look at in the word they get
+PERIOD_COUNTS: Final = 600  # 100 kHz at 60 MHz
+# Bits of `off`.
+SLEEP: Final = 1
+SHUTDOWN: Final = 2
+STOPPED: Final = 4
+OFF_UNLESS_0: Final = 0x7FFF  # what SLEEP and SHUTDOWN look at in the word they get
 
 PINS = {
     "pwm_lead_2": p0(7),
@@ -28,9 +28,14 @@ PINS = {
 }
 
 
+@cython.final
+@cython.cclass
 class OffRequest(IntReceiver):
     """SLEEP or SHUTDOWN as the main brain sent it last: `bit` of the output's `off` is set unless its low 15 bits are
     0."""
+
+    output: "MotorOutput"
+    bit: cython.longlong
 
     def __init__(self, output, bit) -> None:
         IntReceiver.__init__(self)
@@ -45,6 +50,8 @@ class OffRequest(IntReceiver):
             self.output.off |= self.bit
 
 
+@cython.final
+@cython.cclass
 class MotorOutput:
     """Writes a duty (counts of 600, positive drives the motor forward) to alternating leads.
 
@@ -53,6 +60,21 @@ class MotorOutput:
     main brain asks for. `off`: why the motor may not be driven, 0 when it may. SLEEP: the bridge is open, the watchdog
     stays fed; SHUTDOWN: a duty of 0, and the watchdog starves; STOPPED, by the limits: the same.
     """
+
+    second_pattern: cython.bint
+    off: cython.longlong
+    watchdog_pin: cython.longlong
+    low_side_2_pin: cython.longlong
+    low_side_6_pin: cython.longlong
+    gpio: Gpio
+    pwm: Pwm
+    sign: cython.longlong
+    largest: cython.longlong
+    offset: cython.longlong
+    low_side: cython.longlong
+    duty: cython.longlong
+    sleep: OffRequest
+    shutdown: OffRequest
 
     def __init__(self, gpio: Gpio, pwm: Pwm, sign, largest, offset) -> None:
         self.gpio = gpio
@@ -70,11 +92,13 @@ class MotorOutput:
         self.low_side_2_pin = PINS["low_side_2"]
         self.low_side_6_pin = PINS["low_side_6"]
 
+    @cython.ccall
     def feed_watchdog(self) -> None:
         """Toggle the watchdog pin, unless the motor is stopped or shut down."""
         if self.off & (SHUTDOWN | STOPPED) == 0:
             self.gpio.toggle(self.watchdog_pin)
 
+    @cython.ccall
     def enable_low_side(self, on: cython.longlong) -> None:
         """Both low-side enables, written when they change."""
         if on != self.low_side:
@@ -82,6 +106,7 @@ class MotorOutput:
             self.gpio.write(self.low_side_2_pin, on)
             self.gpio.write(self.low_side_6_pin, on)
 
+    @cython.ccall
     def write(self, duty: cython.longlong) -> None:
         """Drive the bridge with `duty` counts; the leads take turns at every call.
 

@@ -7,30 +7,39 @@ with transmit and abort together: a frame that does not get through at once is n
 buffer is still busy the millisecond is skipped without an error. Source: robot.md N1.4.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.can_load import CanLoad
 from ranger_sim.boards.modules.network_time import NetworkTime
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, CanController
+from ranger_sim.foundation.events import FLAG_SINGLE_SHOT
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
-    from ranger_sim.foundation.events import FLAG_SINGLE_SHOT
-
-    TICKS_PER_MS = 5
-    SYNC_BUFFER = 3
-    SYNC_IDENTIFIER = 0
+TICKS_PER_MS: Final = 5
+SYNC_BUFFER: Final = 3
+SYNC_IDENTIFIER: Final = 0
 
 CYCLES_PER_SYNC = 60  # four register writes and a command per controller: chosen by us, no listing says
-# A C variable when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_MASK = 0xFFFFFFFF
+# A C variable when compiled: Cython makes a Python object of every literal above 31 bits.
+_MASK: cython.longlong = 4294967295
 
 
+@cython.final
+@cython.cclass
 class NetworkClock:
     """`tick` is the work of the Timer1 interrupt. `time.ms`: the count, 0 at power-up, wraps after 2^32.
 
     `sent`, `skipped`: sync frames handed over and left out per bus, index 1-4.
     """
+
+    time: NetworkTime
+    load: CanLoad
+    ticks: cython.longlong
+    divider: cython.longlong
+    controllers: list
+    sent: cython.longlong[5]
+    skipped: cython.longlong[5]
 
     def __init__(self, time: NetworkTime, controllers, load: CanLoad) -> None:
         self.time = time
@@ -41,6 +50,7 @@ class NetworkClock:
         self.sent = [0] * 5
         self.skipped = [0] * 5
 
+    @cython.ccall
     def tick(self) -> cython.bint:
         """One 200 us interrupt; True when a millisecond has passed and sync went out."""
         self.ticks += 1
@@ -52,6 +62,7 @@ class NetworkClock:
         self.send_sync()
         return True
 
+    @cython.ccall
     def send_sync(self) -> cython.longlong:
         """The count on every bus whose third transmit buffer is free, single shot; returns the count."""
         controller: CanController

@@ -9,8 +9,11 @@ import cython
 from ranger_sim.boards.modules.receiver import Receiver
 
 
+@cython.cclass
 class NetworkTime(Receiver):
     """`ms`: the last count received, 0 ... 2^32-1."""
+
+    ms: cython.longlong
 
     def __init__(self) -> None:
         Receiver.__init__(self)

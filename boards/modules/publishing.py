@@ -9,16 +9,22 @@ import cython
 
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.sender import Sender
+from ranger_sim.firmware_sim.calls import call
 from ranger_sim.firmware_sim.scheduler import Task
+from ranger_sim.foundation.numbers import word_of_float, word_of_i32
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.calls import call
-    from ranger_sim.foundation.numbers import word_of_float, word_of_i32
 
-
+@cython.final
+@cython.cclass
 class Publication:
     """A variable that a sender's frames carry: what `function()` returns, or always the same `constant`."""
+
+    sender: Sender
+    identifier: cython.longlong
+    function: object
+    constant: cython.double
+    whole: cython.bint
 
     def __init__(self, sender: Sender, identifier, function, constant, whole) -> None:
         self.sender = sender
@@ -40,8 +46,14 @@ class Publication:
         return 1 if word != 0 else 0
 
 
+@cython.final
+@cython.cclass
 class ErrorPublication:
     """The error variable of a board: the error that waits longest, if one does."""
+
+    sender: Sender
+    identifier: cython.longlong
+    errors: ErrorModule
 
     def __init__(self, sender: Sender, identifier, errors: ErrorModule) -> None:
         self.sender = sender

@@ -7,16 +7,16 @@ the firmware's: 32-bit integers and 16.16 fixed point, truncated where C truncat
 (robot.md N4.1; appendix 4.6).
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.error_module import ErrorModule
+from ranger_sim.foundation.numbers import divide_toward_zero, float_of_fixed
 
-if not cython.compiled:
-    from ranger_sim.foundation.numbers import divide_toward_zero, float_of_fixed
-
-    RING_MASK = 63  # places of the 64 edge times that wait for the next slot; one stays empty
-    SLOT_CYCLES = 30_000
-    LARGEST = 0x7FFFFFFF  # of 32 bits
+RING_MASK: Final = 63  # places of the 64 edge times that wait for the next slot; one stays empty
+SLOT_CYCLES: Final = 30_000
+LARGEST: Final = 0x7FFFFFFF  # of 32 bits
 
 PI = 3.141592653589793
 TIMER_HZ = 60000000  # the capture timer counts processor cycles
@@ -37,12 +37,41 @@ def normalised_gain(gain, low, high):
     return int(gain), shift
 
 
+@cython.final
+@cython.cclass
 class QuadratureDecoder:
     """One encoder. `pulses`: lines per turn; `gear`: turns of the encoder per turn of the joint, its sign the
     mounting. `position` is rad x 65536 and `rate` rad/s x 65536, both at the joint.
 
     `filter_exponent`: the rate filter moves by 1/2^n of the difference per slot.
     """
+
+    # what an edge and a slot touch
+    count: cython.longlong
+    position: cython.longlong
+    position_gain: cython.longlong
+    position_shift: cython.longlong
+    filter_exponent: cython.longlong
+    write: cython.longlong
+    read: cython.longlong
+    rate_bits: cython.longlong
+    sign: cython.longlong
+    rate_gain: cython.longlong
+    mean: cython.longlong
+    idle: cython.longlong
+    speed: cython.longlong
+    filtered: cython.longlong
+    rate: cython.longlong
+    after_glitch: cython.bint
+    ring: cython.longlong[64]
+    # the rest
+    glitches: cython.longlong
+    dropped_times: cython.longlong
+    errors: ErrorModule
+    glitch_code: cython.longlong
+    full_code: cython.longlong
+    rate_shift: cython.longlong
+    rad_per_count: cython.double
 
     def __init__(self, pulses, gear, errors: ErrorModule, glitch_code, full_code, filter_exponent=4) -> None:
         self.errors = errors
@@ -72,6 +101,7 @@ class QuadratureDecoder:
         self.speed = 0  # counts per cycle x 2^31, unfiltered
         self.filtered = 0  # the same x 65536, so that the filter's fraction stays
 
+    @cython.ccall
     def edge(self, step: cython.longlong, elapsed: cython.longlong) -> None:
         """An edge of channel A as the fast interrupt sees it: `step` 1 or -1, `elapsed` cycles since the edge before.
 
@@ -88,6 +118,7 @@ class QuadratureDecoder:
             self.ring[write] = step * elapsed
             self.write = after
 
+    @cython.ccall
     def glitch(self) -> None:
         """The pin's level did not agree with the armed edge: nothing counted, a time of 0 stored."""
         self.glitches += 1
@@ -146,11 +177,13 @@ class QuadratureDecoder:
         self.read = here
         return seen
 
+    @cython.cfunc
     def _note_glitch(self) -> cython.void:
         """What was in the ring cannot be: an error, and the next time is not used."""
         self.errors.report(self.glitch_code)
         self.after_glitch = True
 
+    @cython.cfunc
     def _be_silent(self) -> cython.void:
         """A slot without a valid time: the longer the silence, the slower it must be, so the rate falls with the
         inverse of the silence."""
@@ -162,6 +195,7 @@ class QuadratureDecoder:
         else:
             self._filter(1, -self.idle if self.idle > -mean else mean)
 
+    @cython.cfunc
     def _filter(self, times: cython.longlong, total: cython.longlong) -> cython.void:
         """Follow `times` edge times whose sum is `total` cycles, with the sign of their direction."""
         filtered: cython.longlong = self.filtered
@@ -175,18 +209,25 @@ class QuadratureDecoder:
         self.filtered = filtered
         self.rate = (self.rate_gain * filtered) >> self.rate_bits
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def position_rad(self) -> cython.double:
         """Angle of the joint in rad, as it is published."""
         return float_of_fixed(self.position)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def rate_rad_s(self) -> cython.double:
         """Rate of the joint in rad/s, as it is published."""
         return float_of_fixed(self.rate)
 
+    @cython.ccall
     def set_position(self, position: cython.longlong) -> None:
         """Set the count so that the position reads `position` (rad x 65536) from the next slot on."""
         self.count = self.count_at(position)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def count_at(self, position: cython.longlong) -> cython.longlong:
         """The count at `position` (rad x 65536), truncated as in C."""
         return divide_toward_zero(position << self.position_shift, self.position_gain)

@@ -16,8 +16,20 @@ CHANNELS = 4
 FILTER = 16.0  # a pulse moves the smoothed width by this part of the difference
 
 
+@cython.cclass
 class RcReceiver:
     """`capture` is the work of the timer interrupt, `width` what the schedule sends."""
+
+    report: object
+    levels: cython.longlong[::1]
+    rising: cython.longlong[::1]
+    seen: cython.longlong[::1]
+    measured: cython.longlong[::1]
+    pulses: cython.longlong[::1]
+    filtered: cython.double[::1]
+    code_levels: cython.longlong
+    code_channel: cython.longlong
+    bad_levels: cython.longlong
 
     def __init__(self, report) -> None:
         self.report = report
@@ -31,6 +43,7 @@ class RcReceiver:
         self.code_channel = errors.RCX_BAD_CHAN
         self.bad_levels = 0
 
+    @cython.ccall
     def capture(self, channel: cython.longlong, level: cython.longlong, ticks: cython.longlong) -> cython.longlong:
         """An edge of `channel` 0-3 at timer count `ticks`; `level` is the pin after it. Returns 1.
 
@@ -62,6 +75,7 @@ class RcReceiver:
         self.seen[channel] = 1
         return 1
 
+    @cython.ccall
     def width(self, channel: cython.longlong) -> cython.double:
         """Smoothed high time of `channel` 0-3 in ticks; 0.0 before its first pulse, RCX_BAD_CHAN outside."""
         if channel < 0 or channel >= CHANNELS:

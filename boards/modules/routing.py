@@ -7,40 +7,46 @@ yet). Frames go to every destination but the channel they came from, in the orde
 Source: robot.md N1.5.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.boards.modules.can_load import CanLoad
 from ranger_sim.boards.modules.ssp_link import RouterSspLink
 from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
+from ranger_sim.foundation.events import FLAG_REMOTE
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
-    from ranger_sim.foundation.events import FLAG_REMOTE
-
-    IDENTIFIERS = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
-    CHANNEL_SSP = 0
-    FIRST_BUS = 1
-    LAST_BUS = 4
-    CHANNEL_OWN = 5
-    SOURCE_UNKNOWN = 7
-    # a row of the table: destinations, and the source above them
-    DESTINATIONS = 0xFF
-    SOURCE_SHIFT = 8
-    ALL_CHANNELS = 0x1F
-    TO_SSP = 1  # destinations: the main brain alone
-    NOT_LEARNED = 0x701  # a row to the main brain, its source unknown
-    # rings: places are masked; one place stays empty
-    RECEIVE_RING = 64
-    RECEIVE_MASK = 63
-    RECEIVED = 5  # numbers in a place: channel, identifier, flags and two words
-    TRANSMIT_RING = 8
-    TRANSMIT_MASK = 7
-    OWN_MASK = 7
-    TO_SEND = 4  # numbers in a place of a transmit ring or the own ring: identifier, flags and two words
+IDENTIFIERS: Final = 2032  # 2032-2047 would begin with seven recessive bits, which CAN forbids
+CHANNEL_SSP: Final = 0
+FIRST_BUS: Final = 1
+LAST_BUS: Final = 4
+CHANNEL_OWN: Final = 5
+SOURCE_UNKNOWN: Final = 7
+# a row of the table: destinations, and the source above them
+DESTINATIONS: Final = 0xFF
+SOURCE_SHIFT: Final = 8
+ALL_CHANNELS: Final = 0x1F
+TO_SSP: Final = 1  # destinations: the main brain alone
+NOT_LEARNED: Final = 0x701  # a row to the main brain, its source unknown
+# rings: places are masked; one place stays empty
+RECEIVE_RING: Final = 64
+RECEIVE_MASK: Final = 63
+RECEIVED: Final = 5  # numbers in a place: channel, identifier, flags and two words
+TRANSMIT_RING: Final = 8
+TRANSMIT_MASK: Final = 7
+OWN_MASK: Final = 7
+TO_SEND: Final = 4  # numbers in a place of a transmit ring or the own ring: identifier, flags and two words
 
 
+@cython.final
+@cython.cclass
 class RoutingTable:
     """Destinations and learned sources of every identifier. `routes`: pairs (identifier, mask)."""
+
+    rows: cython.longlong[2032]
+    learned: cython.longlong
+    changed: cython.longlong
 
     def __init__(self, routes=()) -> None:
         # every identifier that the table does not name goes to the main brain
@@ -50,7 +56,8 @@ class RoutingTable:
         for identifier, mask in routes:
             self.set_destinations(identifier, mask)
 
-    def set_destinations(self, identifier, mask) -> None:
+    @cython.ccall
+    def set_destinations(self, identifier, mask) -> object:
         """Replace the destinations of `identifier`; IndexError above 2031."""
         if not 0 <= identifier < IDENTIFIERS:
             raise IndexError(f"routing table: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
@@ -66,6 +73,7 @@ class RoutingTable:
         """Channels by identifier; 7: none yet."""
         return [row >> SOURCE_SHIFT for row in list(self.rows)]
 
+    @cython.ccall
     def learn(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
         """Note where `identifier` comes from; a source that changed is accepted without a word."""
         before: cython.longlong = self.rows[identifier] >> SOURCE_SHIFT
@@ -77,17 +85,47 @@ class RoutingTable:
             self.changed += 1
         self.rows[identifier] = self.rows[identifier] & DESTINATIONS | channel << SOURCE_SHIFT
 
+    @cython.ccall
     def subscribe(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
         """A remote frame came from `channel`: send `identifier` there too from now on."""
         self.rows[identifier] |= 1 << channel
 
 
+@cython.final
+@cython.cclass
 class Router:
     """The rings and the moves. `report(code)` hears errors.
 
     `one_frame_lag` is the firmware's quirk: its receive interrupt advances the write index before storing
     and its reader takes before advancing, so a frame waits for its successor.
     """
+
+    # what the main loop and a frame touch
+    rx_write: cython.longlong
+    rx_read: cython.longlong
+    own_write: cython.longlong
+    own_read: cython.longlong
+    to_route: cython.longlong
+    waiting: cython.longlong
+    table: RoutingTable
+    ssp: RouterSspLink
+    load: CanLoad
+    routed: cython.longlong
+    copies: cython.longlong
+    one_frame_lag: cython.bint
+    tx_write: cython.longlong[5]
+    tx_read: cython.longlong[5]
+    rx_rows: cython.longlong[320]
+    own_rows: cython.longlong[32]
+    tx_rows: cython.longlong[160]
+    # the rest
+    report: object
+    receive_lost: cython.longlong
+    own_lost: cython.longlong
+    unroutable: cython.longlong
+    transmit_lost: cython.longlong[5]
+    receive_lost_from: cython.longlong[5]
+    receive_full_codes: cython.longlong[5]
 
     def __init__(self, table: RoutingTable, ssp: RouterSspLink, load: CanLoad, report, one_frame_lag=False) -> None:
         self.table = table
@@ -122,6 +160,7 @@ class Router:
         self.unroutable = 0
         self.transmit_lost = [0] * 5
 
+    @cython.ccall
     def receive(
         self,
         channel: cython.longlong,
@@ -150,6 +189,7 @@ class Router:
         self.to_route += 1
         return True
 
+    @cython.cfunc
     def _lose(self, channel: cython.longlong) -> cython.bint:
         """A frame from `channel` finds the ring full: False."""
         self.receive_lost += 1
@@ -157,6 +197,8 @@ class Router:
         self.report(self.receive_full_codes[channel])
         return False
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """A frame of the router itself into its own ring (7 fit); False when it is lost."""
         following: cython.longlong = (self.own_write + 1) & OWN_MASK
@@ -172,6 +214,7 @@ class Router:
         self.to_route += 1
         return True
 
+    @cython.ccall
     def route_step(self, now: cython.longlong) -> cython.longlong:
         """Move up to three frames, one each from the link, the CAN ring and the own ring; return how many."""
         moved: cython.longlong = 0
@@ -209,6 +252,7 @@ class Router:
             moved += 1
         return moved
 
+    @cython.ccall
     def route(
         self,
         source: cython.longlong,
@@ -237,6 +281,7 @@ class Router:
             return 1
         return self._spread(mask, identifier, flags, word0, word1, now)
 
+    @cython.cfunc
     def _spread(
         self,
         mask: cython.longlong,
@@ -262,6 +307,8 @@ class Router:
         self.copies += n
         return n
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def queue(
         self,
         channel: cython.longlong,
@@ -285,6 +332,8 @@ class Router:
         self.tx_write[channel] = following
         return True
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def frames_for(self, channel: cython.longlong) -> cython.longlong:
         """Frames in the transmit ring of `channel`."""
         return (self.tx_write[channel] - self.tx_read[channel]) & TRANSMIT_MASK

@@ -16,42 +16,44 @@ segment that was handed over: a fault makes its own with `corrupted_copy`. A cir
 can queue and for all that the other end can let wait.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.datatable.generated import errors
+from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
+from ranger_sim.foundation.events import FLAG_REMOTE
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES
-    from ranger_sim.foundation.events import FLAG_REMOTE
-
-    SEGMENT_HALF_WORDS = 31
-    CHECKSUM = 30  # its place: the half-words before it are frames and zeros
-    FRAME_HALF_WORDS = 5
-    FRAME_ROW = 3  # numbers of a frame in `SspSegment.rows`: header and two words
-    SEGMENT_ROWS = 18  # of six frames
-    HEADER_ONES = 0x7800  # bits 11-14 of every header
-    HEADER_REMOTE = 0x8000
-    HEADER_SHIFT = 11
-    HEADER_MARK = 0x0F  # what stands above the identifier of a data frame
-    IDENTIFIER = 0x7FF
-    HALF_WORD = 0xFFFF
-    MOST_BEFORE_A_FRAME = 494  # half-words in the ring of 500: with more a frame does not fit, as one stays free
-    ROUTER_RECEIVE_SEGMENTS = 8
-    RECEIVE_MASK = 7
-    MAIN_BRAIN_SEGMENTS = 16  # each way
-    # 17 hold the ring; one in an exchange, one being delivered; and the 16 that wait at the main brain
-    ROUTER_CIRCLE = 35
-    # 16 queued, one being packed; one in an exchange, one being delivered; and the 8 that wait at the router
-    MAIN_BRAIN_CIRCLE = 27
+SEGMENT_HALF_WORDS: Final = 31
+CHECKSUM: Final = 30  # its place: the half-words before it are frames and zeros
+FRAME_HALF_WORDS: Final = 5
+FRAME_ROW: Final = 3  # numbers of a frame in `SspSegment.rows`: header and two words
+SEGMENT_ROWS: Final = 18  # of six frames
+HEADER_ONES: Final = 0x7800  # bits 11-14 of every header
+HEADER_REMOTE: Final = 0x8000
+HEADER_SHIFT: Final = 11
+HEADER_MARK: Final = 0x0F  # what stands above the identifier of a data frame
+IDENTIFIER: Final = 0x7FF
+HALF_WORD: Final = 0xFFFF
+MOST_BEFORE_A_FRAME: Final = 494  # half-words in the ring of 500: with more a frame does not fit, as one stays free
+ROUTER_RECEIVE_SEGMENTS: Final = 8
+RECEIVE_MASK: Final = 7
+MAIN_BRAIN_SEGMENTS: Final = 16  # each way
+# 17 hold the ring; one in an exchange, one being delivered; and the 16 that wait at the main brain
+ROUTER_CIRCLE: Final = 35
+# 16 queued, one being packed; one in an exchange, one being delivered; and the 8 that wait at the router
+MAIN_BRAIN_CIRCLE: Final = 27
 EXCHANGE_NS = 165_333  # 496 bits at 3.0 Mbit/s
 
 
+@cython.ccall
 def checksum(segment: SspSegment) -> cython.longlong:
     """(1 + sum of the first 30 half-words) modulo 65536; half-words from `used` on are zeros."""
     return (1 + sum(segment.words[: segment.used])) & HALF_WORD
 
 
+@cython.ccall
 def finish(segment: SspSegment, used: cython.longlong) -> None:
     """Zero everything behind `used` half-words; the checksum is right."""
     segment.words = [*segment.words[:used], *[0] * (SEGMENT_HALF_WORDS - used)]
@@ -59,11 +61,14 @@ def finish(segment: SspSegment, used: cython.longlong) -> None:
     segment.checksum_error = 0
 
 
+@cython.ccall
 def empty_segment() -> SspSegment:
     """A valid segment without frames: 30 zeros and the checksum 1."""
     return SspSegment()
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def add_frame(
     segment: SspSegment, header: cython.longlong, word0: cython.longlong, word1: cython.longlong
 ) -> cython.longlong:
@@ -77,6 +82,8 @@ def add_frame(
     return used
 
 
+@cython.ccall
+@cython.exceptval(check=False)
 def frames_in(segment: SspSegment) -> cython.longlong:
     """How many rows of a segment are frames; -1 with a wrong checksum.
 
@@ -90,6 +97,7 @@ def frames_in(segment: SspSegment) -> cython.longlong:
     return row // FRAME_ROW
 
 
+@cython.ccall
 def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cython.longlong) -> SspSegment:
     """A copy of `segment` with bits of half-word `index` (0-30) flipped: a disturbance on the wires."""
     copy: SspSegment = SspSegment()
@@ -100,6 +108,8 @@ def corrupted_copy(segment: SspSegment, index: cython.longlong, flipped_bits: cy
     return copy
 
 
+@cython.final
+@cython.cclass
 class MainBrainSspLink:
     """The slave's end: 16 segments each way, parsed and filled once per slot of the main brain.
 
@@ -107,6 +117,34 @@ class MainBrainSspLink:
     `parse()` leaves in `received` the first `segments` that came in, with `received_frames` frames each and `frames` in
     all; so it stays until the next segment comes in.
     """
+
+    # what a segment touches
+    empty: SspSegment
+    packing: SspSegment
+    queue: list
+    received: list
+    queue_read: cython.longlong
+    queue_count: cython.longlong
+    received_count: cython.longlong
+    segments: cython.longlong
+    frames: cython.longlong
+    last_id: cython.longlong
+    received_frames: cython.longlong[16]
+    segments_received: cython.longlong
+    segments_sent: cython.longlong
+    frames_received: cython.longlong
+    frames_sent: cython.longlong
+    first_is_junk: cython.bint
+    # the rest
+    report: object
+    checksum_errors: cython.longlong
+    receive_full: cython.longlong
+    transmit_full: cython.longlong
+    ids_out_of_range: cython.longlong
+    code_checksum: cython.longlong
+    code_receive_full: cython.longlong
+    code_transmit_full: cython.longlong
+    code_id_out_of_range: cython.longlong
 
     def __init__(self, report, last_id, first_is_junk=True) -> None:
         self.report = report
@@ -136,11 +174,13 @@ class MainBrainSspLink:
         self.code_transmit_full = errors.MB_SSP_TX_FULL
         self.code_id_out_of_range = errors.MB_SSP_ID_OOR
 
+    @cython.ccall
     def exchanged(self, segment: SspSegment) -> SspSegment:
         """Both slave-select edges: keep what came, return the segment to load for the next exchange."""
         self.receive(segment)
         return self.next_segment()
 
+    @cython.ccall
     def receive(self, segment: SspSegment) -> cython.bint:
         """Keep what a received segment brings, as the receive DMA does in one of 16 places; False when it is lost.
 
@@ -156,6 +196,7 @@ class MainBrainSspLink:
         self.segments_received += 1
         return True
 
+    @cython.cfunc
     def _miss(self) -> cython.bint:
         """A segment finds no place: False."""
         self.receive_full += 1
@@ -173,6 +214,7 @@ class MainBrainSspLink:
             ]
         return found
 
+    @cython.ccall
     def shifted(self, segment: SspSegment) -> SspSegment:
         """A copy of `segment` as it looks from its second half-word on."""
         copy: SspSegment = SspSegment()
@@ -180,6 +222,7 @@ class MainBrainSspLink:
         copy.used = CHECKSUM
         return copy
 
+    @cython.ccall
     def next_segment(self) -> SspSegment:
         """The oldest queued segment, or the empty one: what the transmit DMA is started on."""
         segment: SspSegment
@@ -193,6 +236,7 @@ class MainBrainSspLink:
         self.queue_count -= 1
         return segment
 
+    @cython.ccall
     def parse(self) -> cython.longlong:
         """Hand over the frames of every waiting segment, and report the errors; returns how many segments were read.
 
@@ -223,6 +267,7 @@ class MainBrainSspLink:
         self.frames_received += self.frames
         return self.segments
 
+    @cython.cfunc
     def _drop_strangers(self, place: cython.longlong, frames: cython.longlong) -> cython.longlong:
         """Keep the received segment at `place` without the frames that no variable has; returns how many are left."""
         segment: SspSegment = self.received[place]
@@ -236,6 +281,7 @@ class MainBrainSspLink:
         self.received[place] = known
         return known.used // FRAME_HALF_WORDS
 
+    @cython.ccall
     def send(self, identifier: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """Pack one frame; False (and MB_SSP_TX_FULL) when all 16 segments are queued.
 
@@ -248,6 +294,7 @@ class MainBrainSspLink:
             self.flush()
         return True
 
+    @cython.cfunc
     def _begin_segment(self) -> cython.bint:
         """Let an empty segment be the one that is packed; False when all are queued."""
         if self.queue_count >= MAIN_BRAIN_SEGMENTS:
@@ -258,6 +305,8 @@ class MainBrainSspLink:
         self.packing.clear()
         return True
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def flush(self) -> cython.longlong:
         """Queue the segment being packed, padded with zeros; return how many segments are queued."""
         if self.packing is not None:
@@ -266,6 +315,8 @@ class MainBrainSspLink:
         return self.queue_count
 
 
+@cython.final
+@cython.cclass
 class RouterSspLink:
     """The master's end: a transmit ring of 500 half-words and 8 received segments.
 
@@ -278,6 +329,42 @@ class RouterSspLink:
     ROBOT PARITY: a segment is filled at its start; the robot fills its FIFO of eight half-words during
     the exchange, so a frame queued in the first microseconds after the tick goes out 200 us later here.
     """
+
+    # what a frame and a segment touch
+    received_write: cython.longlong
+    received_read: cython.longlong
+    position: cython.longlong
+    packing: SspSegment
+    half_words: cython.longlong
+    push_time: cython.longlong
+    first: cython.longlong
+    last: cython.longlong
+    segments: list
+    received: list
+    received_frames: cython.longlong[8]
+    rx_id: cython.longlong
+    rx_flags: cython.longlong
+    rx_word0: cython.longlong
+    rx_word1: cython.longlong
+    exchange_running: cython.bint
+    exchange_done: cython.bint
+    frames_may_straddle: cython.bint
+    empty: SspSegment
+    push_step_ns: cython.longlong
+    segments_sent: cython.longlong
+    segments_received: cython.longlong
+    frames_sent: cython.longlong
+    frames_received: cython.longlong
+    # the rest
+    report: object
+    checksum_errors: cython.longlong
+    receive_overwritten: cython.longlong
+    transmit_lost: cython.longlong
+    low_rate: cython.longlong
+    code_receive_overwritten: cython.longlong
+    code_low_rate: cython.longlong
+    code_checksum: cython.longlong
+    code_transmit_full: cython.longlong
 
     def __init__(self, report, frames_may_straddle=False) -> None:
         self.report = report
@@ -316,10 +403,13 @@ class RouterSspLink:
         self.code_checksum = errors.SSP_BAD_CHKSM
         self.code_transmit_full = errors.SSP_TX_BUF_OF
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def half_words_waiting(self) -> cython.longlong:
         """Half-words in the transmit ring."""
         return self.half_words
 
+    @cython.ccall
     def push(
         self,
         identifier: cython.longlong,
@@ -346,18 +436,21 @@ class RouterSspLink:
         add_frame(self.packing, header, word0, word1)
         return True
 
+    @cython.cfunc
     def _lose(self) -> cython.bint:
         """A frame finds no room: False."""
         self.transmit_lost += 1
         self.report(self.code_transmit_full)
         return False
 
+    @cython.cfunc
     def _put_half_words(self, header: cython.longlong, word0: cython.longlong, word1: cython.longlong) -> cython.bint:
         """Append a frame that does not lie as the others do, and may go on in the next segment: True."""
         for word in (header, word0 >> 16, word0, word1 >> 16, word1):
             self._put(word & HALF_WORD)
         return True
 
+    @cython.cfunc
     def _begin_segment(self) -> cython.void:
         """Let the segment after the last be the one that is packed."""
         self.last += 1
@@ -366,6 +459,7 @@ class RouterSspLink:
         self.packing = cython.cast(SspSegment, self.segments[self.last])
         self.packing.clear()
 
+    @cython.cfunc
     def _put(self, word: cython.longlong) -> None:
         """Append one half-word."""
         if self.packing.used == CHECKSUM:
@@ -375,6 +469,7 @@ class RouterSspLink:
         self.packing.words = half_words
         finish(self.packing, self.packing.used + 1)
 
+    @cython.ccall
     def next_segment(self, now: cython.longlong) -> SspSegment:
         """The segment that is exchanged from instant `now` (ns) on.
 
@@ -405,6 +500,7 @@ class RouterSspLink:
         self.frames_sent += segment.used // FRAME_HALF_WORDS
         return segment
 
+    @cython.cfunc
     def _cut(self, segment: SspSegment, used: cython.longlong) -> None:
         """Leave `used` half-words in the first segment; the others, of the newest frame, go to the head of the last."""
         moved = segment.words[used : segment.used]
@@ -414,6 +510,7 @@ class RouterSspLink:
         finish(self.packing, self.packing.used + len(moved))
         finish(segment, used)
 
+    @cython.ccall
     def tick(self, now: cython.longlong) -> SspSegment:
         """The 200 us interrupt: judge the exchange that should be over, return the next segment.
 
@@ -433,6 +530,7 @@ class RouterSspLink:
         self.exchange_done = False
         return self.next_segment(now)
 
+    @cython.cfunc
     def _miss_segment(self) -> None:
         """The exchange brought no segment, or there is no place for it."""
         if not self.exchange_done:
@@ -442,6 +540,7 @@ class RouterSspLink:
             self.receive_overwritten += 1
             self.report(self.code_receive_overwritten)
 
+    @cython.ccall
     def receive(self, segment: SspSegment) -> cython.void:
         """The end of an exchange: the main brain's half-words lie in the current place."""
         # a segment that starts with zero is passed over without a look at its checksum, as the robot does
@@ -450,15 +549,19 @@ class RouterSspLink:
         self.exchange_done = True
         self.segments_received += 1
 
+    @cython.cfunc
     def _drop_segment(self) -> None:
         """The checksum of the segment that is read next is wrong."""
         self.checksum_errors += 1
         self.report(self.code_checksum)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def has_segments(self) -> cython.bint:
         """True while a received segment waits to be read, empty or not."""
         return self.received_read != self.received_write
 
+    @cython.ccall
     def take(self) -> cython.bint:
         """Move the next received frame into rx_id, rx_flags, rx_word0, rx_word1; False if there is none.
 

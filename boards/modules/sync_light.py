@@ -22,8 +22,19 @@ CELLS_PER_PATTERN = 10
 PATTERNS = 10
 
 
+@cython.cclass
 class SyncLight:
     """`watch_key` and `update` run once per slot of 1 ms, in this order."""
+
+    gpio: Gpio
+    keypad: Keypad
+    leds: ColourLeds
+    running: cython.bint
+    lit: cython.bint
+    held_slots: cython.longlong
+    milliseconds: cython.longlong
+    flashes: cython.longlong
+    pin: cython.longlong
 
     def __init__(self, gpio: Gpio, keypad: Keypad, leds: ColourLeds) -> None:
         self.gpio = gpio
@@ -37,6 +48,7 @@ class SyncLight:
         self.pin = SYNC_PIN
         gpio.write(SYNC_PIN, 1)
 
+    @cython.ccall
     def watch_key(self) -> cython.longlong:
         """Count the slots in which key 4 is down; at the hundredth start or stop the pattern."""
         if not self.keypad.pressed(SYNC_KEY):
@@ -50,6 +62,7 @@ class SyncLight:
                 self._show(False)
         return 0
 
+    @cython.ccall
     def update(self) -> cython.longlong:
         """One millisecond of the pattern; returns how many light transfers it made."""
         cell: cython.longlong
@@ -70,6 +83,7 @@ class SyncLight:
         self._show(on)
         return TRANSFERS_PER_LED
 
+    @cython.ccall
     def _show(self, on: cython.bint) -> None:
         """Both lights on or off."""
         self.lit = on

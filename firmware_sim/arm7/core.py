@@ -32,31 +32,31 @@ gets its data or prefetch abort instead, as on the chip, and `fault_address` kee
 """
 
 import array
+from typing import Final
 
 import cython
 
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    WRITTEN_BITS = 8
-    # modes: low five bits of the CPSR
-    USER = 0x10
-    FAST = 0x11
-    INTERRUPT = 0x12
-    SUPERVISOR = 0x13
-    ABORT = 0x17
-    UNDEFINED = 0x1B
-    SYSTEM = 0x1F
-    # bits of Core.lines
-    IRQ_LINE = 1
-    FIQ_LINE = 2
-    STATE = 53  # numbers of Core.state_into
-    LOOK_CYCLES = 60_000  # between two looks at a debugger's door; chosen by us: 1 ms of the robot's processors
+WRITTEN_BITS: Final = 8
+# modes: low five bits of the CPSR
+USER: Final = 0x10
+FAST: Final = 0x11
+INTERRUPT: Final = 0x12
+SUPERVISOR: Final = 0x13
+ABORT: Final = 0x17
+UNDEFINED: Final = 0x1B
+SYSTEM: Final = 0x1F
+# bits of Core.lines
+IRQ_LINE: Final = 1
+FIQ_LINE: Final = 2
+STATE: Final = 53  # numbers of Core.state_into
+LOOK_CYCLES: Final = 60_000  # between two looks at a debugger's door; chosen by us: 1 ms of the robot's processors
 
-# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_MASK = 0xFFFFFFFF
-_SIGN = 0x80000000
-_STATUS = 0xF00000FF  # the bits a status register has
+# C variables when compiled: Cython makes a Python object of every literal above 31 bits.
+_MASK: cython.longlong = 4294967295
+_SIGN: cython.longlong = 2147483648
+_STATUS: cython.longlong = 4026532095
 
 MODES = (USER, FAST, INTERRUPT, SUPERVISOR, ABORT, UNDEFINED, SYSTEM)
 # A store to a port behind the bridge, at the processor's own clock, takes 7 clocks instead of 2: the data sheet of the
@@ -93,18 +93,23 @@ def put(words, place, content):
         words[i >> 2] = words[i >> 2] & ~(0xFF << turn) | byte << turn
 
 
+@cython.cclass
 class Device:
     """What a program reaches beyond flash and RAM. A class of this kind is called without Python's way of calling."""
 
+    @cython.ccall
     def read(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
         """A load of `size` bytes, 1, 2 or 4."""
         raise LookupError(address)
 
+    @cython.ccall
     def write(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         """A store."""
         raise LookupError(address)
 
 
+@cython.final
+@cython.cclass
 class Core:
     """One processor with flash, RAM and a hook for everything else.
 
@@ -117,6 +122,59 @@ class Core:
     its accesses. The fields are so many because a processor's state is, and because in one object what an instruction
     touches lies together in memory.
     """
+
+    pc: cython.longlong
+    following: cython.longlong
+    cycles: cython.longlong
+    began: cython.longlong
+    instructions: cython.longlong
+    n: cython.longlong
+    z: cython.longlong
+    c: cython.longlong
+    v: cython.longlong
+    carry: cython.longlong
+    control: cython.longlong
+    lines: cython.longlong
+    faulted: cython.longlong
+    stopped: cython.longlong
+    flash_base: cython.longlong
+    flash_size: cython.longlong
+    ram_base: cython.longlong
+    ram_size: cython.longlong
+    line: cython.longlong
+    data_line: cython.longlong
+    mam_mode: cython.longlong
+    mam_timing: cython.longlong
+    device_waits: cython.longlong
+    bridge_base: cython.longlong
+    cycles_per_instruction: cython.longlong
+    trail: cython.longlong[::1]
+    ahead: cython.longlong[::1]
+    ready: cython.longlong[::1]
+    ram_open: cython.longlong
+    flash_open: cython.longlong
+    takes_aborts: cython.bint
+    armed: cython.bint
+    debugger: object
+    hit: object
+    points: set
+    watches: tuple
+    stepping: cython.longlong
+    passing: cython.longlong
+    return_pc: cython.longlong
+    return_mode: cython.longlong
+    next_look: cython.longlong
+    fault_address: cython.longlong
+    r: cython.longlong[::1]
+    high: cython.longlong[::1]
+    banked: cython.longlong[::1]
+    saved: cython.longlong[::1]
+    flash: cython.longlong[::1]
+    ram: cython.longlong[::1]
+    device: object
+    bridge: Device
+    written: cython.longlong[::1]
+    name: str
 
     def __init__(
         self, flash_size=0x40000, ram_size=0x4000, flash_base=0, ram_base=0x40000000, device=None, name="ARM7TDMI"
@@ -220,6 +278,8 @@ class Core:
 
     # ---- status registers and modes
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def cpsr(self) -> cython.longlong:
         """The current program status register."""
         return self.n << 31 | self.z << 30 | self.c << 29 | self.v << 28 | self.control
@@ -234,6 +294,7 @@ class Core:
         if self.bank(self.control & 0x1F):
             self.saved[self.bank(self.control & 0x1F)] = value & _STATUS
 
+    @cython.ccall
     def set_cpsr(self, value: cython.longlong) -> cython.int:
         """Write all of it; registers change with the mode. ProcessorError for a mode that is none."""
         self.switch_mode(value & 0x1F)
@@ -244,6 +305,8 @@ class Core:
         self.control = value & 0xFF
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def bank(self, mode: cython.longlong) -> cython.longlong:
         if mode == FAST:
             return 1
@@ -261,6 +324,8 @@ class Core:
         """Which of the six banks runs: 0 user and system, 1 FIQ, 2 IRQ, 3 supervisor, 4 abort, 5 undefined."""
         return self.bank(self.control & 0x1F)
 
+    @cython.cfunc
+    @cython.locals(old=cython.longlong, new=cython.longlong, i=cython.longlong)
     def switch_mode(self, mode: cython.longlong) -> cython.int:
         old = self.bank(self.control & 0x1F)
         new = self.bank(mode)
@@ -278,6 +343,8 @@ class Core:
         self.control = self.control & 0xE0 | mode
         return 0
 
+    @cython.cfunc
+    @cython.locals(before=cython.longlong)
     def enter(self, mode: cython.longlong, vector: cython.longlong, back: cython.longlong) -> cython.int:
         """Take an exception: status and return address saved, ARM state, IRQ off (for FIQ also FIQ)."""
         before = self.cpsr()
@@ -289,12 +356,16 @@ class Core:
         self.cycles += 2
         return 0
 
+    @cython.cfunc
     def undefined(self) -> cython.int:
         self.cycles += 1
         return self.enter(UNDEFINED, 4, self.following)
 
     # ---- memory
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    @cython.locals(begun=cython.longlong, bank=cython.longlong)
     def fetch_line(self, line: cython.longlong) -> cython.int:
         """Waits of a fetch from another line of flash than the last fetch."""
         begun = self.cycles
@@ -316,6 +387,8 @@ class Core:
             self.ready[bank] = begun + self.mam_timing
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def read_flash(self, line: cython.longlong) -> cython.int:
         """Waits of a datum in flash."""
         if line != self.data_line:
@@ -326,6 +399,7 @@ class Core:
                 self.data_line = line
         return 0
 
+    @cython.cfunc
     def nothing(self, address: cython.longlong, size: cython.longlong, writing: cython.bint) -> cython.int:
         self.fault_address = address
         if not self.takes_aborts:
@@ -337,6 +411,8 @@ class Core:
         self.faulted = 1
         return 0
 
+    @cython.cfunc
+    @cython.locals(place=cython.longlong, value=cython.longlong)
     def load(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
         """A datum at an address that is a multiple of its size."""
         self.cycles += 1
@@ -354,6 +430,8 @@ class Core:
         value >>= 8 * (address & 3)
         return value & 0xFF if size == 1 else value & 0xFFFF
 
+    @cython.cfunc
+    @cython.locals(value=cython.longlong)
     def load_elsewhere(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
         """A datum of a device, or of memory that is watched."""
         if self.watches:
@@ -376,6 +454,8 @@ class Core:
         self.nothing(address, size, False)
         return 0
 
+    @cython.cfunc
+    @cython.locals(place=cython.longlong, moved=cython.longlong, mask=cython.longlong)
     def store(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         self.cycles += 1
         if self.mam_mode == 1:
@@ -392,6 +472,7 @@ class Core:
             return 0
         return self.store_elsewhere(address, size, value)
 
+    @cython.cfunc
     def store_elsewhere(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         if self.watches:
             self.look_for_watch(address, size, 2)
@@ -414,11 +495,15 @@ class Core:
                 pass
         return self.nothing(address, size, True)
 
+    @cython.cfunc
+    @cython.locals(value=cython.longlong, turn=cython.longlong)
     def load_word(self, address: cython.longlong) -> cython.longlong:
         value = self.load(address & -4, 4)
         turn = 8 * (address & 3)
         return (value >> turn | value << (32 - turn)) & _MASK if turn else value
 
+    @cython.cfunc
+    @cython.locals(value=cython.longlong)
     def load_half(self, address: cython.longlong, signed: cython.bint) -> cython.longlong:
         if address & 1 and signed:
             return self.load_byte(address, True)
@@ -427,12 +512,16 @@ class Core:
             return (value >> 8 | value << 24) & _MASK
         return value | (_MASK ^ 0xFFFF) if signed and value & 0x8000 else value
 
+    @cython.cfunc
+    @cython.locals(value=cython.longlong)
     def load_byte(self, address: cython.longlong, signed: cython.bint) -> cython.longlong:
         value = self.load(address, 1)
         return value | (_MASK ^ 0xFF) if signed and value & 0x80 else value
 
     # ---- arithmetic
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def jump(self, address: cython.longlong) -> cython.int:
         """Go on there, in the present state: the pipeline fills anew."""
         self.following = address & (_MASK - 1 if self.control & 0x20 else _MASK - 3)
@@ -441,6 +530,8 @@ class Core:
             self.line = -2
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def passes(self, condition: cython.longlong) -> cython.bint:
         if condition == 0:
             return self.z == 1
@@ -472,6 +563,9 @@ class Core:
             return self.z == 1 or self.n != self.v
         return condition == 14  # 15 is "never" before ARMv5
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    @cython.locals(total=cython.longlong, result=cython.longlong)
     def add(self, a: cython.longlong, b: cython.longlong, carry: cython.longlong) -> cython.longlong:
         """a + b + carry with all four flags; a - b is a + not b + 1."""
         total = a + b + carry
@@ -482,11 +576,15 @@ class Core:
         self.v = ((a ^ result) & (b ^ result)) >> 31
         return result
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def mark(self, result: cython.longlong) -> cython.int:
         self.n = result >> 31
         self.z = 1 if result == 0 else 0
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def shift(self, kind: cython.longlong, value: cython.longlong, amount: cython.longlong) -> cython.longlong:
         """By the low byte of a register; the bit shifted out last goes to `carry`."""
         self.carry = self.c
@@ -516,6 +614,8 @@ class Core:
         self.carry = value >> 31
         return value
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def shift_fixed(self, kind: cython.longlong, value: cython.longlong, amount: cython.longlong) -> cython.longlong:
         """By an amount in the instruction, where 0 means 32, or for ROR one place through the carry."""
         if amount == 0 and kind:
@@ -525,6 +625,8 @@ class Core:
             amount = 32
         return self.shift(kind, value, amount)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def multiplier_cycles(self, value: cython.longlong, signed: cython.bint) -> cython.int:
         """The multiplier takes 8 bits at a time and ends when the rest is all zeros, or (signed) all ones."""
         if signed and value & _SIGN:
@@ -534,6 +636,7 @@ class Core:
 
     # ---- running
 
+    @cython.ccall
     def run(self, until: cython.longlong) -> cython.int:
         """Execute until `cycles` has reached `until` (the last instruction is completed) or `stop` was called."""
         self.stopped = 0
@@ -545,6 +648,8 @@ class Core:
             self.one()
         return 0
 
+    @cython.ccall
+    @cython.locals(count=cython.longlong)
     def step(self) -> cython.int:
         """One instruction; an interrupt that waits is taken first."""
         if self.armed:
@@ -558,6 +663,7 @@ class Core:
 
     # ---- with a debugger
 
+    @cython.cfunc
     def run_debugged(self, until: cython.longlong) -> cython.int:
         """As `run`."""
         try:
@@ -576,6 +682,8 @@ class Core:
             raise
         return 0
 
+    @cython.cfunc
+    @cython.locals(pc=cython.longlong, mode=cython.longlong)
     def debugged(self) -> cython.int:
         """An instruction, an interrupt's entry, or a halt.
 
@@ -610,18 +718,25 @@ class Core:
         self.hit = None
         self.rearm()
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def is_memory(self, address: cython.longlong) -> cython.bint:
         return 0 <= address - self.ram_base < self.ram_size or 0 <= address - self.flash_base < self.flash_size
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def open_memory(self) -> cython.int:
         self.ram_open = self.ram_size
         self.flash_open = self.flash_size
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def close_memory(self) -> cython.int:
         self.ram_open = self.flash_open = 0
         return 0
 
+    @cython.cfunc
     def look_for_watch(self, address: cython.longlong, size: cython.longlong, kind: cython.longlong) -> cython.int:
         """`hit` is the first watchpoint that this access meets: (address, its kinds)."""
         if self.hit is None:
@@ -653,6 +768,7 @@ class Core:
     def rearm(self) -> None:
         self.armed = bool(self.points or self.watches or self.stepping)
 
+    @cython.ccall
     def state_into(self, into: cython.longlong[::1]) -> cython.int:
         """All that the next instruction can depend on beside memory, inputs and time, as STATE numbers; returns STATE.
 
@@ -678,6 +794,7 @@ class Core:
             into[51 + place] = self.ready[place] - self.cycles if self.ready[place] > self.cycles else 0
         return STATE
 
+    @cython.cfunc
     def interrupt(self) -> cython.int:
         """Enter the exception that a line asks for and the status allows; 1 when it did."""
         if self.lines & FIQ_LINE and not self.control & 0x40:
@@ -690,6 +807,8 @@ class Core:
         self.pc = self.following
         return 1
 
+    @cython.cfunc
+    @cython.locals(pc=cython.longlong, place=cython.longlong, op=cython.longlong)
     def one(self) -> cython.int:
         pc = self.pc
         self.began = self.cycles
@@ -731,6 +850,8 @@ class Core:
 
     # ---- ARM state
 
+    @cython.cfunc
+    @cython.locals(group=cython.longlong, offset=cython.longlong)
     def arm(self, op: cython.longlong) -> cython.int:
         group = op >> 25 & 7
         if group == 0:
@@ -763,6 +884,16 @@ class Core:
                 return self.enter(SUPERVISOR, 8, self.following)
         return self.undefined()  # no coprocessor answers
 
+    @cython.cfunc
+    @cython.locals(
+        a=cython.longlong,
+        b=cython.longlong,
+        result=cython.longlong,
+        rd=cython.longlong,
+        code=cython.longlong,
+        turn=cython.longlong,
+        writes=cython.bint,
+    )
     def data(self, op: cython.longlong) -> cython.int:
         if op & 0x02000000:
             b = op & 0xFF
@@ -850,6 +981,8 @@ class Core:
             self.r[rd] = result
         return 0
 
+    @cython.cfunc
+    @cython.locals(value=cython.longlong, mask=cython.longlong, turn=cython.longlong)
     def status(self, op: cython.longlong) -> cython.int:
         """MRS, MSR and BX; what else has this form belongs to later architectures."""
         if op & 0x0FBF0FFF == 0x010F0000:
@@ -880,6 +1013,17 @@ class Core:
         mask &= _MASK ^ 0x20  # the state changes by BX only
         return self.set_cpsr(self.cpsr() & (_MASK ^ mask) | value & mask)
 
+    @cython.cfunc
+    @cython.locals(
+        a=cython.longlong,
+        b=cython.longlong,
+        low=cython.longlong,
+        top=cython.longlong,
+        product=cython.longlong,
+        rd=cython.longlong,
+        rn=cython.longlong,
+        kind=cython.longlong,
+    )
     def multiply(self, op: cython.longlong) -> cython.int:
         kind = op >> 21 & 7
         rd = op >> 16 & 15
@@ -922,6 +1066,8 @@ class Core:
             self.z = 1 if top == 0 and low == 0 else 0
         return 0
 
+    @cython.cfunc
+    @cython.locals(address=cython.longlong, value=cython.longlong)
     def swap(self, op: cython.longlong) -> cython.int:
         if op & 0x0FB00FF0 != 0x01000090:
             return self.undefined()
@@ -939,6 +1085,17 @@ class Core:
             self.r[op >> 12 & 15] = value
         return 0
 
+    @cython.cfunc
+    @cython.locals(
+        base=cython.longlong,
+        offset=cython.longlong,
+        address=cython.longlong,
+        moved=cython.longlong,
+        value=cython.longlong,
+        rd=cython.longlong,
+        rn=cython.longlong,
+        kind=cython.longlong,
+    )
     def transfer(self, op: cython.longlong) -> cython.int:
         """Load or store of one register: words and bytes, and in group 0 half-words and signed ones."""
         kind = 0  # 1 ... 3: half-word, signed byte, signed half-word
@@ -977,6 +1134,7 @@ class Core:
             self.r[rn] = moved
         return self.finish_load(rd, value)
 
+    @cython.cfunc
     def finish_load(self, rd: cython.longlong, value: cython.longlong) -> cython.int:
         self.cycles += 1
         if not self.faulted:
@@ -985,6 +1143,8 @@ class Core:
             self.r[rd] = value
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def get_user(self, i: cython.longlong) -> cython.longlong:
         """A register of user mode, seen from any mode."""
         if self.bank(self.control & 0x1F) and i < 15:
@@ -994,6 +1154,8 @@ class Core:
                 return self.high[i - 8]
         return self.r[i]
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def set_user(self, i: cython.longlong, value: cython.longlong) -> cython.int:
         if self.bank(self.control & 0x1F) and i > 12:
             self.banked[i - 13] = value
@@ -1003,6 +1165,19 @@ class Core:
             self.r[i] = value
         return 0
 
+    @cython.cfunc
+    @cython.locals(
+        base=cython.longlong,
+        address=cython.longlong,
+        last=cython.longlong,
+        value=cython.longlong,
+        rn=cython.longlong,
+        i=cython.longlong,
+        count=cython.longlong,
+        chosen=cython.longlong,
+        first=cython.bint,
+        user=cython.bint,
+    )
     def block(self, op: cython.longlong) -> cython.int:
         """LDM and STM, with the forms that reach user registers or return from an exception."""
         rn = op >> 16 & 15
@@ -1059,6 +1234,16 @@ class Core:
 
     # ---- Thumb state
 
+    @cython.cfunc
+    @cython.locals(
+        rd=cython.longlong,
+        rs=cython.longlong,
+        a=cython.longlong,
+        b=cython.longlong,
+        kind=cython.longlong,
+        address=cython.longlong,
+        result=cython.longlong,
+    )
     def thumb(self, op: cython.longlong) -> cython.int:
         kind = op >> 11
         rd = op & 7
@@ -1130,6 +1315,10 @@ class Core:
             return self.jump(address)
         return self.undefined()
 
+    @cython.cfunc
+    @cython.locals(
+        rd=cython.longlong, a=cython.longlong, b=cython.longlong, code=cython.longlong, result=cython.longlong
+    )
     def thumb_register(self, op: cython.longlong) -> cython.int:
         """Operations on two registers, and those on high registers with BX."""
         rd = op & 7
@@ -1189,6 +1378,8 @@ class Core:
             self.r[rd] = result
         return self.mark(result)
 
+    @cython.cfunc
+    @cython.locals(address=cython.longlong, rd=cython.longlong, kind=cython.longlong)
     def thumb_transfer(self, op: cython.longlong) -> cython.int:
         """Load or store of one register, by a register's offset, by one in the instruction, or on the stack."""
         rd = op & 7

@@ -5,15 +5,19 @@
 An access acts at the instant at which its instruction begins: what happens in the chip from then on comes after it.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.arm7.core import Device
 from ranger_sim.firmware_sim.lpc2194.block import Block, NotModelledError
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    BLOCK_BITS = 14  # a block of the peripheral bus has 16 KB
-    BLOCKS = 128
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
+
+BLOCK_BITS: Final = 14  # a block of the peripheral bus has 16 KB
+BLOCKS: Final = 128
 
 NAME_OF_ACCESS = {1: "byte", 2: "half-word", 4: "word"}
 
@@ -27,11 +31,20 @@ class NotModelledAccess(UserError):  # noqa: N818  (it is what the program did)
         self.pc = pc
 
 
+@cython.final
+@cython.cclass
 class AddressMap(Device):
     """Blocks of the peripheral bus (0xE...), the fast GPIO and the VIC.
 
     `touched` counts accesses that may do something or give another value another time, `looks` the others.
     """
+
+    board: "ImageBoard"
+    places: list
+    fast_gpio: Block
+    vic: Block
+    touched: cython.longlong
+    looks: cython.longlong
 
     def __init__(self, board) -> None:
         self.board = board
@@ -54,7 +67,8 @@ class AddressMap(Device):
         """All of them, by address."""
         return [self.fast_gpio, *(block for block in self.places if block is not None), self.vic]
 
-    def find(self, address: cython.longlong):
+    @cython.ccall
+    def find(self, address: cython.longlong) -> Block:
         """The block that an address belongs to, or None."""
         page: cython.longlong = address >> BLOCK_BITS
         if page >> 7 == 0x700:  # 0xE0000000 ... 0xE01FFFFF
@@ -90,6 +104,8 @@ class AddressMap(Device):
         value >>= 8 * (address & 3)
         return value & 0xFF if size == 1 else value & 0xFFFF
 
+    @cython.ccall
+    @cython.locals(offset=cython.longlong, value=cython.longlong)
     def peek(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
         """What a load would give, for a debugger: it does nothing. LookupError where it would, or where nothing is."""
         block: Block = self.find(address)

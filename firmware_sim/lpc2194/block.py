@@ -9,8 +9,14 @@ class NotModelledError(Exception):
     """The program asks a register for what no device here does; the text says what."""
 
 
+@cython.final
+@cython.cclass
 class Clocks:
     """The processor's clock (Hz) and the peripherals', which is it divided by VPBDIV."""
+
+    crystal_hz: cython.longlong
+    cclk: cython.longlong
+    divider: cython.longlong
 
     def __init__(self, crystal_hz) -> None:
         self.crystal_hz = crystal_hz
@@ -23,6 +29,7 @@ class Clocks:
         return self.cclk // self.divider
 
 
+@cython.cclass
 class Block(Peripheral):
     """Registers from `base` on, the front of one device of firmware_sim/peripherals.
 
@@ -30,6 +37,13 @@ class Block(Peripheral):
     is set by a read that does nothing and gives the same until a write or an event of the chip: a loop that does
     nothing else can be skipped. `mask`: the inputs of the VIC that it drives, `requests` their levels.
     """
+
+    clocks: Clocks
+    name: str
+    base: cython.longlong
+    mask: cython.longlong
+    steady: cython.bint
+    partner: "Block"
 
     # {offset: (name, "r", "w" or "rw")}: what the reference lists, and a test holds against `read` and `write`
     REGISTERS: dict[int, tuple[str, ...]] = {}
@@ -44,28 +58,34 @@ class Block(Peripheral):
         self.steady = False
         self.partner = None  # a block whose levels an access to this one can change
 
+    @cython.ccall
     def read(self, offset: cython.longlong) -> cython.longlong:
         """Read the register at `offset`."""
         return self.unknown(offset, False)
 
+    @cython.ccall
     def write(self, offset: cython.longlong, value: cython.longlong) -> cython.int:
         """Write it."""
         self.unknown(offset, True)
         return 0
 
+    @cython.ccall
     def write_part(self, offset: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         """Write `size` bytes, 1 or 2: the register's other bytes are zero, as STRB and STRH to a device are meant."""
         if offset & 3:
             self.not_modelled("bytes inside this register")
         return self.write(offset, value)
 
+    @cython.ccall
     def requests(self) -> cython.longlong:
         """Levels of its inputs of the VIC."""
         return 0
 
-    def clocked(self) -> None:
+    @cython.ccall
+    def clocked(self) -> object:
         """The peripherals' clock is another one from now on."""
 
+    @cython.cfunc
     def unknown(self, offset: cython.longlong, writing: cython.bint) -> cython.longlong:
         """An access that `read` and `write` do not know: to no register, or one that the chip has the other way only.
 
@@ -75,6 +95,7 @@ class Block(Peripheral):
             raise NotModelledError("no register is modelled there")
         return 0
 
-    def not_modelled(self, what) -> None:
+    @cython.ccall
+    def not_modelled(self, what) -> object:
         """The register is known, what is asked of it is not."""
         raise NotModelledError(f"{what} is not modelled")

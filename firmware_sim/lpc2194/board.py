@@ -17,17 +17,18 @@ that look at a status are none, and those of interrupts are not the main program
 
 import array
 import dataclasses
+from typing import Final
 
 import cython
 
 from ranger_sim.firmware_sim.alarm import Alarm
-from ranger_sim.firmware_sim.arm7.core import Core
+from ranger_sim.firmware_sim.arm7.core import FAST, INTERRUPT, STATE, Core
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters, ProcessorCounters, SlotCounters
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.lpc2194.address_map import AddressMap
 from ranger_sim.firmware_sim.lpc2194.block import Block, Clocks
-from ranger_sim.firmware_sim.lpc2194.can import CanBlock, CanFilterBlock
+from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS, CanBlock, CanFilterBlock
 from ranger_sim.firmware_sim.lpc2194.converter import ConverterBlock
 from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
 from ranger_sim.firmware_sim.lpc2194.image import Image
@@ -36,28 +37,22 @@ from ranger_sim.firmware_sim.lpc2194.pwm import PwmBlock
 from ranger_sim.firmware_sim.lpc2194.spi import SpiBlock
 from ranger_sim.firmware_sim.lpc2194.ssp import SegmentLink, SerialConverter, SspBlock
 from ranger_sim.firmware_sim.lpc2194.system import SystemBlock
-from ranger_sim.firmware_sim.lpc2194.timer import TimerBlock
+from ranger_sim.firmware_sim.lpc2194.timer import ProgrammedTimer, TimerBlock
 from ranger_sim.firmware_sim.lpc2194.uart import UartBlock
 from ranger_sim.firmware_sim.lpc2194.vic import VicBlock
-from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.microcontroller import INDICES_PER_KIND, MESSAGE_KINDS, Microcontroller
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.ssp import SspDevice
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE, EventQueue
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.arm7.core import FAST, INTERRUPT, STATE
-    from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS
-    from ranger_sim.firmware_sim.microcontroller import INDICES_PER_KIND, MESSAGE_KINDS
-    from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE
-
-    # Chosen by us: how many cycles pass before it is asked whether the program waits, and how long a loop that waits
-    # may be. A slot of the robot's boards takes some 10,000 cycles, their main loops below 200 instructions.
-    STINT = 256
-    LONGEST_PASS = 600
-    DOUBTS = 8  # of so many stints elsewhere one is asked
-    SLOT_SHARES = 20
-    PART_WORDS = 64  # of Core.written
+# Chosen by us: how many cycles pass before it is asked whether the program waits, and how long a loop that waits
+# may be. A slot of the robot's boards takes some 10,000 cycles, their main loops below 200 instructions.
+STINT: Final = 256
+LONGEST_PASS: Final = 600
+DOUBTS: Final = 8  # of so many stints elsewhere one is asked
+SLOT_SHARES: Final = 20
+PART_WORDS: Final = 64  # of Core.written
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,11 +62,47 @@ class ImageCounters(BoardCounters):
     processor: ProcessorCounters | None = None
 
 
+@cython.cclass
 class ImageBoard(Microcontroller):
     """Board `name` with `image` in its memory, powered up at `phase_ns` (ns).
 
     `core` is the processor, `map` its devices by address, `skips_idle` whether loops that wait are skipped.
     """
+
+    core: Core
+    map: AddressMap
+    vic_block: VicBlock
+    system: SystemBlock
+    pin_select: PinSelectBlock
+    converter: ConverterBlock
+    acceptance: CanFilterBlock
+    can_blocks: list
+    asking: list
+    image: object
+    clocks: Clocks
+    skips_idle: cython.bint
+    asleep: cython.bint
+    idle: cython.bint
+    pass_looks: cython.bint
+    base_cycles: cython.longlong
+    base_ns: cython.longlong
+    running_to: cython.longlong
+    slot_match: "ProgrammedTimer"
+    slots_begun: cython.longlong
+    slot_begin: cython.longlong
+    worked_until: cython.longlong
+    most_cycles: cython.longlong
+    all_cycles: cython.longlong
+    slots_by_cycles: cython.longlong[21]
+    pass_cycles: cython.longlong
+    pass_instructions: cython.longlong
+    idle_cycles: cython.longlong
+    idle_instructions: cython.longlong
+    doubts: cython.longlong
+    kept_registers: cython.longlong[::1]
+    now_registers: cython.longlong[::1]
+    kept_ram: cython.longlong[::1]
+    waits: cython.longlong[::1]
 
     def __init__(
         self,
@@ -171,10 +202,12 @@ class ImageBoard(Microcontroller):
 
     # --- the processor's clock ----------------------------------------------------------------------------
 
+    @cython.ccall
     def time_of(self, cycles: cython.longlong) -> cython.longlong:
         """The instant (ns, rounded down) at which the processor has passed so many cycles."""
         return self.base_ns + self.crystal.cycles_to_ns(cycles - self.base_cycles, self.clocks.cclk)
 
+    @cython.cfunc
     def cycles_at(self, time: cython.longlong) -> cython.longlong:
         """The first cycle that begins at `time` (ns) or later."""
         cycles: cython.longlong
@@ -185,7 +218,8 @@ class ImageBoard(Microcontroller):
             cycles += 1
         return cycles
 
-    def set_clocks(self, cclk, divider) -> None:
+    @cython.ccall
+    def set_clocks(self, cclk, divider) -> object:
         """The program sets PLL or VPBDIV: the instruction that does it is the last one at the old rate."""
         if (cclk, divider) == (self.clocks.cclk, self.clocks.divider):
             return
@@ -205,23 +239,28 @@ class ImageBoard(Microcontroller):
         self.base_cycles = cycles
         self.base_ns = now
 
-    def sleep(self) -> None:
+    @cython.ccall
+    def sleep(self) -> object:
         """The program asks for idle mode: no cycles until an interrupt."""
         self.asleep = True
         self.core.stop()
 
     # --- what the address map calls -----------------------------------------------------------------------
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def reach(self) -> cython.void:
         """The present instruction reaches for a device: devices see the instant at which it began."""
         self.now = self.time_of(self.core.began)
 
+    @cython.cfunc
     def work(self) -> cython.void:
         """The present access does something: when the main program makes it, it works."""
         mode: cython.longlong = self.core.control & 0x1F
         if mode != FAST and mode != INTERRUPT:
             self.worked_until = self.now
 
+    @cython.cfunc
     def _begin_slot(self, time: cython.longlong) -> cython.void:
         """The slot timer matched at `time` (ns): the slot before is over."""
         cycles: cython.longlong
@@ -241,6 +280,7 @@ class ImageBoard(Microcontroller):
         self.slots_begun += 1
         self.slot_begin = time
 
+    @cython.cfunc
     def settle(self, block: Block) -> cython.int:
         """After an access: the levels of what the block drives, and how far the processor may run on."""
         vic: VicBlock = self.vic_block
@@ -291,6 +331,7 @@ class ImageBoard(Microcontroller):
         self.next_time = own
         return own
 
+    @cython.cfunc
     def _run(self, stop: cython.longlong) -> cython.int:
         """The processor runs until the instant `stop` (ns), or less far where an access asks for it."""
         core: Core = self.core
@@ -316,6 +357,8 @@ class ImageBoard(Microcontroller):
                     return 0
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _may_wait(self) -> cython.bint:
         """It is worth asking whether the program waits: where it waited before always, elsewhere now and then."""
         if self.waits[self._flash_place(self.core.pc)]:
@@ -323,6 +366,7 @@ class ImageBoard(Microcontroller):
         self.doubts += 1
         return self.doubts % DOUBTS == 0
 
+    @cython.cfunc
     def _waits(self, target: cython.longlong) -> cython.bint:
         """Execute until everything is as it was, or `target` cycles, or some hundred instructions. True: it waits."""
         core: Core = self.core
@@ -350,6 +394,8 @@ class ImageBoard(Microcontroller):
                 return True
         return False
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _flash_place(self, pc: cython.longlong) -> cython.longlong:
         """The word of flash of an instruction; 0 for one in RAM."""
         place: cython.longlong = pc - self.core.flash_base
@@ -362,6 +408,7 @@ class ImageBoard(Microcontroller):
             self.waits[self._flash_place(core.pc)] = 1
             core.step()
 
+    @cython.cfunc
     def _keep(self) -> cython.void:
         """Keep registers and RAM as they are; RAM by the parts that were written since it was kept last."""
         core: Core = self.core
@@ -375,6 +422,8 @@ class ImageBoard(Microcontroller):
                 for i in range(part * PART_WORDS, min((part + 1) * PART_WORDS, len(ram))):
                     self.kept_ram[i] = ram[i]
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _is_as_kept(self) -> cython.bint:
         """Registers and RAM are as they were kept."""
         core: Core = self.core
@@ -394,6 +443,7 @@ class ImageBoard(Microcontroller):
                         return False
         return True
 
+    @cython.cfunc
     def _catch_up(self, time: cython.longlong) -> cython.int:
         """A processor that waits: pass the loop as often as it fits until `time` (ns), and its begin once more."""
         core: Core = self.core
@@ -418,6 +468,7 @@ class ImageBoard(Microcontroller):
             core.run(target)
         return 0
 
+    @cython.cfunc
     def _wake(self, time: cython.longlong) -> cython.int:
         """A processor in idle mode goes on at `time` (ns): an interrupt asks for it."""
         cycles: cython.longlong = self.cycles_at(time)
@@ -427,6 +478,7 @@ class ImageBoard(Microcontroller):
             self.core.cycles = cycles
         return 0
 
+    @cython.cfunc
     def _take_in(self, time: cython.longlong) -> cython.int:
         """The first of what comes at `time` (ns): edges before messages before alarms."""
         vic: VicBlock = self.vic_block
@@ -464,6 +516,7 @@ class ImageBoard(Microcontroller):
         self.core.lines = vic.lines
         return 0
 
+    @cython.cfunc
     def _message(self, queue: EventQueue) -> cython.int:
         """The message just taken."""
         if queue.kind == PIN_EDGE:
@@ -518,6 +571,7 @@ class ImageBoard(Microcontroller):
         """Start of its latest slot (ns); 0 before the first."""
         return self.slot_begin if self.slots_begun else 0
 
+    @cython.ccall
     def slot_counters(self) -> SlotCounters:
         """Its slots: whether one was left unfinished, or tasks were dropped, only its program knows."""
         return SlotCounters(

@@ -4,26 +4,26 @@ LPC2194 user manual, CAN controllers and acceptance filter. The filter is off or
 its tables are not modelled. The controllers are peripherals/can_controller.py.
 """
 
+from typing import Final
+
 import cython
 
+from ranger_sim.can_bus.node import WARNING_LIMIT
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.lpc2194.vic import CAN1_RX_INPUT, CAN1_TX_INPUT, CAN_INPUT
+from ranger_sim.firmware_sim.peripherals.can_controller import (
+    CMR_SRR,
+    ICR_RI,
+    MOD_RESET,
+    CanController,
+)
+from ranger_sim.foundation.events import NEVER
 
-if not cython.compiled:
-    from ranger_sim.can_bus.node import WARNING_LIMIT
-    from ranger_sim.firmware_sim.lpc2194.vic import CAN1_RX_INPUT, CAN1_TX_INPUT, CAN_INPUT
-    from ranger_sim.firmware_sim.peripherals.can_controller import (
-        CMR_SRR,
-        ICR_RI,
-        MOD_RESET,
-    )
-    from ranger_sim.foundation.events import NEVER
-
-    AFMR_OFF = 1
-    AFMR_BYPASS = 2
-    RFS_BP = 0x400  # the frame was received in bypass
-    TX_BITS = 0x602  # TI1, TI2, TI3 in CxICR and CxIER
-    MOD_KNOWN = 0x09  # CxMOD: reset mode, and transmit priority by the PRIO of the buffers
+AFMR_OFF: Final = 1
+AFMR_BYPASS: Final = 2
+RFS_BP: Final = 0x400  # the frame was received in bypass
+TX_BITS: Final = 0x602  # TI1, TI2, TI3 in CxICR and CxIER
+MOD_KNOWN: Final = 0x09  # CxMOD: reset mode, and transmit priority by the PRIO of the buffers
 
 NAMES = {
     0x00: ("MOD", "rw"),
@@ -46,8 +46,14 @@ NAMES = {
 }
 
 
+@cython.final
+@cython.cclass
 class CanFilterBlock(Block):
     """Acceptance filter: AFMR, and the table's registers, which keep what is written."""
+
+    controllers: list
+    mode: cython.longlong
+    table: cython.longlong[8]
 
     REGISTERS = {
         0x00: ("AFMR", "rw"),
@@ -96,8 +102,15 @@ class CanFilterBlock(Block):
         return 0
 
 
+@cython.final
+@cython.cclass
 class CanBlock(Block):
     """Controller `number`. In reset mode after power-up, as the chip."""
+
+    can: CanController
+    acceptance: CanFilterBlock
+    number: cython.longlong
+    set_up: cython.bint
 
     READ_ACTS = frozenset({0x0C})
     REGISTERS = dict(NAMES)
@@ -209,7 +222,8 @@ class CanBlock(Block):
             self.unknown(offset, True)
         return 0
 
-    def tell_ends(self) -> None:
+    @cython.ccall
+    def tell_ends(self) -> object:
         """Ends of transmissions are events when the program wants an interrupt of them."""
         can: CanController = self.can
         wanted: cython.longlong = can.IER & TX_BITS and 1

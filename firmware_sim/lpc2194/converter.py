@@ -4,24 +4,33 @@ LPC2194 user manual (LPC2194/01), A/D converter. Not modelled: starts by a pin o
 The converter is peripherals/adc_internal.py.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.lpc2194.vic import ADC_INPUT
+from ranger_sim.firmware_sim.peripherals.adc_internal import CONVERSION_CLOCKS, CR_BURST, GDR_RESULT_SHIFT, AdcInternal
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.lpc2194.vic import ADC_INPUT
-    from ranger_sim.firmware_sim.peripherals.adc_internal import CONVERSION_CLOCKS, CR_BURST, GDR_RESULT_SHIFT
+CR_PDN_BIT: Final = 0x200000
+START_SHIFT: Final = 24
+GLOBAL_INTERRUPT: Final = 0x100  # ADINTEN: any conversion's end
 
-    CR_PDN_BIT = 0x200000
-    START_SHIFT = 24
-    GLOBAL_INTERRUPT = 0x100  # ADINTEN: any conversion's end
-
-DONE = 0x80000000  # ADGDR and ADDRn; a C variable when compiled (.pxd)
+DONE: cython.longlong = 2147483648
 
 
+@cython.final
+@cython.cclass
 class ConverterBlock(Block):
     """`inten`: ADINTEN. `done`: channels whose ADDR has a result that was not read."""
+
+    adc: AdcInternal
+    control: cython.longlong
+    inten: cython.longlong
+    done: cython.longlong
+    seen: cython.bint
+    data: cython.longlong[8]
+    burst_read: cython.longlong[8]
 
     READ_ACTS = frozenset({0x04, *range(0x10, 0x30, 4)})
     REGISTERS = {
@@ -49,6 +58,7 @@ class ConverterBlock(Block):
         self.data = [0] * 8
         self.burst_read = [0] * 8  # by channel, the number of the conversion that was read last, from 1
 
+    @cython.cfunc
     def look(self) -> cython.void:
         """A conversion may have ended."""
         adc: AdcInternal = self.adc
@@ -68,7 +78,8 @@ class ConverterBlock(Block):
     def clocked(self) -> None:
         self._set_clock()
 
-    def _set_clock(self) -> None:
+    @cython.ccall
+    def _set_clock(self) -> object:
         """By ADCR's divider and the peripherals' clock."""
         adc: AdcInternal = self.adc
         adc.clkdiv = (self.control >> 8 & 0xFF) + 1
@@ -104,6 +115,7 @@ class ConverterBlock(Block):
             return self.inten
         return self.unknown(offset, False)
 
+    @cython.ccall
     def _burst_result(self, channel) -> cython.longlong:
         """ADDRn in burst mode: the newest result, DONE when it was not read before."""
         adc: AdcInternal = self.adc
@@ -128,7 +140,8 @@ class ConverterBlock(Block):
             self.unknown(offset, True)
         return 0
 
-    def _control(self, value) -> None:
+    @cython.ccall
+    def _control(self, value) -> object:
         """Write ADCR: clock, power, and what is to be converted."""
         adc: AdcInternal = self.adc
         start = value >> START_SHIFT & 7

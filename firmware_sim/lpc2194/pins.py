@@ -6,15 +6,19 @@ LPC2194 user manual, GPIO and pin connect block. Both sets of GPIO registers rea
 Functions that a pin can have beside GPIO are looked at for edges alone: a UART's or the PWM's pin needs no PINSEL here.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.lpc2194.timer import ProgrammedTimer
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
-if not cython.compiled:
-    TIMER_BIT = 2  # in a pin's capture word: bits 0-1 the channel, bit 2 the timer
-    NO_CAPTURE = -1
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.peripheral import Peripheral
+
+TIMER_BIT: Final = 2  # in a pin's capture word: bits 0-1 the channel, bit 2 the timer
+NO_CAPTURE: Final = -1
 
 # (pin of port 0, function in PINSEL) -> timer, channel. LPC2194 user manual, PINSEL0 and PINSEL1.
 CAPTURES = {
@@ -36,8 +40,17 @@ EXTERNAL_INTERRUPTS = {
 }  # fmt: skip
 
 
+@cython.final
+@cython.cclass
 class PinSelectBlock(Block):
     """PINSEL0 ... PINSEL2, and the edges of pins. `external`: who hears those of external interrupts."""
+
+    words: cython.longlong[3]
+    timer0: ProgrammedTimer
+    timer1: ProgrammedTimer
+    capture: cython.longlong[64]
+    interrupt: cython.longlong[64]
+    external: "Peripheral"
 
     REGISTERS = {0x00: ("PINSEL0", "rw"), 0x04: ("PINSEL1", "rw"), 0x14: ("PINSEL2", "rw")}
 
@@ -51,7 +64,8 @@ class PinSelectBlock(Block):
         for pin in range(64):
             chip.claim_pin(pin, pin, self)
 
-    def connect(self) -> None:
+    @cython.ccall
+    def connect(self) -> object:
         """PINSEL was written: which pins lead where."""
         for pin in range(32):
             function = self.words[pin >> 4] >> 2 * (pin & 15) & 3
@@ -91,8 +105,14 @@ class PinSelectBlock(Block):
         return 0
 
 
+@cython.final
+@cython.cclass
 class Ports(Gpio):
     """The two ports with directions and output latches; masks of the fast registers."""
+
+    direction: cython.longlong[2]
+    latch: cython.longlong[2]
+    hidden: cython.longlong[2]
 
     def __init__(self, chip) -> None:
         Gpio.__init__(self, chip)
@@ -100,6 +120,7 @@ class Ports(Gpio):
         self.latch = [0, 0]
         self.hidden = [0, 0]  # FIOMASK
 
+    @cython.cfunc
     def drive(self, port: cython.longlong, bits: cython.longlong) -> cython.int:
         """Those of `bits` that are outputs show their latches."""
         bit: cython.longlong = 0
@@ -111,11 +132,13 @@ class Ports(Gpio):
             bit += 1
         return 0
 
+    @cython.cfunc
     def put(self, port: cython.longlong, bits: cython.longlong, levels: cython.longlong) -> cython.int:
         """Latches of `bits` get these levels."""
         self.latch[port] = self.latch[port] & ~bits | levels & bits
         return self.drive(port, bits)
 
+    @cython.cfunc
     def direct(self, port: cython.longlong, value: cython.longlong) -> cython.int:
         """Bits of outputs, the others are inputs. An output that becomes an input keeps its level until an edge."""
         new: cython.longlong = value & ~self.direction[port]
@@ -123,8 +146,12 @@ class Ports(Gpio):
         return self.drive(port, new)
 
 
+@cython.final
+@cython.cclass
 class FastGpioBlock(Block):
     """FIO0... and FIO1...; bytes and half-words of every register."""
+
+    ports: Ports
 
     REGISTERS = {
         32 * port + offset: (f"FIO{port}{name}", access)
@@ -166,6 +193,7 @@ class FastGpioBlock(Block):
         chosen: cython.longlong = 0xFF if size == 1 else 0xFFFF
         return self._put(offset & ~3, value << turn, chosen << turn)
 
+    @cython.cfunc
     def _put(self, offset: cython.longlong, value: cython.longlong, chosen: cython.longlong) -> cython.int:
         """Write the bits `chosen` of a register."""
         ports: Ports = self.ports
@@ -191,8 +219,12 @@ class FastGpioBlock(Block):
         return 0
 
 
+@cython.final
+@cython.cclass
 class OldGpioBlock(Block):
     """IO0... and IO1..., on the peripheral bus."""
+
+    ports: Ports
 
     REGISTERS = {
         16 * port + offset: (f"IO{port}{name}", access)

@@ -5,22 +5,31 @@ is on, at once while it is off. Not modelled: prescaler, double edges, its inter
 The unit is peripherals/pwm.py.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 
-if not cython.compiled:
-    TCR_COUNTS = 1
-    TCR_PWM = 8
-    MCR_RESET_MR0 = 2
+TCR_COUNTS: Final = 1
+TCR_PWM: Final = 8
+MCR_RESET_MR0: Final = 2
 
 MATCHES = ("MR0", "MR1", "MR2", "MR3", "MR4", "MR5", "MR6")
 MATCH_OFFSETS = (0x18, 0x1C, 0x20, 0x24, 0x40, 0x44, 0x48)
 
 
+@cython.final
+@cython.cclass
 class PwmBlock(Block):
     """`begun`: periods pass. They begin when the unit counts in PWM mode and MR0 ends its periods."""
+
+    pwm: Pwm
+    TCR: cython.longlong
+    MCR: cython.longlong
+    PCR: cython.longlong
+    begun: cython.bint
 
     REGISTERS = {
         0x00: ("PWMIR", "rw"),
@@ -47,7 +56,8 @@ class PwmBlock(Block):
         self.begun = False
         self._look()
 
-    def _look(self) -> None:
+    @cython.ccall
+    def _look(self) -> object:
         """Periods begin now, or stop, as the registers are."""
         pwm: Pwm = self.pwm
         runs: cython.bint = self.TCR & 0xB == TCR_COUNTS | TCR_PWM and self.MCR & MCR_RESET_MR0 and pwm.MR0 > 0
@@ -63,11 +73,14 @@ class PwmBlock(Block):
         pwm.latch(0x7F)
         pwm.LER = 0
 
-    def _drive(self) -> None:
+    @cython.ccall
+    def _drive(self) -> object:
         """The pins of channels that PWMPCR enables show pulses while periods pass."""
         self.pwm.driven = self.PCR >> 8 & 0x7E if self.begun else 0
         self.pwm.tell()
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _match(self, number: cython.longlong) -> cython.longlong:
         pwm: Pwm = self.pwm
         if number == 2:

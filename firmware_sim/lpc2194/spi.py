@@ -4,23 +4,31 @@ The encoder is peripherals/spi_encoder.py: what the program sends reaches nobody
 a transfer of SPI 1, whose pins the SSP has.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
+from ranger_sim.firmware_sim.lpc2194.vic import SPI0_INPUT
+from ranger_sim.firmware_sim.peripherals.spi_encoder import SPSR_SPIF, SpiEncoder
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.lpc2194.vic import SPI0_INPUT
-    from ranger_sim.firmware_sim.peripherals.spi_encoder import SPSR_SPIF
-
-    # SPCR
-    CR_BIT_ENABLE = 0x04
-    CR_MASTER = 0x20
-    CR_INTERRUPT = 0x80
+# SPCR
+CR_BIT_ENABLE: Final = 0x04
+CR_MASTER: Final = 0x20
+CR_INTERRUPT: Final = 0x80
 
 
+@cython.final
+@cython.cclass
 class SpiBlock(Block):
     """`SPINT`: the interrupt flag."""
+
+    spi: SpiEncoder
+    CR: cython.longlong
+    CCR: cython.longlong
+    SPINT: cython.longlong
+    under_way: cython.bint
+    status_read: cython.bint
 
     READ_ACTS = frozenset({0x04, 0x08})
     REGISTERS = {
@@ -88,7 +96,8 @@ class SpiBlock(Block):
             self.unknown(offset, True)
         return 0
 
-    def _transfer(self) -> None:
+    @cython.ccall
+    def _transfer(self) -> object:
         """Write S0SPDR."""
         if not self.CR & CR_MASTER:
             self.not_modelled("an SPI as a slave")

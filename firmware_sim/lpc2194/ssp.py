@@ -6,48 +6,53 @@ LPC2194 user manual (LPC2194/01), SSP. Not modelled: slave mode. Words follow ea
 transmit FIFO has some. What hangs there is an `SspDevice`: the external converter, or the end of a link of segments.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.lpc2194.vic import SSP_INPUT
+from ranger_sim.firmware_sim.peripherals.adc_external import START, Ads7871
 from ranger_sim.firmware_sim.peripherals.ssp import SspDevice, SspSegment
 from ranger_sim.firmware_sim.vic import InterruptSource
-from ranger_sim.foundation.events import NEVER, SSP_SEGMENT
+from ranger_sim.foundation.events import NEVER, SSP_SEGMENT, SSP_START
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.lpc2194.vic import SSP_INPUT
-    from ranger_sim.firmware_sim.peripherals.adc_external import START
-    from ranger_sim.foundation.events import SSP_START
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
 
-    DEPTH = 8
-    WORD_ALARM = 0
-    SILENCE_ALARM = 1
-    SILENT_BITS = 32  # after so many bit times without a read what was received asks for the time-out interrupt
+DEPTH: Final = 8
+WORD_ALARM: Final = 0
+SILENCE_ALARM: Final = 1
+SILENT_BITS: Final = 32  # after so many bit times without a read what was received asks for the time-out interrupt
 
-    # SSPSR
-    SR_TFE = 1
-    SR_TNF = 2
-    SR_RNE = 4
-    SR_RFF = 8
-    SR_BSY = 16
-    # SSPIMSC, SSPRIS, SSPMIS, SSPICR
-    ROR = 1  # receive overrun
-    RT = 2  # receive time-out
-    RX = 4  # receive FIFO at least half full
-    TX = 8  # transmit FIFO at least half empty
-    CR1_LOOPBACK = 1
-    CR1_ENABLE = 2
-    CR1_SLAVE = 4
+# SSPSR
+SR_TFE: Final = 1
+SR_TNF: Final = 2
+SR_RNE: Final = 4
+SR_RFF: Final = 8
+SR_BSY: Final = 16
+# SSPIMSC, SSPRIS, SSPMIS, SSPICR
+ROR: Final = 1  # receive overrun
+RT: Final = 2  # receive time-out
+RX: Final = 4  # receive FIFO at least half full
+TX: Final = 8  # transmit FIFO at least half empty
+CR1_LOOPBACK: Final = 1
+CR1_ENABLE: Final = 2
+CR1_SLAVE: Final = 4
 
 SEGMENT_WORDS = 31
 
 
+@cython.final
+@cython.cclass
 class SerialConverter(SspDevice):
     """The ADS7871's serial side: an instruction byte, and a byte that is written or read (SLAS370C).
 
     Bit 7 of the instruction: direct mode, it starts a conversion; else bit 6: read, bit 5: 16 bits, bits 0-4: register.
     Of 16-bit accesses in register mode only the first byte fits into a word of the SSP.
     """
+
+    adc: Ads7871
 
     def __init__(self, chip, adc) -> None:
         SspDevice.__init__(self, chip)
@@ -71,6 +76,8 @@ class SerialConverter(SspDevice):
         return 0
 
 
+@cython.final
+@cython.cclass
 class SegmentLink(SspDevice):
     """The master's end of a link of segments (peripherals/ssp.py), word by word.
 
@@ -79,6 +86,15 @@ class SegmentLink(SspDevice):
     program with the words of the next segment.
     ROBOT PARITY: each way takes one segment, 200 us on Ranger, longer than on the robot.
     """
+
+    sent: cython.longlong
+    interval_ns: cython.longlong
+    earliest: cython.longlong
+    words: list
+    coming: list
+    came: list
+    going: SspSegment
+    alarm: "Alarm"
 
     def __init__(self, chip, interval_ns) -> None:
         SspDevice.__init__(self, chip)
@@ -124,7 +140,8 @@ class SegmentLink(SspDevice):
         self._start(time)
         return None
 
-    def _start(self, time) -> None:
+    @cython.ccall
+    def _start(self, time) -> object:
         """The exchange begins."""
         self.earliest = time + self.interval_ns
         self.chip.outbox.push(time, 0, SSP_START, 0, 0, 0, 0, 0, 0, self.going)
@@ -138,8 +155,28 @@ def used_of(words) -> int:
     return used
 
 
+@cython.final
+@cython.cclass
 class SspBlock(Block):
     """Words that wait to go out and those that came in, the oldest first."""
+
+    device: SspDevice
+    CR0: cython.longlong
+    CR1: cython.longlong
+    CPSR: cython.longlong
+    IMSC: cython.longlong
+    flags: cython.longlong
+    going: cython.longlong[8]
+    came: cython.longlong[8]
+    going_count: cython.longlong
+    came_count: cython.longlong
+    word: cython.longlong
+    word_ns: cython.longlong
+    bit_ns: cython.longlong
+    words: cython.longlong
+    busy: cython.bint
+    word_alarm: "Alarm"
+    silence_alarm: "Alarm"
 
     READ_ACTS = frozenset({0x08})
     REGISTERS = {
@@ -174,6 +211,8 @@ class SspBlock(Block):
         self.word_alarm = chip.new_alarm(self, WORD_ALARM)
         self.silence_alarm = chip.new_alarm(self, SILENCE_ALARM)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def raw(self) -> cython.longlong:
         """SSPRIS."""
         value: cython.longlong = self.flags
@@ -189,7 +228,8 @@ class SspBlock(Block):
     def clocked(self) -> None:
         self._set_rate()
 
-    def _set_rate(self) -> None:
+    @cython.ccall
+    def _set_rate(self) -> object:
         """How long a word takes, by the divisors."""
         if self.CPSR:
             clocks = self.CPSR * ((self.CR0 >> 8 & 0xFF) + 1)
@@ -197,6 +237,7 @@ class SspBlock(Block):
             self.word_ns = self.chip.crystal.true_ns(clocks * bits * 1_000_000_000 // self.clocks.pclk)
             self.bit_ns = self.chip.crystal.true_ns(clocks * 1_000_000_000 // self.clocks.pclk)
 
+    @cython.cfunc
     def _start(self, time: cython.longlong) -> cython.int:
         """The oldest word goes out from `time` on."""
         i: cython.longlong

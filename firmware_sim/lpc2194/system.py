@@ -4,15 +4,15 @@ LPC2194 user manual, System Control Block. The PLL is locked `LOCK_NS` after it 
 RAM (MEMMAP), power-down. PCONP switches nothing off.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
+from ranger_sim.firmware_sim.lpc2194.vic import EINT0_INPUT
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.lpc2194.vic import EINT0_INPUT
-
-    EINTS = 4
+EINTS: Final = 4
 
 LOCK_NS = 100_000  # chosen by us: the user manual only says that a program has to wait for PLOCK
 PLLCON_ENABLED, PLLCON_CONNECTED = 1, 2
@@ -22,8 +22,22 @@ DIVIDERS = {0: 4, 1: 1, 2: 2}  # by VPBDIV
 MAM_SLOWEST = 7
 
 
+@cython.final
+@cython.cclass
 class SystemBlock(Block):
     """`EXTINT`: flags of the four external interrupts. `converter`: whose BUSY hangs on one of them, or None."""
+
+    converter: Ads7871
+    EXTINT: cython.longlong
+    EXTMODE: cython.longlong
+    EXTPOLAR: cython.longlong
+    levels: cython.longlong[4]
+    plain: dict
+    MAMCR: cython.longlong
+    MAMTIM: cython.longlong
+    feed: cython.longlong
+    lock_ns: cython.longlong
+    active: tuple
 
     REGISTERS = {
         0x000: ("MAMCR", "rw"),
@@ -80,6 +94,7 @@ class SystemBlock(Block):
             self.on_pin(converter.eint, converter.busy, self.chip.now)
         return self.EXTINT << EINT0_INPUT
 
+    @cython.cfunc
     def _clear(self, flags: cython.longlong) -> cython.void:
         """Write EXTINT: the flag of a pin that is at its active level stays."""
         number: cython.longlong
@@ -90,7 +105,8 @@ class SystemBlock(Block):
 
     # --- clocks -------------------------------------------------------------------------------------------
 
-    def _feed(self, value) -> None:
+    @cython.ccall
+    def _feed(self, value) -> object:
         """Write PLLFEED: 0xAA, then 0x55, take PLLCON and PLLCFG over."""
         if value == FEEDS[0]:
             self.feed = 1
@@ -103,7 +119,8 @@ class SystemBlock(Block):
             self._set_clock()
         self.feed = 0
 
-    def _set_clock(self) -> None:
+    @cython.ccall
+    def _set_clock(self) -> object:
         """The processor's clock by the PLL, the peripherals' by VPBDIV."""
         control, configuration = self.active
         both = PLLCON_ENABLED | PLLCON_CONNECTED
@@ -161,7 +178,8 @@ class SystemBlock(Block):
             self.unknown(offset, True)
         return 0
 
-    def _accelerate(self, offset, value) -> None:
+    @cython.ccall
+    def _accelerate(self, offset, value) -> object:
         """MAMCR or MAMTIM."""
         if offset:
             self.MAMTIM = value & 7 or MAM_SLOWEST

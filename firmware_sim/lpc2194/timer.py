@@ -8,36 +8,48 @@ A count that the program reads is that of the instant at which its instruction b
 be one less than the clock's edge would give.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.clock import TickTrain
-from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.lpc2194.block import Block, Clocks
+from ranger_sim.firmware_sim.peripherals.timer_capture import CCR_BITS, CCR_INTERRUPT, IR_CR0, TimerCapture
 from ranger_sim.firmware_sim.vic import InterruptSource
+from ranger_sim.foundation.events import NEVER
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.timer_capture import CCR_BITS, CCR_INTERRUPT, IR_CR0
-    from ranger_sim.foundation.events import NEVER
-
-    # TxTCR
-    TCR_ENABLE = 1
-    TCR_RESET = 2
-    # TxMCR, three bits per match register
-    MCR_INTERRUPT = 1
-    MCR_RESET = 2
-    MCR_STOP = 4
-    MCR_BITS = 3
+# TxTCR
+TCR_ENABLE: Final = 1
+TCR_RESET: Final = 2
+# TxMCR, three bits per match register
+MCR_INTERRUPT: Final = 1
+MCR_RESET: Final = 2
+MCR_STOP: Final = 4
+MCR_BITS: Final = 3
 
 FULL_COUNT = 1 << 32
 CLOCK_OF_BEGIN = 60_000_000  # with a period of one millisecond: the device is built before its program sets it up
 
 
+@cython.final
+@cython.cclass
 class ProgrammedTimer(TimerCapture):
     """A timer whose period is the program's: TCR, PR, TC, MCR and MR0 ... MR3 at run time.
 
     While it runs, `wrap_time` is the instant of the count 0 and `next_wrap_time` that at which the count begins anew.
     `planned`: the instant of the next match that interrupts or stops, or of the wrap before it.
     """
+
+    clocks: "Clocks"
+    TCR: cython.longlong
+    PR: cython.longlong
+    MCR: cython.longlong
+    held: cython.longlong
+    passed: cython.longlong
+    planned: cython.longlong
+    matches: cython.longlong
+    match_time: cython.longlong
+    match: cython.longlong[4]
 
     def __init__(self, chip, clocks, number) -> None:
         TimerCapture.__init__(self, chip, number, 60_000, CLOCK_OF_BEGIN)
@@ -55,7 +67,8 @@ class ProgrammedTimer(TimerCapture):
 
     # --- what the program does ----------------------------------------------------------------------------
 
-    def stand(self, count) -> None:
+    @cython.ccall
+    def stand(self, count) -> object:
         """The count stands at `count` from now on."""
         self.held = count
         self.counts_per_ns = 0.0
@@ -65,10 +78,13 @@ class ProgrammedTimer(TimerCapture):
         self.MR0 = FULL_COUNT - 1
         self.alarm.set(NEVER)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def running(self) -> cython.bint:
         """It counts."""
         return self.TCR & (TCR_ENABLE | TCR_RESET) == TCR_ENABLE
 
+    @cython.ccall
     def count(self) -> cython.longlong:
         """TxTC."""
         return self.count_at(self.chip.now) if self.running() else self.held
@@ -124,6 +140,7 @@ class ProgrammedTimer(TimerCapture):
 
     # --- what time does -----------------------------------------------------------------------------------
 
+    @cython.cfunc
     def _plan(self) -> cython.longlong:
         """Find the next match that acts; returns its instant."""
         n: cython.longlong
@@ -175,6 +192,8 @@ class ProgrammedTimer(TimerCapture):
             self.wrap_time = begin
             self._lay_out(begin)
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _act(self) -> cython.void:
         """The planned match, or the wrap."""
         n: cython.longlong
@@ -206,6 +225,8 @@ class ProgrammedTimer(TimerCapture):
         else:
             self._plan()
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _new_period(self) -> cython.void:
         """A period begins; it may be another one than that before, which a match register was written in."""
         n: cython.longlong
@@ -215,6 +236,8 @@ class ProgrammedTimer(TimerCapture):
                 self._shorten()
                 return
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _count_before(self, at: cython.longlong) -> cython.longlong:
         """The count whose match acts at `at`: the smallest that has not acted yet."""
         n: cython.longlong
@@ -224,7 +247,8 @@ class ProgrammedTimer(TimerCapture):
                 best = self.match[n]
         return best
 
-    def _stop_at(self, count) -> None:
+    @cython.ccall
+    def _stop_at(self, count) -> object:
         """A match stops the timer: TCR's enable bit falls, the count stands."""
         self.TCR &= ~TCR_ENABLE
         self.stand(max(count, 0))
@@ -246,8 +270,12 @@ class ProgrammedTimer(TimerCapture):
         return None
 
 
+@cython.final
+@cython.cclass
 class TimerBlock(Block):
     """Timer `number`, 0 or 1."""
+
+    timer: ProgrammedTimer
 
     REGISTERS = {
         0x00: ("IR", "rw"),

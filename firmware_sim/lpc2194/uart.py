@@ -4,26 +4,38 @@ The bytes are peripherals/uart.py: 8N1 whatever UnLCR says, FIFOs on. Not modell
 (they rest), and a transmitter that is switched off.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.lpc2194.block import Block
-from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.firmware_sim.peripherals.uart import IIR_NONE, IIR_RECEIVED, IIR_TIMEOUT, IIR_TRANSMIT, Uart
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.peripherals.uart import IIR_NONE, IIR_RECEIVED, IIR_TIMEOUT, IIR_TRANSMIT
-
-    # UnIER
-    IER_RECEIVE = 1
-    IER_TRANSMIT = 2
-    IER_STATUS = 4
-    IIR_STATUS = 6
-    LCR_DLAB = 0x80
-    TER_ON = 0x80
+# UnIER
+IER_RECEIVE: Final = 1
+IER_TRANSMIT: Final = 2
+IER_STATUS: Final = 4
+IIR_STATUS: Final = 6
+LCR_DLAB: Final = 0x80
+TER_ON: Final = 0x80
 TRIGGERS = (1, 4, 8, 14)  # by UnFCR bits 6-7
 
 
+@cython.final
+@cython.cclass
 class UartBlock(Block):
     """`holds`: the transmit FIFO became empty, which asks for an interrupt until it is told."""
+
+    uart: Uart
+    IER: cython.longlong
+    LCR: cython.longlong
+    MCR: cython.longlong
+    SCR: cython.longlong
+    FCR: cython.longlong
+    FDR: cython.longlong
+    TER: cython.longlong
+    divisor: cython.longlong
+    holds: cython.bint
 
     READ_ACTS = frozenset({0x00, 0x08, 0x14})
     REGISTERS = {
@@ -56,17 +68,21 @@ class UartBlock(Block):
     def clocked(self) -> None:
         self._set_rate()
 
-    def _set_rate(self) -> None:
+    @cython.ccall
+    def _set_rate(self) -> object:
         """By the divisor latch and the fractional divider."""
         self.uart.hz = self.clocks.pclk
         self.uart.set_divisor(self.divisor or 1, self.FDR & 15, self.FDR >> 4 & 15 or 1)
 
+    @cython.cfunc
     def look(self) -> cython.void:
         """What the UART's alarms have told."""
         if self.uart.IIR == IIR_TRANSMIT:
             self.uart.IIR = IIR_NONE
             self.holds = True
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def identity(self) -> cython.longlong:
         """UnIIR's low four bits: the first reason for an interrupt."""
         uart: Uart = self.uart
@@ -166,7 +182,8 @@ class UartBlock(Block):
             self.unknown(offset, True)
         return 0
 
-    def _enable(self, value) -> None:
+    @cython.ccall
+    def _enable(self, value) -> object:
         """Write UnIER. An empty transmit FIFO asks for its interrupt at once."""
         uart: Uart = self.uart
         if value & IER_TRANSMIT and not self.IER & IER_TRANSMIT:

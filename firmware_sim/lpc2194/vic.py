@@ -4,29 +4,29 @@ LPC2194 user manual, VIC (an ARM PL190). A read of VICVectAddr begins the servic
 to VICVectAddr ends it, only slots before it reach the processor. Protection is not modelled: user mode reaches all.
 """
 
+from typing import Final
+
 import cython
 
+from ranger_sim.firmware_sim.arm7.core import FIQ_LINE, IRQ_LINE
 from ranger_sim.firmware_sim.lpc2194.block import Block
 
-if not cython.compiled:
-    from ranger_sim.firmware_sim.arm7.core import FIQ_LINE, IRQ_LINE
+# inputs, LPC2194 user manual
+TIMER0_INPUT: Final = 4
+TIMER1_INPUT: Final = 5
+UART0_INPUT: Final = 6
+UART1_INPUT: Final = 7
+SPI0_INPUT: Final = 10
+SSP_INPUT: Final = 11
+EINT0_INPUT: Final = 14
+ADC_INPUT: Final = 18
+CAN_INPUT: Final = 19
+CAN1_TX_INPUT: Final = 20
+CAN1_RX_INPUT: Final = 26
 
-    # inputs, LPC2194 user manual
-    TIMER0_INPUT = 4
-    TIMER1_INPUT = 5
-    UART0_INPUT = 6
-    UART1_INPUT = 7
-    SPI0_INPUT = 10
-    SSP_INPUT = 11
-    EINT0_INPUT = 14
-    ADC_INPUT = 18
-    CAN_INPUT = 19
-    CAN1_TX_INPUT = 20
-    CAN1_RX_INPUT = 26
-
-    SLOTS = 16
-    NO_SLOT = 16  # an input without a slot: VICDefVectAddr
-    IDLE = 17  # before every slot: nothing is served
+SLOTS: Final = 16
+NO_SLOT: Final = 16  # an input without a slot: VICDefVectAddr
+IDLE: Final = 17  # before every slot: nothing is served
 
 SLOT_ENABLED = 0x20  # VICVectCntl
 NAMES = {
@@ -46,8 +46,24 @@ NAMES = {
 }
 
 
+@cython.final
+@cython.cclass
 class VicBlock(Block):
     """`raw`: levels of the 32 inputs, without the software's; `lines` what the processor sees (IRQ_LINE, FIQ_LINE)."""
+
+    raw: cython.longlong
+    soft: cython.longlong
+    enabled: cython.longlong
+    selected: cython.longlong
+    lines: cython.longlong
+    serving: cython.longlong
+    depth: cython.longlong
+    protection: cython.longlong
+    default_address: cython.longlong
+    addresses: cython.longlong[16]
+    controls: cython.longlong[16]
+    slot_of: cython.longlong[32]
+    served: cython.longlong[18]
 
     READ_ACTS = frozenset({0x30})
     REGISTERS = dict(NAMES)
@@ -68,6 +84,8 @@ class VicBlock(Block):
         self.served = [0] * 18  # those that it has interrupted
         self.depth = 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def settle(self) -> cython.longlong:
         """What the processor sees, by the levels as they are now."""
         active: cython.longlong = (self.raw | self.soft) & self.enabled
@@ -77,6 +95,8 @@ class VicBlock(Block):
             self.lines |= IRQ_LINE
         return self.lines
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     @cython.boundscheck(False)
     @cython.wraparound(False)
     def first(self, irq: cython.longlong) -> cython.longlong:
@@ -88,6 +108,8 @@ class VicBlock(Block):
                 best = self.slot_of[number]
         return best
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     @cython.boundscheck(False)
     @cython.wraparound(False)
     def begin(self) -> cython.longlong:
@@ -105,6 +127,7 @@ class VicBlock(Block):
         self.serving = slot
         return self.addresses[slot] if slot < SLOTS else self.default_address
 
+    @cython.cfunc
     @cython.boundscheck(False)
     @cython.wraparound(False)
     def end(self) -> cython.void:
@@ -113,7 +136,8 @@ class VicBlock(Block):
             self.depth -= 1
             self.serving = self.served[self.depth]
 
-    def place_slots(self) -> None:
+    @cython.ccall
+    def place_slots(self) -> object:
         """A slot's control was written: which slot each input has."""
         for number in range(32):
             self.slot_of[number] = 16

@@ -12,29 +12,32 @@ sampled at its start.
 The SSP transfers (16 bits at 10 MHz) are part of the cost of the code that does them.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
+from cython.cimports.libc.math import copysign
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT, InterruptSource
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from math import copysign
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
 
-    # register 4
-    START = 0x80
-    GAIN_SHIFT = 4
-    GAIN_MASK = 7
-    CHANNEL_MASK = 15
+# register 4
+START: Final = 0x80
+GAIN_SHIFT: Final = 4
+GAIN_MASK: Final = 7
+CHANNEL_MASK: Final = 15
 
-    COUNTS = 8192  # of full scale at gain 1; results have 14 bits with the sign
-    LEAST_COUNT = -8192
-    LAST_COUNT = 8191
+COUNTS: Final = 8192  # of full scale at gain 1; results have 14 bits with the sign
+LEAST_COUNT: Final = -8192
+LAST_COUNT: Final = 8191
 
-    # From a handler's start to its next start word, after two registers were read over the SSP: fitted by us to the
-    # times at which the images' frames are asked for (the handler takes 66 to 70 instructions, robot.md T2)
-    RESTART_NS = 2_500
+# From a handler's start to its next start word, after two registers were read over the SSP: fitted by us to the
+# times at which the images' frames are asked for (the handler takes 66 to 70 instructions, robot.md T2)
+RESTART_NS: Final = 2_500
 
 CONVERSION_NS = 20_833  # 48 kSamples/s, SLAS370C
 GAINS = (1, 2, 4, 5, 8, 10, 16, 20)  # by gain code 0 ... 7, SLAS370C
@@ -50,12 +53,34 @@ def register4(channel_code, gain_code) -> int:
     return START | gain_code << GAIN_SHIFT | channel_code
 
 
+@cython.final
+@cython.cclass
 class Ads7871(Peripheral):
     """One converter. `inputs[code]`: the analog pin behind each multiplexer code (differential: one pin that
     carries the difference); `results[i]`: last result of entry i of the sequence.
 
     counts = round(scale * gain * V / reference_V * 8192) + offset_counts, clipped to 14 bits.
     """
+
+    # what a conversion touches
+    busy: cython.bint
+    done: cython.bint
+    step: cython.longlong
+    length: cython.longlong
+    register4: cython.longlong
+    alarm: "Alarm"
+    source: InterruptSource
+    conversion_ns: cython.longlong
+    offset_counts: cython.longlong
+    sequence: cython.longlong[16]
+    inputs: cython.longlong[16]
+    gains: cython.double[8]
+    count_V: cython.double
+    result: cython.longlong
+    results: cython.longlong[16]
+    # the rest
+    eint: cython.longlong
+    not_finished: cython.longlong
 
     def __init__(
         self, chip, eint=1, reference_V=REFERENCE_V, conversion_ns=CONVERSION_NS, scale=1.0, offset_counts=0
@@ -90,6 +115,8 @@ class Ads7871(Peripheral):
             self.inputs[channel_code] = pin
         self.length = len(entries)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def convert(self, volts: cython.double, gain_code: cython.longlong) -> cython.longlong:
         """Counts for a voltage at the input."""
         scaled: cython.double = self.gains[gain_code] * volts / self.count_V
@@ -104,10 +131,12 @@ class Ads7871(Peripheral):
             return counts
         return LAST_COUNT if counts > 0 else LEAST_COUNT
 
+    @cython.ccall
     def start(self, register4: cython.longlong) -> cython.bint:
         """Write register 4; False when a conversion is under way (the write is lost)."""
         return self.write(register4, self.chip.now)
 
+    @cython.ccall
     def write(self, register4: cython.longlong, time: cython.longlong) -> cython.bint:
         """The same, the word being there at `time` (ns): behind the code before it and the transfers."""
         if self.busy:
@@ -115,6 +144,7 @@ class Ads7871(Peripheral):
         self._take(register4, time)
         return True
 
+    @cython.cfunc
     @cython.final
     def _take(self, register4: cython.longlong, time: cython.longlong) -> cython.void:
         """The start word is there at `time` (ns)."""
@@ -137,12 +167,15 @@ class Ads7871(Peripheral):
         """The 32 registers: result in 0 and 1, what was written in 4."""
         return [self.result << 2 & 255, self.result >> 6 & 255, 0, 0, self.register4 & 127] + [0] * 27
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def read_result(self) -> cython.longlong:
         """Registers 1 and 0 as one signed number, -8192 ... 8191."""
         return self.result
 
     # The firmware's side of a sequence: start it once per slot, let on_busy serve EINT, then wait for it.
 
+    @cython.ccall
     def start_sequence(self) -> cython.bint:
         """Start at the first entry; False (and `not_finished` counts) while the last sequence still runs."""
         if not self.done or self.busy:
@@ -166,6 +199,8 @@ class Ads7871(Peripheral):
             self.done = True
         return None
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def sequence_done(self) -> cython.bint:
         """True when no sequence runs: the condition of a Wait."""
         return self.done

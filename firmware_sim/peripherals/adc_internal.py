@@ -9,32 +9,59 @@ counts = floor(scale * 1024 V / reference_V) + offset_counts, clipped to 0 ... 1
 V / VDDA * 1024; scale and offset are those of a board's own divider and converter).
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import ADC_DONE, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    CONVERSION_CLOCKS = 11
-    COUNTS = 1024  # of the reference
-    LAST_COUNT = 1023
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
 
-    # ADCR; bits 0-7 select the channels
-    CR_CLKDIV_SHIFT = 8
-    CR_BURST = 0x10000
-    CR_PDN = 0x200000  # power on
-    CR_START = 0x1000000  # now
+CONVERSION_CLOCKS: Final = 11
+COUNTS: Final = 1024  # of the reference
+LAST_COUNT: Final = 1023
 
-    # ADGDR
-    GDR_RESULT_SHIFT = 6
-    GDR_CHN_SHIFT = 24
-    GDR_DONE_ABOVE_CHN = 0x80  # bit 31, counted from where the channel stands
+# ADCR; bits 0-7 select the channels
+CR_CLKDIV_SHIFT: Final = 8
+CR_BURST: Final = 0x10000
+CR_PDN: Final = 0x200000  # power on
+CR_START: Final = 0x1000000  # now
+
+# ADGDR
+GDR_RESULT_SHIFT: Final = 6
+GDR_CHN_SHIFT: Final = 24
+GDR_DONE_ABOVE_CHN: Final = 0x80  # bit 31, counted from where the channel stands
 
 
+@cython.final
+@cython.cclass
 class AdcInternal(Peripheral):
     """One converter. `inputs[channel]`: the analog pin of the chip behind AIN0 ... AIN7."""
+
+    # what a conversion touches
+    busy: cython.bint
+    channel: cython.longlong
+    alarm: "Alarm"
+    source: InterruptSource
+    conversion_ns: cython.longlong
+    single: cython.longlong
+    CR: cython.longlong
+    GDR: cython.longlong
+    scale: cython.double
+    count_V: cython.double
+    result: cython.longlong
+    offset_counts: cython.longlong
+    inputs: cython.longlong[8]
+    # burst mode, and the rest
+    channels: cython.longlong[8]
+    burst_count: cython.longlong
+    burst_start: cython.longlong
+    hz: cython.longlong
+    clkdiv: cython.longlong
+    not_finished: cython.longlong
 
     def __init__(self, chip, clkdiv=200, hz=0, reference_V=3.3, scale=1.0, offset_counts=0) -> None:
         Peripheral.__init__(self, chip)
@@ -60,6 +87,8 @@ class AdcInternal(Peripheral):
         self.burst_count = 0
         self.burst_start = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     @cython.cdivision(True)  # the reference is above 0
     def convert(self, volts: cython.double) -> cython.longlong:
         """Counts for a voltage at the pin."""
@@ -75,6 +104,7 @@ class AdcInternal(Peripheral):
             return counts
         return LAST_COUNT if counts > 0 else 0
 
+    @cython.ccall
     def start(self, channel: cython.longlong) -> cython.bint:
         """Start one conversion; False (and `not_finished` counts) while one is under way."""
         if self.busy:
@@ -105,6 +135,7 @@ class AdcInternal(Peripheral):
         self.CR = sum(1 << channel for channel in channels)
         self.CR |= (self.clkdiv - 1) << CR_CLKDIV_SHIFT | CR_BURST | CR_PDN
 
+    @cython.ccall
     def DR(self, channel: cython.longlong) -> cython.longlong:
         """Newest finished burst result of a channel, 0 ... 1023; 0 before the first."""
         finished: cython.longlong = (self.chip.now - self.burst_start) // self.conversion_ns

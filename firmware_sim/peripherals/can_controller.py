@@ -11,6 +11,8 @@ Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, 
 Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
 """
 
+from typing import Annotated, Final
+
 import cython
 
 # handed on to the boards, which see the controller and not the bus
@@ -18,73 +20,70 @@ from ranger_sim.can_bus.node import ICR_BUS_ERROR as ICR_BUS_ERROR  # noqa: PLC0
 from ranger_sim.can_bus.node import ICR_ERROR_PASSIVE as ICR_ERROR_PASSIVE  # noqa: PLC0414
 from ranger_sim.can_bus.node import ICR_ERROR_WARNING as ICR_ERROR_WARNING  # noqa: PLC0414
 from ranger_sim.can_bus.node import ICR_RECEIVING as ICR_RECEIVING  # noqa: PLC0414
+from ranger_sim.can_bus.node import WARNING_LIMIT
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
+from ranger_sim.foundation.events import (
+    CAN_ABORT,
+    CAN_MODE,
+    CAN_RX,
+    CAN_STATUS,
+    CAN_TX_DONE,
+    FLAG_EXTENDED,
+    FLAG_REMOTE,
+    FLAG_SINGLE_SHOT,
+    NEVER,
+    TX_ABORTED,
+    TX_SENT,
+)
 from ranger_sim.foundation.user_error import UserError
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.can_bus.node import WARNING_LIMIT
-    from ranger_sim.foundation.events import (
-        CAN_ABORT,
-        CAN_MODE,
-        CAN_RX,
-        CAN_STATUS,
-        CAN_TX_DONE,
-        FLAG_EXTENDED,
-        FLAG_REMOTE,
-        FLAG_SINGLE_SHOT,
-        NEVER,
-        TX_ABORTED,
-        TX_SENT,
-    )
+MOD_RESET: Final = 0x1  # CxMOD: reset mode
 
-    MOD_RESET = 0x1  # CxMOD: reset mode
+# CxCMR
+CMR_TR: Final = 0x1  # transmission request
+CMR_AT: Final = 0x2  # abort transmission
+CMR_RRB: Final = 0x4  # release receive buffer
+CMR_CDO: Final = 0x8  # clear data overrun
+CMR_SRR: Final = 0x10  # self reception request: not modelled
+CMR_STB1: Final = 0x20  # select transmit buffer
+CMR_STB2: Final = 0x40
+CMR_STB3: Final = 0x80
 
-    # CxCMR
-    CMR_TR = 0x1  # transmission request
-    CMR_AT = 0x2  # abort transmission
-    CMR_RRB = 0x4  # release receive buffer
-    CMR_CDO = 0x8  # clear data overrun
-    CMR_SRR = 0x10  # self reception request: not modelled
-    CMR_STB1 = 0x20  # select transmit buffer
-    CMR_STB2 = 0x40
-    CMR_STB3 = 0x80
+# CxICR and CxIER: the bits of the controller itself; those that the bus tells, ICR_*, are in can_bus/node.py.
+ICR_RI: Final = 0x1  # a frame waits
+ICR_TI1: Final = 0x2  # transmit buffer 1 has ended
+ICR_DOI: Final = 0x8  # data overrun
+ICR_ALI: Final = 0x40  # arbitration lost
+ICR_TI2: Final = 0x200
+ICR_TI3: Final = 0x400
+# ends of transmissions as bits 1 ... 3; those of buffers 2 and 3 stand higher up in CxICR
+ENDED_1: Final = 0x2
+ENDED_2_3: Final = 0xC
+TI2_SHIFT: Final = 7
 
-    # CxICR and CxIER: the bits of the controller itself; those that the bus tells, ICR_*, are in can_bus/node.py.
-    ICR_RI = 0x1  # a frame waits
-    ICR_TI1 = 0x2  # transmit buffer 1 has ended
-    ICR_DOI = 0x8  # data overrun
-    ICR_ALI = 0x40  # arbitration lost
-    ICR_TI2 = 0x200
-    ICR_TI3 = 0x400
-    # ends of transmissions as bits 1 ... 3; those of buffers 2 and 3 stand higher up in CxICR
-    ENDED_1 = 0x2
-    ENDED_2_3 = 0xC
-    TI2_SHIFT = 7
+# CxSR, once per transmit buffer
+SR_RBS: Final = 0x1  # a frame waits
+SR_DOS: Final = 0x2  # data overrun
+SR_TBS: Final = 0x4  # the transmit buffer is free
+SR_TCS: Final = 0x8  # its last transmission was completed
+SR_ES: Final = 0x40  # an error counter is at the warning limit
+SR_BS: Final = 0x80  # bus-off
+SR_BUFFER_BITS: Final = 8
 
-    # CxSR, once per transmit buffer
-    SR_RBS = 0x1  # a frame waits
-    SR_DOS = 0x2  # data overrun
-    SR_TBS = 0x4  # the transmit buffer is free
-    SR_TCS = 0x8  # its last transmission was completed
-    SR_ES = 0x40  # an error counter is at the warning limit
-    SR_BS = 0x80  # bus-off
-    SR_BUFFER_BITS = 8
+# CxGSR: as CxSR below, TBS and TCS of all three buffers together, and the error counters
+GSR_RX_ERRORS_SHIFT: Final = 16
+GSR_TX_ERRORS_SHIFT: Final = 24
+ERROR_COUNTER_MASK: Final = 0xFF
 
-    # CxGSR: as CxSR below, TBS and TCS of all three buffers together, and the error counters
-    GSR_RX_ERRORS_SHIFT = 16
-    GSR_TX_ERRORS_SHIFT = 24
-    ERROR_COUNTER_MASK = 0xFF
-
-    # CxRFS and CxTFI: DLC in bits 16-19, RTR bit 30, FF (extended identifier) bit 31; from a message's flags by shifts
-    DLC_MASK = 0xF
-    DLC_SHIFT = 16
-    RTR_SHIFT = 26  # of FLAG_REMOTE
-    FF_SHIFT = 25  # of FLAG_EXTENDED
-    EIGHT_BYTES = 8  # flags of nearly every frame: DLC 8, neither remote nor extended
-    RFS_EIGHT_BYTES = 0x80000  # the same in CxRFS
+# CxRFS and CxTFI: DLC in bits 16-19, RTR bit 30, FF (extended identifier) bit 31; from a message's flags by shifts
+DLC_MASK: Final = 0xF
+DLC_SHIFT: Final = 16
+RTR_SHIFT: Final = 26  # of FLAG_REMOTE
+FF_SHIFT: Final = 25  # of FLAG_EXTENDED
+EIGHT_BYTES: Final = 8  # flags of nearly every frame: DLC 8, neither remote nor extended
+RFS_EIGHT_BYTES: Final = 0x80000  # the same in CxRFS
 
 
 def btr_value(brp, sjw, tseg1, tseg2, sam=0) -> int:
@@ -112,6 +111,8 @@ def sample_point_of(btr) -> float:
     return before / (before + 1 + (btr >> 20 & 7))
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def frame_word(flags: cython.longlong) -> cython.longlong:
     """CxRFS and CxTFI of a frame with these flags (foundation/events.py)."""
     if flags == EIGHT_BYTES:
@@ -119,16 +120,60 @@ def frame_word(flags: cython.longlong) -> cython.longlong:
     return (flags & DLC_MASK) << DLC_SHIFT | (flags & FLAG_REMOTE) << RTR_SHIFT | (flags & FLAG_EXTENDED) << FF_SHIFT
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def buffers_of(word: cython.longlong) -> cython.longlong:
     """TI1 ... TI3 of a CxICR or CxIER value, as bits 1 ... 3."""
     return word & ENDED_1 | word >> TI2_SHIFT & ENDED_2_3
 
 
+@cython.final
+@cython.cclass
 class CanController(Peripheral):
     """Controller `number` (1 ... 4), field a of all its messages. Counters are ground truth for tests.
 
     `sent`, `aborted` and `lost` count the ends that have been taken in.
     """
+
+    # what a frame touches; registers of the chip have 32 bits
+    rx_source: InterruptSource
+    tx_source: InterruptSource
+    MOD: cython.longlong
+    ends: TransmitEnds
+    IER: Annotated[cython.longlong, "readonly"]
+    end_interrupts: cython.longlong
+    ended: cython.longlong
+    noted: cython.longlong
+    number: cython.longlong
+    rx_count: cython.longlong
+    tx_status: cython.longlong[4]
+    RFS: cython.longlong
+    RID: cython.longlong
+    RDA: cython.longlong
+    RDB: cython.longlong
+    second_RFS: cython.longlong
+    second_RID: cython.longlong
+    second_RDA: cython.longlong
+    second_RDB: cython.longlong
+    received: cython.longlong
+    sent: cython.longlong
+    requests: cython.longlong
+    TFI: cython.longlong[4]
+    TID: cython.longlong[4]
+    TDA: cython.longlong[4]
+    TDB: cython.longlong[4]
+    # the rest
+    data_overruns: cython.longlong
+    lost: cython.longlong
+    aborted: cython.longlong
+    refused: cython.longlong
+    overrun: cython.bint
+    bus_off: cython.bint
+    error_warning: cython.bint
+    tx_errors: cython.longlong
+    rx_errors: cython.longlong
+    BTR: cython.longlong
+    error_source: InterruptSource
 
     def __init__(self, chip, number=1, btr=0x00254001, IER=ICR_RI) -> None:
         # 0x00254001: BRP 1, SJW 1, TSEG1 5, TSEG2 2: 3 Mbit/s at 60 MHz, sampled at 70 %
@@ -180,12 +225,15 @@ class CanController(Peripheral):
         """Where a bus writes the ends of its transmissions."""
         return self.ends
 
+    @cython.ccall
     def bit_rate(self) -> cython.double:
         """Bits per second by CxBTR and the chip's clock."""
         return bit_rate_of(self.BTR, self.chip.hz)
 
     # --- transmit ---------------------------------------------------------------------------------------
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def free_at(self, buffer: cython.longlong, time: cython.longlong) -> cython.bint:
         """TBS of a transmit buffer 1 ... 3 by what has happened up to `time` (ns)."""
         buffer &= 3
@@ -193,10 +241,13 @@ class CanController(Peripheral):
             self._end(buffer, self.ends.statuses[buffer])
         return self.tx_status[buffer] != 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def buffer_free(self, buffer: cython.longlong) -> cython.bint:
         """TBS of a transmit buffer 1 ... 3."""
         return self.free_at(buffer, self.chip.now)
 
+    @cython.ccall
     def tell_end(self, buffer: cython.longlong) -> None:
         """The next end of a transmission from a buffer shall come as a message."""
         end: cython.longlong = self.ends.times[buffer]
@@ -207,6 +258,7 @@ class CanController(Peripheral):
             if end < self.chip.stop_time:
                 self.chip.stop_time = end
 
+    @cython.ccall
     def tell_first_end(self) -> None:
         """Buffers 1 and 2 are not free: the end that frees one of them first shall come as a message."""
         if self.ends.times[1] < NEVER:
@@ -217,6 +269,7 @@ class CanController(Peripheral):
             self.tell_end(1)
             self.tell_end(2)
 
+    @cython.ccall
     def write_IER(self, value: cython.longlong) -> None:
         """Write the interrupt enable register; it counts for what is under way as well."""
         buffer: cython.longlong
@@ -227,12 +280,14 @@ class CanController(Peripheral):
             if self.end_interrupts >> buffer & 1 and self.tx_source.bit != 0:
                 self.tell_end(buffer)
 
+    @cython.cfunc
     def _look(self) -> cython.void:
         """Take in every end that has come."""
         buffer: cython.longlong
         for buffer in range(1, 4):
             self.free_at(buffer, self.chip.now)
 
+    @cython.cfunc
     def _end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
         """The transmission from a buffer has ended."""
         self.ends.times[buffer] = NEVER
@@ -247,6 +302,7 @@ class CanController(Peripheral):
         else:
             self.lost += 1
 
+    @cython.ccall
     def transmit(
         self,
         buffer: cython.longlong,
@@ -264,6 +320,7 @@ class CanController(Peripheral):
         self.refused += 1
         return False
 
+    @cython.ccall
     def transmit_if_free(
         self,
         buffer: cython.longlong,
@@ -290,6 +347,7 @@ class CanController(Peripheral):
             self.tell_end(buffer)
         return True
 
+    @cython.ccall
     def write_CMR(self, command: cython.longlong) -> cython.longlong:
         """Write the command register; returns the command."""
         buffer: cython.longlong
@@ -368,6 +426,7 @@ class CanController(Peripheral):
                 return self.error_source
         return None
 
+    @cython.cfunc
     def _bus_off(self) -> cython.void:
         """Too many transmit errors: reset mode, nothing is sent or received until software restarts it."""
         buffer: cython.longlong
@@ -376,6 +435,7 @@ class CanController(Peripheral):
         for buffer in range(1, 4):
             self.tx_status[buffer] |= SR_TBS
 
+    @cython.ccall
     def release(self) -> cython.void:
         """CMR.RRB: free the older receive buffer; the newer moves up and asks for the interrupt again."""
         if self.rx_count < 2:
@@ -391,6 +451,7 @@ class CanController(Peripheral):
 
     # --- status -----------------------------------------------------------------------------------------
 
+    @cython.ccall
     def write_MOD(self, mode: cython.longlong) -> cython.void:
         """Bit 0: 1 reset mode, 0 operating (after bus-off: begin the recovery)."""
         buffer: cython.longlong
@@ -401,6 +462,8 @@ class CanController(Peripheral):
                 self.tx_status[buffer] |= SR_TBS
         self.chip.outbox.push(self.chip.now, 0, CAN_MODE, self.number, mode & MOD_RESET)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def read_ICR(self) -> cython.longlong:
         """Interrupt and capture register; the read clears all but the receive bit."""
         value: cython.longlong
@@ -415,6 +478,8 @@ class CanController(Peripheral):
         """The same by the ends taken in so far, without clearing anything."""
         return self.noted | self.ended & ENDED_1 | (self.ended & ENDED_2_3) << TI2_SHIFT | (self.rx_count > 0) * ICR_RI
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def SR(self) -> cython.longlong:
         """Status of the three buffers, 8 bits each."""
         buffer: cython.longlong
@@ -433,6 +498,8 @@ class CanController(Peripheral):
             word |= (common | self.tx_status[buffer]) << SR_BUFFER_BITS * (buffer - 1)
         return word
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def GSR(self) -> cython.longlong:
         """Global status: bit 0 RBS, 1 DOS, 2 all buffers free, 3 all complete, 6 ES, 7 BS, 16-23 receive errors,
         24-31 transmit errors."""

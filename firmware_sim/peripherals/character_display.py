@@ -23,11 +23,31 @@ LINE_LENGTH = 40  # characters of memory per line, of which the glass shows some
 ONE_LINE_LENGTH = 80
 
 
+@cython.final
+@cython.cclass
 class CharacterDisplay(Peripheral):
     """`data`: the pins of DB0 ... DB7; RS, R/W and E are one pin each. What is written stands in `memory`.
 
     `on_enable` is to be called with each change of E (`Chip.followers` of whoever made this).
     """
+
+    data_pins: cython.longlong[8]
+    rs: cython.longlong
+    rw: cython.longlong
+    enable: cython.longlong
+    enabled: cython.bint
+    in_shapes: cython.bint
+    wide_bus: cython.bint
+    two_lines: cython.bint
+    on: cython.bint
+    follows: cython.bint
+    memory: cython.longlong[::1]
+    address: cython.longlong
+    increment: cython.longlong
+    shift: cython.longlong
+    half: cython.longlong
+    commands: cython.longlong
+    characters: cython.longlong
 
     def __init__(self, chip, data, rs, rw, enable) -> None:
         Peripheral.__init__(self, chip)
@@ -52,6 +72,7 @@ class CharacterDisplay(Peripheral):
 
     # --- the pins -----------------------------------------------------------------------------------------
 
+    @cython.ccall
     def on_enable(self, level: cython.longlong) -> cython.bint:
         """E is `level` from now on; True when a byte has been taken with that."""
         byte: cython.longlong = 0
@@ -75,6 +96,7 @@ class CharacterDisplay(Peripheral):
         self.write(self.chip.pins[self.rs], byte)
         return True
 
+    @cython.cfunc
     def _read_out(self) -> cython.int:
         """E has changed in a read: the display drives the data pins; at the read's end the address moves on."""
         i: cython.longlong
@@ -98,6 +120,7 @@ class CharacterDisplay(Peripheral):
 
     # --- what a byte does ---------------------------------------------------------------------------------
 
+    @cython.ccall
     def write(self, rs: cython.longlong, byte: cython.longlong) -> cython.int:
         """A whole byte: a character with `rs`, else an instruction."""
         if rs:
@@ -112,6 +135,7 @@ class CharacterDisplay(Peripheral):
             self._instruct(byte)
         return 0
 
+    @cython.cfunc
     def _instruct(self, byte: cython.longlong) -> cython.int:
         """The highest bit that is set says which instruction it is."""
         i: cython.longlong
@@ -147,6 +171,7 @@ class CharacterDisplay(Peripheral):
             self.shift = 0
         return 0
 
+    @cython.cfunc
     def _move_on(self) -> cython.int:
         """The address behind one that was written or read."""
         if self.in_shapes:
@@ -155,6 +180,8 @@ class CharacterDisplay(Peripheral):
             self.address = self._beside(self.address, self.increment)
         return 0
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _beside(self, address: cython.longlong, step: cython.longlong) -> cython.longlong:
         """The next address: behind the end of a line comes the other one."""
         place: cython.longlong
@@ -164,6 +191,7 @@ class CharacterDisplay(Peripheral):
         place = (place + step + 2 * LINE_LENGTH) % (2 * LINE_LENGTH)
         return place if place < LINE_LENGTH else SECOND_LINE + place - LINE_LENGTH
 
+    @cython.ccall
     def shown(self, line: cython.longlong, place: cython.longlong) -> cython.longlong:
         """The code at a place of line 0 or 1 of the glass; 0 while it is off, or has no second line."""
         if not self.on or (line and not self.two_lines):

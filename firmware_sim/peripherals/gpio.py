@@ -11,9 +11,7 @@ the last edge that reported it.
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
-
-if not cython.compiled:
-    from ranger_sim.foundation.events import PIN_OUTPUT
+from ranger_sim.foundation.events import PIN_OUTPUT
 
 
 def p0(bit) -> int:
@@ -26,26 +24,33 @@ def p1(bit) -> int:
     return 32 + bit
 
 
+@cython.cclass
 class Gpio(Peripheral):
     """The two ports of a chip, whose levels are `chip.pins`. `outputs`, per pin: 1 once it was written."""
+
+    outputs: cython.longlong[64]
 
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)
         self.outputs = [0] * 64
 
+    @cython.ccall
     def level(self, pin: cython.longlong) -> cython.longlong:
         """0 or 1, as the pin is now."""
         return self.chip.pins[pin]
 
+    @cython.ccall
     def write(self, pin: cython.longlong, level: cython.longlong) -> None:
         """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
         if self.chip.pins[pin] != level or self.outputs[pin] == 0:
             self._drive(pin, level)
 
+    @cython.ccall
     def toggle(self, pin: cython.longlong) -> None:
         """Invert an output."""
         self._drive(pin, 1 - self.chip.pins[pin])
 
+    @cython.cfunc
     def _drive(self, pin: cython.longlong, level: cython.longlong) -> cython.int:
         self.outputs[pin] = 1
         self.chip.pins[pin] = level
@@ -54,6 +59,7 @@ class Gpio(Peripheral):
             cython.cast(Peripheral, self.chip.followers[pin]).on_level(pin, level)
         return 0
 
+    @cython.ccall
     def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Set the pins of `mask` (bit 0 = Px.0) of port 0 or 1."""
         bit: cython.longlong
@@ -61,6 +67,7 @@ class Gpio(Peripheral):
             if mask >> bit & 1:
                 self.write(port * 32 + bit, 1)
 
+    @cython.ccall
     def IOCLR(self, port: cython.longlong, mask: cython.longlong) -> None:
         """Clear the pins of `mask` of port 0 or 1."""
         bit: cython.longlong
@@ -68,6 +75,7 @@ class Gpio(Peripheral):
             if mask >> bit & 1:
                 self.write(port * 32 + bit, 0)
 
+    @cython.ccall
     def IOPIN(self, port: cython.longlong) -> cython.longlong:
         """The 32 levels of a port as a word."""
         bit: cython.longlong

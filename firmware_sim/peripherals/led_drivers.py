@@ -28,11 +28,20 @@ GROUPS = {0x0A: (0, 10), 0x0B: (0, 4), 0x0C: (4, 8), 0x0D: (8, 10)}  # register:
 ALL_GROUPS_BELOW = 0x10  # 0x0E and 0x0F, inputs, are read only
 
 
+@cython.final
+@cython.cclass
 class LedDrivers(SspDevice):
     """`count` drivers; number 0 is nearest to the processor. `writes`: how many registers have been written.
 
     `on_select` is to be called with each change of the select pin (`Chip.followers` of whoever made this).
     """
+
+    select_pin: cython.longlong
+    count: cython.longlong
+    shift: cython.longlong
+    writes: cython.longlong
+    selected: cython.bint
+    registers: cython.longlong[::1]
 
     def __init__(self, chip, select_pin, count=1) -> None:
         if not 1 <= count <= MOST_DEVICES:
@@ -58,6 +67,7 @@ class LedDrivers(SspDevice):
         self.shift = (self.shift << self.bits | word) & ((cython.cast(cython.longlong, 1) << length) - 1)
         return out
 
+    @cython.ccall
     def on_select(self, level: cython.longlong) -> cython.bint:
         """The select pin is `level` from now on; True when the drivers have taken what was shifted in."""
         device: cython.longlong
@@ -68,6 +78,7 @@ class LedDrivers(SspDevice):
                 self._take(device, self.shift >> (WORD_BITS * device) & 0xFFFF)
         return rises
 
+    @cython.cfunc
     def _take(self, device: cython.longlong, word: cython.longlong) -> cython.int:
         """One driver does what its 16 bits say."""
         address: cython.longlong = word >> 8 & 0x7F
@@ -86,11 +97,13 @@ class LedDrivers(SspDevice):
                 self._put(first + port, word & 0xFF)
         return 0
 
+    @cython.cfunc
     def _put(self, place: cython.longlong, value: cython.longlong) -> cython.int:
         self.registers[place] = value
         self.writes += 1
         return 0
 
+    @cython.ccall
     def level(self, device: cython.longlong, port: cython.longlong) -> cython.longlong:
         """Brightness that an eye sees at a port: 0 (off) ... 255 (always on)."""
         value: cython.longlong = self.registers[REGISTERS * device + port]

@@ -7,32 +7,59 @@ touches MR0, MR2 or MR6 (the two leads of an H-bridge) is told outside as PWM_UP
 of the period that first has the new values: at most one period after `now`.
 """
 
+from typing import Final
+
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
+from ranger_sim.foundation.events import PWM_UPDATE
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import PWM_UPDATE
-
-    # PWMLER, latch enable
-    LER_MR0 = 0x1
-    LER_MR1 = 0x2
-    LER_MR2 = 0x4
-    LER_MR3 = 0x8
-    LER_MR4 = 0x10
-    LER_MR5 = 0x20
-    LER_MR6 = 0x40
+# PWMLER, latch enable
+LER_MR0: Final = 0x1
+LER_MR1: Final = 0x2
+LER_MR2: Final = 0x4
+LER_MR3: Final = 0x8
+LER_MR4: Final = 0x10
+LER_MR5: Final = 0x20
+LER_MR6: Final = 0x40
 
 LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
 
 
+@cython.final
+@cython.cclass
 class Pwm(Peripheral):
     """Seven match registers; `latched_MRn` are the values that drive the pins. `period`: MR0 in counts.
 
     `period_start`: instant (ns) of the period that has what was latched last. `driven`: the channels whose pins it
     drives, bit n for channel n.
     """
+
+    # what a new duty touches
+    MR2: cython.longlong
+    MR6: cython.longlong
+    period_start: cython.longlong
+    rest: cython.longlong
+    rate: cython.longlong
+    period_ns: cython.longlong
+    LER: cython.longlong
+    driven: cython.longlong
+    latched_MR0: cython.longlong
+    latched_MR2: cython.longlong
+    latched_MR6: cython.longlong
+    # the rest
+    MR0: cython.longlong
+    MR1: cython.longlong
+    MR3: cython.longlong
+    MR4: cython.longlong
+    MR5: cython.longlong
+    hz: cython.longlong
+    phase_ns: cython.longlong
+    latched_MR1: cython.longlong
+    latched_MR3: cython.longlong
+    latched_MR4: cython.longlong
+    latched_MR5: cython.longlong
 
     def __init__(self, chip, period=600, hz=0, phase_ns=0) -> None:
         Peripheral.__init__(self, chip)
@@ -65,6 +92,7 @@ class Pwm(Peripheral):
         self.rate = 1_000_000_000 + self.chip.crystal.ppb
         self.rest = 0
 
+    @cython.ccall
     def write(self, MR2: cython.longlong, MR6: cython.longlong) -> None:
         """Write the two bridge leads (counts) and enable their latches."""
         self.MR2 = MR2
@@ -75,6 +103,7 @@ class Pwm(Peripheral):
         self.latched_MR6 = MR6
         self.chip.outbox.push(self.period_start, 0, PWM_UPDATE, MR2, MR6, self.latched_MR0)
 
+    @cython.ccall
     def latch(self, mask: cython.longlong) -> None:
         """Write PWMLER: the match values whose bits are set take effect at the next period."""
         self.LER = mask
@@ -101,6 +130,7 @@ class Pwm(Peripheral):
             self._count_periods()
         self.tell()
 
+    @cython.ccall
     def tell(self) -> None:
         """Whoever follows the unit's pins on the board (`Chip.pwm_follower`) sees what was latched.
 
@@ -109,6 +139,7 @@ class Pwm(Peripheral):
         if self.chip.pwm_follower is not None:
             cython.cast(Peripheral, self.chip.pwm_follower).on_pwm(self)
 
+    @cython.cfunc
     def _count_periods(self) -> None:
         """Count periods of MR0 from `phase_ns` on."""
         # ROBOT PARITY: on the chip a changed MR0 shifts the later periods instead of counting them anew. MR0 is
@@ -122,6 +153,7 @@ class Pwm(Peripheral):
         self.period_start = self.phase_ns
         self.rest = 0
 
+    @cython.cfunc
     def _find_period(self) -> cython.void:
         """Go on to the first period that begins at `now` or later: exactly to its `Crystal.tick_time_ns`."""
         since: cython.longlong = self.chip.now - self.period_start
@@ -132,6 +164,8 @@ class Pwm(Peripheral):
             periods = (since * self.rate - self.rest) // 1000000000
             self._go_on((periods + self.period_ns - 1) // self.period_ns)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _go_on(self, periods: cython.longlong) -> cython.longlong:
         """Go on by so many periods; returns how long they take (ns)."""
         parts: cython.longlong = self.rest + periods * self.period_ns * 1000000000

@@ -6,18 +6,40 @@ The encoder latches its position at the first clock edge and shifts it out; 14 b
 after which (SPI_DONE, number) is raised. The value is the low 13 bits, 0 ... 8191.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import SPI_DONE, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    SPSR_SPIF = 0x80  # S0SPSR: the transfer is complete
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
+
+SPSR_SPIF: Final = 0x80  # S0SPSR: the transfer is complete
 
 
+@cython.final
+@cython.cclass
 class SpiEncoder(Peripheral):
     """SPI `number` with the encoder that holds out `chip.words[word]`."""
+
+    # what a transfer touches
+    busy: cython.bint
+    alarm: "Alarm"
+    word: cython.longlong
+    mask: cython.longlong
+    latched: cython.longlong
+    SPDR: cython.longlong
+    SPSR: cython.longlong
+    transfer_ns: cython.longlong
+    source: InterruptSource
+    # the rest
+    number: cython.longlong
+    bits: cython.longlong
+    bit_rate: cython.longlong
+    not_finished: cython.longlong
 
     def __init__(self, chip, number=0, word=0, bits=14, bit_rate=1_000_000, value_bits=13) -> None:
         Peripheral.__init__(self, chip)
@@ -41,6 +63,7 @@ class SpiEncoder(Peripheral):
         self.not_finished = 0
         self.busy = False
 
+    @cython.ccall
     def start(self) -> cython.bint:
         """Write S0SPDR: the transfer begins; False (and `not_finished` counts) while one is under way."""
         if self.busy:
@@ -59,6 +82,8 @@ class SpiEncoder(Peripheral):
         self.busy = False
         return self.source
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def read(self) -> cython.longlong:
         """Read S0SPDR, which clears SPIF."""
         self.SPSR = 0

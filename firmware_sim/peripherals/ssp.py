@@ -12,14 +12,16 @@ The FIFO is not modelled word by word: the interrupts that feed it are charged i
 handler, which returns the number of half-words.
 """
 
+from typing import TYPE_CHECKING
+
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
-from ranger_sim.foundation.events import SSP_SEGMENT
+from ranger_sim.foundation.events import SSP_LOAD, SSP_SEGMENT, SSP_START
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import SSP_LOAD, SSP_START
+if TYPE_CHECKING:
+    pass
 
 SEGMENT_WORDS = 31
 LONGEST_WORD = 16  # bits
@@ -27,35 +29,47 @@ BIT_RATE = 3_000_000  # 60 MHz / 20
 WORD_BITS = 16
 
 
+@cython.ccall
 def segment_time_ns(words: cython.longlong, word_bits: cython.longlong, bit_rate: cython.longlong) -> cython.longlong:
     """Duration of `words` words of `word_bits` bits (ns, rounded down): 31, 16, 3 Mbit/s give 165,333."""
     return words * word_bits * 1000000000 // bit_rate
 
 
+@cython.cclass
 class SspDevice(Peripheral):
     """What hangs on the SSP: nothing. It reads as zeros. `bits`: of a word, as the master sends it."""
+
+    bits: cython.longlong
 
     def __init__(self, chip) -> None:
         Peripheral.__init__(self, chip)
         self.bits = LONGEST_WORD
 
+    @cython.ccall
     def begin(self, time: cython.longlong) -> cython.int:
         """The first bit of a word goes over the wires at `time` (ns)."""
         return 0
 
+    @cython.ccall
     def exchange(self, word: cython.longlong, time: cython.longlong) -> cython.longlong:
         """The last bit of `word` is through at `time`; returns the word that came the other way."""
         return 0
 
 
+@cython.final
+@cython.cclass
 class SspMaster(Peripheral):
     """The port as a master of words of `bits` bits to `device`."""
+
+    device: SspDevice
+    bits: cython.longlong
 
     def __init__(self, chip, device, bits=LONGEST_WORD) -> None:
         Peripheral.__init__(self, chip)
         self.device = device
         self.bits = bits
 
+    @cython.ccall
     def word(self, word: cython.longlong) -> cython.longlong:
         """Send a word; returns the one that came the other way."""
         device: SspDevice = self.device
@@ -64,12 +78,18 @@ class SspMaster(Peripheral):
         return device.exchange(word & ((1 << self.bits) - 1), self.chip.now)
 
 
+@cython.final
+@cython.cclass
 class SspSegment:
     """31 half-words, the last of which is the checksum of the others; `used`: how many are filled in.
 
     They are kept as those who fill them in have them: `rows` of a half-word and two words of 32 bits, six times. Of the
     checksum only `checksum_error` is kept: how much it is above what the others sum up to, 0 unless somebody spoilt it.
     """
+
+    used: cython.longlong
+    checksum_error: cython.longlong
+    rows: cython.longlong[18]
 
     def __init__(self) -> None:
         self.rows = [0] * 18
@@ -94,13 +114,15 @@ class SspSegment:
             self.rows[3 * row + 2] = half_words[at + 3] << 16 | half_words[at + 4]
         self.checksum_error = (half_words[30] - 1 - sum(half_words[:30])) & 0xFFFF
 
+    @cython.ccall
     def clear(self) -> cython.void:
         """Thirty zeros and their checksum, nothing used."""
         self.rows = [0] * 18
         self.checksum_error = 0
         self.used = 0
 
-    def copy_from(self, other) -> cython.void:
+    @cython.ccall
+    def copy_from(self, other: "SspSegment") -> cython.void:
         """Take over the contents of another segment."""
         i: cython.longlong
         for i in range(18):
@@ -109,8 +131,19 @@ class SspSegment:
         self.used = other.used
 
 
+@cython.final
+@cython.cclass
 class SspPort(Peripheral):
     """One end of the link. A received segment waits in `received`; one not taken is overwritten and counted."""
+
+    fresh: cython.bint
+    number: cython.longlong
+    source: InterruptSource
+    received: SspSegment
+    loaded: SspSegment
+    received_time: cython.longlong
+    exchanges: cython.longlong
+    overwritten: cython.longlong
 
     def __init__(self, chip, number=0) -> None:
         Peripheral.__init__(self, chip)
@@ -124,10 +157,12 @@ class SspPort(Peripheral):
         self.source = chip.vic.source(SSP_SEGMENT, number)
         chip.claim(SSP_SEGMENT, number, self)
 
+    @cython.ccall
     def start(self, segment: SspSegment) -> cython.void:
         """Master: exchange `segment` from `now` on. It must not be changed until it is through."""
         self.chip.outbox.push(self.chip.now, 0, SSP_START, self.number, 0, 0, 0, 0, 0, segment)
 
+    @cython.ccall
     def load(self, segment: SspSegment) -> cython.void:
         """Slave: send `segment` from the next exchange on. It must not be changed until something else is loaded."""
         if segment is self.loaded:
@@ -145,7 +180,8 @@ class SspPort(Peripheral):
         self.exchanges += 1
         return self.source
 
-    def take(self):
+    @cython.ccall
+    def take(self) -> SspSegment:
         """The segment that came in last, or None when it has been taken already."""
         if not self.fresh:
             return None

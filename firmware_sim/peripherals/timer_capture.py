@@ -9,6 +9,8 @@ direction that is not armed is not captured at all. Both are counted in `lost`, 
 captured are counted by their interrupt's source.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.clock import TickTrain
@@ -16,23 +18,46 @@ from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import TIMER_MATCH, InterruptSource
 from ranger_sim.foundation.user_error import UserError
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    IR_MR0 = 0x1  # TxIR: the match that restarts the timer
-    IR_CR0 = 0x10  # capture 0; those of channels 1 ... 3 follow
-    # TxCCR, per channel CCR_BITS apart
-    CCR_RISING = 0x1
-    CCR_FALLING = 0x2
-    CCR_INTERRUPT = 0x4
-    CCR_MASK = 0x7
-    CCR_BITS = 3
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
+
+IR_MR0: Final = 0x1  # TxIR: the match that restarts the timer
+IR_CR0: Final = 0x10  # capture 0; those of channels 1 ... 3 follow
+# TxCCR, per channel CCR_BITS apart
+CCR_RISING: Final = 0x1
+CCR_FALLING: Final = 0x2
+CCR_INTERRUPT: Final = 0x4
+CCR_MASK: Final = 0x7
+CCR_BITS: Final = 3
 
 
+@cython.cclass
 class TimerCapture(Peripheral):
     """Timer `number` that wraps every `period` counts of `hz` (core clock unless given), from `phase_ns` on.
 
     `match_interrupt=True` raises (TIMER_MATCH, number) at every wrap. Edges `lost` per channel.
     """
+
+    # what an edge touches
+    IR: cython.longlong
+    CCR: cython.longlong
+    wrap_time: cython.longlong
+    next_wrap_time: cython.longlong
+    counts_per_ns: cython.double
+    MR0: cython.longlong
+    captures: cython.longlong[4]
+    # what a wrap touches besides
+    alarm: "Alarm"
+    match_source: InterruptSource
+    ticks: TickTrain
+    # the rest
+    period_ns: cython.longlong
+    lost: cython.longlong[4]
+    pins: cython.longlong[4]
+    number: cython.longlong
+    phase_ns: cython.longlong
+    hz: cython.longlong
+    match_interrupt: cython.bint
 
     def __init__(self, chip, number=0, period=30000, hz=0, phase_ns=0, match_interrupt=False) -> None:
         Peripheral.__init__(self, chip)
@@ -85,6 +110,7 @@ class TimerCapture(Peripheral):
         self.arm(channel, rising, falling)
         return source
 
+    @cython.ccall
     def arm(self, channel: cython.longlong, rising: cython.bint, falling: cython.bint) -> None:
         """Choose the edges that channel captures (its three bits of T0CCR, interrupt on)."""
         bits: cython.longlong = CCR_INTERRUPT
@@ -95,6 +121,8 @@ class TimerCapture(Peripheral):
             bits |= CCR_FALLING
         self.CCR = self.CCR & ~(mask << CCR_BITS * channel) | bits << CCR_BITS * channel
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def clear(self, mask: cython.longlong) -> cython.longlong:
         """Write T0IR: the bits of `mask` are cleared, the channels may capture again. Returns what is left."""
         self.IR &= ~mask
@@ -105,6 +133,7 @@ class TimerCapture(Peripheral):
         """How often the timer has started again, as far as it has been looked at."""
         return self.ticks.number - 1
 
+    @cython.ccall
     def CR(self, channel: cython.longlong) -> cython.longlong:
         """Capture register of a channel by number."""
         return self.captures[channel]
@@ -129,10 +158,12 @@ class TimerCapture(Peripheral):
         """Capture register of channel 3."""
         return self.captures[3]
 
+    @cython.ccall
     def TC(self) -> cython.longlong:
         """The count at `now`."""
         return self.count_at(self.chip.now)
 
+    @cython.ccall
     def count_at(self, time: cython.longlong) -> cython.longlong:
         """The count (0 ... MR0) at an instant not before the present wrap."""
         count: cython.longlong
@@ -143,6 +174,7 @@ class TimerCapture(Peripheral):
             return self.MR0
         return count
 
+    @cython.cfunc
     def _wrap_to(self, time: cython.longlong) -> cython.longlong:
         """Bring the wrap that precedes `time` up to date, however far away; returns its instant."""
         self.wrap_time = self.next_wrap_time
@@ -151,6 +183,7 @@ class TimerCapture(Peripheral):
             return self._skip_to(time)
         return self.wrap_time
 
+    @cython.cfunc
     def _skip_to(self, time: cython.longlong) -> cython.longlong:
         """The same over wraps that nobody has looked at."""
         self.ticks.go_to(self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns)
@@ -178,6 +211,7 @@ class TimerCapture(Peripheral):
         self.IR |= flag
         return 1 if asked & CCR_INTERRUPT else 0
 
+    @cython.cfunc
     def _late_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """An edge after a wrap that has not been looked at."""
         self._wrap_to(time)

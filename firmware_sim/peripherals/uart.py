@@ -11,38 +11,66 @@ Transmit: a byte written to THR leaves as UART_OUTPUT, stamped with the end of i
 the FIFO has become empty, (UART_TRANSMIT, number) is raised.
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import UART_TRANSMIT, InterruptSource
-from ranger_sim.foundation.events import NEVER, UART_BYTE
+from ranger_sim.foundation.events import NEVER, UART_BYTE, UART_OUTPUT
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import UART_OUTPUT
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
 
-    FIFO_BYTES = 16
-    BITS_PER_BYTE = 10  # start, 8 data, stop
-    CLOCKS_PER_BIT = 16
-    TIMEOUT_BYTES = 4  # of silence, while bytes wait below the trigger level
-    TIMEOUT_ALARM = 0
-    TRANSMIT_ALARM = 1
+FIFO_BYTES: Final = 16
+BITS_PER_BYTE: Final = 10  # start, 8 data, stop
+CLOCKS_PER_BIT: Final = 16
+TIMEOUT_BYTES: Final = 4  # of silence, while bytes wait below the trigger level
+TIMEOUT_ALARM: Final = 0
+TRANSMIT_ALARM: Final = 1
 
-    # UnIIR
-    IIR_NONE = 1
-    IIR_TRANSMIT = 2  # THRE: the transmit FIFO is empty
-    IIR_RECEIVED = 4  # RDA: the trigger level is reached
-    IIR_TIMEOUT = 12  # CTI: bytes wait below it
+# UnIIR
+IIR_NONE: Final = 1
+IIR_TRANSMIT: Final = 2  # THRE: the transmit FIFO is empty
+IIR_RECEIVED: Final = 4  # RDA: the trigger level is reached
+IIR_TIMEOUT: Final = 12  # CTI: bytes wait below it
 
-    # UnLSR
-    LSR_RDR = 0x1  # a received byte waits
-    LSR_OE = 0x2  # overrun
-    LSR_THRE = 0x20  # the transmit FIFO is empty
-    LSR_TEMT = 0x40  # and the last byte is out
+# UnLSR
+LSR_RDR: Final = 0x1  # a received byte waits
+LSR_OE: Final = 0x2  # overrun
+LSR_THRE: Final = 0x20  # the transmit FIFO is empty
+LSR_TEMT: Final = 0x40  # and the last byte is out
 
 
+@cython.final
+@cython.cclass
 class Uart(Peripheral):
     """UART `number`. baud = hz / (16 * divisor * (1 + divaddval / mulval))."""
+
+    # what a received byte touches
+    source: InterruptSource
+    byte_ns: cython.longlong
+    trigger: cython.longlong
+    fifo_count: cython.longlong
+    IIR: cython.longlong
+    received: cython.longlong
+    fifo: cython.longlong[16]
+    # the rest
+    overruns: cython.longlong
+    errors: cython.longlong
+    number: cython.longlong
+    DL: cython.longlong
+    DIVADDVAL: cython.longlong
+    MULVAL: cython.longlong
+    hz: cython.longlong
+    baud: cython.double
+    transmit_free: cython.longlong
+    sent: cython.longlong
+    refused: cython.longlong
+    timeout_alarm: "Alarm"
+    transmit_alarm: "Alarm"
+    transmit_source: InterruptSource
 
     def __init__(self, chip, number=0, divisor=6, divaddval=0, mulval=1, trigger=8, hz=0) -> None:
         Peripheral.__init__(self, chip)
@@ -67,6 +95,7 @@ class Uart(Peripheral):
         self.transmit_free = 0
         chip.claim(UART_BYTE, number, self)
 
+    @cython.ccall
     def set_divisor(self, DL: cython.longlong, DIVADDVAL: cython.longlong = 0, MULVAL: cython.longlong = 1) -> None:
         """Set the divisor latch and the fractional divider."""
         if DL < 1 or MULVAL < 1 or DIVADDVAL < 0 or DIVADDVAL > 14 or MULVAL > 15:
@@ -85,6 +114,8 @@ class Uart(Peripheral):
         """Its bytes take longer or shorter."""
         self.set_divisor(self.DL, self.DIVADDVAL, self.MULVAL)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def waiting(self) -> cython.longlong:
         """Received bytes that wait in the FIFO."""
         return self.fifo_count
@@ -128,6 +159,8 @@ class Uart(Peripheral):
         self.IIR = IIR_TRANSMIT
         return self.transmit_source
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def RBR(self) -> cython.longlong:
         """Take the oldest received byte; 0 when there is none (see LSR bit 0)."""
         byte: cython.longlong
@@ -137,6 +170,7 @@ class Uart(Peripheral):
         self.were_read(1)
         return byte
 
+    @cython.ccall
     def were_read(self, count: cython.longlong) -> cython.void:
         """The oldest `count` bytes that wait were read from `fifo` itself, as by reads of RBR."""
         i: cython.longlong
@@ -150,6 +184,7 @@ class Uart(Peripheral):
             else:
                 self.timeout_alarm.set(self.chip.now + TIMEOUT_BYTES * self.byte_ns)
 
+    @cython.ccall
     def THR(self, byte: cython.longlong) -> cython.bint:
         """Send a byte; False (and `refused` counts) when the FIFO is full."""
         now: cython.longlong = self.chip.now
@@ -165,6 +200,7 @@ class Uart(Peripheral):
             self.transmit_alarm.set(max(now, self.transmit_free - self.byte_ns))
         return True
 
+    @cython.ccall
     def LSR(self) -> cython.longlong:
         """Line status: bit 0 data ready, 1 overrun (cleared by this read), 5 THR empty, 6 all sent."""
         status: cython.longlong = self.errors

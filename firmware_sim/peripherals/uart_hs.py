@@ -12,23 +12,45 @@ off until the next swap.
 """
 
 import array
+from typing import TYPE_CHECKING
 
 import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import DMA_DONE, InterruptSource
-from ranger_sim.foundation.events import UART_BYTE
+from ranger_sim.foundation.events import UART_BYTE, UART_OUTPUT
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import UART_OUTPUT
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.alarm import Alarm
 
 BITS_PER_BYTE = 10  # start, 8 data, stop
 SAMPLES_PER_BIT = 14
 
 
+@cython.cclass
 class HsUart(Peripheral):
     """UART `number` with transmit DMA `channel`; `buffer_bytes` of each of the two receive buffers."""
+
+    number: cython.longlong
+    rate: cython.longlong
+    hz: cython.longlong
+    byte_ns: cython.longlong
+    done_alarm: "Alarm"
+    baud: cython.double
+    source: InterruptSource
+    busy: cython.bint
+    waits_for_cts: cython.bint
+    clear_to_send: cython.bint
+    overrun: cython.bint
+    held: object
+    sent: cython.longlong
+    buffer_bytes: cython.longlong
+    active: cython.longlong
+    filled: cython.longlong
+    received: cython.longlong
+    lost: cython.longlong
+    buffers: cython.longlong[::1]
 
     def __init__(self, chip, number, channel, rate=0, hz=13_000_000, buffer_bytes=1000, cts_pin=-1) -> None:
         Peripheral.__init__(self, chip)
@@ -67,6 +89,7 @@ class HsUart(Peripheral):
 
     # --- transmit ---------------------------------------------------------------------------------------
 
+    @cython.ccall
     def transmit(self, data: object) -> cython.bint:
         """Start the channel on these bytes; False while an earlier transfer runs or waits."""
         if self.busy:
@@ -79,6 +102,7 @@ class HsUart(Peripheral):
             self.waits_for_cts = True
         return True
 
+    @cython.cfunc
     def _begin(self, data: object, time: cython.longlong) -> None:
         count: cython.longlong = len(data)
         end: cython.longlong = time + count * self.byte_ns
@@ -114,6 +138,8 @@ class HsUart(Peripheral):
             self._store(queue.b & 255)
         return None
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _store(self, byte: cython.longlong) -> cython.void:
         if self.filled >= self.buffer_bytes:
             self.overrun = True
@@ -123,6 +149,7 @@ class HsUart(Peripheral):
         self.buffers[self.active * self.buffer_bytes + self.filled] = byte
         self.filled += 1
 
+    @cython.ccall
     def swap(self) -> cython.longlong:
         """Let the other buffer fill from now on; returns how many bytes the first has (see `taken`)."""
         count: cython.longlong = self.filled
@@ -131,6 +158,7 @@ class HsUart(Peripheral):
         self.overrun = False
         return count
 
+    @cython.ccall
     def taken(self, place: cython.longlong) -> cython.longlong:
         """Byte `place` of the buffer that does not fill."""
         return self.buffers[(1 - self.active) * self.buffer_bytes + place]

@@ -27,9 +27,9 @@ def version(machine: str = "") -> str:
     """
     total = hashlib.blake2b(digest_size=16)
     for room in ROOMS:
-        for path in sorted((loading.HOUSE / room).rglob("*")):
+        for path in sorted((loading.PACKAGE / room).rglob("*")):
             if path.suffix in SOURCES and "__pycache__" not in path.parts:
-                total.update(path.relative_to(loading.HOUSE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+                total.update(path.relative_to(loading.PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     own = subject_of(machine).version()
     return f"{__version__}+{datatable.table_hash()[:12]}.{total.hexdigest()[:16]}" + (f".{own}" if own else "")
 

@@ -10,6 +10,8 @@ from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.harness.step_watch import StepWatch
 
 
+@cython.final
+@cython.cclass
 class ErrorWatch(StepWatch):
     """Fills `rows`: time (ns), place of the board in `boards`, code, how often since it was last looked.
 
@@ -17,6 +19,12 @@ class ErrorWatch(StepWatch):
     boards with errors, as a calibration probe, is not looked at. codes: 0 ... codes - 1
     are looked at. Times are those of the 250 us step before which the error was noted.
     """
+
+    boards: list
+    codes: cython.longlong
+    count: cython.longlong
+    before: cython.longlong[::1]
+    rows: RowStream
 
     def __init__(self, boards, codes) -> None:
         StepWatch.__init__(self)

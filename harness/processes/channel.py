@@ -19,59 +19,55 @@ damaged message never reaches a chip and never ends a process.
 """
 
 import array
+from typing import Final
 
 import cython
 
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
-from ranger_sim.foundation.events import EventQueue, Outbox
+from ranger_sim.foundation.events import CAN_REQUEST, FLAG_EXTENDED, EventQueue, Outbox
 from ranger_sim.harness.processes.kinds import FIELDS, KINDS, PAYLOADS, limits
-from ranger_sim.harness.processes.places import NOTE_WORDS
+from ranger_sim.harness.processes.places import (
+    DIRECTION,
+    LEAST_PAYLOAD,
+    LIMIT_SIZE,
+    MOST_PAYLOAD,
+    NOTE_WORDS,
+    RANGES,
+    SSP_USED,
+    SSP_WORDS,
+)
+from ranger_sim.harness.processes.shared_words import load, mix, pause, post, store
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import CAN_REQUEST, FLAG_EXTENDED
-    from ranger_sim.harness.processes.places import (
-        DIRECTION,
-        LEAST_PAYLOAD,
-        LIMIT_SIZE,
-        MOST_PAYLOAD,
-        RANGES,
-        SSP_USED,
-        SSP_WORDS,
-    )
-    from ranger_sim.harness.processes.plain import load, mix, pause, post, store
+VERSION: Final = 1
+SLOT_WORDS: Final = 12
+# where the parts of a message stand in its first slot
+STAMP_WORD: Final = 1
+ORDER_WORD: Final = 2
+FIELDS_WORD: Final = 3  # and the five after it
+CHECK_WORD: Final = 11
+FIELD_COUNT: Final = 6
+LONGEST: Final = 23  # slots of the longest message: one and those of NOTE_WORDS
+FIRST_OWN_KIND: Final = 64  # kinds from here on are between the processes only: no chip sees them
+LAST_KIND: Final = 127
+# in word 0 of a message
+KIND_MASK: Final = 0xFF
+VERSION_SHIFT: Final = 8
+PAYLOAD_SHIFT: Final = 16
+PAYLOAD_MASK: Final = 0xFFFF
+NUMBER_SHIFT: Final = 32
+NUMBER_MASK: Final = 0xFFFFFF
+LAST_STANDARD_ID: Final = 0x7FF
+FARTHEST_NS: Final = 1_000_000_000  # between a stamp and the instant of its turn
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    VERSION = 1
-    SLOT_WORDS = 12
-    # where the parts of a message stand in its first slot
-    STAMP_WORD = 1
-    ORDER_WORD = 2
-    FIELDS_WORD = 3  # and the five after it
-    CHECK_WORD = 11
-    FIELD_COUNT = 6
-    LONGEST = 23  # slots of the longest message: one and those of NOTE_WORDS
-    FIRST_OWN_KIND = 64  # kinds from here on are between the processes only: no chip sees them
-    LAST_KIND = 127
-    # in word 0 of a message
-    KIND_MASK = 0xFF
-    VERSION_SHIFT = 8
-    PAYLOAD_SHIFT = 16
-    PAYLOAD_MASK = 0xFFFF
-    NUMBER_SHIFT = 32
-    NUMBER_MASK = 0xFFFFFF
-    LAST_STANDARD_ID = 0x7FF
-    FARTHEST_NS = 1_000_000_000  # between a stamp and the instant of its turn
-
-    # What can be wrong with a message; FIELD_WRONG + i: field i is out of range.
-    OF_UNKNOWN_KIND = 1
-    OF_OTHER_VERSION = 2
-    TOO_LONG = 3
-    CHECK_WRONG = 4
-    NO_IDENTIFIER = 5
-    BAD_PAYLOAD = 6
-    OUT_OF_TIME = 7
-    FIELD_WRONG = 16
+# What can be wrong with a message; FIELD_WRONG + i: field i is out of range.
+OF_UNKNOWN_KIND: Final = 1
+OF_OTHER_VERSION: Final = 2
+TOO_LONG: Final = 3
+CHECK_WRONG: Final = 4
+NO_IDENTIFIER: Final = 5
+BAD_PAYLOAD: Final = 6
+OUT_OF_TIME: Final = 7
+FIELD_WRONG: Final = 16
 
 FAULTS = {
     OF_UNKNOWN_KIND: "its kind is not one that goes this way",
@@ -84,11 +80,18 @@ FAULTS = {
 }
 
 
+@cython.cclass
 class Bell:
     """One process rings, the other waits: a count in shared memory, and an eventfd for who sleeps.
 
     `count`, `sleeper`: places of the two words. The bell of a process that is gone is rung by the supervisor.
     """
+
+    words: cython.longlong[::1]
+    count: cython.longlong
+    sleeper: cython.longlong
+    descriptor: cython.longlong
+    rung: cython.longlong
 
     def __init__(self, words, count, sleeper, descriptor) -> None:
         self.words = words
@@ -97,6 +100,7 @@ class Bell:
         self.descriptor = descriptor
         self.rung = 0
 
+    @cython.ccall
     def ring(self) -> cython.void:
         """One more; wakes the other side if it sleeps."""
         self.rung += 1
@@ -104,6 +108,8 @@ class Bell:
         if not cython.compiled or load(self.words, self.sleeper) != 0:
             post(self.descriptor)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def wait(self, count: cython.longlong) -> cython.bint:
         """Sleep until the bell was rung `count` times; False when it was rung from a third side meanwhile."""
         if load(self.words, self.count) == count:
@@ -115,11 +121,30 @@ class Bell:
         return load(self.words, self.count) == count
 
 
+@cython.cclass
 class Mailbox:
     """Messages one way. `first`: place of its first word; `used_word`: place of the number of slots in use.
 
     `name` stands in what is said about damage. `direction`: of the kinds that may stand in it (kinds.py).
     """
+
+    words: cython.longlong[::1]
+    limits: cython.longlong[::1]
+    name: str
+    first: cython.longlong
+    slots: cython.longlong
+    used_word: cython.longlong
+    direction: cython.longlong
+    until: cython.longlong
+    sequence: cython.longlong
+    used: cython.longlong
+    at: cython.longlong
+    closed: cython.longlong
+    damaged: cython.longlong
+    kinds: cython.longlong
+    bit_of_kind: cython.longlong
+    last_damage: str
+    notes: list
 
     def __init__(self, words, name, first, slots, used_word, direction) -> None:
         self.words = words
@@ -142,6 +167,7 @@ class Mailbox:
 
     # --- writing ------------------------------------------------------------------------------------------
 
+    @cython.ccall
     def put(self, queue: EventQueue) -> cython.bint:
         """Add the message in the fields of `queue`; False when the mailbox is full (then nothing is written)."""
         at: cython.longlong = self.first + self.used * SLOT_WORDS
@@ -171,11 +197,13 @@ class Mailbox:
         self.used += 1 + (payload + SLOT_WORDS - 1) // SLOT_WORDS
         return True
 
+    @cython.ccall
     def send(self) -> cython.void:
         """Close what was put: the other side may read it once the bell rings."""
         self.words[self.used_word] = self.used
         self.used = 0
 
+    @cython.cfunc
     def _write_payload(self, kind: cython.longlong, ref: object, at: cython.longlong) -> cython.longlong:
         """The object of a message as words from `at` on; returns how many."""
         i: cython.longlong
@@ -205,6 +233,7 @@ class Mailbox:
             self.closed = 0
             self._damage(f"{used} slots in use, allowed are 0 to {self.slots}")
 
+    @cython.ccall
     def take(self, queue: Outbox) -> cython.bint:
         """Push the next whole message into `queue` (a kind of ours alone into `notes`); False at the end."""
         at: cython.longlong
@@ -253,6 +282,7 @@ class Mailbox:
             return True
         return False
 
+    @cython.cfunc
     def _read_payload(self, at: cython.longlong, count: cython.longlong, kind: cython.longlong) -> object:
         """The object whose words begin at `at`."""
         segment: SspSegment
@@ -266,6 +296,8 @@ class Mailbox:
 
     # --- what is whole ------------------------------------------------------------------------------------
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _check(self, at: cython.longlong, payload: cython.longlong) -> cython.longlong:
         """The check of the message at word `at`."""
         i: cython.longlong
@@ -276,6 +308,8 @@ class Mailbox:
             sum = mix(sum, self.words[at + i])
         return sum
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _fault(self, at: cython.longlong) -> cython.longlong:
         """What is wrong with the message at word `at`; 0 when nothing is."""
         head: cython.longlong = self.words[at]

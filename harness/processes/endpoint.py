@@ -4,6 +4,7 @@ Everything about the board is `Microcontroller.advance`; here is only what bring
 """
 
 import json
+from typing import TYPE_CHECKING
 
 import cython
 
@@ -13,7 +14,7 @@ from ranger_sim.firmware_sim.scheduler import SlotScheduler
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
 from ranger_sim.harness.processes.activity import ActivityStore
-from ranger_sim.harness.processes.channel import Bell, Mailbox
+from ranger_sim.harness.processes.channel import LONGEST, Bell, Mailbox
 from ranger_sim.harness.processes.kinds import (
     FROM_BOARD,
     KINDS,
@@ -25,55 +26,55 @@ from ranger_sim.harness.processes.kinds import (
     TO_BOARD,
 )
 from ranger_sim.harness.processes.lateness import bin_of
+from ranger_sim.harness.processes.places import (
+    ANSWER_USED,
+    ANSWERED,
+    ASK_USED,
+    ASKED,
+    BOARD_SLEEPS,
+    COMMAND,
+    COMMAND_ACTIVITY,
+    COMMAND_ADVANCE,
+    COMMAND_COUNTERS,
+    COMMAND_STOP,
+    DAMAGED,
+    ERRORS,
+    LATE_COUNT,
+    LATE_MAX,
+    LATENESS,
+    MAX_SLOT_CYCLES,
+    NEXT_OUTPUT,
+    NEXT_TIME,
+    OVERRUNS,
+    PACE_TIME_NS,
+    PACE_WALL_NS,
+    PACE_WALL_PER_TIME,
+    PACED,
+    PLANT_SLEEPS,
+    REACHED,
+    RESULT,
+    RESULT_DONE,
+    RESULT_MORE,
+    RING,
+    RING_CYCLES,
+    RING_LATE,
+    RING_ROW,
+    RING_ROWS,
+    RING_START,
+    ROWS,
+    SLOT_COUNT,
+    SLOT_TIME,
+    SLOTS,
+    STAGE_RING,
+    TURNS,
+    UNTIL,
+    URGENT,
+    WATCHED,
+)
 from ranger_sim.harness.wiring.ranger import HEAR_IN_SLOTS
 
-if not cython.compiled:
-    from ranger_sim.harness.processes.channel import LONGEST
-    from ranger_sim.harness.processes.places import (
-        ANSWER_USED,
-        ANSWERED,
-        ASK_USED,
-        ASKED,
-        BOARD_SLEEPS,
-        COMMAND,
-        COMMAND_ACTIVITY,
-        COMMAND_ADVANCE,
-        COMMAND_COUNTERS,
-        COMMAND_STOP,
-        DAMAGED,
-        ERRORS,
-        LATE_COUNT,
-        LATE_MAX,
-        LATENESS,
-        MAX_SLOT_CYCLES,
-        NEXT_OUTPUT,
-        NEXT_TIME,
-        OVERRUNS,
-        PACE_TIME_NS,
-        PACE_WALL_NS,
-        PACE_WALL_PER_TIME,
-        PACED,
-        PLANT_SLEEPS,
-        REACHED,
-        RESULT,
-        RESULT_DONE,
-        RESULT_MORE,
-        RING,
-        RING_CYCLES,
-        RING_LATE,
-        RING_ROW,
-        RING_ROWS,
-        RING_START,
-        ROWS,
-        SLOT_COUNT,
-        SLOT_TIME,
-        SLOTS,
-        STAGE_RING,
-        TURNS,
-        UNTIL,
-        URGENT,
-        WATCHED,
-    )
+if TYPE_CHECKING:
+    from ranger_sim.harness.processes.stage import Audience
 
 # Kinds that wait for a task of a board that hears in its slots: edges, frames, bytes and buffers that come free.
 SLOT_KINDS = 1 << PIN_EDGE | 1 << CAN_RX | 1 << CAN_TX_DONE | 1 << UART_BYTE
@@ -82,8 +83,33 @@ ERRORS_EVERY = 1023  # turns; a mask. Some ten times a second
 NOTE_BYTES = 8 * (NOTE_WORDS - 1)
 
 
+@cython.cclass
 class Endpoint:
     """Serves `board` over the block `shared`; `stage`: the two views of the stage; `audience`: its sensors."""
+
+    board: Microcontroller
+    counts_errors: cython.bint
+    runs_c: cython.bint
+    clock: object
+    shared: object
+    activity: object
+    block: cython.longlong[::1]
+    stage: cython.longlong[::1]
+    stage_doubles: cython.double[::1]
+    ask: Bell
+    answer: Bell
+    to_board: Mailbox
+    from_board: Mailbox
+    audience: "Audience"
+    pending: EventQueue
+    out: EventQueue
+    slots_seen: cython.longlong
+    cycles_seen: cython.longlong
+    ring_first: cython.longlong
+    turns: cython.longlong
+    reached: cython.longlong
+    can_wait: cython.longlong
+    promised: cython.longlong
 
     def __init__(self, board, shared, stage, audience, place) -> None:
         shared.check(place)
@@ -115,6 +141,8 @@ class Endpoint:
         self.ring_first = shared.ring_first
         self.reached = 0
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def serve(self) -> cython.void:
         """Until told to stop."""
         command: cython.longlong
@@ -137,6 +165,8 @@ class Endpoint:
             self._show()
             self.answer.ring()
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _advance(self) -> cython.void:
         """Take in what came, and run; step after step of the plant, as its sensors showed them."""
         until: cython.longlong = self.block[UNTIL]
@@ -165,6 +195,7 @@ class Endpoint:
         self._run_to(until)
         self.reached = until
 
+    @cython.cfunc
     def _run_to(self, until: cython.longlong) -> None:
         """Run the board, and note how late its slots are."""
         board: Microcontroller = self.board
@@ -172,6 +203,8 @@ class Endpoint:
             board.advance(until)
             self._keep_slots()
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _keep_slots(self) -> cython.void:
         """The latest slots into the ring: of most calls none, or one that has begun and ended."""
         scheduler: SlotScheduler = self.board.scheduler
@@ -197,6 +230,8 @@ class Endpoint:
             row = self.ring_first + RING_ROW * ((self.block[RING_ROWS] - 1) % RING)
             self.block[row + RING_CYCLES] = scheduler.last_slot_cycles
 
+    @cython.cfunc
+    @cython.exceptval(-2, check=True)
     def _late(self) -> cython.longlong:
         """A slot has begun: hold its instant against the wall clock; ns, -1 where no pace is kept."""
         due: cython.longlong
@@ -218,6 +253,7 @@ class Endpoint:
         self.block[LATENESS + place] += 1
         return late
 
+    @cython.cfunc
     def _put_out(self) -> cython.bint:
         """What the board put out goes into the mailbox; True when more is left than fits."""
         out: EventQueue = self.out
@@ -236,6 +272,7 @@ class Endpoint:
         self.from_board.send()
         return False
 
+    @cython.cfunc
     def _show(self) -> None:
         """The words that the plant's process and the supervisor look at."""
         board: Microcontroller = self.board

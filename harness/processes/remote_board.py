@@ -11,6 +11,7 @@ the missed time later, and reads its sensors from the stage's rows of that time.
 
 import json
 from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
 import cython
 
@@ -18,48 +19,48 @@ from ranger_sim.boards.counters import from_dict
 from ranger_sim.firmware_sim.board import EVERY_KIND, Board
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.events import NEVER, ORDER_PINS, PIN_EDGE, ROW, ROW_KIND, EventQueue
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.activity import RemoteActivity
-from ranger_sim.harness.processes.channel import Bell, Mailbox
+from ranger_sim.harness.processes.channel import FIRST_OWN_KIND, LONGEST, Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, NOTE, NOTE_COUNTERS, TO_BOARD
+from ranger_sim.harness.processes.places import (
+    ALIVE,
+    ANSWER_USED,
+    ANSWERED,
+    ASK_USED,
+    ASKED,
+    BOARD_SLEEPS,
+    COMMAND,
+    COMMAND_ADVANCE,
+    COMMAND_COUNTERS,
+    COMMAND_MORE,
+    COMMAND_STOP,
+    FATE,
+    NEXT_OUTPUT,
+    NEXT_TIME,
+    PLANT_SLEEPS,
+    RESULT,
+    RESULT_MORE,
+    RING,
+    RING_ROW,
+    RING_ROWS,
+    ROWS,
+    SLOT_TIME,
+    SLOTS,
+    UNTIL,
+    URGENT,
+    WATCHED,
+)
+from ranger_sim.harness.processes.shared_words import load
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER, ORDER_PINS, PIN_EDGE, ROW, ROW_KIND
-    from ranger_sim.harness.processes.channel import FIRST_OWN_KIND, LONGEST
-    from ranger_sim.harness.processes.places import (
-        ALIVE,
-        ANSWER_USED,
-        ANSWERED,
-        ASK_USED,
-        ASKED,
-        BOARD_SLEEPS,
-        COMMAND,
-        COMMAND_ADVANCE,
-        COMMAND_COUNTERS,
-        COMMAND_MORE,
-        COMMAND_STOP,
-        FATE,
-        NEXT_OUTPUT,
-        NEXT_TIME,
-        PLANT_SLEEPS,
-        RESULT,
-        RESULT_MORE,
-        RING,
-        RING_ROW,
-        RING_ROWS,
-        ROWS,
-        SLOT_TIME,
-        SLOTS,
-        UNTIL,
-        URGENT,
-        WATCHED,
-    )
-    from ranger_sim.harness.processes.plain import load
+if TYPE_CHECKING:
+    from ranger_sim.harness.processes.stage import Stage
 
-    MOST_WAITING = 200  # messages that a board left alone lets wait: some two thirds of its queue
+MOST_WAITING: Final = 200  # messages that a board left alone lets wait: some two thirds of its queue
 
 
+@cython.cclass
 class RemoteBoard(Board):
     """Stands for the board `built`, which was built in this process; `shared`: the block of its own process.
 
@@ -68,6 +69,28 @@ class RemoteBoard(Board):
     `follows_steps`: the plant's process reads what this board shows (the main brain's table and swing leg) after
     every step of the plant, so it is up to date by then.
     """
+
+    block: cython.longlong[::1]
+    ask: Bell
+    answer: Bell
+    to_board: Mailbox
+    from_board: Mailbox
+    stage: "Stage"
+    lines: list
+    counted: object
+    uncounted: object
+    log: object
+    posted: cython.bint
+    gone: cython.bint
+    follows_steps: cython.bint
+    ring_first: cython.longlong
+    place: cython.longlong
+    silent_until: cython.longlong
+    urgent: cython.longlong
+    turns: cython.longlong
+    reached: cython.longlong
+    watched_number: cython.longlong
+    slot_time: cython.longlong
 
     def __init__(self, built, shared, stage, place, follows_steps) -> None:
         Board.__init__(self, built.name)
@@ -250,6 +273,8 @@ class RemoteBoard(Board):
             raise UserError(f"{self.name} is gone")
         self.inbox.push(time, 0, kind, a, b)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def _urgent(self, until: cython.longlong) -> cython.bint:
         """True when a message before `until` may make the board put something out at once."""
         inbox: EventQueue = self.inbox
@@ -266,6 +291,8 @@ class RemoteBoard(Board):
             at += ROW
         return False
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _post(self, command: cython.longlong, until: cython.longlong) -> cython.void:
         """Write what has come for the board, and the instant, and ring."""
         while self.inbox.head_time < until and command == COMMAND_ADVANCE:
@@ -280,6 +307,7 @@ class RemoteBoard(Board):
             self.to_board.put(self.inbox)
         self._ring(command, until)
 
+    @cython.cfunc
     def _ring(self, command: cython.longlong, until: cython.longlong) -> None:
         """Hand the turn over."""
         self.to_board.send()
@@ -291,6 +319,7 @@ class RemoteBoard(Board):
         self.posted = True
         self.ask.ring()
 
+    @cython.cfunc
     def _collect(self) -> cython.bint:
         """Wait for the answer and take it; False when the board is gone."""
         more: cython.bint = True

@@ -8,30 +8,39 @@ import array
 import cython
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.processes.places import (
+    MOST_VOLTAGES,
+    MOST_WORDS,
+    ROW_ANALOG_END,
+    ROW_ANALOG_START,
+    ROW_END,
+    ROW_SIZE,
+    ROW_START,
+    ROW_WORDS,
+    STAGE_FIRST,
+    STAGE_RING,
+    STAGE_ROWS,
+)
 from ranger_sim.harness.wiring.board_wires import WordWire
 from ranger_sim.plant.ranger import RangerPlant
 
-if not cython.compiled:
-    from ranger_sim.harness.processes.places import (
-        MOST_VOLTAGES,
-        MOST_WORDS,
-        ROW_ANALOG_END,
-        ROW_ANALOG_START,
-        ROW_END,
-        ROW_SIZE,
-        ROW_START,
-        ROW_WORDS,
-        STAGE_FIRST,
-        STAGE_RING,
-        STAGE_ROWS,
-    )
 
-
+@cython.cclass
 class Stage:
     """The plant's side. `step_times`: start and end of the step that is shown (ns), as the lockstep keeps them.
 
     `wires`: of the digital sensors, in the order of the rows' words.
     """
+
+    words: cython.longlong[::1]
+    step_times: cython.longlong[::1]
+    doubles: cython.double[::1]
+    plant: RangerPlant
+    wires: list
+    rows: cython.longlong
+    shown_end: cython.longlong
+    word_count: cython.longlong
+    voltage_count: cython.longlong
 
     def __init__(self, words, doubles, plant, step_times, wires) -> None:
         self.words = words
@@ -49,6 +58,7 @@ class Stage:
                 f"({MOST_WORDS}, {MOST_VOLTAGES})"
             )
 
+    @cython.ccall
     def update(self) -> cython.void:
         """Write a row if the plant has moved since the last one."""
         at: cython.longlong
@@ -71,11 +81,24 @@ class Stage:
         self.words[STAGE_ROWS] = self.rows
 
 
+@cython.cclass
 class Audience:
     """A board's side: copies a row into the arrays that the board's pins follow.
 
     `wires`: (place among the row's words, register) of its digital sensors.
     """
+
+    words: cython.longlong[::1]
+    step_times: cython.longlong[::1]
+    board_words: cython.longlong[::1]
+    sources: cython.longlong[::1]
+    registers: cython.longlong[::1]
+    doubles: cython.double[::1]
+    analog_start: cython.double[::1]
+    analog_end: cython.double[::1]
+    rows: cython.longlong
+    word_count: cython.longlong
+    voltage_count: cython.longlong
 
     def __init__(self, words, doubles, step_times, analog_start, analog_end, board_words, wires) -> None:
         self.words = words
@@ -90,10 +113,13 @@ class Audience:
         self.voltage_count = len(analog_start)
         self.rows = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def row_start(self, row: cython.longlong) -> cython.longlong:
         """Start of the step of a row (ns)."""
         return self.words[STAGE_FIRST + (row % STAGE_RING) * ROW_SIZE]
 
+    @cython.ccall
     def show(self, row: cython.longlong) -> cython.void:
         """From now on the board's pins show this row."""
         at: cython.longlong = STAGE_FIRST + (row % STAGE_RING) * ROW_SIZE

@@ -6,11 +6,19 @@ Words of the main brain's data table (not hashed, they follow from the others): 
 
 import hashlib
 
+import cython
+
 from ranger_sim.foundation.row_stream import DIGEST_BYTES, FrameStream, RowStream
 
 
+@cython.final
+@cython.cclass
 class Recorder:
     """The streams of one run. `buses`: how many; `sample_columns`, `word_columns`: without the time column."""
+
+    frames: list
+    samples: RowStream
+    words: RowStream
 
     def __init__(self, buses, sample_columns, word_columns) -> None:
         self.frames = [FrameStream(bus) for bus in range(buses)]

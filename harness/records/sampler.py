@@ -3,16 +3,31 @@
 """Samples of body and data table for the trace, at the main brain's rate."""
 
 import array
+from typing import TYPE_CHECKING
 
 import cython
 
 from ranger_sim.foundation.row_stream import RowStream
 
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.board import Board
+    from ranger_sim.plant.plant import Plant
+
 PERIOD_NS = 2_000_000
 
 
+@cython.final
+@cython.cclass
 class Sampler:
     """Fills the streams `samples` (the body) and, unless it is None, `words` (the memory that `board` shows)."""
+
+    plant: "Plant"
+    board: "Board"
+    samples: RowStream
+    words: RowStream
+    next_ns: cython.longlong
+    columns: cython.longlong
+    row: cython.double[::1]
 
     def __init__(self, plant, board, samples, words, start_ns) -> None:
         self.plant = plant
@@ -23,6 +38,7 @@ class Sampler:
         self.columns = len(plant.sample_names)
         self.row = array.array("d", [0.0]) * self.columns
 
+    @cython.ccall
     def take(self, now: cython.longlong) -> None:
         """One row of each stream, at `now` (ns)."""
         stream: RowStream = self.samples

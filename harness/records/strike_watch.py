@@ -9,12 +9,25 @@ from ranger_sim.harness.step_watch import StepEnd
 from ranger_sim.plant.ranger import RangerPlant
 
 
+@cython.final
+@cython.cclass
 class StrikeWatch(StepEnd):
     """`board`: the main brain, of which the swing leg can be watched (`Board.watched`).
 
     `count` strikes were noticed; `missed`: steps of which no flip of the swing leg told; `unmatched`: flips without a
     new strike. `sum_ms`, `squares_ms2`: of the delays.
     """
+
+    plant: RangerPlant
+    board: Board
+    swing_leg: cython.longlong
+    seen_ns: cython.longlong
+    steps_noticed: cython.longlong
+    count: cython.longlong
+    unmatched: cython.longlong
+    missed: cython.longlong
+    sum_ms: cython.double
+    squares_ms2: cython.double
 
     def __init__(self, plant, board) -> None:
         self.plant = plant
@@ -37,6 +50,7 @@ class StrikeWatch(StepEnd):
             self._notice()
         return None
 
+    @cython.cfunc
     def _notice(self) -> cython.void:
         """It has: how long after the body's strike did that slot begin?"""
         plant: RangerPlant = self.plant

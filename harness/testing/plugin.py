@@ -425,7 +425,7 @@ def cut_traceback(error: Exception) -> None:
 
     if not isinstance(error, UserError):
         return
-    rooms = tuple(f"{loading.HOUSE / room}{os.sep}" for room in ("harness", "foundation", "datatable"))
+    rooms = tuple(f"{loading.PACKAGE / room}{os.sep}" for room in ("harness", "foundation", "datatable"))
     entries = []
     entry = error.__traceback__
     while entry is not None:

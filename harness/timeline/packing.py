@@ -8,21 +8,21 @@ The order of fields in a message is free, so that is a packet as any other.
 """
 
 import struct
+from typing import Final
 
 import cython
 
 from ranger_sim.foundation.numbers import integers
 
-if not cython.compiled:
-    HOLE_BYTES = 8
-    VARINT_BYTES = 10  # the longest
-    PACKET_TAG = 0x0A  # field 1 of a Trace, length-delimited: a packet
-    TIMESTAMP_TAG = 0x40  # field 8 of a TracePacket, a varint
-    # what `nested` gives: 4 x the row + one of these
-    OUTER_BEGINS = 0
-    OUTER_ENDS = 1
-    INNER_BEGINS = 2
-    INNER_ENDS = 3
+HOLE_BYTES: Final = 8
+VARINT_BYTES: Final = 10  # the longest
+PACKET_TAG: Final = 0x0A  # field 1 of a Trace, length-delimited: a packet
+TIMESTAMP_TAG: Final = 0x40  # field 8 of a TracePacket, a varint
+# what `nested` gives: 4 x the row + one of these
+OUTER_BEGINS: Final = 0
+OUTER_ENDS: Final = 1
+INNER_BEGINS: Final = 2
+INNER_ENDS: Final = 3
 
 
 def varint(value: int) -> bytes:
@@ -35,11 +35,26 @@ def varint(value: int) -> bytes:
     return bytes(out)
 
 
+@cython.final
+@cython.cclass
 class PacketPacker:
     """Packets one behind the other, in `buffer` up to `used`.
 
     `write`: takes the bytes whenever more than `flush_bytes` have come together.
     """
+
+    write: object
+    flush_bytes: cython.longlong
+    used: cython.longlong
+    longest: cython.longlong
+    buffer: object
+    text: object
+    laid: cython.longlong
+    text_begins: cython.longlong[::1]
+    hole_begins: cython.longlong[::1]
+    hole_places: cython.longlong[::1]
+    templates: list
+    holes: list
 
     def __init__(self, write, flush_bytes=1 << 20) -> None:
         self.write = write
@@ -75,6 +90,7 @@ class PacketPacker:
         self.flush()
         self.buffer = bytearray(self.flush_bytes + self.longest + 2 * VARINT_BYTES + 2)
 
+    @cython.ccall
     def put(
         self,
         times: cython.longlong[::1],
@@ -163,6 +179,7 @@ class PacketPacker:
             self.write(bytes(self.buffer[:used]))
 
 
+@cython.ccall
 def nested(
     outer_start: cython.longlong[::1],
     outer_end: cython.longlong[::1],
@@ -203,7 +220,9 @@ def nested(
     return place
 
 
-def index_packets(data: cython.const_uchar[::1], rows: cython.longlong[::1]) -> cython.longlong:
+@cython.ccall
+@cython.exceptval(-2, check=True)
+def index_packets(data: cython.const[cython.uchar][::1], rows: cython.longlong[::1]) -> cython.longlong:
     """Find the packets of a trace; `rows` takes of each its begin, its end and its time stamp (ns; -1: none).
 
     Returns how many there are, those beyond the length of `rows` too; -1 when `data` is no row of packets.
@@ -260,7 +279,11 @@ def index_packets(data: cython.const_uchar[::1], rows: cython.longlong[::1]) -> 
     return count
 
 
-def take_varint(data: cython.const_uchar[::1], cursor: cython.p_longlong, end: cython.longlong) -> cython.longlong:
+@cython.cfunc
+@cython.exceptval(check=False)
+def take_varint(
+    data: cython.const[cython.uchar][::1], cursor: cython.p_longlong, end: cython.longlong
+) -> cython.longlong:
     """The number of variable length at cursor[0], which moves behind it; -1 when it does not end before `end`."""
     at: cython.longlong = cursor[0]
     value: cython.longlong = 0

@@ -6,33 +6,44 @@ A message is carried on in the moment in which a board puts it out, with its sta
 board's inbox, is written there by whoever sends it: the bus, the link, the plant's sensors.
 """
 
+from typing import TYPE_CHECKING
+
 import cython
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
-from ranger_sim.foundation.events import Outbox
+from ranger_sim.foundation.events import (
+    CAN_ABORT,
+    CAN_MODE,
+    CAN_REQUEST,
+    ORDER_INTERRUPTS,
+    PIN_OUTPUT,
+    PWM_UPDATE,
+    SSP_LOAD,
+    SSP_SEGMENT,
+    SSP_START,
+    UART_OUTPUT,
+    EventQueue,
+    Outbox,
+)
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import (
-        CAN_ABORT,
-        CAN_MODE,
-        CAN_REQUEST,
-        ORDER_INTERRUPTS,
-        PIN_OUTPUT,
-        PWM_UPDATE,
-        SSP_LOAD,
-        SSP_SEGMENT,
-        SSP_START,
-        UART_OUTPUT,
-    )
+if TYPE_CHECKING:
+    from ranger_sim.firmware_sim.board import Board
+    from ranger_sim.plant.bridge import Bridge
 
 CONTROLLERS = range(1, 5)
 
 
+@cython.final
+@cython.cclass
 class WordWire:
     """The register of one digital sensor of the plant, as a board reads it over its serial interface."""
+
+    source: cython.longlong
+    word: cython.longlong
+    board: "Board"
 
     def __init__(self, source, board, word) -> None:
         self.source = source
@@ -40,11 +51,21 @@ class WordWire:
         self.word = word
 
 
+@cython.final
+@cython.cclass
 class SspWire:
     """The serial link between two boards; an exchange that the master starts takes `exchange_ns`.
 
     `tampering`: a fault that changes what arrives, or None (`harness/faults/link.py`).
     """
+
+    master: "EventQueue"
+    slave: "EventQueue"
+    exchange_ns: cython.longlong
+    exchanges: cython.longlong
+    loaded: object
+    tampering: object
+    watch: RowStream
 
     def __init__(self, master, slave, exchange_ns, idle_segment) -> None:
         self.master = master.inbox
@@ -55,6 +76,7 @@ class SspWire:
         self.watch = None  # a RowStream that takes what is exchanged (`_note`)
         self.tampering = None
 
+    @cython.ccall
     def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
         """The master starts an exchange; both sides have the other's segment at its end."""
         end: cython.longlong = time_ns + self.exchange_ns
@@ -71,6 +93,7 @@ class SspWire:
             self._note(time_ns, segment, 0)
             self._note(time_ns, self.loaded, 1)
 
+    @cython.cfunc
     def _note(self, time_ns: cython.longlong, segment: SspSegment, from_slave: cython.longlong) -> cython.void:
         """A row of `watch` for each frame in a segment: start of the exchange (ns), from_slave, header, both words."""
         i: cython.longlong
@@ -83,17 +106,36 @@ class SspWire:
             watch.integers[watch.used + 4] = segment.rows[i + 2]
             watch.finish_row(time_ns)
 
+    @cython.ccall
     def load(self, segment: object) -> cython.void:
         """The slave puts up what it will send in the next exchange."""
         self.loaded = segment
 
 
+@cython.final
+@cython.cclass
 class BoardWires(Outbox):
     """The wires that lead away from one board: its outbox in the assembled robot.
 
     Frames go to its buses, PWM and pins to its bridge, segments over the link, bytes to whoever listens. A pin, a
     controller or a UART that is not connected here leads nowhere.
     """
+
+    board: "Board"
+    drive: "Bridge"
+    window_ns: cython.longlong
+    silent_until: cython.longlong
+    watchdog_pin: cython.longlong
+    low_side_2_pin: cython.longlong
+    low_side_6_pin: cython.longlong
+    low_side_2: cython.bint
+    low_side_6: cython.bint
+    buses: list
+    nodes: cython.longlong[5]
+    link: SspWire
+    watch: RowStream
+    can_lines: dict
+    serial_lines: dict
 
     def __init__(self, board, window_ns) -> None:
         self.board = board
@@ -190,6 +232,7 @@ class BoardWires(Outbox):
         elif kind == UART_OUTPUT:
             self._to_serial_line(time, a, b, c, ref)
 
+    @cython.cfunc
     def _note(
         self, time: cython.longlong, kind: cython.longlong, a: cython.longlong, b: cython.longlong, c: cython.longlong
     ) -> None:

@@ -2,22 +2,32 @@
 # (every index below is a byte's place in the buffer of the sensor)
 """The wire between the plant's inertial unit and a UART of a board: the unit's bytes one way, commands the other."""
 
+from typing import TYPE_CHECKING, Final
+
 import cython
 
 from ranger_sim.foundation.edge_buffer import ByteBuffer
-from ranger_sim.foundation.events import EventQueue
+from ranger_sim.foundation.events import ORDER_PINS, UART_BYTE, EventQueue
 from ranger_sim.harness.step_watch import SerialDevice
 
-if not cython.compiled:
-    from ranger_sim.foundation.events import ORDER_PINS, UART_BYTE
+if TYPE_CHECKING:
+    from ranger_sim.plant.sensors.imu import Imu
 
-    MESSAGE_BYTES = 8  # a UART_BYTE carries so many at most,
-    WORD_BYTES = 4  # half of them in each of its two words
-    PAUSE_NS = 25_000  # from byte to byte; after more a new message begins (at 460,800 baud a byte takes 21.7 us)
+MESSAGE_BYTES: Final = 8  # a UART_BYTE carries so many at most,
+WORD_BYTES: Final = 4  # half of them in each of its two words
+PAUSE_NS: Final = 25_000  # from byte to byte; after more a new message begins (at 460,800 baud a byte takes 21.7 us)
 
 
+@cython.final
+@cython.cclass
 class ImuWire(SerialDevice):
     """`imu` on UART `uart` of `board`. `tap.bytes_sent(times, values, count)` hears what the unit sends, beside it."""
+
+    imu: "Imu"
+    inbox: EventQueue
+    uart: cython.longlong
+    tap: object
+    plugged: cython.bint
 
     def __init__(self, imu, board, uart) -> None:
         self.imu = imu
@@ -42,6 +52,7 @@ class ImuWire(SerialDevice):
             self._put_bytes()
         return None
 
+    @cython.cfunc
     def _put_bytes(self) -> cython.void:
         """Up to eight bytes that follow each other closely travel as one message."""
         line: ByteBuffer = self.imu.bytes

@@ -15,12 +15,10 @@ import dataclasses
 import math
 
 import cython
+from cython.cimports.libc.math import sqrt
 
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.user_error import UserError
-
-if not cython.compiled:
-    from math import sqrt
 
 # Open-circuit volts of one lithium-ion cell of the 18650 class at charge 0, 0.1 ... 1. Chosen by us after usual
 # discharge curves of lithium cobalt oxide: 3.0 V and 4.2 V at the ends (appendix 3.10: 9 and 12.6 V for three
@@ -64,8 +62,23 @@ class BatteryParameters:
         return self.packs * self.pack_energy_Wh * 3600.0 / (self.cells_in_series * mean)
 
 
+@cython.final
+@cython.cclass
 class Battery:
     """All packs. `voltage_V`: at the terminals; `charge`: 1 full ... 0 empty; `current_A`: out of the battery."""
+
+    voltage_V: cython.double
+    current_A: cython.double
+    open_voltage_V: cython.double
+    resistance_ohm: cython.double
+    per_As: cython.double
+    charge: cython.double
+    delivered_J: cython.double
+    lost_J: cython.double
+    cut_off: cython.bint
+    intervals: cython.longlong
+    curve: cython.double[::1]
+    parameters: object
 
     def __init__(self, parameters=None) -> None:
         p = parameters if parameters is not None else BatteryParameters()
@@ -82,6 +95,8 @@ class Battery:
         self.delivered_J = 0.0  # at the terminals
         self.lost_J = 0.0  # in the internal resistance
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def open_circuit_V(self, charge: cython.double) -> cython.double:
         """Voltage without load at a charge, straight between table points, extended straight above full."""
         x: cython.double = charge * self.intervals
@@ -94,6 +109,7 @@ class Battery:
         V: cython.double = self.curve[i]
         return V + (self.curve[i + 1] - V) * (x - i)
 
+    @cython.ccall
     def step(self, h: cython.double, motor_current_A: cython.double, electronics_W: cython.double) -> cython.void:
         """`h` seconds at this mean current of all motors (A) and power of the electronics (W)."""
         a: cython.double

@@ -8,29 +8,30 @@ bridge has power until `watchdog_ns` after the last edge on the watchdog line, a
 (appendix 3.9; robot.md N4.3).
 """
 
+from typing import Final
+
 import cython
 
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.plant.bridge import Bridge
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from ranger_sim.foundation.events import NEVER
+# kinds of changes
+PWM_WRITE: Final = 0
+WATCHDOG_EDGE: Final = 1
+LOW_SIDE_WRITE: Final = 2
 
-    # kinds of changes
-    PWM_WRITE = 0
-    WATCHDOG_EDGE = 1
-    LOW_SIDE_WRITE = 2
+ROW: Final = 5  # numbers of a change in the queue
 
-    ROW = 5  # numbers of a change in the queue
-
-    # what holds a leg (`hold_leg`)
-    DRIVEN = 0  # its PWM
-    HELD_OPEN = 1
-    HELD_LOW = 2
-    HELD_HIGH = 3
+# what holds a leg (`hold_leg`)
+DRIVEN: Final = 0  # its PWM
+HELD_OPEN: Final = 1
+HELD_LOW: Final = 2
+HELD_HIGH: Final = 3
 
 
+@cython.final
+@cython.cclass
 class Drive(Bridge):
     """One bridge. `duty`: net drive (MR2 - MR6) / MR0 of the battery voltage across the motor, -1 ... 1.
 
@@ -40,6 +41,30 @@ class Drive(Bridge):
     to which the loss of the current's ripple is proportional. `healthy_duty`, `healthy_open`: what duty and openness
     would be if no leg were held.
     """
+
+    # what a motor looks at in every step stands first, beside each other
+    next_change_ns: cython.longlong
+    duty: cython.double
+    ripple: cython.double
+    is_open: cython.bint
+    sensed_lead_switches: cython.bint
+    switching_leads: cython.longlong
+    power_off_ns: cython.longlong
+    count: cython.longlong
+    powered: cython.bint
+    enable2: cython.bint
+    enable6: cython.bint
+    mr2: cython.longlong
+    mr6: cython.longlong
+    mr0: cython.longlong
+    watchdog_ns: cython.longlong
+    changes: cython.longlong[::1]
+    capacity: cython.longlong
+    power_losses: cython.longlong
+    held2: cython.longlong
+    held6: cython.longlong
+    healthy_duty: cython.double
+    healthy_open: cython.bint
 
     def __init__(self, watchdog_ns=10_000_000) -> None:
         self.watchdog_ns = watchdog_ns
@@ -91,6 +116,7 @@ class Drive(Bridge):
         """The two low-side enables from `time` on."""
         self._queue(time, LOW_SIDE_WRITE, enable2, enable6, 0)
 
+    @cython.ccall
     def hold_leg(self, leg: cython.longlong, state: cython.longlong) -> cython.void:
         """From now on leg 2 or 6 is held in this state; DRIVEN: it follows its PWM again."""
         if leg == 2:
@@ -99,6 +125,7 @@ class Drive(Bridge):
             self.held6 = state
         self._update()
 
+    @cython.ccall
     def _queue(
         self,
         time: cython.longlong,
@@ -133,6 +160,7 @@ class Drive(Bridge):
             grown[k] = number
         self.changes = grown
 
+    @cython.ccall
     def apply(self, time: cython.longlong) -> cython.void:
         """Let everything stamped up to and including `time` take effect, then judge the watchdog at `time`."""
         at: cython.longlong = 0
@@ -170,6 +198,7 @@ class Drive(Bridge):
         self.next_change_ns = following
         self._update()
 
+    @cython.ccall
     def _update(self) -> cython.void:
         """Duty and switching leads from the registers, and from what holds a leg."""
         high2: cython.longlong = self.mr2
@@ -187,6 +216,7 @@ class Drive(Bridge):
                 high6 = self.mr0 if self.held6 == HELD_HIGH else 0
             self._switch(conducts, high2, high6)
 
+    @cython.cfunc
     def _switch(self, conducts: cython.bint, high2: cython.longlong, high6: cython.longlong) -> cython.void:
         """Duty and switching leads for two match values; one at or above MR0 is always on."""
         period: cython.longlong = self.mr0

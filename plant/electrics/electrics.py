@@ -19,8 +19,10 @@ rejection at 100 kHz leaves of 26 V.
 
 import dataclasses
 import math
+from operator import add, mul
 
 import cython
+from cython.cimports.libc.math import exp
 
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.user_error import UserError
@@ -30,28 +32,23 @@ from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, 
 from ranger_sim.plant.electrics.motor_unit import MotorUnit
 from ranger_sim.plant.sensors.foot_sensor import FootSensors
 from ranger_sim.plant.sensors.noise import NoiseSource
-from ranger_sim.plant.wiring_points import MOTOR_NAMES
-
-if not cython.compiled:
-    from math import exp
-    from operator import add, mul
-
-    from ranger_sim.plant.wiring_points import (
-        ANALOG_COUNT,
-        BATTERY_CURRENT,
-        BATTERY_VOLTAGE,
-        INNER_FOOT_LEFT,
-        INNER_FOOT_RIGHT,
-        MOTOR_COUNT,
-        MOTOR_CURRENT,
-        OUTER_FOOT_LEFT,
-        OUTER_FOOT_RIGHT,
-        PER_MOTOR,
-        ROUTER_CURRENT,
-        ROUTER_VOLTAGE,
-        STEERING,
-        STEERING_ANGLE,
-    )
+from ranger_sim.plant.wiring_points import (
+    ANALOG_COUNT,
+    BATTERY_CURRENT,
+    BATTERY_VOLTAGE,
+    INNER_FOOT_LEFT,
+    INNER_FOOT_RIGHT,
+    MOTOR_COUNT,
+    MOTOR_CURRENT,
+    MOTOR_NAMES,
+    OUTER_FOOT_LEFT,
+    OUTER_FOOT_RIGHT,
+    PER_MOTOR,
+    ROUTER_CURRENT,
+    ROUTER_VOLTAGE,
+    STEERING,
+    STEERING_ANGLE,
+)
 
 ADS7871_REFERENCE_V = 2.5  # robot.md N4.5 (external reference; 2.5 V as the internal one)
 INTERNAL_REFERENCE_V = 3.3
@@ -112,8 +109,50 @@ class ElectricsParameters:
                 raise UserError(f"electrics: {field.name} is {value!r}, it must be a finite number from 0 up")
 
 
+@cython.final
+@cython.cclass
 class Electrics:
     """Everything electrical of the robot. `seed`: for the sensors' noise."""
+
+    # what every step looks at stands first, beside each other
+    hip: MotorUnit
+    outer_ankle: MotorUnit
+    inner_ankle: MotorUnit
+    steering: MotorUnit
+    battery: Battery
+    hip_rate: cython.double
+    outer_rate: cython.double
+    inner_rate: cython.double
+    steering_rate: cython.double
+    electronics_W: cython.double
+    electronics_J: cython.double
+    motor_current_A: cython.double
+    outer_feet: FootSensors
+    inner_feet: FootSensors
+    motors: list
+    noise: NoiseSource
+    lag_h: cython.double
+    lag_factor: cython.double
+    pwm_offset_A: cython.double
+    voltage_clip_V: cython.double
+    steering_rad: cython.double
+    steering_shown_rad: cython.double
+    has_terms: cython.bint
+    has_ripple: cython.bint
+    # as long as there are motors and analog wiring points
+    battery_A: cython.double[4]
+    values: cython.double[19]
+    zero_V: cython.double[19]
+    slope_V: cython.double[19]
+    noise_V: cython.double[19]
+    analog_end: cython.double[::1]
+    analog_start: cython.double[::1]
+    battery_current_lag_s: cython.double
+    scale: cython.double[19]
+    offset: cython.double[19]
+    lag_s: cython.double[19]
+    state: cython.double[19]
+    parameters: object
 
     def __init__(self, parameters=None, seed=0) -> None:
         p = parameters if parameters is not None else ElectricsParameters()
@@ -185,6 +224,7 @@ class Electrics:
         self.noise_V[ROUTER_VOLTAGE] = p.voltage_noise_V * self.slope_V[ROUTER_VOLTAGE]
         self.settle(False, 0.0, False, 0.0, 0.0)
 
+    @cython.ccall
     def step_motors(
         self,
         t0: cython.longlong,
@@ -218,6 +258,7 @@ class Electrics:
         self.electronics_J += self.electronics_W * h
         self.battery.step(h, total, self.electronics_W)
 
+    @cython.ccall
     def turn_motors(
         self,
         t0: cython.longlong,
@@ -235,6 +276,7 @@ class Electrics:
         self.outer_ankle.turn(outer_rad, outer_rate, h)
         self.inner_ankle.turn(inner_rad, inner_rate, h)
 
+    @cython.ccall
     def sense(
         self,
         t0: cython.longlong,
@@ -256,6 +298,7 @@ class Electrics:
                 self.lag_factor = 1.0 - exp(-h / self.battery_current_lag_s)
         self._read(h, steering_rad)
 
+    @cython.ccall
     def settle(
         self,
         outer_contact: cython.bint,
@@ -274,6 +317,7 @@ class Electrics:
         for i in range(ANALOG_COUNT):
             self.analog_start[i] = self.analog_end[i]
 
+    @cython.cfunc
     def _read(self, h: cython.double, steering_rad: cython.double) -> cython.void:
         """Fill `analog_end`; what stood there becomes `analog_start`."""
         V: cython.double = self.battery.voltage_V
@@ -332,6 +376,7 @@ class Electrics:
             volts = map(add, self.zero_V, map(mul, self.slope_V, values))
             self.analog_end[:] = map(add, volts, map(mul, self.noise_V, noise.table[place : place + ANALOG_COUNT]))
 
+    @cython.cfunc
     def _apply_terms(self, h: cython.double) -> cython.void:
         """Scale, offset and lag of a model file on what is measured."""
         i: cython.longlong

@@ -30,17 +30,16 @@ are drawn from the battery here.
 """
 
 import cython
+from cython.cimports.libc.math import exp, log, sin
 
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.plant.electrics.drive import Drive
 from ranger_sim.plant.electrics.motor_parameters import MotorParameters
-
-if not cython.compiled:
-    from math import exp, log, sin
-
-    from ranger_sim.plant.mechanics.friction import smoothed_sign
+from ranger_sim.plant.mechanics.friction import smoothed_sign
 
 
+@cython.final
+@cython.cclass
 class MotorUnit:
     """One motor with its bridge. `parameters`: MotorParameters; `mounting`: +1 or -1.
 
@@ -53,6 +52,71 @@ class MotorUnit:
     More than 40 fields, because the lines of a step use the winding's numbers and its books alike: in an object of
     their own the books would be looked up in every line.
     """
+
+    # what every step looks at stands first, beside each other
+    drive: Drive
+    mounting: cython.double
+    gear: cython.double
+    K: cython.double
+    angle_factor: cython.double
+    winding_ohm: cython.double
+    series_ohm: cython.double
+    contact_drop_V: cython.double
+    dead_time_fraction: cython.double
+    bridge_current_A: cython.double
+    known_s: cython.double
+    known_ohm: cython.double
+    per_s: cython.double
+    per_ohm: cython.double
+    decay: cython.double
+    decay_s: cython.double
+    decay_squared_s: cython.double
+    gate_W_per_V: cython.double
+    ripple_per_ohm2: cython.double
+    mu: cython.double
+    C0: cython.double
+    # what a step leaves behind
+    heat_s: cython.double
+    size_As: cython.double
+    square_A2s: cython.double
+    mechanical_J: cython.double
+    drawn_J: cython.double
+    returned_J: cython.double
+    ripple_J: cython.double
+    gate_J: cython.double
+    current_A: cython.double
+    battery_current_A: cython.double
+    drive_Nm: cython.double
+    coulomb_Nm: cython.double
+    viscous_Nms: cython.double
+    # the rest is looked at every few steps, or by the body alone
+    tau_s: cython.double
+    diode_drop_V: cython.double
+    diode_J: cython.double
+    total_As: cython.double
+    from_battery_As: cython.double
+    heat_matters: cython.bint
+    inductance_H: cython.double
+    C1: cython.double
+    inverse_smoothing: cython.double
+    resistance_per_K: cython.double
+    torque_constant_per_K: cython.double
+    G_wh: cython.double
+    G_ha: cython.double
+    inverse_C_w: cython.double
+    inverse_C_h: cython.double
+    air_C: cython.double
+    rotor_temperature_C: cython.double
+    housing_temperature_C: cython.double
+    heat_W: cython.double
+    drawn_before_J: cython.double
+    warmed_As: cython.double
+    warmed_A2s: cython.double
+    warmed_J: cython.double
+    warmed_ripple_J: cython.double
+    ripples: cython.double[::1]
+    name: str
+    parameters: object
 
     def __init__(self, name, parameters=None, mounting=1) -> None:
         p = parameters if parameters is not None else MotorParameters()
@@ -125,10 +189,14 @@ class MotorUnit:
         self.decay_s = 0.0
         self.decay_squared_s = 0.0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def magnetic_J(self) -> cython.double:
         """Energy in winding and inductor now."""
         return 0.5 * self.inductance_H * self.bridge_current_A * self.bridge_current_A
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def battery_J(self) -> cython.double:
         """Energy taken from the battery since power-up, less what was given back."""
         return self.drawn_J - self.returned_J
@@ -137,6 +205,7 @@ class MotorUnit:
         """K is so much more and less of itself, with this phase where the rotor's angle is 0."""
         self.ripples = reals(list(self.ripples) + [fraction, periods_per_turn, phase_rad])
 
+    @cython.ccall
     def turn(self, angle_rad: cython.double, rate_rad_s: cython.double, seconds: cython.double) -> cython.void:
         """Set K for a step that begins at this angle of the joint: its mean over what the rotor goes through."""
         half: cython.double = 0.5 * self.gear * rate_rad_s * seconds
@@ -153,6 +222,8 @@ class MotorUnit:
             factor += part * sin(self.ripples[i + 1] * middle + self.ripples[i + 2])
         self.angle_factor = factor
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def torque_Nm(self, current_A: cython.double, rate_rad_s: cython.double) -> cython.double:
         """Torque at the joint for a current and a joint rate, without the rotor's inertia."""
         GKI: cython.double = self.gear * self.K * self.angle_factor * current_A
@@ -161,6 +232,7 @@ class MotorUnit:
             GKI - (self.mu * load + self.C0) * smoothed_sign(rate_rad_s * self.inverse_smoothing) - self.C1 * rate_rad_s
         )
 
+    @cython.ccall
     def load(self, current_A: cython.double) -> cython.void:
         """Set the three torque numbers for the body from a current in the joint's sense."""
         GKI: cython.double = self.gear * self.K * self.angle_factor * current_A
@@ -168,6 +240,7 @@ class MotorUnit:
         self.coulomb_Nm = self.mu * (GKI if GKI > 0.0 else -GKI) + self.C0
         self.viscous_Nms = self.C1
 
+    @cython.ccall
     def step_electrical(
         self,
         t0: cython.longlong,
@@ -274,6 +347,7 @@ class MotorUnit:
         self.drive_Nm = x
         self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
 
+    @cython.cfunc
     def _step_in_pieces(
         self,
         t0: cython.longlong,
@@ -413,6 +487,7 @@ class MotorUnit:
         """Heat in the winding without its share of the ripple's."""
         return self.warmed_J + self.winding_ohm * self.square_A2s
 
+    @cython.cfunc
     def _heat(self) -> cython.void:
         """Warm the motor with the mean power since it was last warmed: winding, brushes, its share of the ripple.
 
@@ -431,6 +506,7 @@ class MotorUnit:
         self._warm(self.heat_s)
         self.heat_s = 0.0
 
+    @cython.cfunc
     def _know_step(self, h: cython.double, R: cython.double) -> cython.void:
         """Keep what a step of `h` seconds at a loop resistance of `R` ohm needs of the exponential."""
         self.known_s = h
@@ -442,6 +518,7 @@ class MotorUnit:
         self.decay_s = self.tau_s * (1.0 - self.decay)
         self.decay_squared_s = 0.5 * self.tau_s * (1.0 - self.decay * self.decay)
 
+    @cython.ccall
     def _warm(self, h: cython.double) -> cython.void:
         """Winding and housing after `h` seconds of `heat_W`; R and K follow when their coefficients are set.
 

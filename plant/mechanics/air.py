@@ -3,18 +3,18 @@
 """Motion in the air or in the operator's hands (EQUATIONS 7); written as `on_feet` is."""
 
 import cython
+from cython.cimports.libc.math import cos, sin
 
-if not cython.compiled:
-    from math import cos, sin
-
-    from ranger_sim.plant.mechanics.body import HELD
-    from ranger_sim.plant.mechanics.friction import smoothed_sign
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.parts import Ankle, HipJoint
-    from ranger_sim.plant.mechanics.term_torques import TermTorques
+from ranger_sim.plant.mechanics.body import HELD, Body
+from ranger_sim.plant.mechanics.friction import smoothed_sign
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.parts import Ankle, HipJoint
+from ranger_sim.plant.mechanics.term_torques import TermTorques
 
 
-def in_air(body, h: cython.double, stages: cython.longlong) -> cython.void:
+@cython.ccall
+@cython.exceptval(check=True)
+def in_air(body: "Body", h: cython.double, stages: cython.longlong) -> cython.void:
     """One step as `on_feet` makes it, of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look.
 
     Inside, o is the outer leg with foot F, leg th and motor p, i the inner one with foot G, leg tw and motor n; neither

@@ -21,37 +21,86 @@ The body's fields and geometry stand here. What happens to it, in the order in w
     walking/handling     what the operator does: place, hold, release
 """
 
+from typing import TYPE_CHECKING, Final
+
 import cython
+from cython.cimports.libc.math import cos, sin
 
 from ranger_sim.plant.mechanics.contact_equations import ContactEquations
 from ranger_sim.plant.mechanics.floor import Floor
-from ranger_sim.plant.mechanics.leg import LEG_NAMES, Leg
+from ranger_sim.plant.mechanics.leg import INNER, LEG_NAMES, OUTER, Leg
 from ranger_sim.plant.mechanics.observed import Observed
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.plant.mechanics.parts import Ankle, HipJoint, Sole
 from ranger_sim.plant.mechanics.walk_record import WalkRecord
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from math import cos, sin
+if TYPE_CHECKING:
+    from ranger_sim.plant.mechanics.term_torques import TermTorques
 
-    from ranger_sim.plant.mechanics.leg import INNER, OUTER
-
-    HELD = 0
-    SINGLE = 1
-    DOUBLE = 2
-    FLIGHT = 3
-    FALLEN = 4
+HELD: Final = 0
+SINGLE: Final = 1
+DOUBLE: Final = 2
+FLIGHT: Final = 3
+FALLEN: Final = 4
 
 MODE_NAMES = ("held", "single stance", "double stance", "flight", "fallen")
 
 
+@cython.final
+@cython.cclass
 class Body:
     """State and motion of the mechanical robot. `parameters`: BodyParameters; `floor`: Floor.
 
     `outer`, `inner`: the legs; `stance`, `swing`: the same two by role. `stance` carries in single stance and is the
     reference leg in double stance. More than 40 fields, because a step reads most of them at every turn.
     """
+
+    # what every step looks at stands first, beside each other
+    outer: Leg
+    inner: Leg
+    stance: Leg
+    swing: Leg
+    mode: cython.longlong
+    step_start_ns: cython.longlong
+    changes: cython.longlong
+    hip_x: cython.double
+    hip_y: cython.double
+    hip_vx: cython.double
+    hip_vy: cython.double
+    hip: HipJoint
+    ankle: Ankle
+    brush: cython.bint
+    standing: cython.bint
+    lock_hip: cython.bint
+    terms: "TermTorques"
+    M: cython.double
+    gx: cython.double
+    gy: cython.double
+    inverse_smoothing: cython.double
+    elapsed: cython.double
+    time_s: cython.double
+    strike_ahead: cython.double
+    seen: Observed
+    last_strike: Leg
+    saved: cython.double[4]
+    # the rest serves double stance, the sole, events and additional terms
+    closing_rate: cython.double
+    hip_ay: cython.double
+    sole: Sole
+    event: cython.longlong
+    event_leg: Leg
+    coulomb: cython.bint
+    compliant: cython.bint
+    floating: cython.bint
+    sliding: cython.bint
+    watched: cython.bint
+    unilateral: cython.bint
+    lift_leading: cython.bint
+    equations: ContactEquations
+    parameters: object
+    floor: object
+    record: object
+    cause: str
 
     def __init__(self, parameters=None, floor=None) -> None:
         p = parameters if parameters is not None else BodyParameters()
@@ -119,25 +168,30 @@ class Body:
 
     # ---- legs and where things are --------------------------------------------------------------------------
 
+    @cython.ccall
     def set_slope(self, slope_rad: cython.double) -> cython.void:
         """Turn gravity: the floor falls in the walking direction by `slope_rad` (EQUATIONS 3)."""
         g: cython.double = self.parameters.gravity_m_per_s2
         self.gx = g * sin(slope_rad)
         self.gy = -g * cos(slope_rad)
 
-    def stand_on(self, leg) -> cython.void:
+    @cython.ccall
+    def stand_on(self, leg: Leg) -> cython.void:
         """Exchange roles, if need be: this leg stands, the other one swings."""
         self.swing = self.other(leg)
         self.stance = leg
 
-    def other(self, leg):
+    @cython.ccall
+    def other(self, leg: Leg) -> Leg:
         """The leg that is not this one."""
         return self.inner if leg is self.outer else self.outer
 
-    def leg(self, side: cython.longlong):
+    @cython.ccall
+    def leg(self, side: cython.longlong) -> Leg:
         """The leg of this side, OUTER or INNER."""
         return self.outer if side == OUTER else self.inner
 
+    @cython.cfunc
     def know_angles(self) -> cython.void:
         """Sines and cosines of all present angles into the legs' fields."""
         self.outer.know_foot()
@@ -145,18 +199,24 @@ class Body:
         self.inner.know_leg()
         self.inner.know_foot()
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def ahead(self) -> cython.double:
         """How far the swing foot's lowest point is ahead of the stance foot's, m."""
         return self.stance.behind() - self.swing.behind()
 
-    def anchor_foot(self, leg) -> cython.void:
+    @cython.ccall
+    def anchor_foot(self, leg: Leg) -> cython.void:
         """From here on the foot stands where it is."""
         leg.anchor = self.hip_x - leg.chain_x(leg.foot_angle, leg.angle)
 
-    def contact_x(self, leg) -> cython.double:
+    @cython.ccall
+    @cython.exceptval(check=False)
+    def contact_x(self, leg: Leg) -> cython.double:
         """Where the lowest point of a foot is along the floor, m."""
         return self.hip_x - leg.behind()
 
+    @cython.ccall
     def update_pose(self) -> cython.void:
         """Hip position and the two gaps from the angles (in flight and held: the gaps only; sliding: not along x)."""
         outer: Leg = self.outer
@@ -178,6 +238,7 @@ class Body:
         outer.gap = self.hip_y - outer_reach - outer.height
         inner.gap = self.hip_y - inner_reach - inner.height
 
+    @cython.ccall
     def update_hip_rates(self) -> cython.void:
         """Hip velocity from the standing foot, of one that slides only normal to the floor (EQUATIONS 4)."""
         s: Leg = self.stance
@@ -190,22 +251,30 @@ class Body:
             self.hip_vx = (s.r * cos(excess) - s.d * s.cos_foot) * s.foot_rate + s.el * s.cos_leg * s.rate
         self.hip_vy = (s.d * s.sin_foot - s.r * sin(excess)) * s.foot_rate - s.el * s.sin_leg * s.rate
 
-    def slip_m_per_s(self, leg) -> cython.double:
+    @cython.ccall
+    @cython.exceptval(check=False)
+    def slip_m_per_s(self, leg: Leg) -> cython.double:
         """How fast the lowest point of a foot moves along the floor, m/s (EQUATIONS 8)."""
         leg.know_leg()
         leg.know_foot()
         along: cython.double = leg.r * cos(leg.excess(leg.foot_angle)) - leg.d * leg.cos_foot
         return self.hip_vx - leg.el * leg.cos_leg * leg.rate - along * leg.foot_rate
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def hip_angle(self) -> cython.double:
         """h of the firmware: inner legs ahead of the outer ones, rad."""
         return self.outer.angle - self.inner.angle
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def hip_rate(self) -> cython.double:
         """Rate of h, rad/s."""
         return self.outer.rate - self.inner.rate
 
-    def stands(self, leg) -> cython.bint:
+    @cython.ccall
+    @cython.exceptval(check=False)
+    def stands(self, leg: Leg) -> cython.bint:
         """True while this foot has the floor under it."""
         if self.mode == DOUBLE:
             return True
@@ -213,6 +282,7 @@ class Body:
             return leg is self.stance or leg.Fy > 0.0
         return False
 
+    @cython.ccall
     def snapshot(self) -> dict:
         """Points in the plane of the floor for a drawing, m: hip, ankles, foot centres; angles in rad."""
         joints = {"hip": (self.hip_x, self.hip_y), "mode": MODE_NAMES[self.mode], "stance": int(self.stance.side)}
@@ -228,10 +298,12 @@ class Body:
 
     # ---- the whole state ------------------------------------------------------------------------------------
 
+    @cython.ccall
     def lift(self) -> cython.void:
         """Raise the hip 50 mm higher than standing (chosen by us: feet turn free of the floor)."""
         self.hip_y = self.outer.el + self.outer.r - self.outer.d + 0.05
 
+    @cython.ccall
     def energy_J(self) -> cython.double:
         """Kinetic and potential energy with springs and rotors, potential measured from the floor's frame."""
         o: Leg = self.outer
@@ -268,10 +340,13 @@ class Body:
             - self.gy * (self.M * self.hip_y - Ao - Ai)
         )
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def event_time_ns(self) -> cython.longlong:
         """Instant of the running event, ns."""
         return self.step_start_ns + int(self.elapsed * 1e9 + 0.5)
 
+    @cython.cfunc
     def save(self) -> cython.void:
         """Keep angles, rates and the hip's state for `restore`."""
         s: cython.p_double = self.saved
@@ -282,6 +357,7 @@ class Body:
         s[2] = self.hip_vx
         s[3] = self.hip_vy
 
+    @cython.cfunc
     def restore(self) -> cython.void:
         """Back to the state that `save` has kept."""
         s: cython.p_double = self.saved

@@ -15,31 +15,30 @@ That is Coulomb's friction and a plastic impact with complementarity (Glocker an
 1996). Two feet have sixteen pairs of states, so the right one is found by trying them.
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import cos, fabs, sin
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    from math import cos, fabs, sin
+from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
 
-    from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
+# Columns of `matrix`, and rows of `solution`: what is unknown, and last the right-hand side.
+COLUMN_VX: Final = 0  # of the hip
+COLUMN_VY: Final = 1
+COLUMN_LEG: Final = 2  # the outer, and next the inner leg
+COLUMN_FOOT: Final = 4  # the outer, and next the inner foot
+COLUMN_IMPULSE: Final = 6  # x and y of the outer foot, and of the inner
+COLUMN_RIGHT: Final = 10
+COLUMNS: Final = 11
 
-    # Columns of `matrix`, and rows of `solution`: what is unknown, and last the right-hand side.
-    COLUMN_VX = 0  # of the hip
-    COLUMN_VY = 1
-    COLUMN_LEG = 2  # the outer, and next the inner leg
-    COLUMN_FOOT = 4  # the outer, and next the inner foot
-    COLUMN_IMPULSE = 6  # x and y of the outer foot, and of the inner
-    COLUMN_RIGHT = 10
-    COLUMNS = 11
+# what a foot does
+APART: Final = 0
+STICKS: Final = 1
+SLIDES_ON: Final = 2
+SLIDES_BACK: Final = 3
+STATES: Final = 4
 
-    # what a foot does
-    APART = 0
-    STICKS = 1
-    SLIDES_ON = 2
-    SLIDES_BACK = 3
-    STATES = 4
-
-    ARMS = 4  # numbers per foot in `arm`
+ARMS: Final = 4  # numbers per foot in `arm`
 
 
 # In which order pairs of states are tried: of the foot that stood, and of the one that touches. When more than one
@@ -65,6 +64,8 @@ PAIRS = (
 )
 
 
+@cython.final
+@cython.cclass
 class ContactEquations:
     """The equations and their solution. Arrays are by foot, outer first; "rate" may be acceleration, "impulse" force.
 
@@ -73,6 +74,31 @@ class ContactEquations:
     is at the floor; `follow`, of a massless foot, what its motor's rate is, which it follows when apart. `moving`: the
     foot slides already, its direction is known.
     """
+
+    matrix: cython.double[110]
+    solution: cython.double[10]
+    mass: cython.double[36]
+    right: cython.double[6]
+    arm: cython.double[8]
+    target: cython.double[4]
+    follow: cython.double[2]
+    rolling: cython.double[2]
+    motor: cython.double[2]
+    brush: cython.double[4]
+    place: cython.double[8]
+    rate: cython.double[8]
+    acceleration: cython.double[8]
+    first_place: cython.double[8]
+    first_rate: cython.double[8]
+    place_sum: cython.double[8]
+    rate_sum: cython.double[8]
+    massless: cython.bint[2]
+    moving: cython.bint[2]
+    at_floor: cython.bint[2]
+    allowed: cython.bint[8]
+    state: cython.longlong[2]
+    mu: cython.double
+    total_mass: cython.double
 
     def __init__(self) -> None:
         self.matrix = [0.0] * 110
@@ -104,10 +130,11 @@ class ContactEquations:
         self.mu = 0.0
         self.total_mass = 1.0
 
+    @cython.ccall
     def begin(
         self,
-        outer,
-        inner,
+        outer: "Leg",
+        inner: "Leg",
         total_mass: cython.double,
         hip_rotor: cython.double,
         mu: cython.double,
@@ -157,6 +184,7 @@ class ContactEquations:
             self.moving[leg.side] = False
             self.allow_all(leg.side)
 
+    @cython.ccall
     def allow_all(self, side: cython.longlong) -> cython.void:
         """This foot is at the floor and may do whatever fits."""
         n: cython.longlong
@@ -164,17 +192,21 @@ class ContactEquations:
         for n in range(STATES):
             self.allowed[STATES * side + n] = True
 
+    @cython.ccall
     def allow_only(self, side: cython.longlong, state: cython.longlong) -> cython.void:
         """This foot does this, and nothing else fits."""
         n: cython.longlong
         for n in range(STATES):
             self.allowed[STATES * side + n] = n == state
 
+    @cython.ccall
     def leave_out(self, side: cython.longlong) -> cython.void:
         """This foot is in the air: the floor asks nothing of it."""
         self.allow_only(side, APART)
         self.at_floor[side] = False
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def solve(self, outer: cython.longlong, inner: cython.longlong) -> cython.bint:
         """Solve with these states of the feet, inequalities not asked; False when the equations contradict."""
         row: cython.longlong
@@ -193,6 +225,7 @@ class ContactEquations:
         self.write_contact(INNER, inner)
         return eliminate(a, self.solution, COLUMN_RIGHT)
 
+    @cython.cfunc
     def write_contact(self, side: cython.longlong, state: cython.longlong) -> cython.void:
         """Two rows and two columns of `matrix`: what this foot does, and what its impulse does to the robot."""
         along: cython.longlong = COLUMN_IMPULSE + 2 * side
@@ -234,6 +267,8 @@ class ContactEquations:
             a[COLUMNS * along + along] = 1.0
             a[COLUMNS * along + normal] = self.mu if state == SLIDES_ON else -self.mu
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def contact_rate(self, side: cython.longlong, along: cython.longlong) -> cython.double:
         """By how much the contact of this foot is faster than its target in `solution`: normal (0) or along (1)."""
         x: cython.p_double = self.solution
@@ -242,6 +277,8 @@ class ContactEquations:
         rate += self.arm[n] * x[COLUMN_LEG + side] + self.arm[n + 1] * x[COLUMN_FOOT + side]
         return rate - self.target[2 * side + (0 if along else 1)]
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def slack(self, side: cython.longlong, state: cython.longlong) -> cython.double:
         """How far the inequalities of this state are from being broken in `solution`, m/s; below 0 they are.
 
@@ -263,6 +300,7 @@ class ContactEquations:
                 rest = -rest
         return rest if rest < push else push
 
+    @cython.ccall
     def settle(self, last: cython.longlong) -> cython.double:
         """Find the feet's states, and solve with them: `state`, `solution`. `last`: side of the foot that touches.
 
@@ -293,6 +331,8 @@ class ContactEquations:
         return best
 
 
+@cython.cfunc
+@cython.exceptval(check=False)
 def eliminate(a: cython.p_double, x: cython.p_double, n: cython.longlong) -> cython.bint:
     """Solve n equations (rows of 11, right-hand side last) by Gauss with pivots; False when they are singular."""
     i: cython.longlong

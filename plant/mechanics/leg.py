@@ -9,15 +9,13 @@ All angles are positive clockwise seen with the walking direction to the right, 
     motor_angle  p, of the ankle motor over its gear, relative to the leg; equal to F - th without cable stretch
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import cos, sin
 
-if not cython.compiled:
-    from math import cos, sin
-
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    OUTER = 0
-    INNER = 1
+OUTER: Final = 0
+INNER: Final = 1
 
 # kg m^2. A massless foot that slides has no equation for its angle where its contact is below its ankle (f = 0 in
 # EQUATIONS 4). Where feet may slide they have this at least; chosen by us: a tenth of a real foot's, and against its
@@ -29,12 +27,62 @@ RIGID = ("sticking", "unilateral")  # contacts in which a foot on the floor neve
 LEG_NAMES = ("outer", "inner")
 
 
+@cython.final
+@cython.cclass
 class Leg:
     """State, contact, forces and parameters of one leg. `side`: OUTER or INNER; `parameters`: BodyParameters.
 
     Both legs have the same equations; what differs between them is numbers, and all of these stand here. More than 40
     fields, because a step reads nearly all of them: split in two (a leg and its foot) each would cost a second look-up.
     """
+
+    # what every step looks at stands first, beside each other
+    foot_angle: cython.double
+    angle: cython.double
+    motor_angle: cython.double
+    foot_rate: cython.double
+    rate: cython.double
+    motor_rate: cython.double
+    known_foot: cython.double
+    sin_foot: cython.double
+    cos_foot: cython.double
+    known_angle: cython.double
+    sin_leg: cython.double
+    cos_leg: cython.double
+    drive: cython.double
+    coulomb: cython.double
+    viscous: cython.double
+    Fx: cython.double
+    Fy: cython.double
+    foot_acc: cython.double
+    acc: cython.double
+    motor_acc: cython.double
+    anchor: cython.double
+    height: cython.double
+    gap: cython.double
+    hip_sign: cython.double
+    el: cython.double
+    r: cython.double
+    d: cython.double
+    heel: cython.double
+    toe: cython.double
+    Jf: cython.double
+    inverse_Jf: cython.double
+    C: cython.double
+    mc: cython.double
+    mw: cython.double
+    mt: cython.double
+    m22: cython.double
+    i33: cython.double
+    J: cython.double
+    extra_ankle: cython.double
+    extra_motor: cython.double
+    impulse_x: cython.double
+    impulse_y: cython.double
+    side: cython.longlong
+    slide: cython.longlong
+    armed: cython.bint
+    saved: cython.double[6]
 
     def __init__(self, side, parameters) -> None:
         p = parameters
@@ -113,6 +161,7 @@ class Leg:
 
     # ---- where things are -----------------------------------------------------------------------------------
 
+    @cython.cfunc
     def know_leg(self) -> cython.void:
         """Sine and cosine of the leg's present angle into the fields; steps on the floor leave them there."""
         if self.angle != self.known_angle:
@@ -120,6 +169,7 @@ class Leg:
             self.sin_leg = sin(self.angle)
             self.cos_leg = cos(self.angle)
 
+    @cython.cfunc
     def know_foot(self) -> cython.void:
         """As `know_leg`, of the foot's angle."""
         if self.foot_angle != self.known_foot:
@@ -127,6 +177,8 @@ class Leg:
             self.sin_foot = sin(self.foot_angle)
             self.cos_foot = cos(self.foot_angle)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def excess(self, foot: cython.double) -> cython.double:
         """Angle by which the foot, at this angle, has rolled beyond the end of its arc (sigma), 0 on the arc."""
         if foot < self.heel:
@@ -135,15 +187,21 @@ class Leg:
             return foot - self.toe
         return 0.0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def chain_x(self, foot: cython.double, leg: cython.double) -> cython.double:
         """Hip ahead of the anchor of the standing foot at these two angles, m (EQUATIONS 4)."""
         excess: cython.double = self.excess(foot)
         return self.r * (foot - excess + sin(excess)) - self.d * sin(foot) + self.el * sin(leg)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def chain_y(self, foot: cython.double, leg: cython.double) -> cython.double:
         """Hip above the foothold of the standing foot at these two angles, m (EQUATIONS 4)."""
         return self.r * cos(self.excess(foot)) - self.d * cos(foot) + self.el * cos(leg)
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def reach(self) -> cython.double:
         """The lowest point of the foot below the hip, m: `chain_y` with the known sines (EQUATIONS 4)."""
         y: cython.double = self.el * self.cos_leg - self.d * self.cos_foot
@@ -152,6 +210,8 @@ class Leg:
             return y + self.r * cos(self.excess(foot))
         return y + self.r
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def behind(self) -> cython.double:
         """The lowest point of the foot behind the hip, m (EQUATIONS 4)."""
         foot: cython.double = self.foot_angle
@@ -163,6 +223,8 @@ class Leg:
             x += self.r * sin(self.excess(foot))
         return x
 
+    @cython.cfunc
+    @cython.exceptval(check=False)
     def rise(self) -> cython.double:
         """Vertical acceleration of the hip if the foot's contact rested: f ddF - l sin th ddth + bias (EQUATIONS 4)."""
         foot: cython.double = self.foot_angle
@@ -179,15 +241,19 @@ class Leg:
 
     # ---- what happens to it ---------------------------------------------------------------------------------
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def stretch(self) -> cython.double:
         """Of the ankle's cable, rad at the joint (EQUATIONS 1)."""
         return self.motor_angle - (self.foot_angle - self.angle)
 
+    @cython.ccall
     def limp(self) -> cython.void:
         """A massless foot in the air stands where its motor holds it, q4 = q4m (EQUATIONS 5.4)."""
         self.foot_angle = self.angle + self.motor_angle
         self.foot_rate = self.rate + self.motor_rate
 
+    @cython.ccall
     def lie(self) -> cython.void:
         """No motion and no force of the floor."""
         self.foot_rate = 0.0
@@ -196,6 +262,7 @@ class Leg:
         self.Fx = 0.0
         self.Fy = 0.0
 
+    @cython.cfunc
     def save(self) -> cython.void:
         """Keep the state for `restore`."""
         s: cython.p_double = self.saved
@@ -206,6 +273,7 @@ class Leg:
         s[4] = self.rate
         s[5] = self.motor_rate
 
+    @cython.cfunc
     def restore(self) -> cython.void:
         """Back to the state that `save` has kept."""
         s: cython.p_double = self.saved

@@ -5,8 +5,25 @@ import math
 import cython
 
 
+@cython.final
+@cython.cclass
 class Observed:
     """Starts anew when the robot is let go; read by plant/walking/watch.py, the summary of a walk, and tests."""
+
+    foothold_due: cython.bint
+    brushing: cython.bint
+    passing_gap: cython.double
+    scuff_time_s: cython.double
+    brush_s: cython.double
+    released_s: cython.double
+    friction_ratio_max: cython.double
+    slip_s: cython.double
+    normal_force_min: cython.double
+    pull_s: cython.double
+    fall_lean: cython.double
+    fall_height: cython.double
+    fall_split: cython.double
+    stall_s: cython.double
 
     def __init__(self) -> None:
         self.foothold_due = False  # the swing foot has not passed the stance foot yet
@@ -25,6 +42,7 @@ class Observed:
         self.fall_split = 1.2  # rad between the legs
         self.stall_s = 3.0
 
+    @cython.ccall
     def begin(self, time_s: cython.double) -> cython.void:
         """The robot is let go at this time of the body."""
         self.released_s = time_s

@@ -3,13 +3,24 @@
 """Parts of the body that both legs share: the hip joint between them, and what their ankles and soles are made of."""
 
 import cython
-
-if not cython.compiled:
-    from math import cos, sin, sqrt
+from cython.cimports.libc.math import cos, sin, sqrt
 
 
+@cython.final
+@cython.cclass
 class HipJoint:
     """Motor and spring between the legs (EQUATIONS 2.1, 2.2, 2.4). `parameters`: BodyParameters."""
+
+    drive: cython.double
+    coulomb: cython.double
+    viscous: cython.double
+    k: cython.double
+    J: cython.double
+    exact: cython.bint
+    exact_k: cython.double
+    l0: cython.double
+    ab: cython.double
+    aabb: cython.double
 
     def __init__(self, parameters) -> None:
         p = parameters
@@ -26,6 +37,8 @@ class HipJoint:
         self.ab = p.hip_spring_arm_a_m * p.hip_spring_arm_b_m
         self.aabb = p.hip_spring_arm_a_m * p.hip_spring_arm_a_m + p.hip_spring_arm_b_m * p.hip_spring_arm_b_m
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def spring_torque(self, angle: cython.double) -> cython.double:
         """Torque of the spring at a hip angle, N m, that it resists with (EQUATIONS 2.4)."""
         length: cython.double
@@ -34,6 +47,8 @@ class HipJoint:
         length = sqrt(self.aabb - 2.0 * self.ab * cos(angle))
         return 2.0 * self.exact_k * self.ab * (1.0 - self.l0 / length) * sin(angle)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def spring_energy(self, angle: cython.double) -> cython.double:
         """Energy in the spring at a hip angle, J."""
         length: cython.double
@@ -43,8 +58,20 @@ class HipJoint:
         return self.exact_k * (length - self.l0) * (length - self.l0)
 
 
+@cython.final
+@cython.cclass
 class Ankle:
     """Cable, rotor, springs and stops of an ankle (EQUATIONS 2.2, 2.3, 2.5, 2.7); `parameters`: BodyParameters."""
+
+    k: cython.double
+    J: cython.double
+    inverse_J: cython.double
+    low: cython.double
+    high: cython.double
+    stop_k: cython.double
+    stop_c: cython.double
+    return_k: cython.double
+    rest: cython.double
 
     def __init__(self, parameters) -> None:
         p = parameters
@@ -59,6 +86,8 @@ class Ankle:
         self.stop_k = p.ankle_stop_Nm_per_rad
         self.stop_c = p.ankle_stop_Nms_per_rad
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def stop_torque(self, angle: cython.double, rate: cython.double) -> cython.double:
         """Torque on the foot of the stop that this angle is beyond: a spring and damper that only push (N m)."""
         torque: cython.double
@@ -69,8 +98,18 @@ class Ankle:
         return torque if torque < 0.0 else 0.0
 
 
+@cython.final
+@cython.cclass
 class Sole:
     """What a foot meets the floor with while it brushes, or on a compliant floor (EQUATIONS 9): N/m, N s/m, s/m, mu."""
+
+    k: cython.double
+    c: cython.double
+    per_m_s: cython.double
+    mu: cython.double
+    floor_k: cython.double
+    floor_a: cython.double
+    floor_per_m_s: cython.double
 
     def __init__(self, parameters) -> None:
         p = parameters

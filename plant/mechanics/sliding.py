@@ -6,38 +6,37 @@ Slides are short and seldom: the ten equations are written and solved anew at ev
 do a thousand times as often they do in closed form. Feet have an inertia here (`Body` sees to it).
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import cos, sin
 
-if not cython.compiled:
-    from math import cos, sin
+from ranger_sim.plant.mechanics.body import DOUBLE, SINGLE, Body
+from ranger_sim.plant.mechanics.contact_equations import (
+    APART,
+    ARMS,
+    COLUMN_FOOT,
+    COLUMN_IMPULSE,
+    COLUMN_LEG,
+    COLUMN_VX,
+    COLUMN_VY,
+    SLIDES_BACK,
+    SLIDES_ON,
+    STICKS,
+    ContactEquations,
+)
+from ranger_sim.plant.mechanics.friction import smoothed_sign
+from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
+from ranger_sim.plant.mechanics.parts import Ankle, HipJoint
+from ranger_sim.plant.mechanics.term_torques import TermTorques
 
-    from ranger_sim.plant.mechanics.body import DOUBLE, SINGLE
-    from ranger_sim.plant.mechanics.contact_equations import (
-        APART,
-        ARMS,
-        COLUMN_FOOT,
-        COLUMN_IMPULSE,
-        COLUMN_LEG,
-        COLUMN_VX,
-        COLUMN_VY,
-        SLIDES_BACK,
-        SLIDES_ON,
-        STICKS,
-        ContactEquations,
-    )
-    from ranger_sim.plant.mechanics.friction import smoothed_sign
-    from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
-    from ranger_sim.plant.mechanics.parts import Ankle, HipJoint
-    from ranger_sim.plant.mechanics.term_torques import TermTorques
-
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    # places in `place`, `rate`, `acceleration` of the equations: as their columns, then both motors
-    MOTOR = 6
-    FREEDOMS = 8
+# places in `place`, `rate`, `acceleration` of the equations: as their columns, then both motors
+MOTOR: Final = 6
+FREEDOMS: Final = 8
 
 
-def slide(body, h: cython.double, stages: cython.longlong) -> cython.void:
+@cython.ccall
+def slide(body: "Body", h: cython.double, stages: cython.longlong) -> cython.void:
     """One Runge-Kutta-Nystrom step of `h` seconds on feet of which any may slide; stages 4, or 1 to look only.
 
     As `on_feet`, with k4 as written (EQUATIONS 15): accelerations and forces of its start are left in the legs.
@@ -86,7 +85,8 @@ def slide(body, h: cython.double, stages: cython.longlong) -> cython.void:
     body.update_hip_rates()
 
 
-def accelerate(body) -> cython.void:
+@cython.cfunc
+def accelerate(body: "Body") -> cython.void:
     """Accelerations of the present state, with the feet doing what they do."""
     n: cython.longlong
     x: ContactEquations = body.equations
@@ -100,7 +100,9 @@ def accelerate(body) -> cython.void:
     x.acceleration[MOTOR + 1] = x.motor[INNER]
 
 
-def state_of(body, leg) -> cython.longlong:
+@cython.cfunc
+@cython.exceptval(check=False)
+def state_of(body: "Body", leg: "Leg") -> cython.longlong:
     """APART, STICKS, SLIDES_ON or SLIDES_BACK: what this foot does."""
     if body.floating or (body.mode != DOUBLE and (body.mode != SINGLE or leg is not body.stance)):
         return APART
@@ -109,7 +111,8 @@ def state_of(body, leg) -> cython.longlong:
     return SLIDES_ON if leg.slide > 0 else SLIDES_BACK
 
 
-def write_forces(body) -> cython.void:
+@cython.ccall
+def write_forces(body: "Body") -> cython.void:
     """Into the equations: forces and torques of the present state, and what keeps a standing foot on its foothold."""
     n: cython.longlong
     hip: cython.double
@@ -140,7 +143,8 @@ def write_forces(body) -> cython.void:
         write_brush(body, body.swing)
 
 
-def write_leg(body, leg) -> cython.void:
+@cython.cfunc
+def write_leg(body: "Body", leg: "Leg") -> cython.void:
     """Of one leg with its foot and motor (EQUATIONS 2, 5, 9)."""
     x: ContactEquations = body.equations
     ankle: Ankle = body.ankle
@@ -176,7 +180,8 @@ def write_leg(body, leg) -> cython.void:
         x.leave_out(side)
 
 
-def write_targets(body, leg) -> cython.void:
+@cython.cfunc
+def write_targets(body: "Body", leg: "Leg") -> cython.void:
     """How a standing foot's contact is to accelerate (EQUATIONS 4): not at all, and errors decay as in section 6."""
     x: ContactEquations = body.equations
     n: cython.longlong = ARMS * leg.side
@@ -198,7 +203,8 @@ def write_targets(body, leg) -> cython.void:
     )
 
 
-def write_brush(body, leg) -> cython.void:
+@cython.cfunc
+def write_brush(body: "Body", leg: "Leg") -> cython.void:
     """The swing foot brushes the floor with its sole, as in `on_feet` (EQUATIONS 9)."""
     x: ContactEquations = body.equations
     n: cython.longlong = ARMS * leg.side
@@ -213,7 +219,8 @@ def write_brush(body, leg) -> cython.void:
     push(body, leg, along, normal)
 
 
-def write_press(body, leg) -> cython.void:
+@cython.cfunc
+def write_press(body: "Body", leg: "Leg") -> cython.void:
     """A foot presses into a floor that gives: Hunt and Crossley's spring and damper, friction (EQUATIONS 9)."""
     x: ContactEquations = body.equations
     n: cython.longlong = ARMS * leg.side
@@ -229,7 +236,8 @@ def write_press(body, leg) -> cython.void:
     x.right[COLUMN_FOOT + leg.side] += x.rolling[leg.side]
 
 
-def push(body, leg, along: cython.double, normal: cython.double) -> cython.void:
+@cython.cfunc
+def push(body: "Body", leg: "Leg", along: cython.double, normal: cython.double) -> cython.void:
     """A force on a foot that is known, into the equations."""
     x: ContactEquations = body.equations
     n: cython.longlong = ARMS * leg.side
@@ -241,7 +249,8 @@ def push(body, leg, along: cython.double, normal: cython.double) -> cython.void:
     x.right[COLUMN_FOOT + leg.side] += x.arm[n + 1] * along + x.arm[n + 3] * normal
 
 
-def take_forces(body) -> cython.void:
+@cython.cfunc
+def take_forces(body: "Body") -> cython.void:
     """Accelerations and forces of the present state out of the equations into the legs, as `on_feet` leaves them."""
     leg: Leg
     x: ContactEquations = body.equations
@@ -253,7 +262,8 @@ def take_forces(body) -> cython.void:
         leg.Fy = x.solution[COLUMN_IMPULSE + 2 * leg.side + 1] + x.brush[2 * leg.side + 1]
 
 
-def read_state(body) -> cython.void:
+@cython.cfunc
+def read_state(body: "Body") -> cython.void:
     """Hip, legs, feet and motors into `place` and `rate` of the equations."""
     leg: Leg
     q: cython.p_double = body.equations.place
@@ -271,7 +281,8 @@ def read_state(body) -> cython.void:
         u[MOTOR + leg.side] = leg.motor_rate
 
 
-def write_state(body, q: cython.p_double, u: cython.p_double) -> cython.void:
+@cython.cfunc
+def write_state(body: "Body", q: cython.p_double, u: cython.p_double) -> cython.void:
     """And back from places and rates given."""
     leg: Leg
     body.hip_x = q[COLUMN_VX]

@@ -3,18 +3,18 @@
 """Motion on one or two feet (EQUATIONS 5, 6): the right-hand side of the equations, and a step of them (15)."""
 
 import cython
+from cython.cimports.libc.math import cos, sin
 
-if not cython.compiled:
-    from math import cos, sin
-
-    from ranger_sim.plant.mechanics.body import DOUBLE
-    from ranger_sim.plant.mechanics.friction import smoothed_sign
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.parts import Ankle, HipJoint
-    from ranger_sim.plant.mechanics.term_torques import TermTorques
+from ranger_sim.plant.mechanics.body import DOUBLE, Body
+from ranger_sim.plant.mechanics.friction import smoothed_sign
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.parts import Ankle, HipJoint
+from ranger_sim.plant.mechanics.term_torques import TermTorques
 
 
-def on_feet(body, h: cython.double, stages: cython.longlong) -> cython.void:
+@cython.ccall
+@cython.exceptval(check=True)
+def on_feet(body: "Body", h: cython.double, stages: cython.longlong) -> cython.void:
     """One Runge-Kutta-Nystrom step of `h` seconds in single or double stance; stages 4, or 1 to look only.
 
     Inside, s is the stance (reference) leg and w the other; numbers without a letter are those of s. Accelerations and

@@ -12,13 +12,13 @@ Positive is to the left, seen from above. With all feet on the floor the twist i
 """
 
 import cython
+from cython.cimports.libc.math import cos, sin
 
-if not cython.compiled:
-    from math import cos, sin
-
-    from ranger_sim.plant.mechanics.friction import smoothed_sign
+from ranger_sim.plant.mechanics.friction import smoothed_sign
 
 
+@cython.final
+@cython.cclass
 class Steering:
     """Twist (rad), heading `yaw` (rad) and the hip's path `path_x`, `path_y` (m) in the plane of the floor.
 
@@ -28,6 +28,22 @@ class Steering:
     leg tubes about the vertical axis between them, 0.2 kg m^2 for the robot about the same axis (10 kg at 0.14 m);
     damping 0.1 N m s/rad.
     """
+
+    twist: cython.double
+    rate: cython.double
+    yaw: cython.double
+    path_x: cython.double
+    path_y: cython.double
+    hip_x: cython.double
+    known_yaw: cython.double
+    sin_yaw: cython.double
+    cos_yaw: cython.double
+    rotor_inertia: cython.double
+    swing_inertia: cython.double
+    stance_inertia: cython.double
+    stiffness: cython.double
+    damping: cython.double
+    stop: cython.double
 
     def __init__(self, rotor_inertia_kg_m2=84.0 * 84.0 * 1e-7) -> None:
         self.twist = 0.0
@@ -47,6 +63,7 @@ class Steering:
         self.damping = 0.1
         self.stop = 0.0436
 
+    @cython.ccall
     def begin(self, hip_x: cython.double) -> cython.void:
         """The robot is put down: path and heading start here."""
         self.yaw = 0.0
@@ -54,6 +71,7 @@ class Steering:
         self.path_y = 0.0
         self.hip_x = hip_x
 
+    @cython.ccall
     def advance(
         self,
         h: cython.double,

@@ -21,39 +21,51 @@ stretch of a cable (motor less joint), G the gear, epsilon the friction smoothin
 """
 
 import array
+from typing import TYPE_CHECKING, Final
 
 import cython
+from cython.cimports.libc.math import exp, sin
 
-if not cython.compiled:
-    from math import exp, sin
+from ranger_sim.plant.mechanics.friction import smoothed_sign
 
-    from ranger_sim.plant.mechanics.friction import smoothed_sign
+if TYPE_CHECKING:
+    from ranger_sim.plant.mechanics.leg import Leg
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    # forms
-    STRIBECK = 0
-    COULOMB = 1
-    VISCOUS = 2
-    DIRECTION = 3
-    DRAG = 4
-    SPRING = 5
-    COGGING = 6
-    TURN = 7
-    STIFFENING = 8
-    BACKLASH = 9
-    SLACK = 10
-    CABLE_DAMPING = 11
-    # Places of a torque; the hip's motor and joint share an angle but not the gear of periodic terms.
-    HIP_JOINT = 0
-    HIP_MOTOR = 1
-    ANKLE_JOINT = 2
-    ANKLE_MOTOR = 3
-    ANKLE_CABLE = 4
+# forms
+STRIBECK: Final = 0
+COULOMB: Final = 1
+VISCOUS: Final = 2
+DIRECTION: Final = 3
+DRAG: Final = 4
+SPRING: Final = 5
+COGGING: Final = 6
+TURN: Final = 7
+STIFFENING: Final = 8
+BACKLASH: Final = 9
+SLACK: Final = 10
+CABLE_DAMPING: Final = 11
+# Places of a torque; the hip's motor and joint share an angle but not the gear of periodic terms.
+HIP_JOINT: Final = 0
+HIP_MOTOR: Final = 1
+ANKLE_JOINT: Final = 2
+ANKLE_MOTOR: Final = 3
+ANKLE_CABLE: Final = 4
 
 
+@cython.final
+@cython.cclass
 class TermTorques:
     """Rows of terms. `zero_rad`: joint angle of an ankle whose relative angle is 0 in the body's coordinates."""
+
+    count: cython.longlong
+    zero_rad: cython.double
+    hip_gear: cython.double
+    ankle_gear: cython.double
+    inverse_smoothing: cython.double
+    forms: cython.longlong[::1]
+    places: cython.longlong[::1]
+    sides: cython.longlong[::1]
+    parameters: cython.double[::1]
 
     def __init__(self, zero_rad, hip_gear, ankle_gear, smoothing_rad_s) -> None:
         self.count = 0
@@ -83,6 +95,7 @@ class TermTorques:
         self.parameters = numbers
         self.count += 1
 
+    @cython.ccall
     def torque(
         self,
         i: cython.longlong,
@@ -134,6 +147,7 @@ class TermTorques:
             return -p0 * q if q < 0.0 else 0.0
         return p0 * w
 
+    @cython.ccall
     def torque_on_hip(self, h: cython.double, h_rate: cython.double) -> cython.double:
         """Additional torque on the hip angle h (N m), at h (rad) and its rate (rad/s)."""
         i: cython.longlong
@@ -145,9 +159,10 @@ class TermTorques:
                 total += self.torque(i, h, h_rate, self.hip_gear)
         return total
 
+    @cython.ccall
     def act_on_ankle(
         self,
-        leg,
+        leg: "Leg",
         angle: cython.double,
         rate: cython.double,
         motor: cython.double,

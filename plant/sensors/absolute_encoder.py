@@ -5,27 +5,47 @@ word = zero + sign x 8192 / (2 pi) x (angle + errors), to the nearest count, mod
 joint angle 0, `sign` the mounting. Zeros of the robot: hip 4590 (+), outer ankle 6562 (-), inner ankle 1572 (+).
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import exp, sin
 
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.sensors.noise import NoiseSource
 
-if not cython.compiled:
-    from math import exp, sin
-
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    WORD_BITS = 13
-    COUNTS_PER_TURN = 8192
+WORD_BITS: Final = 13
+COUNTS_PER_TURN: Final = 8192
 
 PI = 3.141592653589793
 
 
+@cython.final
+@cython.cclass
 class AbsoluteEncoder:
     """One device. `noise_counts`: standard deviation before rounding; `bit_flip`: probability per word that one
     of its bits is read wrong (the long unshielded cable of appendix 3.8; 0 by default, because no source gives a rate).
     """
+
+    # what every word asks for stands first, beside each other
+    noise: NoiseSource
+    scale: cython.double
+    offset_rad: cython.double
+    lag_s: cython.double
+    eccentricity_1: cython.double
+    eccentricity_2: cython.double
+    counts_per_rad: cython.double
+    noise_counts: cython.double
+    bit_flip: cython.double
+    zero: cython.longlong
+    phase_1: cython.double
+    phase_2: cython.double
+    angle: cython.double
+    started: cython.bint
+    flips: RandomStream
+    sign: cython.longlong
+    flipped: cython.longlong
+    name: str
 
     def __init__(self, name, zero, sign=1, noise_counts=0.3, bit_flip=0.0, seed=0) -> None:
         if not 0 <= zero < COUNTS_PER_TURN or sign not in (-1, 1):
@@ -53,6 +73,8 @@ class AbsoluteEncoder:
         self.started = False
         self.flipped = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def word(self, angle: cython.double, h: cython.double = 0.0) -> cython.longlong:
         """The device's word at a joint angle (rad), `h` seconds after the word before (only a lag needs it)."""
         x: cython.double = self.scale * angle + self.offset_rad

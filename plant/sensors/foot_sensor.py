@@ -15,22 +15,36 @@ gap is closed and the stop takes over (appendix 2.4): chosen by us, half of the 
 """
 
 import cython
+from cython.cimports.libc.math import exp
 
 from ranger_sim.foundation.user_error import UserError
-
-if not cython.compiled:
-    from math import exp
 
 SWING_COUNTS = 700.0
 STANCE_COUNTS = 7000.0
 VOLTS_PER_COUNT = 2.5 / 8192.0  # ADS7871 at gain 1 with its 2.5 V reference, robot.md N4.5
 
 
+@cython.final
+@cython.cclass
 class FootSensors:
     """Left and right sensor of one foot pair; `left_V` and `right_V` now, without noise.
 
     `left_gain`, `right_gain`: how far each goes of the nominal span (both feet of a pair carry the same load).
     """
+
+    closure: cython.double
+    last_h: cython.double
+    decay: cython.double
+    share: cython.double
+    per_N: cython.double
+    left_gain: cython.double
+    right_gain: cython.double
+    swing_counts: cython.double
+    span_counts: cython.double
+    left_V: cython.double
+    right_V: cython.double
+    rise_time_constant_s: cython.double
+    name: str
 
     def __init__(
         self,
@@ -62,6 +76,7 @@ class FootSensors:
         self.left_V = swing_counts * VOLTS_PER_COUNT
         self.right_V = swing_counts * VOLTS_PER_COUNT
 
+    @cython.ccall
     def step(self, h: cython.double, contact: cython.bint, load_N: cython.double) -> cython.void:
         """`h` seconds on with this contact and vertical load (N, all of the foot pair)."""
         target: cython.double = 0.0
@@ -80,6 +95,7 @@ class FootSensors:
         self.left_V = (self.swing_counts + self.left_gain * target) * (2.5 / 8192.0)
         self.right_V = (self.swing_counts + self.right_gain * target) * (2.5 / 8192.0)
 
+    @cython.ccall
     def settle(self, contact: cython.bint, load_N: cython.double) -> cython.void:
         """Take the value that a lasting contact and load give."""
         self.step(1000.0 * self.rise_time_constant_s, contact, load_N)

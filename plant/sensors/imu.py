@@ -19,41 +19,73 @@ roll = roll_bias - LO. So the firmware's -(rate x - bias) is the legs' rate. The
 ROBOT PARITY: fused angles are the true ones with noise and bias; the device's slow correction is not modelled.
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import cos, exp, sin
 
 from ranger_sim.foundation.edge_buffer import ByteBuffer
+from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from math import cos, exp, sin
+# `Imu.mode`: the header of the packets that it sends
+SILENT: Final = 0
+HEADER_ANGLES_AND_RATES: Final = 0xCF
+HEADER_RATES: Final = 0xC2
+# the command that sets the mode: three bytes, then the header asked for
+SET_MODE: Final = 0xC4
+SET_MODE_SECOND: Final = 0xC1
+SET_MODE_THIRD: Final = 0x29
 
-    from ranger_sim.foundation.numbers import word_of_float
-
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    # `Imu.mode`: the header of the packets that it sends
-    SILENT = 0
-    HEADER_ANGLES_AND_RATES = 0xCF
-    HEADER_RATES = 0xC2
-    # the command that sets the mode: three bytes, then the header asked for
-    SET_MODE = 0xC4
-    SET_MODE_SECOND = 0xC1
-    SET_MODE_THIRD = 0x29
-
-    PACKET_BYTES = 31
-    MAX_FILTER = 64  # samples
-# C variables when compiled (.pxd): Cython makes a Python object of every literal above 31 bits.
-_MASK = 0xFFFFFFFF
-_TEN_BITS = 10000000000  # ns times baud
+PACKET_BYTES: Final = 31
+MAX_FILTER: Final = 64  # samples
+# C variables when compiled: Cython makes a Python object of every literal above 31 bits.
+_MASK: cython.longlong = 4294967295
+_TEN_BITS: cython.longlong = 10000000000
 
 
+@cython.final
+@cython.cclass
 class Imu:
     """The device. `bytes`: ByteBuffer of what it sent in the last `update`, stamped with the end of each byte.
 
     `bias_rad_s`, `noise_rad_s` of each rate; `filter_samples`: moving average over so many samples (1: none);
     `latency_ns`: sample to first start bit; `ppb`: its own clock fast by this many parts per billion.
     """
+
+    # what every step and every packet look at stands first, beside each other
+    bytes: ByteBuffer
+    next_sample_ns: cython.longlong
+    acknowledge: cython.longlong
+    line_free_ns: cython.longlong
+    byte_ns: cython.longlong
+    checksum: cython.longlong
+    mode: cython.longlong
+    samples: cython.longlong
+    packets: cython.longlong
+    rate_scale: cython.double
+    lag_s: cython.double
+    cross_x_from_z: cython.double
+    bias_rad_s: cython.double
+    noise_rad_s: cython.double
+    roll_bias_rad: cython.double
+    roll_noise_rad: cython.double
+    stream: RandomStream
+    filter_samples: cython.longlong
+    latency_ns: cython.longlong
+    baud: cython.longlong
+    sample_ns: cython.longlong
+    fusion_divider: cython.longlong
+    ppb: cython.longlong
+    phase_ns: cython.longlong
+    lagged: cython.double
+    rate_x: cython.double
+    roll: cython.double
+    command: cython.longlong
+    acknowledge_ns: cython.longlong
+    ring_sum: cython.double
+    ring: cython.double[64]  # MAX_FILTER
 
     def __init__(
         self,
@@ -110,6 +142,7 @@ class Imu:
         self.roll = 0.0
         self.checksum = 0
 
+    @cython.ccall
     def receive_byte(self, time: cython.longlong, byte: cython.longlong) -> cython.void:
         """A byte of the board arrived complete at `time` (ns)."""
         if self.command == 3:
@@ -124,16 +157,20 @@ class Imu:
         else:
             self.command = 1 if byte == SET_MODE else 0
 
+    @cython.ccall
     def sample_time(self, n: cython.longlong) -> cython.longlong:
         """Instant (ns) of sample n, from the count, in a clock that is `ppb` fast."""
         drift: cython.longlong = (n // 1000000) * self.ppb * (self.sample_ns // 1000)
         drift += (n % 1000000) * self.ppb * self.sample_ns // 1000000000
         return self.phase_ns + n * self.sample_ns - drift
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def is_due(self, t1: cython.longlong) -> cython.bint:
         """Whether an `update` up to `t1` (ns) has anything to do, if only to take away the bytes of the last one."""
         return self.next_sample_ns < t1 or self.acknowledge >= 0 or self.bytes.count > 0
 
+    @cython.ccall
     def update(
         self,
         t0: cython.longlong,
@@ -187,6 +224,7 @@ class Imu:
             self.samples += 1
             self.next_sample_ns = self.sample_time(self.samples)
 
+    @cython.ccall
     def _begin(self) -> cython.void:
         """Make room for a packet and start its sum."""
         line: ByteBuffer = self.bytes
@@ -195,6 +233,7 @@ class Imu:
         self.byte_ns = _TEN_BITS // self.baud
         self.checksum = 0
 
+    @cython.ccall
     def _send(self, byte: cython.longlong) -> cython.void:
         """One byte on the line, from `line_free_ns` on; 10 bits at the baud rate."""
         line: ByteBuffer = self.bytes
@@ -204,6 +243,7 @@ class Imu:
         line.values[line.count] = byte
         line.count += 1
 
+    @cython.ccall
     def _word(self, word: cython.longlong) -> cython.void:
         """Four bytes, the highest first."""
         line: ByteBuffer = self.bytes
@@ -224,12 +264,14 @@ class Imu:
         self.line_free_ns = time
         line.count = at
 
+    @cython.ccall
     def _sum(self) -> cython.void:
         """The 16-bit sum of everything since the header."""
         total: cython.longlong = self.checksum & 65535
         self._send(total >> 8)
         self._send(total & 255)
 
+    @cython.ccall
     def _packet(
         self,
         start: cython.longlong,
@@ -252,6 +294,7 @@ class Imu:
         self._sum()
         self.packets += 1
 
+    @cython.ccall
     def _acknowledge(self) -> cython.void:
         """The answer to a mode command: C4, the command, timer, sum (8 bytes)."""
         start: cython.longlong = self.acknowledge_ns + self.latency_ns

@@ -18,26 +18,70 @@ disc (rad of encoder shaft, once and twice per turn). `bounce`: share of edges t
 over again, as noise at the comparator or in the interpolated position makes them.
 """
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import cos, sin, sqrt
 
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 
-if not cython.compiled:
-    from math import cos, sin, sqrt
-
-    BOUNCE_NS = 3_000  # from over to back: chosen by us, longer than the fast interrupt, so that each edge is seen
+BOUNCE_NS: Final = 3_000  # from over to back: chosen by us, longer than the fast interrupt, so that each edge is seen
 
 PI = 3.141592653589793
 
 
+@cython.final
+@cython.cclass
 class IncrementalEncoder:
     """One encoder. `lines` per turn of its shaft; `gear` turns of the shaft per turn of the joint; `sign` of the
     mounting. `edges`: EdgeBuffer of the last `update`; `cell`: edges below the present position, the count
     that a perfect 2X decoder would hold.
     """
+
+    # what every step looks at stands first, beside each other
+    edges: EdgeBuffer
+    calm_rad: cython.double
+    calm_from: cython.double
+    calm_to: cython.double
+    edges_per_rad: cython.double
+    edges_at_zero: cython.double
+    started: cython.bint
+    eccentric: cython.bint
+    uneven: cython.bint
+    has_errors: cython.bint
+    cell: cython.longlong
+    total: cython.longlong
+    # the running piece
+    u0: cython.double
+    du: cython.double
+    m0: cython.double
+    m1: cython.double
+    span_ns: cython.double
+    t0: cython.longlong
+    last_time: cython.longlong
+    # what describes the encoder
+    bounces: cython.longlong
+    jitter: cython.double
+    bounce: cython.double
+    scale: cython.double
+    offset_rad: cython.double
+    shaft_per_rad: cython.double
+    edges_per_shaft_rad: cython.double
+    gear: cython.double
+    eccentricity_1: cython.double
+    phase_1: cython.double
+    eccentricity_2: cython.double
+    phase_2: cython.double
+    lines: cython.longlong
+    sign: cython.longlong
+    table_size: cython.longlong
+    stream: RandomStream
+    errors: cython.double[::1]
+    name: str
+    seed: object
 
     def __init__(
         self,
@@ -117,6 +161,8 @@ class IncrementalEncoder:
             self.errors[2 * line + 1] = error + duty_error
         self.started = False
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def position(self, angle: cython.double) -> cython.double:
         """Position in edges for a joint angle (rad)."""
         shaft: cython.double = self.shaft_per_rad * (self.scale * angle + self.offset_rad)
@@ -126,6 +172,8 @@ class IncrementalEncoder:
             )
         return self.edges_per_shaft_rad * shaft
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def speed(self, angle: cython.double, rate: cython.double) -> cython.double:
         """Edges per second at a joint angle and rate."""
         shaft: cython.double
@@ -136,12 +184,15 @@ class IncrementalEncoder:
             factor += 2.0 * self.eccentricity_2 * cos(2.0 * shaft + self.phase_2)
         return self.edges_per_shaft_rad * self.shaft_per_rad * self.scale * rate * factor
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def threshold(self, n: cython.longlong) -> cython.double:
         """Where edge n lies, in edges."""
         if self.has_errors:
             return n + self.errors[n % self.table_size]
         return n
 
+    @cython.ccall
     def reset(self, angle: cython.double) -> cython.void:
         """Stand at an angle without having moved: no edges. Needed after a change of what describes the encoder."""
         u: cython.double = self.position(angle)
@@ -161,10 +212,13 @@ class IncrementalEncoder:
         self.calm_rad = 0.0
         self.edges.clear()
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def level_a(self) -> cython.longlong:
         """Level of channel A now."""
         return 1 - (self.cell & 1)
 
+    @cython.ccall
     def level_b(self, angle: cython.double) -> cython.longlong:
         """Level of channel B at an angle (rad): the level A had a quarter of a line earlier."""
         u: cython.double = self.position(angle) - 0.5
@@ -173,6 +227,7 @@ class IncrementalEncoder:
             n -= 1
         return 1 - (n & 1)
 
+    @cython.ccall
     @cython.cdivision(True)  # what is divided by is not zero
     def update(
         self,
@@ -289,6 +344,7 @@ class IncrementalEncoder:
             x += direction
         return count
 
+    @cython.cfunc
     def _one_way(
         self,
         t0: cython.longlong,
@@ -348,6 +404,7 @@ class IncrementalEncoder:
         self.total += count
         return count
 
+    @cython.ccall
     def add_bounces(self, t1: cython.longlong) -> cython.longlong:
         """Let edges of the last `update` bounce, which ended at `t1` (ns); returns how many do.
 
@@ -376,6 +433,7 @@ class IncrementalEncoder:
         self.bounces += count
         return count
 
+    @cython.cfunc
     def _calm(self) -> cython.void:
         """Find the joint angles between the two edges beside the present position, a tenth of an edge inside."""
         a: cython.double = self.edges_per_rad
@@ -389,12 +447,15 @@ class IncrementalEncoder:
             a = -a
         self.calm_rad = 0.5 / a  # 4/27 of it are less than a tenth of an edge
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def _value(self, x: cython.double) -> cython.double:
         """The cubic at the fraction x of the step, in edges."""
         return self.u0 + x * (
             self.m0 + x * (3.0 * self.du - 2.0 * self.m0 - self.m1 + x * (self.m0 + self.m1 - 2.0 * self.du))
         )
 
+    @cython.ccall
     def _turning(
         self,
         t0: cython.longlong,
@@ -449,6 +510,7 @@ class IncrementalEncoder:
         self.calm_rad = 0.0
         self.total += self.edges.count - before
 
+    @cython.ccall
     def _piece(self, x0: cython.double, x1: cython.double) -> None:
         """Edges between two fractions of the step in which the cubic runs one way."""
         start: cython.double = self._value(x0)
@@ -462,6 +524,7 @@ class IncrementalEncoder:
                 self.cell -= 1
                 self._emit(x0, x1, self.threshold(self.cell + 1), (self.cell + 1) & 1)
 
+    @cython.ccall
     def _emit(self, x0: cython.double, x1: cython.double, level: cython.double, level_b: cython.longlong) -> None:
         """One edge where the cubic passes `level` between two fractions of the step (bisection)."""
         low: cython.double = x0

@@ -27,11 +27,20 @@ def quantile_table() -> list[float]:
     return half + [-value for value in reversed(half)]
 
 
+@cython.final
+@cython.cclass
 class NoiseSource:
     """Normal numbers of one named stream. `seed`: any integer; `name`: unique per source.
 
     A source gives either single values (`normal`) or places (`block`): the former are drawn ahead.
     """
+
+    drawn: cython.longlong
+    ahead: cython.double[60]
+    left: cython.longlong
+    word: cython.longlong
+    table: cython.double[::1]
+    stream: RandomStream
 
     def __init__(self, seed, name) -> None:
         self.stream = RandomStream(seed, name)
@@ -46,6 +55,8 @@ class NoiseSource:
         self.ahead = [0.0] * 60  # drawn and not given yet; the first to come last
         self.drawn = 0
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def normal(self) -> cython.double:
         """The next value, mean 0, variance 1: at the place that `block` would give."""
         if self.drawn == 0:
@@ -53,6 +64,7 @@ class NoiseSource:
         self.drawn -= 1
         return self.ahead[self.drawn]
 
+    @cython.cfunc
     @cython.final
     def _draw_ahead(self) -> cython.void:
         """The next 60 values at once: the processor fetches them side by side, not each from memory in its turn.
@@ -71,6 +83,8 @@ class NoiseSource:
                 word >>= 12
         self.drawn = 60
 
+    @cython.ccall
+    @cython.exceptval(check=False)
     def block(self) -> cython.longlong:
         """A random place of `table` (0 ... 4095): 64 values from there on are noise of so many channels."""
         place: cython.longlong

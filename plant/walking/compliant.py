@@ -2,22 +2,22 @@
 # (only by a number of parts)
 """Motion on a floor that gives: no foot is held, none strikes (EQUATIONS 9)."""
 
+from typing import Final
+
 import cython
 
-if not cython.compiled:
-    from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, FLIGHT, SINGLE
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.sliding import slide
-    from ranger_sim.plant.walking.lift_off import leave
+from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, FLIGHT, SINGLE, Body
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.sliding import slide
+from ranger_sim.plant.walking.lift_off import leave
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    # Parts of a step. Friction at 400 N stops a foot of 0.0012 kg m^2 54 mm below its ankle with a time constant of
-    # 11 us; Runge and Kutta's method is stable up to 2.8 times that, so 25 us. Chosen by us.
-    PARTS = 10
+# Parts of a step. Friction at 400 N stops a foot of 0.0012 kg m^2 54 mm below its ankle with a time constant of
+# 11 us; Runge and Kutta's method is stable up to 2.8 times that, so 25 us. Chosen by us.
+PARTS: Final = 10
 
 
-def press(body, h: cython.double) -> None:
+@cython.cfunc
+def press(body: "Body", h: cython.double) -> None:
     """Move on by `h` seconds; touches and lift-offs are noted to a part, 25 us."""
     part: cython.longlong
     outer: cython.double
@@ -34,7 +34,8 @@ def press(body, h: cython.double) -> None:
         meet(body, body.inner, inner)
 
 
-def meet(body, leg, before: cython.double) -> None:
+@cython.cfunc
+def meet(body: "Body", leg: "Leg", before: cython.double) -> None:
     """The foot's gap was `before` and is what it is: has it touched, or left?"""
     other: Leg = body.other(leg)
     stands: cython.bint = body.mode == DOUBLE or (body.mode == SINGLE and leg is body.stance)
@@ -46,7 +47,8 @@ def meet(body, leg, before: cython.double) -> None:
         stand(body, leg, ahead)
 
 
-def stand(body, leg, ahead: cython.double) -> None:
+@cython.cfunc
+def stand(body: "Body", leg: "Leg", ahead: cython.double) -> None:
     """This foot carries from here on; a step is counted when it has struck ahead."""
     strike: cython.bint = leg is not body.last_strike and ahead > body.strike_ahead
     body.mode = SINGLE if body.mode == FLIGHT else DOUBLE

@@ -1,29 +1,29 @@
 """Whether a standing foot sticks, slides or leaves, while no foot strikes (EQUATIONS 9)."""
 
+from typing import Final
+
 import cython
+from cython.cimports.libc.math import fabs
 
-if not cython.compiled:
-    from math import fabs
+from ranger_sim.plant.mechanics.body import DOUBLE, FLIGHT, SINGLE, Body
+from ranger_sim.plant.mechanics.contact_equations import APART, SLIDES_BACK, SLIDES_ON, STICKS, ContactEquations
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.sliding import slide, write_forces
+from ranger_sim.plant.mechanics.stance import on_feet
+from ranger_sim.plant.walking.impact import collide, take_states
+from ranger_sim.plant.walking.lift_off import leave
 
-    from ranger_sim.plant.mechanics.body import DOUBLE, FLIGHT, SINGLE
-    from ranger_sim.plant.mechanics.contact_equations import APART, SLIDES_BACK, SLIDES_ON, STICKS, ContactEquations
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.sliding import slide, write_forces
-    from ranger_sim.plant.mechanics.stance import on_feet
-    from ranger_sim.plant.walking.impact import collide, take_states
-    from ranger_sim.plant.walking.lift_off import leave
-
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    # what `Body.event` says of `Body.event_leg`
-    NO_EVENT = 0
-    TOUCH = 1
-    LIFT_OFF = 2
-    SLIDE = 3
-    STICK = 4
+# what `Body.event` says of `Body.event_leg`
+NO_EVENT: Final = 0
+TOUCH: Final = 1
+LIFT_OFF: Final = 2
+SLIDE: Final = 3
+STICK: Final = 4
 
 
-def asks_too_much(body) -> cython.bint:
+@cython.cfunc
+@cython.exceptval(check=False)
+def asks_too_much(body: "Body") -> cython.bint:
     """Whether a foot, by the forces left in the legs, would have to be pulled or held beyond friction."""
     if body.mode == SINGLE:
         return margin(body, body.stance) < 0.0
@@ -32,14 +32,18 @@ def asks_too_much(body) -> cython.bint:
     return margin(body, body.outer) < 0.0 or margin(body, body.inner) < 0.0
 
 
-def margin(body, leg) -> cython.double:
+@cython.cfunc
+@cython.exceptval(check=False)
+def margin(body: "Body", leg: "Leg") -> cython.double:
     """What is left of a standing foot's friction, N; of one that slides, of its normal force."""
     if leg.slide != 0:
         return leg.Fy
     return body.sole.mu * leg.Fy - fabs(leg.Fx)
 
 
-def near_the_bounds(body) -> cython.bint:
+@cython.cfunc
+@cython.exceptval(check=False)
+def near_the_bounds(body: "Body") -> cython.bint:
     """Whether an event of the grip may happen within this step, by the forces at its start.
 
     Feet that slide, and two feet, are looked at after every step. In single stance forces change by less than 2 N in a
@@ -51,7 +55,8 @@ def near_the_bounds(body) -> cython.bint:
     return body.mode == SINGLE or body.mode == DOUBLE
 
 
-def grip_witness(body, value: cython.double) -> cython.double:
+@cython.cfunc
+def grip_witness(body: "Body", value: cython.double) -> cython.double:
     """The witness of the next event of the grip: `value` of another event, or less, and then `event` says which.
 
     SLIDE: a foot's friction is used up (N). LIFT_OFF: the normal force of a sliding foot (N). STICK: the speed of a
@@ -82,7 +87,8 @@ def grip_witness(body, value: cython.double) -> cython.double:
     return value
 
 
-def regrip(body) -> cython.bint:
+@cython.ccall
+def regrip(body: "Body") -> cython.bint:
     """Find what the standing feet do from here on, by trying (EQUATIONS 9); True when that is something new.
 
     `event` of `event_leg` happens now: SLIDE and STICK say what that foot cannot do any more.
@@ -112,7 +118,8 @@ def regrip(body) -> cython.bint:
     return take_grip(body)
 
 
-def allow(body, leg) -> cython.void:
+@cython.cfunc
+def allow(body: "Body", leg: "Leg") -> cython.void:
     """What this standing foot may do next: one that slides goes on or leaves, one that does not may do anything."""
     x: ContactEquations = body.equations
     way: cython.longlong = leg.slide
@@ -127,7 +134,8 @@ def allow(body, leg) -> cython.void:
         x.moving[side] = True
 
 
-def jam(body) -> cython.bint:
+@cython.cfunc
+def jam(body: "Body") -> cython.bint:
     """No state of the feet fits: forces cannot keep them out of the floor, impulses can (Painleve's paradox).
 
     True when those impulses have changed what the feet do.
@@ -142,7 +150,8 @@ def jam(body) -> cython.bint:
     return body.mode != mode or body.outer.slide != outer or body.inner.slide != inner
 
 
-def take_grip(body) -> cython.bint:
+@cython.cfunc
+def take_grip(body: "Body") -> cython.bint:
     """Let the feet do what the equations have found in `state`; True when that is something new."""
     leg: Leg
     way: cython.longlong

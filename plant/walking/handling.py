@@ -2,13 +2,13 @@
 
 import cython
 
-if not cython.compiled:
-    from ranger_sim.plant.mechanics.body import HELD, SINGLE
-    from ranger_sim.plant.mechanics.leg import OUTER, Leg
-    from ranger_sim.plant.walking.watch import fall
+from ranger_sim.plant.mechanics.body import HELD, SINGLE, Body
+from ranger_sim.plant.mechanics.leg import OUTER, Leg
+from ranger_sim.plant.walking.watch import fall
 
 
-def place(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
+@cython.ccall
+def place(body: "Body", outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
     """Everything at rest in the operator's hands, feet square to their legs, the hip free."""
     leg: Leg
     body.outer.angle = outer_leg_rad
@@ -20,7 +20,8 @@ def place(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
     hold(body, outer_leg_rad)
 
 
-def hold(body, outer_leg_rad: cython.double) -> None:
+@cython.ccall
+def hold(body: "Body", outer_leg_rad: cython.double) -> None:
     """Lift the robot by its outer legs, which the operator keeps at this lean, motionless.
 
     The inner leg hangs at the hip and both feet hang free, so the motors move them; the hip is 50 mm higher
@@ -49,7 +50,8 @@ def hold(body, outer_leg_rad: cython.double) -> None:
     body.update_pose()
 
 
-def hold_both(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
+@cython.ccall
+def hold_both(body: "Body", outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
     """As `hold`, and the operator keeps the inner legs at this hip angle too."""
     body.inner.angle = outer_leg_rad - hip_rad
     body.inner.rate = 0.0
@@ -57,7 +59,10 @@ def hold_both(body, outer_leg_rad: cython.double, hip_rad: cython.double) -> Non
     body.lock_hip = True
 
 
-def hold_standing(body, outer_leg_rad: cython.double, hip_rad: cython.double, stance: cython.longlong = OUTER) -> None:
+@cython.ccall
+def hold_standing(
+    body: "Body", outer_leg_rad: cython.double, hip_rad: cython.double, stance: cython.longlong = OUTER
+) -> None:
     """As `hold_both`, with the stance foot on the floor under the robot's weight, where it may roll.
 
     The hands guide the legs' angles only. They also damp the rolling; 2 N m s/rad, about critical for the
@@ -72,8 +77,9 @@ def hold_standing(body, outer_leg_rad: cython.double, hip_rad: cython.double, st
     body.update_pose()
 
 
+@cython.ccall
 def release(
-    body,
+    body: "Body",
     outer_leg_rate: cython.double,
     stance: cython.longlong = OUTER,
     stance_foot_rate: cython.double = 0.0,
@@ -92,7 +98,8 @@ def release(
     begin_walk(body)
 
 
-def begin_walk(body) -> None:
+@cython.ccall
+def begin_walk(body: "Body") -> None:
     """Stand on the stance foot from here on: anchors, footholds and the record start anew."""
     first: cython.double = body.floor.first_height()
     leg: Leg

@@ -2,24 +2,24 @@
 
 import cython
 
-if not cython.compiled:
-    from ranger_sim.plant.mechanics.body import DOUBLE, FLIGHT, SINGLE
-    from ranger_sim.plant.mechanics.contact_equations import (
-        APART,
-        COLUMN_FOOT,
-        COLUMN_IMPULSE,
-        COLUMN_LEG,
-        COLUMN_VX,
-        COLUMN_VY,
-        SLIDES_BACK,
-        SLIDES_ON,
-        STICKS,
-        ContactEquations,
-    )
-    from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.body import DOUBLE, FLIGHT, SINGLE, Body
+from ranger_sim.plant.mechanics.contact_equations import (
+    APART,
+    COLUMN_FOOT,
+    COLUMN_IMPULSE,
+    COLUMN_LEG,
+    COLUMN_VX,
+    COLUMN_VY,
+    SLIDES_BACK,
+    SLIDES_ON,
+    STICKS,
+    ContactEquations,
+)
+from ranger_sim.plant.mechanics.leg import Leg
 
 
-def touch(body, leg) -> None:
+@cython.cfunc
+def touch(body: "Body", leg: "Leg") -> None:
     """The leg's foot meets the floor: anchor it, take the impact, count a step when it strikes ahead."""
     before: Leg = body.stance  # the leg that stood, or stood last
     after: Leg = body.swing
@@ -61,21 +61,24 @@ def touch(body, leg) -> None:
         body.swing.limp()
 
 
-def set_down(body, leg) -> cython.void:
+@cython.cfunc
+def set_down(body: "Body", leg: "Leg") -> cython.void:
     """The foot stands where it is, and as deep as it is when it strikes with its sole already pressed."""
     body.anchor_foot(leg)
     leg.armed = False
     leg.height += leg.gap
 
 
-def land(body, leg) -> None:
+@cython.cfunc
+def land(body: "Body", leg: "Leg") -> None:
     """From flight to single stance on this leg."""
     impact(body, leg is body.outer, leg is body.inner)
     body.mode = SINGLE
     body.stand_on(leg)
 
 
-def close_linkage(body, leg) -> None:
+@cython.cfunc
+def close_linkage(body: "Body", leg: "Leg") -> None:
     """From single to double stance with this leg, or on to it alone.
 
     The rule of the appendix keeps the trailing foot on the floor, by a pull if need be (EQUATIONS 8).
@@ -93,7 +96,8 @@ def close_linkage(body, leg) -> None:
     body.stand_on(leg)
 
 
-def impact(body, outer: cython.bint, inner: cython.bint) -> None:
+@cython.ccall
+def impact(body: "Body", outer: cython.bint, inner: cython.bint) -> None:
     """Rates just after the feet named here are at rest on the floor, by a pull if need be (EQUATIONS 8).
 
     The motors, behind their cables, keep their rates. Each leg keeps the impulse that its foot took, 0 without one.
@@ -104,7 +108,8 @@ def impact(body, outer: cython.bint, inner: cython.bint) -> None:
     take_rates(body)
 
 
-def collide(body, leg, other_stands: cython.bint) -> None:
+@cython.ccall
+def collide(body: "Body", leg: "Leg", other_stands: cython.bint) -> None:
     """Rates just after this leg's foot has met the floor, which neither pulls nor holds beyond friction (EQUATIONS 8).
 
     `other_stands`: the other foot is on the floor too. What the feet do then is left in the equations' `state`.
@@ -117,7 +122,8 @@ def collide(body, leg, other_stands: cython.bint) -> None:
     take_rates(body)
 
 
-def take_states(body, leg) -> None:
+@cython.cfunc
+def take_states(body: "Body", leg: "Leg") -> None:
     """The body's mode after `collide`, and which feet slide. `leg` touched: it leads when both stand."""
     equations: ContactEquations = body.equations
     other: Leg = body.other(leg)
@@ -137,7 +143,8 @@ def take_states(body, leg) -> None:
     body.stand_on(leg if stands else other)
 
 
-def take_slides(body) -> cython.void:
+@cython.cfunc
+def take_slides(body: "Body") -> cython.void:
     """Which feet slide, and which way, out of the equations' `state`."""
     equations: ContactEquations = body.equations
     leg: Leg
@@ -150,7 +157,8 @@ def take_slides(body) -> cython.void:
     body.sliding = body.outer.slide != 0 or body.inner.slide != 0
 
 
-def write_momentum(body) -> None:
+@cython.cfunc
+def write_momentum(body: "Body") -> None:
     """Into the equations: what the momentum of hip, legs and feet was before, and what a massless foot does."""
     row: cython.longlong
     column: cython.longlong
@@ -171,7 +179,8 @@ def write_momentum(body) -> None:
             equations.follow[leg.side] = leg.motor_rate
 
 
-def take_rates(body) -> None:
+@cython.cfunc
+def take_rates(body: "Body") -> None:
     """Out of the equations: rates of hip, legs and feet, and the impulses on the feet."""
     leg: Leg
     x: cython.p_double = body.equations.solution

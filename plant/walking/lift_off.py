@@ -2,28 +2,32 @@
 
 import cython
 
-if not cython.compiled:
-    from ranger_sim.plant.mechanics.air import in_air
-    from ranger_sim.plant.mechanics.body import DOUBLE, FLIGHT, SINGLE
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.stance import on_feet
+from ranger_sim.plant.mechanics.air import in_air
+from ranger_sim.plant.mechanics.body import DOUBLE, FLIGHT, SINGLE, Body
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.stance import on_feet
 
 
-def may_leave(body, leg) -> cython.bint:
+@cython.cfunc
+@cython.exceptval(check=False)
+def may_leave(body: "Body", leg: "Leg") -> cython.bint:
     """Feet on the floor may leave it; the leading one in double stance only with `lift_leading`."""
     if body.mode == SINGLE:
         return leg is body.stance
     return body.lift_leading or leg is not body.last_strike
 
 
-def sole_ready(body, leg) -> cython.bint:
+@cython.cfunc
+@cython.exceptval(check=False)
+def sole_ready(body: "Body", leg: "Leg") -> cython.bint:
     """True when this foot of a double stance is not ahead: let go, its sole stops it from driving in."""
     if body.mode != DOUBLE or leg.Jf == 0.0:
         return False
     return body.other(leg).behind() - leg.behind() < body.strike_ahead
 
 
-def lets_go(body, leg) -> cython.bint:
+@cython.ccall
+def lets_go(body: "Body", leg: "Leg") -> cython.bint:
     """True when this foot, let go by the floor now, would rise: only then may it leave (EQUATIONS 9).
 
     A rigid foot that sticks can ask for a pull and yet, let go, drive into the floor, because letting go also
@@ -71,7 +75,8 @@ def lets_go(body, leg) -> cython.bint:
     return gap > -1e-9 and away > 0.0
 
 
-def leave(body, leg) -> None:
+@cython.cfunc
+def leave(body: "Body", leg: "Leg") -> None:
     """The leg's foot goes off the floor; the other one carries, or none does."""
     other: Leg = body.other(leg)
     leg.armed = False

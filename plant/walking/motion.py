@@ -7,37 +7,37 @@ number that is above zero before and falls through zero as it happens: the clear
 normal force on a standing one (N), what is left of its friction (N), its speed (m/s).
 """
 
+from typing import Final
+
 import cython
 
-if not cython.compiled:
-    from ranger_sim.plant.mechanics.air import in_air
-    from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, HELD, SINGLE
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.sliding import slide
-    from ranger_sim.plant.mechanics.stance import on_feet
-    from ranger_sim.plant.walking.compliant import press
-    from ranger_sim.plant.walking.grip import (
-        LIFT_OFF,
-        NO_EVENT,
-        SLIDE,
-        STICK,
-        TOUCH,
-        asks_too_much,
-        grip_witness,
-        near_the_bounds,
-        regrip,
-    )
-    from ranger_sim.plant.walking.impact import touch
-    from ranger_sim.plant.walking.lift_off import leave, lets_go, may_leave, sole_ready
-    from ranger_sim.plant.walking.watch import watch
+from ranger_sim.plant.mechanics.air import in_air
+from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, HELD, SINGLE, Body
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.sliding import slide
+from ranger_sim.plant.mechanics.stance import on_feet
+from ranger_sim.plant.walking.compliant import press
+from ranger_sim.plant.walking.grip import (
+    LIFT_OFF,
+    NO_EVENT,
+    SLIDE,
+    STICK,
+    TOUCH,
+    asks_too_much,
+    grip_witness,
+    near_the_bounds,
+    regrip,
+)
+from ranger_sim.plant.walking.impact import touch
+from ranger_sim.plant.walking.lift_off import leave, lets_go, may_leave, sole_ready
+from ranger_sim.plant.walking.watch import watch
 
-# C constants when compiled: the same numbers stand in the .pxd, and a test holds them together.
-if not cython.compiled:
-    MOST_EVENTS = 20  # in one step; what comes after is left for the next step
-    MOST_TRIES = 60  # to locate an event; a bisection needs 22
+MOST_EVENTS: Final = 20  # in one step; what comes after is left for the next step
+MOST_TRIES: Final = 60  # to locate an event; a bisection needs 22
 
 
-def advance(body, h: cython.double) -> None:
+@cython.ccall
+def advance(body: "Body", h: cython.double) -> None:
     """Move on by `h` seconds under constant laws of the motors' torques, events located inside (EQUATIONS 15)."""
     remaining: cython.double = h
     used: cython.double
@@ -75,7 +75,8 @@ def advance(body, h: cython.double) -> None:
         watch(body, h)
 
 
-def move(body, h: cython.double) -> None:
+@cython.cfunc
+def move(body: "Body", h: cython.double) -> None:
     """One step of the equations of motion, in whatever mode the body is."""
     if body.sliding:
         slide(body, h, 4)
@@ -86,7 +87,8 @@ def move(body, h: cython.double) -> None:
         body.update_pose()
 
 
-def change_grip(body, h: cython.double) -> cython.bint:
+@cython.cfunc
+def change_grip(body: "Body", h: cython.double) -> cython.bint:
     """A foot would be pulled, or held beyond friction, at the start of this piece of `h` seconds: find what it does.
 
     True when it does something new: then the state is that of the start.
@@ -99,7 +101,8 @@ def change_grip(body, h: cython.double) -> cython.bint:
     return False
 
 
-def let_pulled_foot_go(body, h: cython.double) -> cython.bint:
+@cython.cfunc
+def let_pulled_foot_go(body: "Body", h: cython.double) -> cython.bint:
     """Let a foot go that the floor would have to pull at the start of this piece of `h` seconds.
 
     True when one was: then the state is that of the start. The foot that is pulled more is asked first.
@@ -127,12 +130,15 @@ def let_pulled_foot_go(body, h: cython.double) -> cython.bint:
     return False
 
 
-def clearance(leg) -> cython.double:
+@cython.cfunc
+@cython.exceptval(check=False)
+def clearance(leg: "Leg") -> cython.double:
     """The witness of a touch: the foot's gap, m. One that has just left the floor must first be clear of it."""
     return leg.gap + (0.0 if leg.armed else 2e-6)
 
 
-def free_to_leave(body, leg) -> cython.bint:
+@cython.cfunc
+def free_to_leave(body: "Body", leg: "Leg") -> cython.bint:
     """Whether the normal force on this foot is the witness of its lift-off: it does not stay for another reason.
 
     A foot that is pulled and yet would not rise stays (EQUATIONS 9).
@@ -140,7 +146,8 @@ def free_to_leave(body, leg) -> cython.bint:
     return may_leave(body, leg) and (leg.Fy >= 0.0 or sole_ready(body, leg) or lets_go(body, leg))
 
 
-def witness(body) -> cython.double:
+@cython.cfunc
+def witness(body: "Body") -> cython.double:
     """The witness of the event that is next; below 0 when it lies behind. `event` and `event_leg` name it."""
     value: cython.double = 1.0  # of no event: far from one
     body.event = NO_EVENT
@@ -162,7 +169,9 @@ def witness(body) -> cython.double:
     return touch_witness(body)
 
 
-def touch_witness(body) -> cython.double:
+@cython.cfunc
+@cython.exceptval(check=False)
+def touch_witness(body: "Body") -> cython.double:
     """The witness of a foot in the air: its clearance, m."""
     value: cython.double
     if body.mode == SINGLE:
@@ -178,14 +187,16 @@ def touch_witness(body) -> cython.double:
     return clearance(body.event_leg)
 
 
-def try_piece(body, h: cython.double) -> cython.double:
+@cython.cfunc
+def try_piece(body: "Body", h: cython.double) -> cython.double:
     """The witness after a piece of `h` seconds from the saved state."""
     body.restore()
     move(body, h)
     return witness(body)
 
 
-def locate(body, h: cython.double) -> cython.double:
+@cython.cfunc
+def locate(body: "Body", h: cython.double) -> cython.double:
     """Time in (0, h] at which the witness falls through 0, within 1e-10 s (Illinois method)."""
     low: cython.double = 0.0
     high: cython.double = h
@@ -225,7 +236,8 @@ def locate(body, h: cython.double) -> cython.double:
     return high
 
 
-def act(body) -> None:
+@cython.cfunc
+def act(body: "Body") -> None:
     """Do what the located event asks for."""
     body.update_hip_rates()
     if body.event == TOUCH:

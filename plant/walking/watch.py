@@ -3,16 +3,15 @@
 """What is noticed once per step of a walk: feet clear of the floor, footholds, extremes of the forces, falls."""
 
 import cython
+from cython.cimports.libc.math import fabs
 
-if not cython.compiled:
-    from math import fabs
-
-    from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, FLIGHT, SINGLE
-    from ranger_sim.plant.mechanics.leg import Leg
-    from ranger_sim.plant.mechanics.observed import Observed
+from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, FLIGHT, SINGLE, Body
+from ranger_sim.plant.mechanics.leg import Leg
+from ranger_sim.plant.mechanics.observed import Observed
 
 
-def watch(body, h: cython.double) -> None:
+@cython.ccall
+def watch(body: "Body", h: cython.double) -> None:
     """Once per step of `h` seconds, while the robot walks."""
     arm(body.outer)
     arm(body.inner)
@@ -22,13 +21,15 @@ def watch(body, h: cython.double) -> None:
     judge_fall(body)
 
 
-def arm(leg) -> cython.void:
+@cython.cfunc
+def arm(leg: "Leg") -> cython.void:
     """A foot that is clear of the floor can touch it again."""
     if not leg.armed and leg.gap > 1e-6:
         leg.armed = True
 
 
-def watch_swing_foot(body, h: cython.double) -> None:
+@cython.cfunc
+def watch_swing_foot(body: "Body", h: cython.double) -> None:
     """Draw its next foothold, notice its sole on the floor, keep its lowest clearance."""
     seen: Observed = body.seen
     w: Leg = body.swing
@@ -55,7 +56,8 @@ def watch_swing_foot(body, h: cython.double) -> None:
         seen.passing_gap = gap
 
 
-def keep_forces(body, h: cython.double) -> cython.void:
+@cython.ccall
+def keep_forces(body: "Body", h: cython.double) -> cython.void:
     """Worst friction ratio and pull of the walk; time with more than the floor's friction."""
     seen: Observed = body.seen
     least: cython.double = body.stance.Fy
@@ -73,7 +75,9 @@ def keep_forces(body, h: cython.double) -> cython.void:
         seen.pull_s += h
 
 
-def slips(body, leg) -> cython.bint:
+@cython.cfunc
+@cython.exceptval(check=False)
+def slips(body: "Body", leg: "Leg") -> cython.bint:
     """Whether this foot slides or asks for more than the floor's friction; the worst friction ratio is kept."""
     along: cython.double = fabs(leg.Fx)
     if leg.slide != 0:
@@ -86,7 +90,8 @@ def slips(body, leg) -> cython.bint:
     return along > body.sole.mu * leg.Fy
 
 
-def judge_fall(body) -> None:
+@cython.cfunc
+def judge_fall(body: "Body") -> None:
     """The walk is over when the robot lies, leans too far, splits its legs or stands still (EQUATIONS 16)."""
     seen: Observed = body.seen
     s: cython.double = body.stance.angle
@@ -104,7 +109,8 @@ def judge_fall(body) -> None:
         fall(body, "stalled")
 
 
-def fall(body, cause) -> None:
+@cython.ccall
+def fall(body: "Body", cause) -> None:
     """The walk ends here: the body lies still, with the cause."""
     body.mode = FALLEN
     body.cause = cause

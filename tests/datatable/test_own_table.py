@@ -67,7 +67,7 @@ def test_a_table_that_changed_after_its_code_was_made_is_refused(mine, monkeypat
 def test_a_folder_without_generated_code_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(loading, "OWN_TABLE", tmp_path)
     with pytest.raises(UserError, match="RANGER_SIM_TABLE: nothing was generated in"):
-        loading.RoomFinder.find_spec(loading.GENERATED, ["elsewhere"])
+        datatable.place_of_generated(["ours"])
 
 
 def test_a_copy_never_goes_over_a_folder_that_is_there(tmp_path, capsys):

@@ -9,15 +9,13 @@ import cython
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.events import STAGE_BUS, EventQueue
-
-if not cython.compiled:
-    from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE
+from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, STAGE_BUS, EventQueue
 
 ROBOT_BIT_RATE = 3_000_000  # bit/s, robot.md N1.2
 ROBOT_BUSES = 4
 
 
+@cython.cclass
 class Load:
     """Nodes on some buses that send all the time and check every frame they hear.
 
@@ -26,6 +24,23 @@ class Load:
     and with 1 or more every buffer is refilled as soon as it is free. The data carry a running number
     per identifier: a frame lost, doubled or out of order shows up in `out_of_order`.
     """
+
+    buses: list
+    inboxes: list
+    per_node: cython.longlong
+    nodes_per_bus: cython.longlong
+    period_ns: cython.longlong
+    quantum_ns: cython.longlong
+    time: cython.longlong
+    requested: cython.longlong
+    delivered: cython.longlong
+    done: cython.longlong
+    out_of_order: cython.longlong
+    wrong: cython.longlong
+    sent: cython.longlong[::1]
+    expected: cython.longlong[::1]
+    free: cython.longlong[::1]
+    word: cython.longlong[::1]
 
     def __init__(self, buses=4, nodes_per_bus=3, load=0.75, per_node=3) -> None:
         self.per_node = per_node
@@ -55,6 +70,8 @@ class Load:
         self.free = array.array("q", [7]) * count  # bit set of free buffers
         self.word = array.array("q", [0]) * (2 * count)  # next instant to send (ns), identifiers used
 
+    @cython.ccall
+    @cython.exceptval(check=True)
     def run(self, frames: cython.longlong) -> cython.void:
         """Pass time until `frames` have been asked for, then until the buses are empty."""
         bus: Bus
@@ -102,6 +119,8 @@ class Load:
                         self.requested += 1
             self.time += self.quantum_ns
 
+    @cython.cfunc
+    @cython.exceptval(check=True)
     def _drain(self, bus: Bus, b: cython.longlong, n: cython.longlong, inbox: EventQueue) -> cython.void:
         """What a node heard up to now."""
         sender: cython.longlong

@@ -18,8 +18,7 @@ from collections import Counter
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import HOUSE
-from ranger_sim.rooms import ROOMS
+from ranger_sim.loading import CHECKOUT, PACKAGE, packages
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import whole_number
 from ranger_sim.tools.mutate.mutants import Mutant
@@ -65,7 +64,7 @@ def parser() -> argparse.ArgumentParser:
     command = argparse.ArgumentParser(
         prog=COMMAND, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    command.add_argument("room", nargs="+", choices=ROOMS, metavar="ROOM", help=", ".join(ROOMS))
+    command.add_argument("room", nargs="+", choices=packages(), metavar="ROOM", help=", ".join(packages()))
     command.add_argument(
         "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each room (default {COUNT})"
     )
@@ -100,7 +99,7 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--work",
         type=pathlib.Path,
-        default=HOUSE / "build" / "mutate",
+        default=(CHECKOUT or pathlib.Path()) / "build" / "mutate",
         metavar="DIR",
         help="copy, map of the tests and verdicts (default build/mutate)",
     )
@@ -194,7 +193,7 @@ def told(room: str, every: list[Mutant], drawn: list[Mutant], results: Results, 
         outcome = "equivalent" if mutant.key in equivalent else results.verdicts[mutant.key].outcome
         if outcome in (*NOTICED, "equivalent"):
             continue
-        source = (HOUSE / mutant.path).read_text(encoding="utf-8")
+        source = (PACKAGE / mutant.path).read_text(encoding="utf-8")
         survivors.append({"place": f"{mutant.path}:{mutant.line}", "outcome": outcome, "key": mutant.key})
         say(f"\n{mutant.path}:{mutant.line}: {outcome}; {mutant.function or 'module'}\n{mutant.difference(source)}")
     share = "none" if rate is None else f"{100.0 * rate:.0f} %"

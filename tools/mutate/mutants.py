@@ -1,8 +1,7 @@
 """The faults that can be put into a source file: one expression or statement of it, replaced.
 
 Left alone: annotations, decorators, defaults of fields, doc strings, the text of messages (everything inside `raise`
-and f-strings), and what stands under `if not cython.compiled` or asks for it, because the .pxd says it a second time
-and tests/test_architecture.py holds both together.
+and f-strings), and what asks for `cython.compiled`: a mutant runs interpreted.
 """
 
 import ast

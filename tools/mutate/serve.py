@@ -29,10 +29,9 @@ from typing import Any
 
 import pytest
 
-from ranger_sim.loading import HOUSE
-from ranger_sim.rooms import ROOMS
+from ranger_sim.loading import PACKAGE, packages
 
-ROOTS = tuple(str(HOUSE / room) + os.sep for room in ROOMS)
+ROOTS = tuple(str(PACKAGE / name) + os.sep for name in packages())
 ASKED_BY = "RANGER_SIM_MUTANTS"
 STARTING = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # the interpreter's audit events
 
@@ -140,7 +139,7 @@ class Watch:
 
 def places(codes: set[CodeType]) -> list[str]:
     """`path:line` of those that belong to the rooms, in order."""
-    root = len(str(HOUSE)) + 1
+    root = len(str(PACKAGE)) + 1
     return sorted(
         {f"{code.co_filename[root:]}:{code.co_firstlineno}" for code in codes if code.co_filename.startswith(ROOTS)}
     )
@@ -228,7 +227,7 @@ class Server:
 
     def judge(self, request: dict) -> dict:
         """Run the tests until one fails."""
-        exchange(HOUSE / request["path"], request["before"], request["after"])
+        exchange(PACKAGE / request["path"], request["before"], request["after"])
         chosen = [self.items[name] for name in request["tests"]]
         for item, following in zip(chosen, [*chosen[1:], None], strict=True):
             reports = run(item, following, request["limit_test_s"])

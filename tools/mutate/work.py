@@ -17,7 +17,15 @@ from typing import Any, TextIO
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import BUILD_RECORD, HOUSE, LIBRARY, RUNS_INTERPRETED_BECAUSE
+from ranger_sim.loading import (
+    CHECKOUT,
+    COMPILED,
+    IS_COMPILED,
+    PACKAGE,
+    RECORD,
+    RUNS_COMPILED,
+    RUNS_INTERPRETED_BECAUSE,
+)
 from ranger_sim.tools.mutate.mutants import Mutant, mutants
 from ranger_sim.tools.mutate.serve import ASKED_BY
 
@@ -74,7 +82,7 @@ def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
     return found
 
 
-def all_mutants(room: str, house: pathlib.Path = HOUSE) -> list[Mutant]:
+def all_mutants(room: str, house: pathlib.Path = PACKAGE) -> list[Mutant]:
     """Every mutant of a room, in order of file and place."""
     found: list[Mutant] = []
     for path in sorted((house / room).rglob("*.py")):
@@ -96,7 +104,9 @@ def sample(every: list[Mutant], room: str, count: int, seed: int) -> list[Mutant
 class Copy:
     """The repository's files in another folder, where mutants live; the folder may be one that an earlier run left."""
 
-    def __init__(self, folder: pathlib.Path, house: pathlib.Path = HOUSE) -> None:
+    def __init__(self, folder: pathlib.Path, house: pathlib.Path | None = CHECKOUT) -> None:
+        if house is None:
+            raise UserError("mutants need a checkout with its .git")
         self.folder = folder = folder.resolve()  # what runs there has another working folder than we
         self.house = house
         listed = subprocess.run(
@@ -107,25 +117,29 @@ class Copy:
         )
         if listed.returncode:
             raise UserError(f"{house}: mutants need a checkout with its .git: {listed.stderr.decode().strip()}")
-        names = [name for name in listed.stdout.decode().split("\0") if name and (house / name).is_file()]
+        names = [
+            name
+            for name in listed.stdout.decode().split("\0")
+            if name and ((house / name).is_file() or (house / name).is_symlink())
+        ]
         for name in names:
             there = folder / name
             there.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(house / name, there)
+            there.unlink(missing_ok=True)
+            shutil.copy2(house / name, there, follow_symlinks=False)
         for path in [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]:
             if path.relative_to(folder).as_posix() not in set(names) and path.suffix in (".py", ".pxd", ".toml"):
                 path.unlink()  # gone since an earlier run
         for cache in [path for path in folder.rglob("__pycache__") if path.is_dir()]:
             shutil.rmtree(cache)  # an earlier run gave its files the same time stamps
         self.stamp = int((folder / "pyproject.toml").stat().st_mtime)
-        self.compiled = LIBRARY is not None and house == HOUSE
-        if self.compiled:
-            for built in (pathlib.Path(LIBRARY.__file__), BUILD_RECORD):
-                shutil.copy2(built, folder / built.relative_to(house))
+        self.compiled = RUNS_COMPILED and house == CHECKOUT
+        if self.compiled and COMPILED is not None:
+            shutil.copytree(COMPILED, folder / COMPILED.relative_to(house), dirs_exist_ok=True)
 
     def runs_compiled(self, mutant: Mutant) -> bool:
         """True when the rest of the robot may run compiled: the mutant's own file never is."""
-        return self.compiled and not (self.folder / mutant.path).with_suffix(".pxd").exists()
+        return self.compiled and not IS_COMPILED.search((self.folder / mutant.path).read_bytes())
 
     def put(self, path: str, text: str) -> None:
         """The file's text from now on. A time stamp that it never had, so that no byte code of before is believed."""
@@ -187,13 +201,13 @@ class Copy:
 class Built(Copy):
     """A copy whose compiled modules are built again with each mutant: what `make test` would run."""
 
-    def __init__(self, folder: pathlib.Path, house: pathlib.Path = HOUSE) -> None:
+    def __init__(self, folder: pathlib.Path, house: pathlib.Path | None = CHECKOUT) -> None:
         super().__init__(folder, house)
         if not self.compiled:
             raise UserError(f"{house}: nothing is compiled there, so that no mutant can be: {RUNS_INTERPRETED_BECAUSE}")
         shutil.rmtree(self.folder / "build", ignore_errors=True)  # an earlier run may have left a mutant in it
-        for made in (house / "build" / "cython", *(house / "build").glob("temp.*")):
-            shutil.copytree(made, self.folder / "build" / made.name)
+        for made in ("cython", "compiled", *(each.name for each in (self.house / "build").glob("temp.*"))):
+            shutil.copytree(self.house / "build" / made, self.folder / "build" / made)
 
     def put(self, path: str, text: str) -> None:
         """The file's text from now on, newer than all that was built."""
@@ -210,7 +224,7 @@ class Built(Copy):
             check=False,
             timeout=BUILD_S,
         )
-        record = self.folder / BUILD_RECORD.relative_to(HOUSE)
+        [record] = (self.folder / "build" / "compiled").glob(f"*/{RECORD}")
         return json.loads(record.read_text(encoding="utf-8"))["compiled"]
 
 

@@ -1,4 +1,0 @@
-from ranger_sim.boards.modules.receiver cimport Receiver
-
-cdef class NetworkTime(Receiver):
-    cdef public long long ms

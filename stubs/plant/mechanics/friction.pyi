@@ -1,3 +1,0 @@
-# Generated from plant/mechanics/friction.py and plant/mechanics/friction.pxd (python -m ranger_sim.tools.stubs); do not edit.
-
-def smoothed_sign(x: float) -> float: ...
