@@ -46,7 +46,15 @@ REALS = {"double", "float"}
 BUILTIN = {"bytearray", "bytes", "dict", "list", "object", "set", "str", "tuple"}
 OF_FUNCTIONS = {"ccall", "cfunc", "inline", "exceptval", "locals"}  # decorators that the .pxd carries
 KEPT_IN_COPY = {"final", "boundscheck", "wraparound", "cdivision", "initializedcheck"}
-USUAL_CLAUSE = {"int": " except -1", "void": " noexcept"}  # Cython's own for the others
+# of a result by its type; `int` is that of a function without a result. Said outright, because Cython's own for a
+# function whose body is in a .py is `except *`, which asks for an exception after every call. Without the cast Cython
+# 3.3 writes -1LLLL into the C file of another module.
+USUAL_CLAUSE = {
+    "int": " except -1",
+    "void": " noexcept",
+    "long long": " except? <long long>-1",
+    **dict.fromkeys(["bint", "double", "float", "short", "unsigned long long"], " except? -1"),
+}
 C_FUNCTION = re.compile(r"^cdef inline .*?(\w+)\(", re.MULTILINE)
 SMALLEST, LARGEST = -(2**31), 2**31 - 1  # of an enum
 
@@ -309,7 +317,6 @@ class Declarations:
         check = next((each.value.value for each in decorator.keywords if each.arg == "check"), True)
         if not decorator.args:
             return " except *" if check else " noexcept"
-        # without the cast Cython 3.3 writes -2LLLL into the C file of another module
         cast = "<long long>" if returns == "long long" else ""
         return f" except{'?' if check else ''} {cast}{ast.unparse(decorator.args[0])}"
 

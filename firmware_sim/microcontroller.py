@@ -333,7 +333,7 @@ class Microcontroller(Chip):
         inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         scheduler: SlotScheduler = self.scheduler
-        asking: InterruptSource
+        entry: cython.longlong  # where the entry of the task begins in the table
         first: cython.longlong
         own: cython.longlong
         number: cython.longlong
@@ -375,14 +375,14 @@ class Microcontroller(Chip):
                 while scheduler.position < scheduler.end:
                     number = scheduler.numbers[scheduler.position]
                     scheduler.position += 1
-                    usual_ns = scheduler.table[ENTRY * number + ENTRY_NS]
+                    entry = ENTRY * number
+                    usual_ns = scheduler.table[entry + ENTRY_NS]
                     self.now = self.code_time
                     if usual_ns >= 0:
-                        entry = ENTRY * number
                         items = run(scheduler.table[entry + ENTRY_CODE], scheduler.table[entry + ENTRY_OWNER])
                         if items == 0 and self.extra_cycles == 0:
                             self.code_time += usual_ns
-                            scheduler.table[ENTRY * number + ENTRY_CALLS] += 1
+                            scheduler.table[entry + ENTRY_CALLS] += 1
                         else:
                             self._spent(cython.cast(Task, scheduler.tasks[number]), items)
                     elif not self._special_task(cython.cast(Task, scheduler.tasks[number])):
