@@ -16,6 +16,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import sys
 import sysconfig
 import tempfile
@@ -24,6 +25,7 @@ import threading
 from setuptools import Extension, find_namespace_packages, setup
 from setuptools.command.build_ext import build_ext
 from setuptools.command.build_py import build_py
+from setuptools.modified import newer_group
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "dev")]
@@ -178,8 +180,14 @@ class OptionalBuild(build_ext):
         return found
 
     def build_extension(self, extension):
-        """One module; and how far the build is."""
-        super().build_extension(extension)
+        """One module, or its library of this checkout if that is up to date; and how far the build is."""
+        place = self.get_ext_filename(extension.name)
+        ours, wanted = pathlib.Path(IN_PLACE, place), pathlib.Path(self.build_lib, place)
+        if ours == wanted or newer_group([*extension.sources, *extension.depends], str(ours)):
+            super().build_extension(extension)
+        else:
+            wanted.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ours, wanted)
         self.built += 1
         self.progress.show("compiled", self.built, len(self.extensions))
 

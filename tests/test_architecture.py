@@ -1,4 +1,4 @@
-"""The house keeps its plan: which room may import which, and what the compiled declarations promise."""
+"""The plan of the packages: which may import which, and what compiled modules declare."""
 
 import ast
 import contextlib
@@ -11,6 +11,7 @@ import sys
 
 import pytest
 
+from dev import declarations
 from ranger_sim import loading
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -57,7 +58,7 @@ def sources():
 
 
 def imported_packages(path):
-    """What a file imports, in .py by its syntax tree, in .pxd by its cimport lines: libraries, and rooms by name."""
+    """What a file imports: libraries, and packages of ours by name."""
     for names, line in imported_modules(path):
         package, _, rest = names.partition(".")
         yield (rest.partition(".")[0] or package) if package == "ranger_sim" else package, line
@@ -65,13 +66,6 @@ def imported_packages(path):
 
 def imported_modules(path):
     """(dotted name, line) of what a file imports."""
-    if path.suffix == ".pxd":
-        text = path.read_text(encoding="utf-8")
-        for match in re.finditer(r"^\s*(?:from\s+([\w.]+)\s+cimport|cimport\s+([\w.]+))", text, re.MULTILINE):
-            name = match.group(1) or match.group(2)
-            if not name.startswith("."):
-                yield name, text[: match.start()].count("\n") + 1
-        return
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -87,7 +81,7 @@ def imported_modules(path):
 @pytest.mark.parametrize("package", MAY_IMPORT)
 def test_a_package_imports_only_what_the_table_allows(package):
     faults = []
-    for path in [*(ROOT / package).rglob("*.py"), *(ROOT / package).rglob("*.pxd")]:
+    for path in (ROOT / package).rglob("*.py"):
         for name, line in imported_packages(path):
             if (name in MAY_IMPORT or name == "tests") and name != package and name not in MAY_IMPORT[package]:
                 faults.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
@@ -99,7 +93,7 @@ def test_arrows_between_rooms_of_a_room_run_one_way(inside):
     room, _, own = inside.partition("/")
     others = {name.partition("/")[2] for name in INSIDE if name.startswith(f"{room}/")} - {own}
     faults = []
-    for path in [*(ROOT / inside).rglob("*.py"), *(ROOT / inside).rglob("*.pxd")]:
+    for path in (ROOT / inside).rglob("*.py"):
         for name, line in imported_modules(path):
             if name.startswith(f"ranger_sim.{room}.") and name.split(".")[2] in others - INSIDE[inside]:
                 faults.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
@@ -123,49 +117,23 @@ def test_nobody_draws_from_a_global_random_generator():
     assert faults == ["foundation/random_arrays.py"]  # makes generators of their own, from seed and name
 
 
-@pytest.mark.parametrize("room", MAY_IMPORT)
-def test_a_room_imported_by_its_bare_name_is_refused_with_the_right_one(room):
-    program = f"import {room}"
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stderr.splitlines()[-1] == f"ImportError: {room} is a room of ranger_sim: import ranger_sim.{room}"
+def test_the_table_has_every_package():
+    assert set(loading.packages()) == set(MAY_IMPORT)
 
 
-def test_the_finder_knows_every_room():
-    assert set(loading.ROOMS) == set(MAY_IMPORT)
+def test_packages_are_imported_through_ranger_sim_alone():
+    """`import boards` would find a folder of the checkout, and a second copy of each of its modules."""
+    faults = []
+    for folder in (*MAY_IMPORT, "tests", "docs", "examples", "benchmarks"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for name, line in imported_modules(path):
+                if name.partition(".")[0] in MAY_IMPORT:
+                    faults.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
+    assert not faults, "\n".join(faults)
 
 
-def declarations():
-    return sorted(path.relative_to(ROOT) for package in MAY_IMPORT for path in (ROOT / package).rglob("*.pxd"))
-
-
-def declared_classes(text):
-    """{class: (base, fields, methods)} of a .pxd in the style of this project."""
-    classes = {}
-    current = None
-    text = re.sub(r"#.*", "", text)
-    text = re.sub(r"\(([^()]*)\)", lambda m: "(" + m.group(1).replace("\n", " ") + ")", text)
-    for line in text.splitlines():
-        head = re.match(r"cdef\s+class\s+(\w+)(?:\((\w+)\))?\s*:", line)
-        if head:
-            current = classes.setdefault(head.group(1), (head.group(2), set(), set()))
-            continue
-        if not line.startswith((" ", "\t")):
-            if line.strip():
-                current = None
-            continue
-        if current is None:
-            continue
-        line = line.strip()
-        method = re.match(r"(?:cpdef|cdef)\s+(?:inline\s+)?.*?\b(\w+)\s*\(", line)
-        if method:
-            current[2].add(method.group(1))
-            continue
-        field = re.match(r"cdef\s+(?:public\s+|readonly\s+)?(.*)$", line)
-        if field:
-            without_type = re.sub(r"^(?:unsigned\s+)?(?:long\s+long|[\w.]+)(?:\*|\[[^\]]*\])?\s+", "", field.group(1))
-            current[1].update(name.strip() for name in without_type.split(",") if name.strip())
-    return classes
+SOURCES = declarations.Sources(ROOT)
+COMPILED = SOURCES.compiled_modules()
 
 
 class Names(dict):
@@ -209,74 +177,35 @@ def calls_setattr(call):
     return isinstance(call.func, ast.Name) and call.func.id == "setattr" and ast.unparse(call.args[0]) == "self"
 
 
-@pytest.mark.parametrize("declaration", declarations(), ids=str)
-def test_a_compiled_declaration_agrees_with_its_source(declaration):
-    """Fields and methods of the .pxd and of the .py are the same: what one mode has, the other has."""
-    source = (ROOT / declaration).with_suffix(".py")
-    assert source.exists(), f"{declaration} has no source"
-    tree = ast.parse(source.read_text(encoding="utf-8"))
-    in_source = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
-    declared = declared_classes((ROOT / declaration).read_text(encoding="utf-8"))
+@pytest.mark.parametrize("name", COMPILED)
+def test_every_declared_field_is_set(name):
+    source = SOURCES.module(name)
     faults = []
-
-    def all_fields(name):
-        if name not in declared:
-            return None  # a base from another file: its fields are checked there
-        base, fields, _ = declared[name]
-        above = all_fields(base) if base else set()
-        return None if above is None else fields | above
-
-    for name, (_, fields, methods) in declared.items():
-        if name not in in_source:
-            faults.append(f"{declaration}: class {name} is not in {source.name}")
-            continue
-        defined = {n.name for n in ast.walk(in_source[name]) if isinstance(n, ast.FunctionDef)}
-        assigned = {
-            target.attr
-            for node in ast.walk(in_source[name])
-            for target in ast.walk(node)
-            if isinstance(target, ast.Attribute)
-            and isinstance(target.ctx, ast.Store)
-            and isinstance(target.value, ast.Name)
-            and target.value.id == "self"
-        } | set_by_name(tree, in_source[name])
-        faults += [f"{declaration}: {name}.{m}() is not in {source.name}" for m in sorted(methods - defined)]
-        known = all_fields(name)
-        if known is not None:
-            faults += [f"{source.name}: {name}.{f} is not declared" for f in sorted(assigned - known)]
-        faults += [f"{declaration}: {name}.{f} is never set" for f in sorted(fields - assigned)]
-    assert not faults, "\n".join(faults)
+    for owner in source.classes.values():
+        assigned = fields_set(owner) | set_by_name(source.tree, owner)
+        faults += [f"{owner.name}.{f.node.target.id}" for f in source.fields(owner) if f.node.target.id not in assigned]
+    assert not faults, f"{source.path}: never set: {', '.join(faults)}"
 
 
-@pytest.mark.parametrize("declaration", declarations(), ids=str)
-def test_numbers_in_compiled_fields_have_64_bits(declaration):
+@pytest.mark.parametrize("name", COMPILED)
+def test_numbers_in_compiled_fields_have_64_bits(name):
     """Narrower ones wrap and round, and only when compiled. Bytes seen through a view are bytes in both modes."""
-    text = re.sub(r"#.*", "", (ROOT / declaration).read_text(encoding="utf-8"))
-    fields = re.findall(r"^ +cdef (?:public |readonly )?([^(\n]+)$", text, re.MULTILINE)
-    narrow = r"(?:(?:un)?signed )?(?:short|int|char|long(?! long)|float|Py_UCS4)\b"
-    found = [field for field in fields if re.match(narrow, field) and not field.startswith("unsigned char[::1] ")]
-    assert not found, f"{declaration}: {found}"
-
-
-def declared_constants(text):
-    """{name: number} of the enums of a .pxd that Python sees."""
-    numbers, inside = {}, False
-    for line in re.sub(r"#.*", "", text).splitlines():
-        if line.strip() and not line.startswith(" "):
-            inside = line.strip() == "cpdef enum:"
-        elif inside and line.strip():
-            name, _, value = line.partition("=")
-            numbers[name.strip()] = int(value, 0)
-    return numbers
+    source = SOURCES.module(name)
+    narrow = re.compile(r"cython\.(?:short|u?int|u?char|ushort|schar|float)\b(?!\[::1\])")
+    fields = [ast.unparse(each.annotation) for owner in source.classes.values() for each in source.fields(owner)]
+    assert [each for each in fields if narrow.match(each)] == []
 
 
 def test_constants_are_the_same_numbers_interpreted_and_compiled():
-    """An enum of a .pxd is what the compiler uses; what stands under the same name in the source, the interpreter."""
+    """Compiled modules have them as numbers of C; what Python sees of either kind of run is the value in the source."""
     wanted = {}
-    for declaration in declarations():
-        numbers = declared_constants((ROOT / declaration).read_text(encoding="utf-8"))
-        if numbers:
-            wanted[".".join(("ranger_sim", *declaration.with_suffix("").parts))] = numbers
+    for name in COMPILED:
+        nodes = SOURCES.module(name).constants
+        if nodes:
+            numbers = {}
+            for constant, node in nodes.items():
+                numbers[constant] = eval(ast.unparse(node.value), {"__builtins__": {}}, numbers)
+            wanted[name] = numbers
     assert wanted["ranger_sim.foundation.events"]["PIN_OUTPUT"] == 36
     program = (
         "import importlib, json, sys\n"

@@ -15,13 +15,13 @@ import venv
 
 import pytest
 
+from dev import declarations
 from ranger_sim import __version__, loading
 from set_up import LATER, SetUpError, for_a_walk, name_of, part_of_lock
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 BUILT = (".so", ".pyd")
-DATA_FOLDERS = ("profiles",)  # shipped beside the packages, no Python in them
 CC = os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc"  # with its options, or a cache before it
 COMPILER = CC.split()[0]
 needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason="no C compiler here")
@@ -29,13 +29,6 @@ WHERE_FROM = (
     "import importlib, json, sys\n"
     "print(json.dumps({name: importlib.import_module(name).__file__ for name in sys.argv[1:]}))"
 )
-
-
-def declared_modules():
-    """Names of the modules that have a .pxd, of every room."""
-    for room in loading.ROOMS:
-        for path in sorted((ROOT / room).rglob("*.pxd")):
-            yield ".".join(("ranger_sim", *path.relative_to(ROOT).with_suffix("").parts))
 
 
 def run(arguments, cwd, **environment):
@@ -63,7 +56,7 @@ def files_of(names, folder, **environment):
 
 
 def test_every_declared_module_is_compiled_where_a_compiler_is():
-    declared = sorted(declared_modules())
+    declared = declarations.Sources(ROOT).compiled_modules()
     assert sorted(loading.declared_modules()) == declared
     if loading.interpreted_is_forced():
         assert not loading.COMPILED_MODULES
@@ -87,8 +80,8 @@ def test_modules_with_the_same_last_name_are_not_confused():
 
 
 def test_interpreted_is_forced_for_every_package_by_plain_imports(tmp_path):
-    """In the tree where built modules lie beside the sources, and from elsewhere through the installation."""
-    names = list(declared_modules())
+    """In the checkout, and from elsewhere through the installation."""
+    names = list(loading.declared_modules())
     files = files_of(names, ROOT, RANGER_SIM_INTERPRETED="1")
     assert [file for file in files.values() if not file.endswith(".py")] == []
     files = files_of(names, tmp_path, RANGER_SIM_INTERPRETED="1", PYTHONPATH=str(ROOT))
@@ -97,7 +90,7 @@ def test_interpreted_is_forced_for_every_package_by_plain_imports(tmp_path):
 
 def test_interpreted_is_forced_under_pytest(tmp_path):
     test = tmp_path / "test_inside.py"
-    names = list(declared_modules())
+    names = list(loading.declared_modules())
     test.write_text(
         "import importlib, pytest\n"
         f"@pytest.mark.parametrize('name', {names!r})\n"
@@ -119,34 +112,28 @@ def test_interpreted_is_forced_under_pytest(tmp_path):
 
 @pytest.fixture(scope="module")
 def shipped(tmp_path_factory):
-    """The folder of packages that a wheel holds, with this tree's library of compiled modules."""
+    """The folder of packages that a wheel holds, with the compiled modules of this tree."""
     folder = tmp_path_factory.mktemp("shipped")
     done = run(["setup.py", "-q", "build_py", "--build-lib", folder], ROOT)
     assert done.returncode == 0, done.stderr
-    for pattern in ("_compiled.*", "build_record.json"):
-        for built in (ROOT / "ranger_sim").glob(pattern):
-            shutil.copy(built, folder / "ranger_sim")
+    if loading.COMPILED.is_dir():
+        shutil.copytree(loading.COMPILED / "ranger_sim", folder / "ranger_sim", dirs_exist_ok=True)
+        shutil.copy(loading.COMPILED / loading.RECORD, folder / "ranger_sim")
     return folder
 
 
 def test_every_file_of_the_packages_is_shipped_and_nothing_else(shipped):
-    def kept(root):
+    def kept(root, *folders):
         return {
             path.relative_to(root).as_posix()
-            for room in (*loading.ROOMS, *DATA_FOLDERS)
-            for path in (root / room).rglob("*")
+            for folder in folders
+            for path in (root / folder).rglob("*")
             if path.is_file() and "__pycache__" not in path.parts and path.suffix not in BUILT
         }
 
-    in_tree = {
-        name
-        for name in kept(ROOT)
-        if not name.endswith(".c")
-        or name.startswith(("datatable/generated/", "firmware_sim/native/runtime/", "firmware_sim/native/chip/"))
-    }  # earlier builds left C files beside the sources
-    types = {path.relative_to(ROOT / "stubs").as_posix() for path in (ROOT / "stubs").rglob("*.pyi")}
-    assert types == {name.partition(".")[2].replace(".", "/") + ".pyi" for name in declared_modules()}
-    assert kept(shipped / "ranger_sim") == in_tree | types
+    folders = [path.name for path in loading.PACKAGE.iterdir() if path.is_symlink()]
+    types = {f"{name.partition('.')[2].replace('.', '/')}.pyi" for name in loading.declared_modules()}
+    assert kept(shipped / "ranger_sim", *folders) == kept(ROOT, *folders) | types
     assert [path.name for path in shipped.iterdir()] == ["ranger_sim"]
 
 
@@ -154,7 +141,7 @@ def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path
     digests = set()
     for interpreted in ("", "1"):
         setting = {"PYTHONPATH": str(shipped), "RANGER_SIM_INTERPRETED": interpreted}
-        files = files_of(list(declared_modules()), tmp_path, **setting)
+        files = files_of(list(loading.declared_modules()), tmp_path, **setting)
         assert all(file.startswith(str(shipped)) for file in files.values())
         if interpreted:
             assert all(file.endswith(".py") for file in files.values())
@@ -170,20 +157,21 @@ def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path
     assert len(digests) == 1
 
 
-# --- the build itself, on a small house -------------------------------------------------------------------
+# --- the build itself, on one package ---------------------------------------------------------------------
 
 
 @pytest.fixture
-def small_house(tmp_path):
-    """setup.py, the package and the room `foundation` alone, not built."""
+def checkout(tmp_path):
+    """What a checkout has, with the package `foundation` alone, not built."""
     for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
-    for folder in ("ranger_sim", "foundation"):
-        shutil.copytree(
-            ROOT / folder,
-            tmp_path / folder,
-            ignore=shutil.ignore_patterns("*.so", "*.pyd", "*.c", "__pycache__", "build_record.json"),
-        )
+    (tmp_path / "dev").mkdir()
+    shutil.copy(ROOT / "dev" / "declarations.py", tmp_path / "dev")
+    (tmp_path / "ranger_sim").mkdir()
+    for name in ("__init__.py", "__main__.py", "loading.py", "py.typed"):
+        shutil.copy(ROOT / "ranger_sim" / name, tmp_path / "ranger_sim")
+    shutil.copytree(ROOT / "foundation", tmp_path / "foundation", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "ranger_sim" / "foundation").symlink_to("../foundation")
     return tmp_path
 
 
@@ -202,96 +190,129 @@ def how_it_runs(folder):
 
 
 @needs_compiler
-def test_sources_that_changed_since_the_build_run_and_say_so_until_they_are_as_they_were(small_house):
-    build_in(small_house)
-    source = small_house / "foundation" / "numbers.py"
-    declaration = small_house / "foundation" / "events.pxd"
-    before = source.read_text(encoding="utf-8"), declaration.read_text(encoding="utf-8")
-    source.write_text(before[0] + "\nADDED = 1\n", encoding="utf-8")
-    files, reason = how_it_runs(small_house)
+def test_sources_that_changed_since_the_build_run_and_say_so_until_they_are_as_they_were(checkout):
+    build_in(checkout)
+    numbers, events = (checkout / "foundation" / name for name in ("numbers.py", "events.py"))
+    before = numbers.read_text(encoding="utf-8"), events.read_text(encoding="utf-8")
+    numbers.write_text(before[0] + "\nADDED = 1\n", encoding="utf-8")
+    files, reason = how_it_runs(checkout)
     assert all(file.endswith(".py") for file in files)
-    assert reason == "foundation/numbers.py changed since the library was built: `make setup` builds it again"
-    declaration.write_text(before[1] + "\n", encoding="utf-8")
-    _, reason = how_it_runs(small_house)
-    assert reason.startswith("foundation/events.pxd and 1 more changed since the library was built")
-    source.write_text(before[0], encoding="utf-8")
-    declaration.write_text(before[1], encoding="utf-8")
-    files, reason = how_it_runs(small_house)
+    assert reason == "foundation/numbers.py changed since the build: `make setup` builds again"
+    events.write_text(before[1] + "\n", encoding="utf-8")
+    _, reason = how_it_runs(checkout)
+    assert reason.startswith("foundation/events.py and 1 more changed since the build")
+    numbers.write_text(before[0], encoding="utf-8")
+    events.write_text(before[1], encoding="utf-8")
+    files, reason = how_it_runs(checkout)
     assert reason == "" and all(file.endswith(BUILT) for file in files)
-    (small_house / "foundation" / "later.pxd").write_text("", encoding="utf-8")
-    _, reason = how_it_runs(small_house)
-    assert reason.startswith("foundation/later.pxd and 1 more changed")
+    (checkout / "foundation" / "later.py").write_text("import cython\n", encoding="utf-8")
+    _, reason = how_it_runs(checkout)
+    assert reason.startswith("foundation/later.py changed since the build")
+    (checkout / "foundation" / "later.py").write_text("PLAIN = 1\n", encoding="utf-8")
+    assert how_it_runs(checkout)[1] == ""
 
 
-def times_of_objects(folder):
-    """{name of an object file: when it was written, ns}."""
-    return {path.name: path.stat().st_mtime_ns for path in (folder / "build").rglob("*.o")}
-
-
-@needs_compiler
-def test_a_build_compiles_rebuilds_only_what_changed_and_survives_a_broken_declaration(small_house):
-    build_in(small_house)
-    files, reason = how_it_runs(small_house)
-    [library] = map(pathlib.Path, set(files))
-    assert library.name.endswith(BUILT) and reason == ""
-    assert not list((small_house / "foundation").glob("*.c"))
-
-    # "touched": one second ahead of what was built, so that no clock resolution matters
-    built = times_of_objects(small_house)
-    source = small_house / "foundation" / "numbers.py"
-    ahead = library.stat().st_mtime_ns + 1_000_000_000
-    os.utime(source, ns=(ahead, ahead))
-    told = build_in(small_house).stdout
-    assert told.splitlines() == ["translated 1 of 1 modules", "compiled 6 of 6 modules"]
-    log = (small_house / "build" / "setup.log").read_text(encoding="utf-8")
-    assert re.findall(r"Compiling (\S+) because it changed", log) == ["ranger_sim/foundation/numbers.py"]
-    changed = {name for name, time in times_of_objects(small_house).items() if time != built[name]}
-    assert changed == {"numbers.o", "directory.o"}
-    assert set(how_it_runs(small_house)[0]) == {str(library)}
-
-    library.write_bytes(b"from another machine")
-    files, reason = how_it_runs(small_house)
-    assert all(file.endswith(".py") for file in files) and "cannot be loaded" in reason
-
-    # a declaration that does not translate: loud, and nothing compiled is mixed with what is not
-    declaration = small_house / "foundation" / "numbers.pxd"
-    declaration.write_text(declaration.read_text(encoding="utf-8") + "cdef class (\n", encoding="utf-8")
-    told = build_in(small_house).stderr
-    assert "NOT COMPILED" in told and "numbers" in told and "setup.log" in told
-    assert "cdef class (" in (small_house / "build" / "setup.log").read_text(encoding="utf-8")
-    files, reason = how_it_runs(small_house)
-    assert all(file.endswith(".py") for file in files)
-    assert "could not translate" in reason
+def times_of_libraries(folder):
+    """{name of a library: when it was written, ns}."""
+    return {
+        path.name.partition(".")[0]: path.stat().st_mtime_ns
+        for path in (folder / "build" / "compiled").rglob("*")
+        if path.suffix in BUILT
+    }
 
 
 @needs_compiler
-def test_a_tool_chain_that_knows_no_layout_builds_as_well_and_what_older_builds_left_is_not_used(small_house):
-    for name in ("numbers", "_compiled"):
-        left = small_house / "foundation" / (name + sysconfig.get_config_var("EXT_SUFFIX"))
-        left.write_bytes(b"a library as they were built once")
-    files, reason = how_it_runs(small_house)
-    assert all(file.endswith(".py") for file in files) and reason == "nothing was built here"
+def test_a_build_compiles_and_rebuilds_a_changed_module_and_those_whose_view_of_it_changed(checkout):
+    build_in(checkout)
+    files, reason = how_it_runs(checkout)
+    assert all(file.endswith(BUILT) and "/build/compiled/" in file for file in files) and reason == ""
+    assert not list((checkout / "foundation").glob("*.c")) and not list((checkout / "foundation").glob("*.so"))
 
-    compiler = small_house / "cc"
+    built = times_of_libraries(checkout)
+    events = checkout / "foundation" / "events.py"
+    text = events.read_text(encoding="utf-8")
+    events.write_text(text + "\n# a remark\n", encoding="utf-8")
+    build_in(checkout)
+    now = times_of_libraries(checkout)
+    assert {name for name in now if now[name] != built[name]} == {"events"}
+
+    # numbers cimports nothing of events, row_stream cimports its constants
+    events.write_text(text.replace("TX_LOST: Final = 2", "TX_LOST: Final = 3"), encoding="utf-8")
+    build_in(checkout)
+    later = times_of_libraries(checkout)
+    changed = {name for name in later if later[name] != now[name]}
+    assert "events" in changed and "numbers" not in changed
+    assert how_it_runs(checkout)[1] == ""
+
+
+@needs_compiler
+def test_a_declaration_that_is_not_understood_is_reported_and_nothing_compiled_runs(checkout):
+    build_in(checkout)
+    numbers = checkout / "foundation" / "numbers.py"
+    numbers.write_text(numbers.read_text(encoding="utf-8") + '\nWIDE: Final = "x"\n', encoding="utf-8")
+    line = len(numbers.read_text(encoding="utf-8").splitlines())
+    report = build_in(checkout).stderr
+    assert "NOT COMPILED" in report and f"numbers.py:{line}: WIDE: a C constant is a whole number, not 'x'" in report
+    files, reason = how_it_runs(checkout)
+    assert all(file.endswith(".py") for file in files) and "a C constant is a whole number" in reason
+
+
+@needs_compiler
+def test_a_source_that_cython_refuses_is_reported_and_nothing_compiled_runs(checkout):
+    numbers = checkout / "foundation" / "numbers.py"
+    wrong = "\n\n@cython.ccall\ndef wrong(value: cython.longlong) -> cython.longlong:\n    return value.nothing[:]\n"
+    numbers.write_text(numbers.read_text(encoding="utf-8") + wrong, encoding="utf-8")
+    report = build_in(checkout).stderr
+    assert "NOT COMPILED" in report and "numbers" in report and "setup.log" in report
+    files, reason = how_it_runs(checkout)
+    assert all(file.endswith(".py") for file in files) and "could not translate" in reason
+
+
+@needs_compiler
+def test_a_compiler_that_knows_fewer_options_builds_as_well(checkout):
+    compiler = checkout / "cc"
     compiler.write_text(f'#!/bin/sh\ncase "$*" in *-fno-plt*) exit 1;; esac\nexec {CC} "$@"\n', encoding="ascii")
     compiler.chmod(0o755)
-    build_in(small_house, CC=str(compiler))
-    files, reason = how_it_runs(small_house)
+    build_in(checkout, CC=str(compiler))
+    files, reason = how_it_runs(checkout)
     assert all(file.endswith(BUILT) for file in files) and reason == ""
 
 
-def test_without_a_compiler_the_sources_run_and_the_reason_is_told(small_house):
-    told = build_in(small_house, CC="/bin/false").stderr
-    assert "NOT COMPILED" in told and "/bin/false" in told
-    files, reason = how_it_runs(small_house)
+def test_without_a_compiler_the_sources_run_and_the_reason_is_reported(checkout):
+    report = build_in(checkout, CC="/bin/false").stderr
+    assert "NOT COMPILED" in report and "/bin/false" in report
+    files, reason = how_it_runs(checkout)
     assert all(file.endswith(".py") for file in files)
     assert "C compiler '/bin/false'" in reason
 
 
-def test_a_build_can_be_told_not_to_compile(small_house):
-    told = build_in(small_house, RANGER_SIM_INTERPRETED="1").stderr
-    assert "NOT COMPILED: RANGER_SIM_INTERPRETED was set" in told
-    assert all(file.endswith(".py") for file in how_it_runs(small_house)[0])
+def test_a_build_can_be_told_not_to_compile(checkout):
+    report = build_in(checkout, RANGER_SIM_INTERPRETED="1").stderr
+    assert "NOT COMPILED: RANGER_SIM_INTERPRETED was set" in report
+    assert all(file.endswith(".py") for file in how_it_runs(checkout)[0])
+
+
+def test_a_record_of_the_build_that_is_damaged_is_reported_and_the_sources_run(checkout):
+    build_in(checkout, CC="/bin/false")
+    [record] = (checkout / "build" / "compiled").glob("*/build_record.json")
+    for text in ("{", "[]", '{"compiled": true, "sources": {"foundation/events.py": "old"}}', '{"compiled": true}'):
+        record.write_text(text, encoding="utf-8")
+        files, reason = how_it_runs(checkout)
+        assert all(file.endswith(".py") for file in files), text
+        assert "is not readable" in reason, text
+
+
+def test_links_that_have_become_files_stop_the_import_and_the_build_with_one_line(checkout):
+    """As a checkout without symbolic links leaves them, and some programs that unpack archives."""
+    link = checkout / "ranger_sim" / "foundation"
+    link.unlink()
+    link.write_text("../foundation", encoding="ascii")
+    done = run(["-c", "import ranger_sim"], checkout)
+    assert done.stderr.splitlines()[-1].startswith(f"ImportError: {link} is a file and not a link to the folder")
+    done = run(["setup.py", "-q", "build_py", "--build-lib", "out"], checkout)
+    assert done.returncode == 1 and not (checkout / "out").exists()
+    assert done.stderr.startswith(f"ranger-sim cannot be built: {link} is a file and not a link")
+    assert len(done.stderr.splitlines()) == 1
 
 
 # --- the papers -------------------------------------------------------------------------------------------
@@ -403,7 +424,7 @@ def test_a_library_that_comes_later_is_named_in_one_line(library, package, comma
 def test_modules_that_are_optimised_most_exist():
     source = (ROOT / "setup.py").read_text(encoding="utf-8")
     listed = re.findall(r'"([\w.]+)"', re.search(r"OFTEN_RUN = \((.*?)\)\n", source, re.DOTALL)[1])
-    assert len(listed) > 20 and set(listed) <= set(declared_modules())
+    assert len(listed) > 20 and set(listed) <= set(loading.declared_modules())
 
 
 def test_every_dependency_has_its_reason_beside_it():
@@ -423,12 +444,6 @@ def test_what_is_cited_is_this_version():
     assert re.findall(r"^license: (.+)$", citation, re.MULTILINE) == [PROJECT["project"]["license"]]
 
 
-def test_folders_of_data_are_listed_alike_everywhere():
-    source = (ROOT / "setup.py").read_text(encoding="utf-8")
-    in_setup = re.search(r"DATA_FOLDERS = \((.*?)\)", source, re.DOTALL).group(1)
-    assert tuple(re.findall(r'"(\w+)"', in_setup)) == DATA_FOLDERS
-
-
 def test_type_checking_leaves_no_module_out():
     settings = [PROJECT["tool"]["mypy"], *PROJECT["tool"]["mypy"]["overrides"]]
     assert PROJECT["tool"]["mypy"]["strict"] and not any(each.get("ignore_errors") for each in settings)
@@ -436,29 +451,6 @@ def test_type_checking_leaves_no_module_out():
 
 
 # --- types ------------------------------------------------------------------------------------------------
-
-
-def test_mypy_reads_the_stub_of_a_compiled_module_and_the_source_of_every_other(small_house):
-    shutil.copytree(ROOT / "stubs" / "foundation", small_house / "stubs" / "foundation")
-    typed = small_house / "build" / "typed" / "ranger_sim"
-    for _ in range(2):
-        done = run(["setup.py", "-q", "lay_types"], small_house, CC="/bin/false")
-        assert done.returncode == 0, done.stderr
-        assert (typed / "py.typed").exists() and (typed / "loading.py").exists()
-        assert {path.name for path in (typed / "foundation").glob("events.py*")} == {"events.pyi"}
-        assert "def push(" in (typed / "foundation" / "events.pyi").read_text(encoding="utf-8")
-        assert {path.name for path in (typed / "foundation").glob("user_error.py*")} == {"user_error.py"}
-    # what has gone from the house goes from there
-    (small_house / "foundation" / "user_error.py").unlink()
-    (small_house / "stubs" / "foundation" / "events.pyi").unlink()
-    assert run(["setup.py", "-q", "lay_types"], small_house).returncode == 0
-    assert not (typed / "foundation" / "user_error.py").is_symlink()
-    assert {path.name for path in (typed / "foundation").glob("events.py*")} == {"events.py"}
-
-
-def test_a_build_lays_the_types_without_a_compiler_too(small_house):
-    build_in(small_house, CC="/bin/false")
-    assert (small_house / "build" / "typed" / "ranger_sim" / "foundation" / "wallclock.py").exists()
 
 
 USERS_SCRIPT = """\

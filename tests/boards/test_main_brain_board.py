@@ -370,13 +370,11 @@ def test_every_table_number_that_a_compiled_class_declares_is_filled_in(board):
         "reflex_feet": reflex.inner_foot,
     }
     for name, owner in owners.items():
-        declared = set()
-        for line in (folder / f"{name}.pxd").read_text().splitlines():
-            if line.strip().startswith("cdef public long long"):
-                declared |= set(re.findall(r"\b[A-Z][A-Z0-9]*_[A-Z0-9_]+\b|\bTIMESTAMP\b", line))
+        source = (folder / f"{name}.py").read_text(encoding="utf-8")
+        declared = re.findall(r"^    ([A-Z][A-Z0-9]*_[A-Z0-9_]+|TIMESTAMP): cython.longlong$", source, re.MULTILINE)
         assert declared
         for variable in declared:
-            assert getattr(owner, variable) == getattr(table, variable), f"{name}.pxd: {variable}"
+            assert getattr(owner, variable) == getattr(table, variable), f"{name}.py: {variable}"
 
 
 def test_an_error_that_waits_already_is_counted_and_keeps_its_place_with_the_newest_stamp():
