@@ -174,7 +174,7 @@ def named_for(dataset: Dataset, name: str) -> Dataset:
         found[expected.name] = dataclasses.replace(channel, name=expected.name, unit=expected.unit, value=value)
         taken.add(channel.name)
     found |= {key: channel for key, channel in dataset.channels.items() if key not in taken}
-    return Dataset(dataset.name, found, list(dataset.findings), repairs)
+    return dataclasses.replace(dataset, channels=found, findings=list(dataset.findings), repairs=repairs)
 
 
 def _is_there(dataset: Dataset, source: str, name: str) -> bool:

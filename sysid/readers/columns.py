@@ -7,7 +7,7 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import units
-from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding, Repair
+from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.units import Unit
 
 EPOCH_S = 1e8  # stamps beyond this (three years) are of a calendar; floats would resolve them to 0.2 us only
@@ -60,8 +60,16 @@ def label(source: str, column: str, unit_text: str | None, mapping: Mapping[str,
     return Label(units.si_name(stem, unit) if in_name and unit is not None else stem, unit)
 
 
-def add(dataset: Dataset, column: str, named: Label, time_s: Array, value: Array, resolution: float = 0.0) -> None:
-    """Put a column into the dataset, in SI; what was done is recorded there."""
+def add(
+    dataset: Dataset,
+    column: str,
+    named: Label,
+    time_s: Array,
+    value: Array,
+    resolution: float = 0.0,
+    losses: tuple[Loss, ...] = (),
+) -> None:
+    """Put a column into the dataset, in SI; what was done is recorded there. losses: what was read and is left out."""
     if named.name in dataset.channels:
         raise UserError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
     unit = named.unit
@@ -78,7 +86,7 @@ def add(dataset: Dataset, column: str, named: Label, time_s: Array, value: Array
         dataset.repairs.append(Repair(named.name, "renamed", 0, f"{column} is called {named.name}"))
     factor = unit.factor if unit is not None else 1.0
     dataset.channels[named.name] = Channel(
-        named.name, unit.text if unit is not None else "", time_s, value, abs(factor) * resolution, column
+        named.name, unit.text if unit is not None else "", time_s, value, abs(factor) * resolution, column, losses
     )
 
 

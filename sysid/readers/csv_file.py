@@ -15,7 +15,7 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import units
-from ranger_sim.sysid.dataset import Array, Dataset, Finding, Repair
+from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.readers import columns
 
 COMMENTS = ("#", "%", "//")
@@ -43,7 +43,8 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
     names, unit_texts, rows = _header(dataset, rows, decimal_comma)
     mapping = dict(mapping or {})
     columns.check_mapping(dataset, mapping, names)
-    cells = _grid(dataset, rows, names)
+    dataset.rows = len(rows)
+    cells, lost = _grid(dataset, rows, names)
     time_column, time_s = _time(dataset, names, unit_texts, cells, mapping, time_unit, decimal_comma)
     time_s = columns.from_zero(dataset, time_s)
     stamped = np.isfinite(time_s)
@@ -51,6 +52,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
         text = f"{int((~stamped).sum())} rows have no stamp and are left out"
         dataset.repairs.append(Repair("", "no_stamp", int((~stamped).sum()), text))
         dataset.findings.append(Finding("", "no_stamp", *columns.ends(time_s), float((~stamped).sum()), "rows", text))
+        lost += (Loss("no_stamp", int((~stamped).sum()), f"in line {rows[int(np.argmin(stamped))][0]}"),)
     for index, name in enumerate(names):
         if index == time_column:
             continue
@@ -61,7 +63,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
             text = f"{name}: has no number in it, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
             continue
-        columns.add(dataset, name, named, time_s[kept], value[kept], finest)
+        columns.add(dataset, name, named, time_s[kept], value[kept], finest, lost)
     if not dataset.channels:
         raise UserError(f"{path}: there is no channel beside the time column {names[time_column]}")
     return dataset
@@ -171,18 +173,22 @@ def _header(
     return names, unit_texts, rows[1:]
 
 
-def _grid(dataset: Dataset, rows: list[tuple[int, list[str]]], names: list[str]) -> list[list[str]]:
-    """Cells by column. Rows that are too long or too short are left out, and told."""
+def _grid(
+    dataset: Dataset, rows: list[tuple[int, list[str]]], names: list[str]
+) -> tuple[list[list[str]], tuple[Loss, ...]]:
+    """(cells by column, rows that are left out because they are too long or too short)."""
+    lost: tuple[Loss, ...] = ()
     wrong = [number for number, cells in rows if not _fits(cells, len(names))]
     if wrong:
         some = ", ".join(str(number) for number in wrong[:NAMED_LINES]) + (" ..." if len(wrong) > NAMED_LINES else "")
         text = f"{len(wrong)} rows do not have {len(names)} cells and are left out (line {some})"
         dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(wrong)), "rows", text))
         dataset.repairs.append(Repair("", "ragged", len(wrong), text))
+        lost = (Loss("ragged", len(wrong), f"in line {wrong[0]}"),)
         rows[:] = [(number, cells) for number, cells in rows if _fits(cells, len(names))]
     if not rows:
         raise UserError(f"{dataset.name}: the table has no row below its header")
-    return [[cells[index] for _, cells in rows] for index in range(len(names))]
+    return [[cells[index] for _, cells in rows] for index in range(len(names))], lost
 
 
 def _fits(cells: list[str], count: int) -> bool:

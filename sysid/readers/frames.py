@@ -14,7 +14,7 @@ import numpy as np
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid.dataset import Dataset, Finding
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
 
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
@@ -69,7 +69,8 @@ def decode(
     for key, (stamps, values, unit) in samples.items():
         time_s = np.array([(stamp - begin_ns) * 1e-9 for stamp in stamps], dtype=np.float64)
         named = columns.label(dataset.name, called[key], unit, mapping)
-        columns.add(dataset, called[key], named, time_s, np.array(values))
+        lost = (Loss("broken_frames", broken[key[0]]),) if key[0] in broken else ()
+        columns.add(dataset, called[key], named, time_s, np.array(values), losses=lost)
     return dataset
 
 

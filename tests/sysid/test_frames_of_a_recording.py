@@ -73,6 +73,7 @@ def test_frames_that_nobody_knows_and_those_that_do_not_fit_are_counted(dbc):
     assert (told["broken_frames"].channel, told["broken_frames"].size) == ("ANGLE", 2.0)
     assert told["broken_frames"].unit == "frames" and told["broken_frames"].severity == "warning"
     assert len(found["ANGLE"].value) == 1
+    assert (found["ANGLE"].read, found["ANGLE"].lost_share) == (3, 2 / 3)
 
 
 def test_stamps_of_the_epoch_begin_at_the_first_frame_that_was_one(dbc):

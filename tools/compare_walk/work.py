@@ -24,7 +24,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
-from ranger_sim.sysid import channels, inspection, sanity
+from ranger_sim.sysid import channels, inspection, losses, repairs, sanity
 from ranger_sim.sysid.dataset import Array, Finding
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
@@ -76,7 +76,9 @@ def read(options: argparse.Namespace) -> tuple[gait.Walk, list[Finding]]:
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *gait.CHANNELS)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(options.log, findings)
-    return gait.of_dataset(dataset), findings
+    mended = repairs.mend(dataset, findings)
+    losses.stop_if_too_many(mended, gait.CHANNELS, options.accept_loss)
+    return gait.of_dataset(mended), findings
 
 
 @contextlib.contextmanager

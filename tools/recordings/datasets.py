@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pathlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import channels, readers, repairs, sanity
-from ranger_sim.sysid.dataset import Dataset, Finding, Table
+from ranger_sim.sysid import losses, readers
+from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import columns, frames
-
-
-@dataclasses.dataclass(frozen=True)
-class Prepared:
-    """A recording ready for work. findings: all that is odd; doubts: those after which no cause may be named."""
-
-    dataset: Dataset
-    table: Table
-    findings: list[Finding]
-    doubts: list[Finding]
+from ranger_sim.tools.command_line.units import SHARES, quantity
 
 
 def add_options(command: Any) -> None:
@@ -36,6 +26,18 @@ def add_options(command: Any) -> None:
         "--dbc", action="append", default=[], metavar="FILE", help="messages of a recording of CAN frames (repeatable)"
     )
     command.add_argument("--time-unit", metavar="ms", help="of a time column whose name does not say it")
+    add_accept_loss(command)
+
+
+def add_accept_loss(command: Any) -> None:
+    """The option that lets a verdict follow from a recording of which much is lost."""
+    command.add_argument(
+        "--accept-loss",
+        type=quantity(SHARES, "1", least=0.0, most=1.0),
+        default=losses.ACCEPTED,
+        metavar="SHARE",
+        help="conclude from a channel that lost up to this share of its samples (1%%)",
+    )
 
 
 def open_recording(
@@ -64,24 +66,6 @@ def open_recording(
 def open_with(options: Any, path: str) -> Dataset:
     """The recording `path` as `add_options` says."""
     return open_recording(path, columns.mapping_of(options.map), options.dbc, options.time_unit)
-
-
-def prepared(options: Any, path: str, experiment: str) -> Prepared:
-    """The recording `path` under its experiment's names, inspected, mended, its channels on one time base.
-
-    UserError when it cannot be read, lacks a needed channel, or has nothing to work on.
-    """
-    dataset = channels.named_for(open_with(options, path), experiment)
-    wanted = [each.name for each in channels.experiment(experiment).channels if each.name in dataset]
-    if not wanted:
-        raise UserError(f"{path}: it has no channel of the experiment {experiment}; --map NAME=CHANNEL names them")
-    dataset.channels = {name: dataset.channels[name] for name in wanted}
-    dataset.findings = [each for each in dataset.findings if each.channel in ("", *wanted)]
-    findings = sanity.inspect(dataset)
-    sanity.stop_if_fatal(path, findings)
-    mended = repairs.mend(dataset, findings)
-    names = [name for name in wanted if name in mended]
-    return Prepared(mended, mended.table(names), findings, sanity.doubts(dataset, findings))
 
 
 def robot_units() -> dict[str, str]:
