@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import channels, repairs, units
+from ranger_sim.sysid.dataset import Loss
 from ranger_sim.sysid.readers import columns, csv_file, read
 from ranger_sim.tools.recordings.datasets import open_recording
 from tests.boards.original_images import DATA
@@ -254,6 +255,42 @@ def test_a_log_without_names_keeps_its_numbers_and_says_so(tmp_path):
     assert data["hip_angle_rad"].value.tolist() == [0.5, 0.6, 0.7]
     assert "id_62" in data
     assert {each.kind: each.size for each in data.findings} == {"ragged": 1.0, "no_header": 2.0, "no_unit": 0.0}
+
+
+def test_the_robots_own_log_of_2015_is_read_as_its_program_wrote_it(tmp_path):
+    """Numbers padded with spaces, idle variables with stamp 0, samples that come again (docs/robot.md, C6.1)."""
+    lines = [
+        "  14\t1.533984E-3\t   151042",
+        " 194\t4.446710E-2\t   151045",
+        " 229\t0.000000E+0\t        0",
+        "  14\t1.533984E-3\t   151042",
+        "  14\t-2.301000E-3\t   151048",
+        " 138\t4.591775E-41\t   151048",
+    ]
+    path = tmp_path / "Test.txt"
+    path.write_text("\r\n".join([*lines, ""]))
+    data = read(path, {"id_14": "hip_angle_rad"})
+    assert data["hip_angle_rad"].value.tolist() == [1.533984e-3, -2.301e-3]
+    assert data["hip_angle_rad"].time_s == pytest.approx([151.042, 151.048])
+    assert data["id_194"].value.tolist() == [4.44671e-2] and set(data.channels) == {"hip_angle_rad", "id_194", "id_138"}
+    assert (data.rows, data.losses, data["hip_angle_rad"].losses) == (6, [], (Loss("repeated", 1),))
+
+
+def test_the_names_of_a_log_of_2016_may_be_padded_too(tmp_path):
+    path = tmp_path / "Test.txt"
+    path.write_text("ID_TIMESTAMP\t   0\t\nID_MCH_ANGLE\t  14\t\n  14\t5.0E-1\t   1000\n  14\t6.0E-1\t   1002\n")
+    assert read(path)["ID_MCH_ANGLE"].value.tolist() == [0.5, 0.6]
+
+
+def test_every_row_of_a_table_is_kept_or_left_out_with_its_reason(table):
+    text = "t_s,a_V,b_V\n0,1,2\n0.1,1\n,1,2\n0.2,x,2\n0.3,1,\n0.4,1,2\n0.5,1,2,7,8\n0.6,1,2\n"
+    data = table(text)
+    assert data.rows == 8
+    read_of = (Loss("ragged", 2, "in line 3"), Loss("no_stamp", 1, "in line 4"))
+    assert data["a_V"].losses == data["b_V"].losses == read_of
+    assert (data["a_V"].read, data["b_V"].read) == (8, 7)  # an empty cell is an instant without a sample
+    mended = repairs.mend(data)["a_V"]
+    assert (mended.read, mended.losses[2]) == (8, Loss("not_finite", 1, "at 0.2 s")) and len(mended.value) == 4
 
 
 def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(tmp_path):
