@@ -26,6 +26,7 @@ KINDS = {
     "unreadable": "cells that are no numbers",
     "no_numbers": "channels of a measurement file that hold no plain numbers",
     "unknown_frames": "frames that the DBC file does not know",
+    "several_buses": "messages that came on several buses",
     "broken_frames": "frames that do not fit their message",
     "no_summary": "a walk's folder without its summary",
     "fell": "the robot fell in this walk",

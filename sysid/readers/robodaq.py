@@ -97,8 +97,6 @@ def read(
             continue  # a variable that was never written
         counts = {"never_written": int((~written).sum()), "repeated": int(again.sum())}
         lost = tuple(Loss(reason, count) for reason, count in counts.items() if count)
-        for each in lost:
-            dataset.repairs.append(Repair(named.name, each.reason, each.count, f"{each.text} are left out"))
         columns.add(dataset, called[key], named, pair[kept, 0] * 1e-3, pair[kept, 1], losses=lost)
     if not dataset.channels:
         raise UserError(f"{path}: no variable of this log was ever written")

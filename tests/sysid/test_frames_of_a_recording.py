@@ -6,7 +6,10 @@ import pytest
 
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import sanity
 from ranger_sim.sysid.readers import frames
+from ranger_sim.tools.recordings import datasets
+from tests.boards.original_images import DATA
 
 DBC = """VERSION ""
 
@@ -98,3 +101,59 @@ def test_recordings_and_files_that_say_nothing_are_told(dbc, tmp_path):
     wrong.write_text("BO_ nothing", encoding="utf-8")
     with pytest.raises(UserError, match="wrong.dbc: not a DBC file that cantools can read"):
         frames.decode("log", [], [wrong])
+
+
+def on(bus, number, value, identifier=291):
+    return (bus, number * 1_000_000, identifier, 4, value & 0xFFFF, 0)
+
+
+def test_a_message_on_two_buses_is_two_channels(dbc):
+    rows = [on(bus, number, value) for number in range(1, 5) for bus, value in (("can0", number), ("can1", 1000))]
+    rows += [("can1", 9_000_000, 292, 8, 250, 7)]  # on one bus only
+    found = frames.decode("log", rows, [dbc])
+    assert set(found.channels) == {"can0.ANGLE", "can1.ANGLE", "DRIVE.current", "DRIVE.level"}
+    assert found["can0.ANGLE"].value == pytest.approx([0.001, 0.002, 0.003, 0.004])
+    assert found["can1.ANGLE"].value == pytest.approx([1.0] * 4)
+    (said,) = [each for each in found.findings if each.kind == "several_buses"]
+    assert "ANGLE on can0, can1" in said.text and said.kind in sanity.KINDS
+    mapped = frames.decode("log", rows, [dbc], {"can1.ANGLE": "hip_angle_rad"})
+    assert "hip_angle_rad" in mapped and "can0.ANGLE" in mapped
+
+
+def test_one_bus_is_read_where_it_is_asked_for(dbc):
+    rows = [on("can0", 1, 7), on("can1", 2, 8), on("can0", 3, 9), on("can1", 4, 1, 7)]
+    found = frames.decode("log", rows, [dbc], buses=["can0"])
+    assert found["ANGLE"].value == pytest.approx([0.007, 0.009]) and found.findings == []
+    assert set(frames.decode("log", rows, [dbc], buses=["can0", "can1"]).channels) == {"can0.ANGLE", "can1.ANGLE"}
+    with pytest.raises(UserError, match=r"log: --bus can7: unknown bus \(available: can0, can1\)"):
+        frames.decode("log", rows, [dbc], buses=["can7"])
+
+
+def test_frames_that_do_not_fit_are_lost_on_their_own_bus(dbc):
+    rows = [on("can0", 1, 7), on("can1", 2, 8), ("can1", 3_000_000, 291, 1, 8, 0)]
+    found = frames.decode("log", rows, [dbc])
+    assert (found["can0.ANGLE"].lost_share, found["can1.ANGLE"].lost_share) == (0.0, 0.5)
+    assert [each.channel for each in found.findings if each.kind == "broken_frames"] == ["can1.ANGLE"]
+
+
+def test_an_identifier_that_two_files_call_otherwise_is_refused(dbc, tmp_path):
+    other = tmp_path / "other.dbc"
+    other.write_text(DBC.replace("ANGLE", "SPEED"), encoding="utf-8")
+    with pytest.raises(UserError, match=r"other.dbc: the identifier 0x123 is SPEED here and ANGLE in another DBC file"):
+        frames.decode("log", [on("can0", 1, 7)], [dbc, other])
+    assert "ANGLE" in frames.decode("log", [on("can0", 1, 7)], [dbc, dbc])
+
+
+CASE = DATA.parent / "cases" / "01-two-buses-one-id"
+
+
+@pytest.mark.skipif(not CASE.exists(), reason=f"no case in {CASE.name}/")
+def test_the_case_of_one_identifier_on_two_buses():
+    files = CASE / "m_two_buses.log", None, [CASE / "m.dbc"]
+    both = datasets.open_recording(*files)
+    assert {"can0.DRIVE.angle", "can1.DRIVE.angle"} <= set(both.channels)
+    assert set(both["can1.DRIVE.angle"].value) == {1.0} != set(both["can0.DRIVE.angle"].value)
+    one = datasets.open_recording(*files, buses=["can1"])
+    assert set(one["DRIVE.angle"].value) == {1.0}
+    with pytest.raises(UserError, match="--bus can1: .* is not a recording of CAN frames"):
+        datasets.open_recording(CASE / "m.dbc", buses=["can1"])

@@ -197,6 +197,7 @@ def prepared(
             raise UserError(f"--repair {name}: {dataset.name} has no such channel; there are {', '.join(names)}")
     dataset.channels = {name: dataset.channels[name] for name in names}
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
+    dataset.repairs = [each for each in dataset.repairs if each.channel in ("", *names)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
     inputs = {each.name for each in machine.quantities if each.is_input} - set(asked)

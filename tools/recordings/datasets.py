@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
@@ -24,6 +24,9 @@ def add_options(command: Any) -> None:
     )
     command.add_argument(
         "--dbc", action="append", default=[], metavar="FILE", help="messages of a recording of CAN frames (repeatable)"
+    )
+    command.add_argument(
+        "--bus", action="append", default=[], metavar="NAME", help="read the frames of this bus only (repeatable)"
     )
     command.add_argument("--time-unit", metavar="ms", help="of a time column whose name does not say it")
     add_accept_loss(command)
@@ -46,8 +49,9 @@ def open_recording(
     databases: Sequence[str | pathlib.Path] = (),
     time_unit: str | None = None,
     read_frames: Callable[[pathlib.Path], Iterable[frames.Frame]] | None = None,
+    buses: Collection[str] = (),
 ) -> Dataset:
-    """The channels of a file or folder. `databases`: DBC files, for frames (candump, BLF, ASC, TRC).
+    """The channels of a file or folder. `databases`: DBC files, for frames (candump, BLF, ASC, TRC), of these `buses`.
 
     read_frames: reads them otherwise than can_bus.edge.logs.read_log does, to keep them.
     An MDF file is read as frames when DBC files are given, and as channels otherwise. UserError for all that is wrong.
@@ -59,13 +63,15 @@ def open_recording(
 
         if not databases:
             raise UserError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
-        return frames.decode(path.name, (read_frames or read_log)(path), databases, mapping)
+        return frames.decode(path.name, (read_frames or read_log)(path), databases, mapping, buses)
+    if buses:
+        raise UserError(f"--bus {' '.join(buses)}: {path} is not a recording of CAN frames, or --dbc is missing")
     return readers.read(path, mapping, time_unit=time_unit, variable_units=robot_units())
 
 
 def open_with(options: Any, path: str) -> Dataset:
     """The recording `path` as `add_options` says."""
-    return open_recording(path, columns.mapping_of(options.map), options.dbc, options.time_unit)
+    return open_recording(path, columns.mapping_of(options.map), options.dbc, options.time_unit, buses=options.bus)
 
 
 def robot_units() -> dict[str, str]:
