@@ -24,6 +24,8 @@ LOSSES = {
     "ragged": "rows with too many or too few cells",
     "no_stamp": "rows without a stamp",
     "not_finite": "values or stamps that are not numbers",
+    "cut_off": "frames that should be there: the file is cut off",
+    "not_frames": "lines of frames that the reader passed over",
     "broken_frames": "frames that do not fit their message",
     "reversed_stamps": "stamps that go back and do not fit between the others either",
     "restarted_stamps": "stamps that begin again within the time of those before: several recordings in one file?",

@@ -24,9 +24,10 @@ def stop_if_too_many(dataset: Dataset, names: Iterable[str], accepted: float = A
 
 
 def _refuse(dataset: Dataset, name: str, lost: int, read: int, losses: Iterable[Loss], accepted: float) -> None:
+    what = "lines" if any(loss.reason == "ragged" for loss in losses) else "frames"
     reasons = "; ".join(loss.text for loss in losses if loss.reason in LOSSES)
     share = 100.0 * lost / read
-    place = f"{dataset.name}: {name}: {lost} of {read} samples" if name else f"{dataset.name}: {lost} of {read} lines"
+    place = f"{dataset.name}: {name}: {lost} of {read} samples" if name else f"{dataset.name}: {lost} of {read} {what}"
     raise UserError(
         f"{place} are lost, {share:.3g} % where {100.0 * accepted:.3g} % are accepted: {reasons}; nothing is concluded "
         f"from the rest (--accept-loss {min(math.ceil(share), 100)}% does)"

@@ -26,6 +26,7 @@ KINDS = {
     "unreadable": "cells that are no numbers",
     "no_numbers": "channels of a measurement file that hold no plain numbers",
     "unknown_frames": "frames that the DBC file does not know",
+    "lost_frames": "frames that the file has, or should have, and that did not come out",
     "several_buses": "messages that came on several buses",
     "broken_frames": "frames that do not fit their message",
     "no_summary": "a walk's folder without its summary",

@@ -2,11 +2,13 @@
 
 import pathlib
 
+import can
+import numpy as np
 import pytest
 
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import sanity
+from ranger_sim.sysid import losses, sanity
 from ranger_sim.sysid.readers import frames
 from ranger_sim.tools.recordings import datasets
 from tests.boards.original_images import DATA
@@ -157,3 +159,46 @@ def test_the_case_of_one_identifier_on_two_buses():
     assert set(one["DRIVE.angle"].value) == {1.0}
     with pytest.raises(UserError, match="--bus can1: .* is not a recording of CAN frames"):
         datasets.open_recording(CASE / "m.dbc", buses=["can1"])
+
+
+def test_frames_that_a_file_lacks_are_in_the_ledger_and_stop_a_verdict(dbc, tmp_path):
+    path = tmp_path / "a.blf"
+    with can.Logger(path) as writer:
+        for number in range(4000):
+            data = (number % 1000).to_bytes(2, "little") + bytes(2)
+            writer(can.Message(timestamp=1000 + 0.01 * number, arbitration_id=291, data=data, is_extended_id=False))
+    whole = datasets.open_recording(path, databases=[dbc])
+    assert (whole.rows, whole.losses) == (4000, [])
+    losses.stop_if_too_many(whole, whole.channels)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    half = datasets.open_recording(path, databases=[dbc])
+    (loss,) = half.losses
+    assert half.rows == 4000 == len(half["ANGLE"].value) + loss.count
+    assert half.ledger()[""]["kept"] == len(half["ANGLE"].value)
+    (said,) = [each for each in half.findings if each.kind == "lost_frames"]
+    assert said.kind in sanity.KINDS and "the file is cut off" in said.text
+    with pytest.raises(
+        UserError, match=r"a.blf: \d+ of 4000 frames are lost, .* the file is cut off, the first behind"
+    ):
+        losses.stop_if_too_many(half, half.channels)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".db"])
+def test_python_cans_table_and_data_base_are_recordings_of_frames(dbc, tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    with can.Logger(path) as writer:
+        for number in range(5):
+            writer(
+                can.Message(timestamp=0.01 * number, arbitration_id=291, data=[number, 0, 0, 0], is_extended_id=False)
+            )
+    assert datasets.open_recording(path, databases=[dbc])["ANGLE"].value == pytest.approx(0.001 * np.arange(5))
+    with pytest.raises(UserError, match=f"a{suffix}: a recording of CAN frames needs a DBC file"):
+        datasets.open_recording(path)
+
+
+def test_every_frame_of_a_recording_passes_who_keeps_them(dbc, tmp_path):
+    path = tmp_path / "a.log"
+    path.write_text("(1.0) can0 123#01000000\n(2.0) can0 007#\n(3.0) can0 123#02000000\n")
+    kept = []
+    datasets.open_recording(path, databases=[dbc], each_frame=kept.append)
+    assert [frame[2] for frame in kept] == [0x123, 7, 0x123]

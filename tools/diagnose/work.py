@@ -188,10 +188,13 @@ def prepared(
     if experiment in MACHINES:
         dataset = named_for(dataset, experiment)
     missing = [each.name for each in machine.quantities if each.needed and each.name not in dataset]
-    if missing:
-        there = ", ".join(dataset.channels) or "none"
-        raise UserError(f"{dataset.name}: {machine.name} needs {', '.join(missing)}; there are {there}")
     names = [each.name for each in machine.quantities if each.name in dataset]
+    if missing or not names:
+        wanted = ", ".join(missing) or "one of its channels"
+        there = ", ".join(dataset.channels) or "none"
+        raise UserError(
+            f"{dataset.name}: {machine.name} needs {wanted}; there are {there} (--map NAME=CHANNEL names it)"
+        )
     for name in asked:
         if name not in names:
             raise UserError(f"--repair {name}: {dataset.name} has no such channel; there are {', '.join(names)}")

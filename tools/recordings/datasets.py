@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import losses, readers
-from ranger_sim.sysid.dataset import Dataset
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns, frames
 from ranger_sim.tools.command_line.units import SHARES, quantity
 
@@ -48,25 +48,59 @@ def open_recording(
     mapping: Mapping[str, str] | None = None,
     databases: Sequence[str | pathlib.Path] = (),
     time_unit: str | None = None,
-    read_frames: Callable[[pathlib.Path], Iterable[frames.Frame]] | None = None,
+    each_frame: Callable[[frames.Frame], None] | None = None,
     buses: Collection[str] = (),
 ) -> Dataset:
-    """The channels of a file or folder. `databases`: DBC files, for frames (candump, BLF, ASC, TRC), of these `buses`.
+    """The channels of a file or folder. `databases`: DBC files, for frames (can_bus.edge.logs), of these `buses`.
 
-    read_frames: reads them otherwise than can_bus.edge.logs.read_log does, to keep them.
+    each_frame: is called with every frame that is read, to keep it.
     An MDF file is read as frames when DBC files are given, and as channels otherwise. UserError for all that is wrong.
     """
     path = pathlib.Path(path)
-    suffix = path.suffix.lower()
-    if path.is_file() and (suffix in readers.FRAMES or (databases and suffix in readers.MEASUREMENTS)):
-        from ranger_sim.can_bus.edge.logs import read_log
-
+    if path.is_file() and _has_frames(path, bool(databases)):
         if not databases:
             raise UserError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
-        return frames.decode(path.name, (read_frames or read_log)(path), databases, mapping, buses)
+        return _decoded(path, mapping, databases, each_frame, buses)
     if buses:
         raise UserError(f"--bus {' '.join(buses)}: {path} is not a recording of CAN frames, or --dbc is missing")
     return readers.read(path, mapping, time_unit=time_unit, variable_units=robot_units())
+
+
+def _has_frames(path: pathlib.Path, with_databases: bool) -> bool:
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        from ranger_sim.can_bus.edge.logs import is_frame_table
+
+        return is_frame_table(path)
+    return suffix in readers.FRAMES or (with_databases and suffix in readers.MEASUREMENTS)
+
+
+def _decoded(
+    path: pathlib.Path,
+    mapping: Mapping[str, str] | None,
+    databases: Sequence[str | pathlib.Path],
+    each_frame: Callable[[frames.Frame], None] | None,
+    buses: Collection[str],
+) -> Dataset:
+    """The channels of recorded frames, with what became of the file's lines."""
+    from ranger_sim.can_bus.edge.logs import read_log
+
+    log = read_log(path)
+
+    def passing() -> Iterator[frames.Frame]:
+        for frame in log:
+            if each_frame is not None:
+                each_frame(frame)
+            yield frame
+
+    dataset = frames.decode(path.name, passing(), databases, mapping, buses)
+    dataset.rows = log.read
+    for reason, count, where in log.losses:
+        loss = Loss(reason, count, where)
+        dataset.losses.append(loss)
+        text = f"{log.read} frames should be there, {loss.text}"
+        dataset.findings.append(Finding("", "lost_frames", 0.0, 0.0, float(count), "frames", text))
+    return dataset
 
 
 def open_with(options: Any, path: str) -> Dataset:
