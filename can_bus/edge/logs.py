@@ -235,7 +235,7 @@ SCREEN = re.compile(  # candump on a screen: with or without stamps, -x, and the
     r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<length>\d+)\]\s*(?P<data>.*)"
 )
 BUSMASTER = re.compile(
-    r"(?P<h>\d+):(?P<m>\d+):(?P<s>\d+):(?P<part>\d{4})\s+(?:Rx|Tx)\s+(?P<bus>\d+)\s+(?P<id>(?:0x)?[0-9A-Fa-f]+)\s+"
+    r"(?P<h>\d+):(?P<m>\d+):(?P<s>\d+):(?P<part>\d{1,4})\s+(?:Rx|Tx)\s+(?P<bus>\d+)\s+(?P<id>(?:0x)?[0-9A-Fa-f]+)\s+"
     r"(?P<kind>[sx]r?)\s+(?P<length>\d+)\s*(?P<data>.*)",
     re.IGNORECASE,
 )
@@ -320,7 +320,8 @@ def _busmaster_frame(line: str) -> Frame:
     if found is None:
         raise ValueError(f"not `time direction bus identifier kind length data`: {line.strip()[:60]!r}")
     seconds = int(found["h"]) * 3600 + int(found["m"]) * 60 + int(found["s"])
-    time_ns = seconds * SECOND_NS + int(found["part"]) * 100_000
+    part_ns = 100_000 if len(found["part"]) == 4 else 1_000_000  # version 2 writes ms without zeros in front
+    time_ns = seconds * SECOND_NS + int(found["part"]) * part_ns
     kind, identifier, length = found["kind"].lower(), int(found["id"], 16), int(found["length"])
     flags = FLAG_EXTENDED if kind[0] == "x" else 0
     if "r" in kind:

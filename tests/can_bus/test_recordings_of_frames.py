@@ -183,6 +183,10 @@ def test_extended_and_remote_frames_of_busmaster_and_savvycan(tmp_path):
     assert recorded(path)[0] == [
         ("2", 1_000_500_000, 0x1ABCDEF0, 1 | FLAG_EXTENDED, 0xFF, 0), ("1", 2000 * MS, 7, 2 | FLAG_REMOTE, 0, 0)
     ]  # fmt: skip
+    path.write_text(
+        "***BUSMASTER Ver 2.4.0***\n***HEX***\n22:20:14:8 Rx 0 0000021A s 1 FE \n22:20:14:992 Rx 0 00000210 s 0 \n"
+    )
+    assert [frame[1] % 1_000_000_000 for frame in recorded(path)[0]] == [8 * MS, 992 * MS]  # version 2 writes ms
     path.write_text("***BUSMASTER Ver 3.2.2***\n***DEC***\n00:00:01:0005 Rx 2 7 s 1 255\n")
     with pytest.raises(UserError, match="a.log: BUSMASTER's log in decimal numbers"):
         recorded(path)
