@@ -20,6 +20,7 @@ KINDS = {
     # of the file, told by its reader
     "no_header": "the columns have no names",
     "no_unit": "nothing says the unit",
+    "unknown_unit": "the file says a unit that is not known",
     "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
     "no_stamp": "rows without a stamp",
     "ragged": "rows with too many or too few cells",
@@ -53,7 +54,7 @@ KINDS = {
     "wrong_unit": "values as of another unit than is told",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
-DOUBTED = ("wrong_unit", "stuck", "noise")
+DOUBTED = ("unknown_unit", "wrong_unit", "stuck", "noise")
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples

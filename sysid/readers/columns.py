@@ -15,10 +15,14 @@ EPOCH_S = 1e8  # stamps beyond this (three years) are of a calendar; floats woul
 
 @dataclasses.dataclass(frozen=True)
 class Label:
-    """What a column is called in SI, with its unit; None when nothing says the unit."""
+    """What a column is called in SI, with its unit; None when nothing says the unit.
+
+    unknown: what the file says of a unit that is not known, where nothing else says the unit.
+    """
 
     name: str
     unit: Unit | None
+    unknown: str = ""
 
 
 def mapping_of(texts: list[str]) -> dict[str, str]:
@@ -57,7 +61,8 @@ def label(source: str, column: str, unit_text: str | None, mapping: Mapping[str,
                 f"{source}: {column} is in {unit.text or 'parts of one'}, it cannot become {given} "
                 f"({new_unit.text or 'parts of one'})"
             )
-    return Label(units.si_name(stem, unit) if in_name and unit is not None else stem, unit)
+    unknown = unit_text.strip() if unit is None and unit_text is not None else ""
+    return Label(units.si_name(stem, unit) if in_name and unit is not None else stem, unit, unknown)
 
 
 def add(
@@ -73,7 +78,10 @@ def add(
     if named.name in dataset.channels:
         raise UserError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
     unit = named.unit
-    if unit is None:
+    if named.unknown:
+        text = f"{column}: its unit {named.unknown[:40]!r} is not known (--map {column}=NAME_UNIT says it)"
+        dataset.findings.append(Finding(named.name, "unknown_unit", *ends(time_s), 0.0, "", text))
+    elif unit is None:
         dataset.findings.append(
             Finding(named.name, "no_unit", *ends(time_s), 0.0, "", f"{column}: nothing says its unit", "note")
         )
