@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 LOSSES = {
     "ragged": "rows with too many or too few cells",
     "no_stamp": "rows without a stamp",
+    "text": "values that stand for a text (not available, error)",
     "not_finite": "values or stamps that are not numbers",
     "cut_off": "frames that should be there: the file is cut off",
     "not_frames": "lines of frames that the reader passed over",

@@ -3,6 +3,7 @@
 import math
 import os
 import pathlib
+import warnings
 
 import numpy as np
 import pytest
@@ -466,6 +467,53 @@ def test_a_measurement_begins_at_zero_and_its_groups_keep_their_distance(tmp_pat
     data = read(tmp_path / "late.mf4")
     assert data["a_A" if "a_A" in data else "a"].time_s.tolist() == pytest.approx((early - start_s).tolist())
     assert data["b_V" if "b_V" in data else "b"].time_s.tolist() == pytest.approx((late - start_s).tolist())
+
+
+def measured(path, raw, conversion):
+    """A measurement file with one channel of raw numbers and a conversion of them, 10 ms apart."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from asammdf import MDF, Signal
+
+        with MDF(version="4.10") as file:
+            time_s = 0.01 * np.arange(len(raw))
+            signal = Signal(np.array(raw, dtype=np.uint16), time_s, name="speed", unit="rpm", conversion=conversion)
+            file.append([signal])
+            file.save(path, overwrite=True)
+    return read(path)
+
+
+@pytest.mark.parametrize(
+    ("conversion", "values"),
+    [
+        ({"val_0": 65535, "text_0": "SNA"}, [10.0, 20.0, 40.0]),
+        ({"val_0": 65535, "text_0": "SNA", "default_addr": {"a": 0.5, "b": 1.0}}, [6.0, 11.0, 21.0]),
+        ({"lower_0": 65000, "upper_0": 65535, "text_0": "error"}, [10.0, 20.0, 40.0]),
+        ({"lower_0": 0, "upper_0": 1000, "text_0": {"a": 2.0, "b": 0.0}, "default_addr": "SNA"}, [20.0, 40.0, 80.0]),
+    ],
+    ids=["a value", "a value, the others scaled", "a range", "all but a range"],
+)
+def test_a_text_for_some_values_leaves_the_others(tmp_path, conversion, values):
+    data = measured(tmp_path / "a.mf4", [10, 20, 65535, 40], conversion)
+    channel = data["speed"]
+    assert channel.value == pytest.approx(np.array(values) * math.pi / 30)
+    assert channel.time_s == pytest.approx([0.0, 0.01, 0.03]) and channel.losses == (Loss("text", 1, "at 0.02 s"),)
+    (said,) = data.findings
+    assert (said.kind, said.size, said.text) == ("text", 1.0, "1 of 4 values stand for a text and are no samples")
+    assert said.kind in sanity.KINDS and channel.read == 4
+
+
+def test_states_that_all_have_a_name_are_their_numbers(tmp_path):
+    names = {f"val_{k}": k for k in range(3)} | {f"text_{k}": f"state {k}" for k in range(3)}
+    data = measured(tmp_path / "a.mf4", [0, 2, 1, 1], names)
+    assert data["speed"].losses == () and data["speed"].value == pytest.approx(np.array([0, 2, 1, 1]) * math.pi / 30)
+
+
+@pytest.mark.skipif(not CASES.exists(), reason=f"no cases in {CASES.name}/")
+def test_the_case_of_a_value_that_is_not_available():
+    data = read(CASES / "15-mf4-partial-text" / "d_sna.mf4")
+    assert (len(data["speed"].value), data["speed"].read, data["speed"].unit) == (9, 10, "rad/s")
+    assert data["speed"].value[0] == pytest.approx(1000.0 * math.pi / 30)
 
 
 def test_a_broken_measurement_file_is_told_in_a_line(tmp_path):
