@@ -32,6 +32,7 @@ from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.recordings import datasets
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
+MOST_GAPS = 4  # more of them are one line on a screen; report and JSON have all
 LEAST_ROWS = 50  # below, filters are longer than the data; what says anything has some hundreds
 
 
@@ -74,7 +75,9 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
         replace_file(path, model_file.model_text(found).encode())
         found.answer["model_file"] = str(path)
         for each in model_file.effects_found(found):
-            if each.term is None:
+            if (
+                each.term is None and found.machine.name in MACHINES
+            ):  # a machine of one's own has a simulator of its own
                 found.answer["evidence"].setdefault("without_form", []).append(
                     {"name": each.known.cause, "at": each.known.at, "reason": each.no_form}
                 )
@@ -278,7 +281,16 @@ def _show(found: Diagnosis, console: Console) -> None:
         console.print(f"{name} comes out as {value}, which no machine has", highlight=False, soft_wrap=True)
     for name in answer["evidence"].get("refused_by_holdout", ()):
         console.print(f"{name} is in these data and not in the held-out ones: refused", highlight=False, soft_wrap=True)
-    for word, lines in (("data", answer["data_findings"]), ("repaired", answer["data_repairs"])):
+    findings, gaps = answer["data_findings"], [each for each in answer["data_findings"] if each["kind"] == "gap"]
+    if len(gaps) > MOST_GAPS:
+        findings = [each for each in findings if each["kind"] != "gap"]
+        longest = max(gaps, key=lambda each: each["size"])
+        text = (
+            f"gaps in {len({each['channel'] for each in gaps})} channels; the longest is {longest['size']:.4g} s at "
+            f"{longest['start_s']:.4g} s, in {longest['channel']}"
+        )
+        findings.append({"recording": longest["recording"], "channel": "", "text": text})
+    for word, lines in (("data", findings), ("repaired", answer["data_repairs"])):
         together: dict[tuple[str, str], list[str]] = {}  # what is said of several channels alike is one line
         for each in lines:
             together.setdefault((each["recording"], each["text"]), []).append(each["channel"])
