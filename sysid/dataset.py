@@ -16,7 +16,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 
 Array = NDArray[np.float64]
 # Why samples are left out. Of the second kind nothing is lost: the same was there already, never was, or is not wanted.
@@ -174,6 +174,9 @@ class Dataset:
     repairs: list[Repair] = dataclasses.field(default_factory=list)
     rows: int = 0
     losses: list[Loss] = dataclasses.field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.name = printable(self.name)  # a file's name may have bytes that are no letters in UTF-8
 
     def __getitem__(self, name: str) -> Channel:
         try:

@@ -208,7 +208,9 @@ class Regression:
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
         self.whitening: dict[str, Whitening] = dict(noise.whitening) if noise else {}
         known = noise.shared if noise else {}
-        self.shared = {pair: each for pair, each in known.items() if set(pair) <= set(self.equations)}
+        self.shared: dict[tuple[str, str], float] = {
+            pair: each for pair, each in known.items() if set(pair) <= set(self.equations)
+        }
         counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
         if counted <= 10 * (self.count - len(self._priors())):
             names = ", ".join(recording.table.name for recording in self.recordings)

@@ -21,7 +21,7 @@ from scipy.stats import t as t_distribution
 
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
 from ranger_sim.sysid import channels, inspection, losses, repairs, sanity
@@ -110,7 +110,7 @@ def compare(log: str, measured: gait.Walk, emulator: emulate.Emulator, causes: b
     walked = walked[-emulator.settled :]
     features = np.mean([each.features for each in walked], axis=0)
     answer: dict[str, Any] = {
-        "log": pathlib.Path(log).name,
+        "log": printable(pathlib.Path(log).name),
         "controller": emulator.scenario.controller,
         "body": emulator.scenario.body,
         "model": emulator.scenario.model_file,

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.sysid import losses, model_file, predicted_ties, repairs, sanity
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Repair, Table
@@ -25,7 +25,7 @@ from ranger_sim.sysid.diagnose import Progress as Progressed
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
-from ranger_sim.sysid.machines import MACHINES, made
+from ranger_sim.sysid.machines import MACHINES, ROBOT, made
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.diagnose import words
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         found = of_options(options, lambda what, share: bar.update(task, description=what, completed=share))
         if folder is not None:
             bar.update(task, description="report")
-            write(found, folder, shlex.join(["ranger-sim", *sys.argv[1:]]))
+            write(found, folder, printable(shlex.join(["ranger-sim", *sys.argv[1:]])))
     if options.json == "-":
         print(_json(found.answer))
     else:
@@ -75,9 +75,7 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
         replace_file(path, model_file.model_text(found).encode())
         found.answer["model_file"] = str(path)
         for each in model_file.effects_found(found):
-            if (
-                each.term is None and found.machine.name in MACHINES
-            ):  # a machine of one's own has a simulator of its own
+            if each.term is None and found.machine.name in ROBOT:  # others have simulators of their own
                 found.answer["evidence"].setdefault("without_form", []).append(
                     {"name": each.known.cause, "at": each.known.at, "reason": each.no_form}
                 )

@@ -18,7 +18,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.plant import terms
 from ranger_sim.sysid import losses, readers, repairs, sanity
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
@@ -255,7 +255,7 @@ def told_of(options: argparse.Namespace, fits: dict[str, Fit], truth: dict[str, 
     ]
     return {
         "bench": options.bench,
-        "data": options.data,
+        "data": None if options.data is None else printable(options.data),
         "seed": options.seed if options.data is None else None,
         "gear": options.gear,
         "fits": [fit_as_data(title, found) for title, found in fits.items()],
