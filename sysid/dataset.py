@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 LOSSES = {
     "ragged": "rows with too many or too few cells",
     "no_stamp": "rows without a stamp",
-    "text": "values that stand for a text (not available, error)",
+    "text": "values that have a text instead of a number (not available, error)",
     "not_finite": "values or stamps that are not numbers",
     "cut_off": "frames that should be there: the file is cut off",
     "not_frames": "lines of frames that the reader passed over",
@@ -176,7 +176,7 @@ class Dataset:
     losses: list[Loss] = dataclasses.field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.name = printable(self.name)  # a file's name may have bytes that are no letters in UTF-8
+        self.name = printable(self.name)  # a file's name may have bytes that are not UTF-8
 
     def __getitem__(self, name: str) -> Channel:
         try:
@@ -190,14 +190,18 @@ class Dataset:
 
     def ledger(self) -> dict[str, dict[str, object]]:
         """What became of every sample: {channel: {"read", "kept", "left_out"}}; "" for lines of no channel."""
-        told: dict[str, dict[str, object]] = {}
+        accounts: dict[str, dict[str, object]] = {}
         if self.losses:
             kept = self.rows - sum(loss.count for loss in self.losses)
-            told[""] = {"read": self.rows, "kept": kept, "left_out": [dataclasses.asdict(each) for each in self.losses]}
+            accounts[""] = {
+                "read": self.rows,
+                "kept": kept,
+                "left_out": [dataclasses.asdict(each) for each in self.losses],
+            }
         for name, channel in self.channels.items():
             left_out = [dataclasses.asdict(each) for each in channel.losses]
-            told[name] = {"read": channel.read, "kept": len(channel.value), "left_out": left_out}
-        return told
+            accounts[name] = {"read": channel.read, "kept": len(channel.value), "left_out": left_out}
+        return accounts
 
     def table(self, names: Iterable[str], longest_gap: float = 5.0) -> Table:
         """These channels on the stamps of the densest of them, by straight lines, cut at gaps.

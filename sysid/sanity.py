@@ -25,7 +25,7 @@ KINDS = {
     "no_stamp": "rows without a stamp",
     "ragged": "rows with too many or too few cells",
     "unreadable": "cells that are no numbers",
-    "text": "values of a measurement file that stand for a text",
+    "text": "values of a measurement file that have a text instead of a number",
     "no_numbers": "channels of a measurement file that hold no plain numbers",
     "unknown_frames": "frames that the DBC file does not know",
     "lost_frames": "frames that the file has, or should have, and that did not come out",

@@ -211,7 +211,7 @@ def _asc_lines(log: RecordedFrames) -> Iterator[str]:
         if in_header and line.strip():
             in_header = False
             if not re.match(r"\s*(no\s+)?internal\s+events\s+logged", line, re.IGNORECASE):
-                # this stands in for the line that ends the header; both are one line of the file
+                # this replaces the line that ends the header; both are one line of the file
                 line = "internal events logged\n" + line
                 first, line = line.split("\n", 1)
                 yield first + "\n"

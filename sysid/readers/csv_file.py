@@ -211,7 +211,7 @@ def _time(
     time_unit: str | None,
     decimal_comma: bool,
 ) -> tuple[set[int], Array]:
-    """(indices of the columns that hold time, stamps in s; not a number where there is none)."""
+    """(indices of the columns that hold time, stamps in s; NaN where a row has none)."""
     split = [units.split(mapping.get(name, name)) for name in names]
     candidates = [k for k, (stem, _) in enumerate(split) if stem.lower() in (*units.TIME_WORDS, *CLOCKS)]
     if not candidates:
@@ -253,7 +253,7 @@ def _counted(
     time_unit: str | None,
     decimal_comma: bool,
 ) -> Array:
-    """Stamps in s of a column of numbers; not a number where there is none."""
+    """Stamps in s of a column of numbers; NaN where a row has none."""
     said = units.unit_of(unit_text) if unit_text else None
     unit = said or unit or (units.unit_of(time_unit) if time_unit else None)
     plain = _plain_numbers(cells, decimal_comma)

@@ -59,7 +59,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
         lost: tuple[Loss, ...] = ()
         if has_text.any():
             lost = (Loss("text", int(has_text.sum()), f"at {stamps[has_text][0]:.6g} s"),)
-            text = f"{lost[0].count} of {len(value)} values stand for a text and are no samples"
+            text = f"{lost[0].count} of {len(value)} values have a text instead of a number and are left out"
             ends = columns.ends(stamps[has_text])
             dataset.findings.append(Finding(named.name, "text", *ends, float(lost[0].count), "samples", text))
         columns.add(dataset, name, named, stamps[~has_text], value[~has_text], losses=lost)
@@ -69,7 +69,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
 
 
 def _channels(path: pathlib.Path, truth: bool) -> Iterator[tuple[str, str, Array, Array | None, NDArray[np.bool_]]]:
-    """(name, unit, stamps, values, which of them stand for a text) of every channel that is no group's clock.
+    """(name, unit, stamps, values, which of them have a text instead) of every channel that is no group's clock.
 
     The values are None when they are not numbers at all.
     """
@@ -99,7 +99,7 @@ def _channels(path: pathlib.Path, truth: bool) -> Iterator[tuple[str, str, Array
 
 
 def _with_texts(conversion: Any, raw: NDArray[Any]) -> tuple[Array | None, NDArray[np.bool_]]:
-    """(numbers or None, which of them stand for a text) of raw values (n,) of which some have a text.
+    """(numbers or None, which of them have a text instead) of raw values (n,) of which some have a text.
 
     Where every value that occurs has one, they are states, and their raw numbers are the values.
     """

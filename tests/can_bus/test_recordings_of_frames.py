@@ -1,4 +1,4 @@
-"""Every frame that a recording has comes out or is accounted for, whoever wrote the file."""
+"""Every frame that a recording has comes out or is accounted for, whatever program wrote the file."""
 
 import itertools
 

@@ -196,7 +196,7 @@ def test_python_cans_table_and_data_base_are_recordings_of_frames(dbc, tmp_path,
         datasets.open_recording(path)
 
 
-def test_every_frame_of_a_recording_passes_who_keeps_them(dbc, tmp_path):
+def test_every_frame_of_a_recording_is_given_to_what_keeps_them(dbc, tmp_path):
     path = tmp_path / "a.log"
     path.write_text("(1.0) can0 123#01000000\n(2.0) can0 007#\n(3.0) can0 123#02000000\n")
     kept = []

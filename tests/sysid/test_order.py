@@ -83,7 +83,7 @@ def test_a_sample_with_a_wrong_stamp_is_left_out(stamp):
     assert found.read == 3000
 
 
-def test_a_sample_that_came_again_is_no_loss_and_another_value_at_its_stamp_is():
+def test_a_repeated_sample_is_not_a_loss_and_another_value_at_its_stamp_is():
     twice = mended(np.repeat(T, 2), np.repeat(V, 2))
     assert [(each.reason, each.count) for each in twice["a_V"].losses] == [("repeated", 3000)]
     losses.stop_if_too_many(twice, twice.channels)

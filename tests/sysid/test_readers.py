@@ -139,7 +139,7 @@ def test_one_unknown_word_leaves_the_other_units_of_its_row(table):
     assert named["speed_m_per_s"].value == pytest.approx([4e-3] * 2) and not sanity.doubts(named.findings)
 
 
-def test_a_row_of_words_in_which_no_unit_is_known_is_no_row_of_units(table):
+def test_a_row_of_words_in_which_no_unit_is_known_is_read_as_data(table):
     data = table("t_s,a_V\nstart,low\n0,1\n1,2\n")
     assert data["a_V"].value.tolist() == [1.0, 2.0] and data["a_V"].losses == (Loss("no_stamp", 1, "in line 2"),)
 
@@ -182,7 +182,7 @@ def test_a_date_and_a_time_in_two_columns_are_one_stamp(table):
     assert data["a_V"].time_s == pytest.approx([0.0, 0.25, 0.49, 0.75])
 
 
-def test_a_date_next_to_seconds_is_no_stamp(table):
+def test_a_date_next_to_seconds_is_left_out(table):
     data = table("Date,t_s,a_V\n2026-11-05,0,1\n2026-11-05,0.5,2\n")
     assert data["a_V"].time_s.tolist() == [0.0, 0.5] and set(data.channels) == {"a_V"}
 
@@ -192,7 +192,7 @@ def test_day_and_month_are_taken_as_the_rows_allow(table):
         return table("time,a_V\n" + "".join(f"{each} 00:00:00,1\n" for each in stamps))["a_V"].time_s.tolist()
 
     assert times("11/29/2026", "11/30/2026") == times("29/11/2026", "30/11/2026") == [0.0, 86400.0]
-    assert times("30/11/2026", "01/12/2026") == [0.0, 86400.0]  # the thirtieth is no month
+    assert times("30/11/2026", "01/12/2026") == [0.0, 86400.0]  # a thirtieth month does not exist
     assert times("11/05/2026", "12/05/2026") == [0.0, 86400.0]  # a day, and not a month, which it could be too
 
 
@@ -499,7 +499,11 @@ def test_a_text_for_some_values_leaves_the_others(tmp_path, conversion, values):
     assert channel.value == pytest.approx(np.array(values) * math.pi / 30)
     assert channel.time_s == pytest.approx([0.0, 0.01, 0.03]) and channel.losses == (Loss("text", 1, "at 0.02 s"),)
     (said,) = data.findings
-    assert (said.kind, said.size, said.text) == ("text", 1.0, "1 of 4 values stand for a text and are no samples")
+    assert (said.kind, said.size, said.text) == (
+        "text",
+        1.0,
+        "1 of 4 values have a text instead of a number and are left out",
+    )
     assert said.kind in sanity.KINDS and channel.read == 4
 
 

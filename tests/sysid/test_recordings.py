@@ -67,7 +67,7 @@ def holes(share):
         (lambda name, value: np.where(value < 2.0, value, value - 2.0) if name == "t_s" else value,
          "voltage_V: 200 of 400 samples are lost, 50 % where 1 % are accepted: 200 for stamps that begin again"),
     ],
-    ids=["microamperes", "milliseconds", "holes", "a sensor that stands", "stamps of 50 ms", "two recordings"],
+    ids=["microamperes", "milliseconds", "holes", "a stuck sensor", "stamps of 50 ms", "two recordings"],
 )  # fmt: skip
 def test_data_that_are_not_what_they_are_said_to_be_are_refused(tmp_path, change, line):
     with pytest.raises(UserError, match=line):
@@ -108,7 +108,7 @@ def test_rows_that_cannot_be_read_are_lost_in_every_channel(tmp_path):
 
 def test_a_repair_of_a_channel_that_is_not_there_is_refused(tmp_path):
     data = datasets.open_recording(bench(tmp_path / "a.csv"))
-    with pytest.raises(UserError, match="--repair amps: a.csv has no such channel; there are voltage_V, current_A"):
+    with pytest.raises(UserError, match=r"--repair amps: unknown channel of a.csv \(available: voltage_V, current_A"):
         work.prepared(data, made("motor-bench")(), "motor-bench", asked=["amps"])
 
 

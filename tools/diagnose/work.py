@@ -198,7 +198,7 @@ def prepared(
         )
     for name in asked:
         if name not in names:
-            raise UserError(f"--repair {name}: {dataset.name} has no such channel; there are {', '.join(names)}")
+            raise UserError(f"--repair {name}: unknown channel of {dataset.name} (available: {', '.join(names)})")
     dataset.channels = {name: dataset.channels[name] for name in names}
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
     dataset.repairs = [each for each in dataset.repairs if each.channel in ("", *names)]
