@@ -41,6 +41,7 @@ KINDS = {
     "reversed_stamps": "stamps that go back",
     "duplicate_stamps": "stamps that come twice",
     "gap": "no samples for a while",
+    "slow_samples": "samples so far apart that the stamps may be in another unit",
     "clock_drift": "two clocks do not run alike",
     # of the values
     "not_finite": "values that are no numbers",
@@ -55,7 +56,7 @@ KINDS = {
     "wrong_unit": "values as of another unit than is told",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
-DOUBTED = ("unknown_unit", "wrong_unit", "stuck", "noise")
+DOUBTED = ("unknown_unit", "slow_samples", "wrong_unit", "stuck", "noise")
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
@@ -220,7 +221,7 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
     states = np.all(channel.value == np.round(channel.value))  # numbers of states are written when they change
     if usual > LONGEST_STEP_S and len(finite) >= FEWEST and not states:
         text = f"samples are {usual:.4g} s apart: the stamps are probably in ms, or readings were taken one by one"
-        yield Finding(name, "wrong_unit", float(finite[0]), float(finite[-1]), usual, "s", text)
+        yield Finding(name, "slow_samples", float(finite[0]), float(finite[-1]), usual, "s", text)
 
 
 def _gaps(name: str, time_s: Array, steps: Array, usual: float) -> Iterator[Finding]:

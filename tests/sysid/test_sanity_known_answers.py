@@ -72,9 +72,9 @@ def test_a_counter_of_the_clock_runs_over_to_next_to_nothing(span, first, last, 
 @pytest.mark.parametrize(("step_s", "told"), [(0.49, False), (0.51, True)])
 def test_samples_half_a_second_apart_are_doubted(step_s, told):
     t = step_s * np.arange(100)
-    assert bool(of("wrong_unit", channel("current_A", np.sin(t), "A", t))) == told
+    assert bool(of("slow_samples", channel("current_A", np.sin(t), "A", t))) == told
     states = channel("walk_state", np.arange(100) % 3, "", t)  # numbers of states are written when they change
-    assert not of("wrong_unit", states)
+    assert not of("slow_samples", states)
 
 
 def test_stamps_and_values_that_are_no_numbers_are_counted():

@@ -195,3 +195,10 @@ def test_many_gaps_are_one_line_on_a_screen_and_a_gain_is_shown_where_one_was_me
     printed = console.file.getvalue()
     assert "data: walk: gaps in 2 channels; the longest is 0.3 s at 3 s, in hip_rad\n" in printed
     assert "no sample for" not in printed and "gain on" not in printed
+
+
+def test_a_slow_machine_of_ones_own_may_have_slow_samples(tmp_path, capsys):
+    run = cart_run(1, drag=0.02)
+    columns = np.column_stack([1e3 * run.time_s, *run.columns.values()])[:2000]  # steps of some seconds
+    code, told = diagnosed(tmp_path / "a.csv", capsys, text_of(["t_s", *run.columns], columns))
+    assert code in (0, 1) and "slow_samples" in {each["kind"] for each in told["data_findings"]}
