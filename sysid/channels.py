@@ -148,8 +148,8 @@ def named_for(dataset: Dataset, name: str) -> Dataset:
     """
     wanted = experiment(name)
     found = {}
-    repairs = list(dataset.repairs)
-    taken: set[str] = set()
+    repairs: list[Repair] = []
+    renamed: dict[str, str] = {}  # {in the file: in the experiment}
     for expected in wanted.channels:
         names = (expected.name, *expected.also)
         source = next((each for each in names if _is_there(dataset, each, expected.name)), None)
@@ -172,9 +172,16 @@ def named_for(dataset: Dataset, name: str) -> Dataset:
         if channel.name != expected.name:
             repairs.append(Repair(expected.name, "renamed", 0, f"{channel.name} is called {expected.name}"))
         found[expected.name] = dataclasses.replace(channel, name=expected.name, unit=expected.unit, value=value)
-        taken.add(channel.name)
-    found |= {key: channel for key, channel in dataset.channels.items() if key not in taken}
-    return Dataset(dataset.name, found, list(dataset.findings), repairs)
+        renamed[channel.name] = expected.name
+    found |= {key: channel for key, channel in dataset.channels.items() if key not in renamed}
+    findings = [
+        dataclasses.replace(each, channel=renamed.get(each.channel, each.channel))
+        for each in dataset.findings
+        # a state is a number, whatever a file calls its unit
+        if not (each.kind == "unknown_unit" and each.channel in renamed and not wanted[renamed[each.channel]].unit)
+    ]
+    before = [dataclasses.replace(each, channel=renamed.get(each.channel, each.channel)) for each in dataset.repairs]
+    return dataclasses.replace(dataset, channels=found, findings=findings, repairs=[*before, *repairs])
 
 
 def _is_there(dataset: Dataset, source: str, name: str) -> bool:

@@ -3,6 +3,7 @@
     Channel   one quantity: stamps and values, each of shape (n,), in SI units
     Finding   something odd at a place in a channel, with its size; nothing is changed by finding it
     Repair    a change that was made to a channel, with its reason; nothing is changed without one
+    Loss      samples that were read and are left out, with the reason: what was read is what is kept and all losses
     Dataset   the channels of one recording, by name
     Table     channels on one time base, cut where there is a gap: what fits and balances work on
 
@@ -15,14 +16,51 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 
 Array = NDArray[np.float64]
+# Why samples are left out. Of the second kind nothing is lost: the same was there already, never was, or is not wanted.
+LOSSES = {
+    "ragged": "rows with too many or too few cells",
+    "no_stamp": "rows without a stamp",
+    "text": "values that have a text instead of a number (not available, error)",
+    "not_finite": "values or stamps that are not numbers",
+    "cut_off": "frames that should be there: the file is cut off",
+    "not_frames": "lines of frames that the reader passed over",
+    "broken_frames": "frames that do not fit their message",
+    "reversed_stamps": "stamps that go back and do not fit between the others either",
+    "restarted_stamps": "stamps that begin again within the time of those before: several recordings in one file?",
+    "duplicate_stamps": "stamps that come twice, with different values",
+    "bit_flip": "single values with a wrong bit",
+}
+NOTHING_LOST = {
+    "repeated": "samples that came again, stamp and value",
+    "never_written": "samples of a variable before it was written",
+    "cut": "a time that is not wanted",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Loss:
+    """Samples that are left out. reason: one of LOSSES or NOTHING_LOST; where: the first of them."""
+
+    reason: str
+    count: int
+    where: str = ""
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        meaning = LOSSES.get(self.reason) or NOTHING_LOST[self.reason]
+        return f"{self.count} for {meaning}" + (f", the first {self.where}" if self.where else "")
 
 
 @dataclasses.dataclass(frozen=True)
 class Channel:
-    """One measured quantity. time_s, value: shape (n,). resolution: of one count in the channel's unit, 0: unknown."""
+    """One measured quantity. time_s, value: shape (n,). resolution: of one count in the channel's unit, 0: unknown.
+
+    losses: what was read of it and is left out.
+    """
 
     name: str
     unit: str
@@ -30,6 +68,7 @@ class Channel:
     value: Array
     resolution: float = 0.0
     source: str = ""
+    losses: tuple[Loss, ...] = ()
 
     def __post_init__(self) -> None:
         if self.time_s.shape != self.value.shape or self.time_s.ndim != 1:
@@ -37,6 +76,28 @@ class Channel:
                 f"channel {self.name}: {self.time_s.shape} stamps and {self.value.shape} values, "
                 "both must be one row of the same length"
             )
+
+    @property
+    def read(self) -> int:
+        """Samples that were read of it: what is kept and what is left out."""
+        return len(self.value) + sum(loss.count for loss in self.losses)
+
+    @property
+    def lost_share(self) -> float:
+        """The lost part of what it had: 0 to 1."""
+        lost = sum(loss.count for loss in self.losses if loss.reason in LOSSES)
+        return lost / (len(self.value) + lost) if lost else 0.0
+
+    def without(self, left_out: NDArray[np.bool_], reason: str) -> "Channel":
+        """The channel without the samples of the mask (n,), which become a loss."""
+        places = np.flatnonzero(left_out)
+        if not len(places):
+            return self
+        first = float(self.time_s[places[0]])
+        loss = Loss(reason, len(places), f"at {first:.6g} s" if np.isfinite(first) else "")
+        kept = ~left_out
+        losses = (*self.losses, loss)
+        return dataclasses.replace(self, time_s=self.time_s[kept], value=self.value[kept], losses=losses)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,12 +163,20 @@ class Table:
 
 @dataclasses.dataclass
 class Dataset:
-    """The channels of one recording, by name; what was found, and what was mended."""
+    """The channels of one recording, by name; what was found, and what was mended.
+
+    rows, losses: lines or frames of the file, and those left out of which nothing says whose samples they were.
+    """
 
     name: str
     channels: dict[str, Channel]
     findings: list[Finding] = dataclasses.field(default_factory=list)
     repairs: list[Repair] = dataclasses.field(default_factory=list)
+    rows: int = 0
+    losses: list[Loss] = dataclasses.field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.name = printable(self.name)  # a file's name may have bytes that are not UTF-8
 
     def __getitem__(self, name: str) -> Channel:
         try:
@@ -118,6 +187,21 @@ class Dataset:
 
     def __contains__(self, name: str) -> bool:
         return name in self.channels
+
+    def ledger(self) -> dict[str, dict[str, object]]:
+        """What became of every sample: {channel: {"read", "kept", "left_out"}}; "" for lines of no channel."""
+        accounts: dict[str, dict[str, object]] = {}
+        if self.losses:
+            kept = self.rows - sum(loss.count for loss in self.losses)
+            accounts[""] = {
+                "read": self.rows,
+                "kept": kept,
+                "left_out": [dataclasses.asdict(each) for each in self.losses],
+            }
+        for name, channel in self.channels.items():
+            left_out = [dataclasses.asdict(each) for each in channel.losses]
+            accounts[name] = {"read": channel.read, "kept": len(channel.value), "left_out": left_out}
+        return accounts
 
     def table(self, names: Iterable[str], longest_gap: float = 5.0) -> Table:
         """These channels on the stamps of the densest of them, by straight lines, cut at gaps.

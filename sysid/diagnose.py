@@ -90,7 +90,7 @@ def _hold_out(found: Diagnosis, holdout: Sequence[Table], seed: int) -> None:
     named = [] if found.doubtful else found.named
     held = held_out.judged(found.machine, found.plain, found.extended, holdout, found.skews, named, seed)
     told = found.answer
-    told["gain"] = held.told() if held.tells else None
+    told["gain"] = held.told()
     told["evidence"]["refused_by_holdout"] = [each.effect.name for each in held.refused]
     told["evidence"]["holdout_excites_it"] = held.tells
     if held.refused:

@@ -53,6 +53,7 @@ def measure(
     expected = 0.0
     for each in named:
         made = [each.effect.columns(recording, each.shape, plain.values) for recording in plain.recordings]
+        made = [{name: column for name, column in columns.items() if name in plain.equations} for columns in made]
         if not any(made):
             continue
         beside = plain.columns(made)

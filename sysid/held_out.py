@@ -25,13 +25,15 @@ class Held:
     refused: list[Named]
     tells: bool
 
-    def told(self) -> dict[str, Any]:
-        """For the JSON."""
+    def told(self) -> dict[str, Any] | None:
+        """For the JSON; None where no gain was measured."""
+        if self.gain is None or not self.tells:
+            return None
         return {
-            "fraction_of_achievable": self.gain.fraction if self.gain is not None else 0.0,
-            "ci95": list(self.gain.ci95) if self.gain is not None else [0.0, 0.0],
+            "fraction_of_achievable": self.gain.fraction,
+            "ci95": list(self.gain.ci95),
             "holdout": self.holdout,
-            "worse": self.gain is not None and self.gain.worse,
+            "worse": self.gain.worse,
         }
 
 

@@ -17,18 +17,32 @@ import numpy as np
 
 from ranger_sim.sysid.dataset import Array, Finding, Table
 
+DRIVING = ("command", "cmd", "target", "reference", "setpoint", "input")  # words in the names of inputs
+
 Values = Mapping[str, float]
 Columns = dict[str, Array]  # by equation, each of shape (n, k): k coefficients
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A channel that the machine knows. `needed`: without it there is no diagnosis."""
+    """A channel that the machine knows. `needed`: without it there is no diagnosis.
+
+    drives: True for what drives the machine, whose values are never repaired without being asked; where nothing is
+    said, a voltage is such a channel, and what is called a command, target, reference or setpoint.
+    """
 
     name: str
     unit: str
     meaning: str
     needed: bool = True
+    drives: bool | None = None
+
+    @property
+    def is_input(self) -> bool:
+        """True for what drives the machine."""
+        if self.drives is not None:
+            return self.drives
+        return self.unit == "V" or any(word in DRIVING for word in self.name.lower().split("_"))
 
 
 @dataclasses.dataclass(frozen=True)

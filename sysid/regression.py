@@ -196,12 +196,21 @@ class Regression:
         another regression whose whitening and parameters are taken over as a start."""
         self.recordings = list(recordings)
         self.equations = list(dict.fromkeys(name for each in recordings for name in each.equations))
-        self.names = list(dict.fromkeys(name for r in recordings for e in r.equations.values() for name in e.columns))
+        if noise is not None:  # of an equation that the other has not, no noise is known
+            self.equations = [name for name in self.equations if name in noise.whitening]
+        if not self.equations:
+            there = ", ".join(recording.table.name for recording in self.recordings)
+            raise UserError(f"{there}: no equation that the other recordings have can be made of it")
+        made = (r.equations[name] for r in recordings for name in r.equations if name in self.equations)
+        self.names = list(dict.fromkeys(name for each in made for name in each.columns))
         self.names += list(extra_names)
         self.count = len(self.names)
         self.parts = {name: self._part(name, extra, list(extra_names)) for name in self.equations}
         self.whitening: dict[str, Whitening] = dict(noise.whitening) if noise else {}
-        self.shared: dict[tuple[str, str], float] = dict(noise.shared) if noise else {}
+        known = noise.shared if noise else {}
+        self.shared: dict[tuple[str, str], float] = {
+            pair: each for pair, each in known.items() if set(pair) <= set(self.equations)
+        }
         counted = sum(int(np.count_nonzero(self._good(name))) for name in self.equations)
         if counted <= 10 * (self.count - len(self._priors())):
             names = ", ".join(recording.table.name for recording in self.recordings)

@@ -1,24 +1,30 @@
 """Changes to measured data, each explicit, each recorded in the dataset with its reason and its count.
 
-`mend` does what has one right answer: it leaves out what is no sample, puts an overrun counter right. What is a
-judgement (another unit, a lag, a zero) is asked for by name. A value is never invented: a wrong one is left out.
+`mend` does what has one right answer: it leaves out what is not a sample, sorts samples that came out of order, puts an
+overrun counter right. What is a judgement (another unit, a lag, a zero) is asked for by name, and so is any change to
+what drives the machine. A value is never invented: a wrong one is left out, and is a loss in the channel's ledger.
 """
 
 import dataclasses
 import math
+from collections.abc import Collection
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import sanity, units
-from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding, Repair
+from ranger_sim.sysid import order, sanity, units, wraps
+from ranger_sim.sysid.dataset import LOSSES, NOTHING_LOST, Channel, Dataset, Finding, Repair
 
 FEWEST = 2  # samples that a channel must keep
 KINDS = {
     "stamp_wrap": "an overrun counter of the clock counts on",
     "not_finite": "values and stamps that are no numbers are left out",
-    "reversed_stamps": "samples whose stamps go back are left out",
+    "sorted": "samples that came out of order are sorted by their stamps",
+    "reversed_stamps": "samples whose stamps go back and do not fit elsewhere are left out",
+    "restarted_stamps": "of recordings that lie over each other one is kept",
     "duplicate_stamps": "of samples with one stamp the first is kept",
+    "repeated": "a sample that came again is kept once",
     "wrap": "an overrun integer counts on",
     "bit_flip": "single wrong values are left out",
     "dropped": "a channel with nothing in it is left out",
@@ -30,99 +36,96 @@ KINDS = {
 }
 
 
-def mend(dataset: Dataset, findings: list[Finding] | None = None) -> Dataset:
+def mend(dataset: Dataset, findings: list[Finding] | None = None, inputs: Collection[str] = ()) -> Dataset:
     """The dataset without what is certainly wrong; findings (`sanity.inspect` where not given) come along.
 
-    UserError when no channel is left.
+    inputs: channels that drive the machine. Their values stay as they are, and a finding says what could be repaired.
+    A channel that has fewer than FEWEST samples left is not in the result. UserError when no channel is left.
     """
     findings = sanity.inspect(dataset) if findings is None else findings
-    wraps = {each.channel for each in findings if each.kind == "stamp_wrap"}
+    flips = {each.channel for each in findings if each.kind == "bit_flip"}
     channels = {}
-    repairs = list(dataset.repairs)
+    repairs, kept_as_is = list(dataset.repairs), []
     for channel in dataset.channels.values():
-        time_s, value = channel.time_s, channel.value
-        if channel.name in wraps:
-            time_s = _counted_on(channel.name, time_s, repairs)
-        time_s, value = _forward(channel.name, time_s, value, repairs)
-        if len(value) < FEWEST:
-            repairs.append(Repair(channel.name, "dropped", len(value), f"{len(value)} sound samples: left out"))
+        channel = _in_order(_counted_on(channel, repairs), repairs)
+        if len(channel.value) < FEWEST:
+            text = f"{len(channel.value)} sound samples: left out"
+            repairs.append(Repair(channel.name, "dropped", len(channel.value), text))
             continue
-        value = _unwrapped(channel, value, repairs)
-        time_s, value = _without_spikes(channel, time_s, value, findings, repairs)
-        channels[channel.name] = dataclasses.replace(channel, time_s=time_s, value=value)
+        wrapped = sanity.wraps_of(channel)
+        flipped = sanity.spike_places(channel.value) if channel.name in flips else np.array([], dtype=np.intp)
+        if channel.name in inputs:
+            if wrapped.places or len(flipped):
+                kept_as_is.append(_not_repaired(channel, len(wrapped.places) + len(flipped)))
+        else:
+            channel = _without_bits(_unwrapped(channel, wrapped, repairs), flipped, repairs)
+        channels[channel.name] = channel
     if not channels:
         raise UserError(f"{dataset.name}: no channel has {FEWEST} sound samples")
-    return Dataset(dataset.name, channels, findings, repairs)
+    findings = [*findings, *kept_as_is]
+    return dataclasses.replace(dataset, channels=channels, findings=findings, repairs=repairs)
 
 
-def _counted_on(name: str, time_s: Array, repairs: list[Repair]) -> Array:
+def _not_repaired(channel: Channel, count: int) -> Finding:
+    ends = float(channel.time_s[0]), float(channel.time_s[-1])
+    text = (
+        f"it drives the machine: {count} values that look wrong stay as they are (--repair {channel.name} changes them)"
+    )
+    return Finding(channel.name, "not_repaired", *ends, float(count), "samples", text)
+
+
+def _counted_on(channel: Channel, repairs: list[Repair]) -> Channel:
     """Stamps with an overrun counter's span added behind each overrun."""
-    steps = np.diff(time_s)
-    finite = steps[np.isfinite(steps)]
-    usual = float(np.median(finite[finite > 0.0])) if (finite > 0.0).any() else 0.0
-    back = [place for place in np.flatnonzero(steps < 0.0) if sanity.is_clock_wrap(time_s, int(place))]
-    mended = time_s.copy()
-    for place in back:
-        span = _span_of(float(time_s[place] - time_s[place + 1]) + usual)
-        mended[place + 1 :] += span
-        text = f"{span:.9g} s added behind {time_s[place]:.6g} s, where the counter ran over"
-        repairs.append(Repair(name, "stamp_wrap", len(time_s) - int(place) - 1, text))
-    return mended
+    for place, span in wraps.of_clock(channel.time_s):
+        text = f"{span:.9g} s added behind {channel.time_s[place]:.6g} s, where the counter ran over"
+        repairs.append(Repair(channel.name, "stamp_wrap", len(channel.time_s) - place - 1, text))
+    return dataclasses.replace(channel, time_s=wraps.counted_on(channel.time_s))
 
 
-def _span_of(step_s: float) -> float:
-    """A counter's span, next to a step back: a power of two of microseconds or milliseconds."""
-    spans = [2.0**bits * tick for bits in (16, 24, 31, 32) for tick in (1e-6, 1e-3)]
-    nearest = min(spans, key=lambda span: abs(span - step_s))
-    return nearest if abs(nearest / step_s - 1.0) < 0.02 else step_s
+def _in_order(channel: Channel, repairs: list[Repair]) -> Channel:
+    """Finite samples in the order of their stamps, none twice."""
+    found = order.of(channel.time_s, channel.value)
+    for reason, places in found.left_out.items():
+        text = f"{len(places)} samples are left out: {LOSSES.get(reason) or NOTHING_LOST[reason]}"
+        repairs.append(Repair(channel.name, reason, len(places), text))
+    if found.moved:
+        text = (
+            f"{found.moved} samples came out of order and are sorted by their stamps: {found.even:.2%} of the steps "
+            f"are then {found.step_s:.4g} s"
+        )
+        repairs.append(Repair(channel.name, "sorted", found.moved, text))
+    losses = channel.losses
+    for reason, places in found.left_out.items():
+        mask = np.zeros(len(channel.value), dtype=bool)
+        mask[places] = True
+        losses += channel.without(mask, reason).losses[len(channel.losses) :]
+    return dataclasses.replace(
+        channel, time_s=channel.time_s[found.kept], value=channel.value[found.kept], losses=losses
+    )
 
 
-def _forward(name: str, time_s: Array, value: Array, repairs: list[Repair]) -> tuple[Array, Array]:
-    """Finite samples at stamps that run forward."""
-    finite = np.isfinite(time_s) & np.isfinite(value)
-    if not finite.all():
-        count = int((~finite).sum())
-        repairs.append(Repair(name, "not_finite", count, f"{count} samples that are no numbers are left out"))
-        time_s, value = time_s[finite], value[finite]
-    if len(time_s) < 2:
-        return time_s, value
-    before = np.concatenate(([-math.inf], np.maximum.accumulate(time_s)[:-1]))
-    for kind, wrong in (("reversed_stamps", time_s < before), ("duplicate_stamps", time_s == before)):
-        if wrong.any():
-            count = int(wrong.sum())
-            text = f"{count} samples whose stamps {'go back' if kind[0] == 'r' else 'came before'} are left out"
-            repairs.append(Repair(name, kind, count, text))
-    kept = time_s > before
-    return time_s[kept], value[kept]
+def _unwrapped(channel: Channel, found: wraps.Wraps, repairs: list[Repair]) -> Channel:
+    """An overrun integer counted on by its span."""
+    if not found.places:
+        return channel
+    steps = np.diff(channel.value)
+    mended = channel.value.copy()
+    for place in found.places:
+        mended[place + 1 :] -= math.copysign(found.span, steps[place])
+    text = f"{found.span:.6g} {channel.unit} taken out at {len(found.places)} places where the integer ran over"
+    repairs.append(Repair(channel.name, "wrap", len(found.places), text))
+    return dataclasses.replace(channel, value=mended)
 
 
-def _unwrapped(channel: Channel, value: Array, repairs: list[Repair]) -> Array:
-    """An overrun integer counted on: the jump less the motion around it is its span."""
-    places = sanity.wrap_places(value)
-    if not places:
-        return value
-    steps = np.diff(value)
-    jumps = [steps[p] - 0.5 * (steps[p - 1] + steps[p + 1]) for p in places]
-    span = float(np.median(np.abs(jumps)))
-    mended = value.copy()
-    for place, jump in zip(places, jumps, strict=True):
-        mended[place + 1 :] -= math.copysign(span, jump)
-    text = f"{span:.6g} {channel.unit} taken out at {len(places)} places where the integer ran over"
-    repairs.append(Repair(channel.name, "wrap", len(places), text))
-    return mended
-
-
-def _without_spikes(
-    channel: Channel, time_s: Array, value: Array, findings: list[Finding], repairs: list[Repair]
-) -> tuple[Array, Array]:
+def _without_bits(channel: Channel, places: NDArray[np.intp], repairs: list[Repair]) -> Channel:
     """Without single values that are wrong by one bit; other spikes may be true and stay."""
-    if not any(each.channel == channel.name and each.kind == "bit_flip" for each in findings):
-        return time_s, value
-    places = sanity.spike_places(value)
-    if len(places):
-        text = f"{len(places)} single values with a wrong bit are left out"
-        repairs.append(Repair(channel.name, "bit_flip", len(places), text))
-    return np.delete(time_s, places), np.delete(value, places)
+    if not len(places):
+        return channel
+    text = f"{len(places)} single values with a wrong bit are left out"
+    repairs.append(Repair(channel.name, "bit_flip", len(places), text))
+    mask = np.zeros(len(channel.value), dtype=bool)
+    mask[places] = True
+    return channel.without(mask, "bit_flip")
 
 
 # --- asked for by name --------------------------------------------------------------------------------------
@@ -159,17 +162,17 @@ def cut(dataset: Dataset, start_s: float, end_s: float) -> Dataset:
     channels = {}
     left_out = 0
     for name, channel in dataset.channels.items():
-        kept = (channel.time_s < start_s) | (channel.time_s > end_s)
-        if kept.sum() < FEWEST:
-            raise UserError(f"{dataset.name}: {name} has {int(kept.sum())} samples outside {start_s:g} to {end_s:g} s")
-        left_out += int((~kept).sum())
-        channels[name] = dataclasses.replace(channel, time_s=channel.time_s[kept], value=channel.value[kept])
+        inside = (channel.time_s >= start_s) & (channel.time_s <= end_s)
+        outside = int((~inside).sum())
+        if outside < FEWEST:
+            raise UserError(f"{dataset.name}: {name} has {outside} samples outside {start_s:g} to {end_s:g} s")
+        left_out += int(inside.sum())
+        channels[name] = channel.without(inside, "cut")
     repair = Repair("", "cut", left_out, f"{start_s:g} to {end_s:g} s is left out of all channels")
-    return Dataset(dataset.name, channels, list(dataset.findings), [*dataset.repairs, repair])
+    return dataclasses.replace(dataset, channels=channels, repairs=[*dataset.repairs, repair])
 
 
 def _with(dataset: Dataset, channel: Channel, kind: str, count: int, text: str) -> Dataset:
     repair = Repair(channel.name, kind, count, text)
-    return Dataset(
-        dataset.name, dataset.channels | {channel.name: channel}, list(dataset.findings), [*dataset.repairs, repair]
-    )
+    channels = dataset.channels | {channel.name: channel}
+    return dataclasses.replace(dataset, channels=channels, repairs=[*dataset.repairs, repair])

@@ -6,12 +6,13 @@ docs/robot.md C6 show what is told of them there and nothing else; each stands w
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import order, wraps
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
 
 NOTE, WARNING, FATAL = "note", "warning", "fatal"
@@ -19,12 +20,16 @@ KINDS = {
     # of the file, told by its reader
     "no_header": "the columns have no names",
     "no_unit": "nothing says the unit",
+    "unknown_unit": "the file says a unit that is not known",
     "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
     "no_stamp": "rows without a stamp",
     "ragged": "rows with too many or too few cells",
     "unreadable": "cells that are no numbers",
+    "text": "values of a measurement file that have a text instead of a number",
     "no_numbers": "channels of a measurement file that hold no plain numbers",
     "unknown_frames": "frames that the DBC file does not know",
+    "lost_frames": "frames that the file has, or should have, and that did not come out",
+    "several_buses": "messages that came on several buses",
     "broken_frames": "frames that do not fit their message",
     "no_summary": "a walk's folder without its summary",
     "fell": "the robot fell in this walk",
@@ -36,10 +41,12 @@ KINDS = {
     "reversed_stamps": "stamps that go back",
     "duplicate_stamps": "stamps that come twice",
     "gap": "no samples for a while",
+    "slow_samples": "samples so far apart that the stamps may be in another unit",
     "clock_drift": "two clocks do not run alike",
     # of the values
     "not_finite": "values that are no numbers",
     "wrap": "an integer ran over",
+    "not_repaired": "what drives the machine looks wrong and stays as it is",
     "bit_flip": "single values that are wrong by a power of two of the finest step",
     "spike": "single values far from both neighbours",
     "stuck": "a value stands still while other channels move",
@@ -49,9 +56,7 @@ KINDS = {
     "wrong_unit": "values as of another unit than is told",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
-DOUBTED = ("wrong_unit", "stuck", "noise")
-LEFT_OUT = ("ragged", "unreadable", "no_stamp", "not_finite", "duplicate_stamps")  # their sizes count samples
-DOUBTED_PART = 0.1  # of the samples; radio links lose a few in a hundred
+DOUBTED = ("unknown_unit", "slow_samples", "wrong_unit", "stuck", "noise")
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
@@ -151,11 +156,9 @@ def stop_if_fatal(name: str, findings: list[Finding]) -> None:
             raise UserError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
 
 
-def doubts(dataset: Dataset, findings: list[Finding]) -> list[Finding]:
+def doubts(findings: list[Finding]) -> list[Finding]:
     """The findings after which no cause may be named with confidence: the data are not what they are said to be."""
-    count = max((len(channel.value) for channel in dataset.channels.values()), default=0)
-    many = [each for each in findings if each.kind in LEFT_OUT and each.size > DOUBTED_PART * count]
-    return [each for each in findings if each.kind in DOUBTED] + many
+    return [each for each in findings if each.kind in DOUBTED]
 
 
 def as_json(finding: Finding) -> dict[str, object]:
@@ -164,13 +167,10 @@ def as_json(finding: Finding) -> dict[str, object]:
 
 
 def _tidied(channel: Channel) -> Channel:
-    """Only finite samples at stamps that run forward: what the checks of values look at."""
-    kept = np.isfinite(channel.time_s) & np.isfinite(channel.value)
-    time_s, value = channel.time_s[kept], channel.value[kept]
-    forward = np.ones(len(time_s), dtype=bool)
-    if len(time_s):
-        forward[1:] = time_s[1:] > np.maximum.accumulate(time_s)[:-1]
-    return dataclasses.replace(channel, time_s=time_s[forward], value=value[forward])
+    """Only finite samples in the order of their stamps: what the checks of values look at."""
+    time_s = wraps.counted_on(channel.time_s)
+    kept = order.of(time_s, channel.value).kept
+    return dataclasses.replace(channel, time_s=time_s[kept], value=channel.value[kept])
 
 
 # --- stamps -------------------------------------------------------------------------------------------------
@@ -197,12 +197,12 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
         yield Finding(name, "one_instant", float(finite[0]), float(finite[0]), 0.0, "s", text, FATAL)
         return
     back = np.flatnonzero(steps < 0.0)
-    wraps = [int(place) for place in back if is_clock_wrap(finite, int(place))]
-    for place in wraps[:NAMED_PLACES]:
+    overruns = [place for place, _ in wraps.of_clock(finite)]
+    for place in overruns[:NAMED_PLACES]:
         size = -float(steps[place])
         text = f"the clock's counter runs over: {size:.6g} s back"
         yield Finding(name, "stamp_wrap", float(finite[place]), float(finite[place + 1]), size, "s", text)
-    back = np.setdiff1d(back, wraps)
+    back = np.setdiff1d(back, overruns)
     if len(back):
         size = -float(steps[back].min())
         text = f"stamps go back {len(back)} times, by up to {size:.6g} s"
@@ -212,18 +212,16 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
         text = f"{len(same)} stamps come twice"
         ends = float(finite[same[0]]), float(finite[same[-1]])
         yield Finding(name, "duplicate_stamps", *ends, len(same), "samples", text)
+    if len(back) or overruns:  # gaps are those that are left when the samples are in order
+        finite = wraps.counted_on(finite)
+        finite = finite[order.of(finite, np.zeros(len(finite))).kept]
+        steps = np.diff(finite)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     yield from _gaps(name, finite, steps, usual)
     states = np.all(channel.value == np.round(channel.value))  # numbers of states are written when they change
     if usual > LONGEST_STEP_S and len(finite) >= FEWEST and not states:
         text = f"samples are {usual:.4g} s apart: the stamps are probably in ms, or readings were taken one by one"
-        yield Finding(name, "wrong_unit", float(finite[0]), float(finite[-1]), usual, "s", text)
-
-
-def is_clock_wrap(time_s: Array, place: int) -> bool:
-    """True when a step back is a counter's: the stamps fall to near nothing from near all that they ever were."""
-    before, after = time_s[place], time_s[place + 1]
-    return bool(after <= 0.02 * before and before >= time_s.max() * 0.98 and before > 30.0)
+        yield Finding(name, "slow_samples", float(finite[0]), float(finite[-1]), usual, "s", text)
 
 
 def _gaps(name: str, time_s: Array, steps: Array, usual: float) -> Iterator[Finding]:
@@ -261,14 +259,14 @@ def _values(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Find
         yield Finding(channel.name, "constant", float(time_s[0]), float(time_s[-1]), 0.0, channel.unit, text, NOTE)
         return
     yield from _size(channel)
-    wraps = wrap_places(value)
-    for place in wraps[:NAMED_PLACES]:
+    overruns = wraps_of(channel)
+    for place in overruns.places[:NAMED_PLACES]:
         size = abs(float(value[place + 1] - value[place]))
         text = f"it jumps by {size:.6g} {channel.unit} against its motion: an integer ran over"
         yield Finding(
             channel.name, "wrap", float(time_s[place]), float(time_s[place + 1]), size, channel.unit, text
         )  # fmt: skip
-    yield from _spikes(channel, wraps)
+    yield from _spikes(channel, overruns.places)
     yield from _stuck(channel, all_channels)
     yield from _saturation(channel)
 
@@ -290,21 +288,9 @@ def _size(channel: Channel) -> Iterator[Finding]:
             yield Finding(channel.name, "wrong_unit", *ends, top, "rad", text)
 
 
-def wrap_places(value: Array) -> list[int]:
-    """Where a counter runs over: a jump of most of the range, against a motion that goes on behind it as before."""
-    steps = np.diff(value)
-    spread = float(np.ptp(value))
-    found = []
-    for place in np.flatnonzero(np.abs(steps) > 0.8 * spread):
-        before, after = steps[max(0, place - 5) : place], steps[place + 1 : place + 6]
-        if len(before) < 3 or len(after) < 3:
-            continue
-        slopes = float(before.mean()), float(after.mean())
-        calm = max(np.abs(before).max(), np.abs(after).max()) < 0.2 * abs(steps[place])
-        if calm and slopes[0] * slopes[1] > 0.0 and slopes[0] * steps[place] < 0.0:
-            if min(map(abs, slopes)) > 0.2 * max(map(abs, slopes)):
-                found.append(int(place))
-    return found
+def wraps_of(channel: Channel) -> wraps.Wraps:
+    """Where the channel's integer ran over; the channel's samples are in order and finite."""
+    return wraps.of(channel.value, channel.unit, (lattice_step(channel.value), channel.resolution))
 
 
 def spike_places(value: Array) -> NDArray[np.intp]:
@@ -323,8 +309,8 @@ def _usual(sizes: Array) -> float:
     return float(np.percentile(sizes, 90.0))
 
 
-def _spikes(channel: Channel, wraps: list[int]) -> Iterator[Finding]:
-    places = np.array([place for place in spike_places(channel.value) if place not in wraps], dtype=int)
+def _spikes(channel: Channel, overruns: Sequence[int]) -> Iterator[Finding]:
+    places = np.array([place for place in spike_places(channel.value) if place not in overruns], dtype=int)
     if not len(places):
         return
     value, time_s = channel.value, channel.time_s

@@ -12,7 +12,7 @@ import re
 # what people write: (what we write, factor). An exponent may follow: s2, m^2.
 ATOMS: dict[str, tuple[str, float]] = {
     "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "µs": ("s", 1e-6), "μs": ("s", 1e-6), "ns": ("s", 1e-9),
-    "min": ("s", 60.0), "h": ("s", 3600.0), "sec": ("s", 1.0),
+    "min": ("s", 60.0), "h": ("s", 3600.0), "d": ("s", 86400.0), "sec": ("s", 1.0),
     "A": ("A", 1.0), "mA": ("A", 1e-3), "uA": ("A", 1e-6), "kA": ("A", 1e3), "Amp": ("A", 1.0),
     "V": ("V", 1.0), "mV": ("V", 1e-3), "uV": ("V", 1e-6), "kV": ("V", 1e3), "Volt": ("V", 1.0),
     "W": ("W", 1.0), "mW": ("W", 1e-3), "kW": ("W", 1e3),
@@ -41,9 +41,19 @@ WHOLE: dict[str, tuple[str, str, float, float]] = {
     "percent": ("", "", 1e-2, 0.0),
     "%": ("", "", 1e-2, 0.0),
     "1": ("", "", 1.0, 0.0),
-}
-AMBIGUOUS_ALONE = ("min", "h")  # current_min is a minimum; as units of their own only behind a word for time
+    # drives are written so: per minute is revolutions per minute
+    **{each: ("rad", "s", 2.0 * math.pi / 60.0, 0.0)
+       for each in ("U/min", "Umdr/min", "Upm", "r/min", "1/min", "min-1", "min^-1", "min⁻¹")},
+    # of an alternating current or voltage, the value that heats
+    **{f"{unit}{mark}": (unit, "", 1.0, 0.0) for unit in "AV" for mark in ("rms", "_rms", " rms", "(rms)", "eff")},
+    # numbers of states and the like
+    **{each: ("", "", 1.0, 0.0) for each in ("enum", "bool", "boolean", "state", "flag", "none", "unitless")},
+}  # fmt: skip
+AMBIGUOUS_ALONE = ("min", "h", "d")  # current_min is a minimum; as units of their own only behind a word for time
+WORDS_OF_NAMES = ("enum", "bool", "boolean", "state", "flag", "none", "unitless")  # walk_state is a name
 TIME_WORDS = ("t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "zeit")
+SUPERSCRIPTS = str.maketrans("⁻−¹²³⁴", "--1234")
+NEGATIVE = re.compile(r"([^\d^-]+)\^?\(?-([1-4])\)?")  # a word and its exponent
 LONGEST_SUFFIX = 6  # tokens of a unit in a name, as in cmd_dampness_A_s_per_rad
 
 
@@ -89,6 +99,7 @@ def unit_of(text: str) -> Unit | None:
         return Unit()
     if text in WHOLE:
         return _whole(text)
+    text = _with_a_bar(text.translate(SUPERSCRIPTS))
     top, slash, bottom = text.partition("/")
     words = _words(top.strip("() "))
     if slash:
@@ -96,8 +107,17 @@ def unit_of(text: str) -> Unit | None:
     return _of_words(words)
 
 
+def _with_a_bar(text: str) -> str:
+    """The unit's text with what has a negative exponent below a bar: "rad*s^-1" is "rad/s"."""
+    words = _words(text)
+    below = [match[1] + match[2].replace("1", "") for word in words if (match := NEGATIVE.fullmatch(word))]
+    if not below or "/" in text:
+        return text
+    return f"{' '.join(word for word in words if not NEGATIVE.fullmatch(word)) or '1'}/{' '.join(below)}"
+
+
 def _words(text: str) -> list[str]:
-    return [word for word in re.split(r"[\s*·._]+", text) if word]
+    return [word for word in re.split(r"[\s*·⋅._]+", text) if word]
 
 
 def _whole(text: str) -> Unit:
@@ -118,11 +138,11 @@ def _of_words(words: list[str]) -> Unit | None:
                 return None
             below = 1
             continue
-        match = re.fullmatch(r"(\D+?)\^?([2-4²³]?)", word)
+        match = re.fullmatch(r"(\D+?)\^?([2-4]?)", word.translate(SUPERSCRIPTS))
         if match is None or match[1] not in ATOMS:
             return None
         name, size = ATOMS[match[1]]
-        exponent = int(match[2].translate({ord("²"): "2", ord("³"): "3"}) or 1)
+        exponent = int(match[2] or 1)
         factor *= size ** (-exponent if below else exponent)
         sides[below].append(name + (str(exponent) if exponent > 1 else ""))
     if not below and len(sides[0]) == 2 and sides[0][0] in ("rad", "m") and sides[0][1] in ("s", "s2"):
@@ -147,6 +167,8 @@ def _ratio(words: list[str]) -> float:
 def split(column: str) -> tuple[str, Unit | None]:
     """(name without unit, unit) of a column's name; the unit is None when the name has none that is known."""
     column = column.strip()
+    if re.search(r"\w\[\d+\]$", column):  # xyz[1] is the second of several, "ratio [1]" a pure number
+        return _plain(column), None
     bracketed = re.fullmatch(r"(.*?\S)\s*_?[\[(]([^\])]*)[\])]", column)
     if bracketed is not None:
         unit = unit_of(bracketed[2])
@@ -154,7 +176,7 @@ def split(column: str) -> tuple[str, Unit | None]:
     tokens = _plain(column).split("_")
     for length in range(min(LONGEST_SUFFIX, len(tokens) - 1), 0, -1):
         words = tokens[-length:]
-        if words == ["1"]:  # current_1 is the first of two, not a pure number
+        if words == ["1"] or words[0] in WORDS_OF_NAMES:  # current_1 is the first of two, not a pure number
             continue
         stem = "_".join(tokens[:-length])
         if len(words) == 1 and words[0] in AMBIGUOUS_ALONE and stem.lower() not in TIME_WORDS:

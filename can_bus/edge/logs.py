@@ -1,34 +1,356 @@
-"""Recorded frames out of whatever file python-can reads: .mf4, .asc, .blf, .trc, .csv, .db, and candump's .log."""
+"""Recorded frames out of whatever file can be read, with an account of its lines.
 
+python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log, what candump shows on a screen, BUSMASTER's .log
+and SavvyCAN's .csv are read here. A library's reader passes over what it does not know, so its frames are counted
+against the lines or objects of the file.
+"""
+
+import calendar
+import io
+import itertools
 import pathlib
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 
 import can
 
-from ranger_sim.can_bus.edge.candump import read_candump
-from ranger_sim.can_bus.edge.messages import frame_of_message
-from ranger_sim.foundation.events import FLAG_ERROR
+from ranger_sim.can_bus.edge.candump import frame_of_line
+from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 
+Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
+PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
+SAVVYCAN_HEADER = "time stamp,id,extended,"
+BUSMASTER_HEADER = "***BUSMASTER"
+SECOND_NS = 1_000_000_000
 
-def read_log(path: str | pathlib.Path) -> Iterator[tuple[str, int, int, int, int, int]]:
-    """(channel, time_ns, identifier, flags, lo, hi) of every frame in a recording; error frames are left out.
 
-    Times are as in the file. UserError for what cannot be read.
+class RecordedFrames:
+    """The frames of a recording, error frames left out. Iterating raises UserError for what cannot be read.
+
+    After that `read` is the number of frames that the file has or says that it has, error frames among them, and
+    `losses` are those of them that did not come out: (reason, count, where the first is); reason "cut_off" or
+    "not_frames".
     """
-    source = pathlib.Path(path)
-    if source.suffix == ".log":
-        for frame in read_candump(source):
-            if not frame[3] & FLAG_ERROR:
-                yield frame
-        return
+
+    def __init__(self, source: pathlib.Path) -> None:
+        self.source = source
+        self.read = 0
+        self.losses: list[tuple[str, int, str]] = []
+
+    def __iter__(self) -> Iterator[Frame]:
+        self.read, self.losses = 0, []
+        try:
+            for frame in _opened(self):
+                if not frame[3] & FLAG_ERROR:
+                    yield frame
+        except UserError:
+            raise
+        except Exception as error:  # whatever a reader of some format raises
+            said = error.strerror if isinstance(error, OSError) and error.strerror else error
+            text = f"{self.source}: the recording cannot be read ({said or type(error).__name__})"
+            raise UserError(text) from None
+
+    def lose(self, reason: str, count: int, where: str) -> None:
+        """Note frames that are in the file and did not come out."""
+        if count > 0:
+            self.losses.append((reason, count, where))
+
+
+def read_log(path: str | pathlib.Path) -> RecordedFrames:
+    """(channel, time_ns, identifier, flags, lo, hi) of every frame in a recording, as it is iterated.
+
+    Times are as in the file, or since its first frame where the format says so.
+    """
+    return RecordedFrames(pathlib.Path(path))
+
+
+def is_frame_table(path: pathlib.Path) -> bool:
+    """True for a .csv of frames: python-can's or SavvyCAN's."""
     try:
-        with can.LogReader(source) as reader:
-            for message in reader:
-                if not message.is_error_frame:
-                    channel = "" if message.channel is None else str(message.channel)
-                    yield channel, round(message.timestamp * 1e9), *frame_of_message(message)
-    except UserError:
-        raise
-    except Exception as error:  # whatever a reader of some format raises
-        raise UserError(f"{source}: the recording cannot be read ({error or type(error).__name__})") from None
+        with path.open(encoding="utf-8", errors="replace") as file:
+            first = file.readline(200).strip().lower()
+    except OSError:
+        return False
+    return first == PYTHON_CAN_HEADER or first.startswith(SAVVYCAN_HEADER)
+
+
+def _opened(log: RecordedFrames) -> Iterator[Frame]:
+    suffix = log.source.suffix.lower()
+    if not log.source.is_file():
+        raise FileNotFoundError(2, "no such file")  # sqlite would make one
+    if suffix == ".log":
+        return _candump_or_busmaster(log)
+    if suffix == ".csv":
+        return _csv(log)
+    if suffix == ".asc":
+        return _by_lines(log, can.ASCReader, _asc_lines(log), ASC_FRAME)
+    if suffix == ".trc":
+        return _by_lines(log, can.TRCReader, _text_lines(log), TRC_FRAME)
+    return _by_python_can(log)
+
+
+def _frame(message: can.Message) -> Frame:
+    channel = "" if message.channel is None else str(message.channel)
+    return channel, round(message.timestamp * 1e9), *frame_of_message(message)
+
+
+# --- by python-can ------------------------------------------------------------------------------------------------
+
+# stamp and bus, then an identifier (a line may be torn behind it), a name, or an error; not a request to send
+ASC_FRAME = re.compile(
+    r"\s*\d+[.,]\d+\s+(?:\d+\s+(?:[0-9A-F]+x?\b(?!:)(?!.*\bTxRq\b)|\S+\s+(?:Tx|Rx)\b|ErrorFrame)|CANFD\s+\d)",
+    re.IGNORECASE,
+)
+ASC_EVENT = re.compile(r"(\s*)(\d+[.,]\d+)(\s.*)", re.DOTALL)
+ASC_SYMBOLIC = re.compile(r"\s*\d+[.,]\d+\s+\d+\s+(?![0-9A-Fa-f]+x?\s)(\S+)\s+(?:Tx|Rx)\b", re.IGNORECASE)
+ASC_HEADER = re.compile(r"\s*(?:date\s|base\s|//)", re.IGNORECASE)
+# number, offset, then in any version a type that carries data, or (1.0) an identifier and its length
+TRC_FRAME = re.compile(
+    r"\s*\d+\)?\s+[\d.]+\s+(?:(?:\d+\s+)?(?:Rx|Tx)\s|(?:DT|FD|FB|FE|BI|RR)\s|(?!FFFFFFFF)[0-9A-Fa-f]{4,8}\s+\d)"
+)
+
+
+def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
+    """Formats whose reader takes a path."""
+    with can.LogReader(log.source) as reader:
+        for message in reader:
+            log.read += 1
+            yield _frame(message)
+        if isinstance(reader, can.BLFReader):
+            _count_blf(log, reader)
+
+
+def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
+    """What a BLF file says of its own size, against what was there: a file that was cut off ends without a word."""
+    missing = reader.object_count - log.read
+    there = log.source.stat().st_size
+    if there < reader.file_size:
+        where = f"behind byte {there} of {reader.file_size}"
+    elif reader._tail:  # a container that ends within an object
+        where = f"behind byte {there}"
+    else:
+        return
+    log.read += max(missing, 1)
+    log.lose("cut_off", max(missing, 1), where)
+
+
+class _Lines(io.TextIOBase):
+    """Lines of a file for a reader of a library, with an account of those that must become frames."""
+
+    def __init__(self, log: RecordedFrames, lines: Iterable[str], is_frame: re.Pattern[str]) -> None:
+        super().__init__()
+        self.log, self.lines, self.is_frame = log, iter(lines), is_frame
+        self.number = 0
+        self.waiting = 0  # the line that must become a frame and has not
+        self.whole = True  # the last line has its end
+        self.lost: list[int] = []
+
+    def __next__(self) -> str:  # type: ignore[override]
+        line = next(self.lines, "")
+        self.settle()
+        if not line:
+            raise StopIteration
+        self.number += 1
+        self.whole = line.endswith("\n")
+        if self.is_frame.match(line):
+            self.log.read += 1
+            self.waiting = self.number
+        return line
+
+    def readline(self, size: int | None = -1) -> str:  # type: ignore[override]
+        """The next line, for readers that ask so."""
+        return next(self, "")
+
+    def settle(self) -> None:
+        """A line that did not become a frame until the next one is lost."""
+        if self.waiting:
+            self.lost.append(self.waiting)
+        self.waiting = 0
+
+
+def _by_lines(
+    log: RecordedFrames, reader: Callable[..., Iterable[can.Message]], lines: Iterable[str], is_frame: re.Pattern[str]
+) -> Iterator[Frame]:
+    """Frames of a text format by a reader of python-can."""
+    given = _Lines(log, lines, is_frame)
+    try:
+        for message in reader(given):
+            given.waiting = 0
+            yield _frame(message)
+        given.settle()
+    except (ValueError, IndexError) as error:
+        if given.whole:
+            text = f"{log.source}:{given.number}: not a frame that python-can can read ({error})"
+            raise UserError(text) from None
+        log.read += not given.waiting
+        log.lose("cut_off", 1, f"in line {given.number}")
+        return
+    if given.lost:
+        log.lose("not_frames", len(given.lost), f"in line {given.lost[0]}")
+
+
+def _text_lines(log: RecordedFrames) -> Iterator[str]:
+    with log.source.open(encoding="utf-8", errors="replace") as file:
+        yield from file
+
+
+def _asc_lines(log: RecordedFrames) -> Iterator[str]:
+    """Lines of an ASC file as python-can reads them: its header is ended, and stamps are those since the begin.
+
+    The reader loses the first line behind a header that nothing ends, and takes a relative stamp, which is that since
+    the line before, for an absolute one.
+    """
+    relative, in_header, time_s = False, True, 0.0
+    for number, line in enumerate(_text_lines(log), 1):
+        if in_header and ASC_HEADER.match(line):
+            relative = relative or bool(re.search(r"\btimestamps\s+relative\b", line, re.IGNORECASE))
+            yield line
+            continue
+        if in_header and line.strip():
+            in_header = False
+            if not re.match(r"\s*(no\s+)?internal\s+events\s+logged", line, re.IGNORECASE):
+                # this replaces the line that ends the header; both are one line of the file
+                line = "internal events logged\n" + line
+                first, line = line.split("\n", 1)
+                yield first + "\n"
+        symbolic = ASC_SYMBOLIC.match(line)
+        if symbolic:
+            raise UserError(
+                f"{log.source}:{number}: {symbolic[1][:40]} is a name where an identifier is expected; export the log "
+                "with numeric identifiers"
+            )
+        event = ASC_EVENT.match(line)
+        if event and relative:
+            time_s += float(event[2].replace(",", "."))
+            line = f"{event[1]}{time_s:.9f}{event[3]}"
+        yield "\n" if "start of measurement" in line.lower() else line
+
+
+# --- formats of other programs ------------------------------------------------------------------------------------
+
+SCREEN = re.compile(  # candump on a screen: with or without stamps, -x, and the name of the interface
+    r"\s*(?:\((?P<time>[^)]*)\)\s+)?(?P<bus>\S+)\s+(?:(?:RX|TX)\s+\S+\s+\S+\s+)?"
+    r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})\s+\[(?P<length>\d+)\]\s*(?P<data>.*)"
+)
+BUSMASTER = re.compile(
+    r"(?P<h>\d+):(?P<m>\d+):(?P<s>\d+):(?P<part>\d{1,4})\s+(?:Rx|Tx)\s+(?P<bus>\d+)\s+(?P<id>(?:0x)?[0-9A-Fa-f]+)\s+"
+    r"(?P<kind>[sx]r?)\s+(?P<length>\d+)\s*(?P<data>.*)",
+    re.IGNORECASE,
+)
+
+
+def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
+    """candump's file or screen, or BUSMASTER's log: every line is a frame, and only the last may be cut off."""
+    try:
+        text = log.source.read_text(encoding="ascii")
+    except UnicodeDecodeError:
+        raise UserError(f"{log.source}: the recording cannot be read (not plain ASCII)") from None
+    lines = [(number, line) for number, line in enumerate(text.splitlines(keepends=True), 1) if line.strip()]
+    parse: Callable[[str], Frame] = frame_of_line
+    if lines and lines[0][1].startswith(BUSMASTER_HEADER):
+        if any("***DEC***" in line for _, line in lines[:20]):
+            raise UserError(f"{log.source}: BUSMASTER's log in decimal numbers; write it in hexadecimal ones")
+        lines = [(number, line) for number, line in lines if not line.startswith("***")]
+        parse = _busmaster_frame
+    elif lines and SCREEN.match(lines[0][1]):
+        parse = _ScreenLine([line for _, line in lines])
+    for number, line in lines:
+        log.read += 1
+        try:
+            yield parse(line)
+        except ValueError as error:
+            if number == lines[-1][0] and not line.endswith("\n"):
+                log.lose("cut_off", 1, f"in line {number}")
+                return
+            raise UserError(f"{log.source}:{number}: {error}") from None
+
+
+class _ScreenLine:
+    """What candump shows on a screen: with -ta or -tA stamps are absolute, with -tz since the begin.
+
+    With -td they are since the frame before, and look like those of -tz, but for running back.
+    """
+
+    def __init__(self, lines: list[str]) -> None:
+        stamps = [float(found[1]) for line in lines if (found := re.match(r"\s*\((\d{1,9}\.\d{6})\)", line))]
+        self.since_before = any(stamp < before for before, stamp in itertools.pairwise(stamps))
+        self.time_ns = 0
+
+    def __call__(self, line: str) -> Frame:
+        found = SCREEN.fullmatch(line.strip())
+        if found is None:
+            raise ValueError(f"not `(stamp) interface identifier [length] data`: {line.strip()[:60]!r}")
+        if found["time"] is None:
+            raise ValueError("frames without stamps: candump shows them with -ta, and writes a file with -L or -l")
+        time_ns = _stamp_ns(found["time"])
+        self.time_ns = time_ns = time_ns + self.time_ns if self.since_before else time_ns
+        identifier, length = int(found["id"], 16), int(found["length"])
+        flags = FLAG_EXTENDED if len(found["id"]) == 8 else 0
+        if "remote request" in found["data"]:
+            return found["bus"], time_ns, identifier, flags | FLAG_REMOTE | min(length, 8), 0, 0
+        return found["bus"], time_ns, *_words(identifier, flags, length, found["data"].split("'")[0].split()[:length])
+
+
+def _stamp_ns(text: str) -> int:
+    """A stamp in s, or as date and time, which is taken for UTC: only differences matter."""
+    if re.fullmatch(r"\d+\.\d{1,9}", text):
+        seconds, _, fraction = text.partition(".")
+        return int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+    found = re.fullmatch(r"(\d{4})-(\d\d)-(\d\d) (\d\d):(\d\d):(\d\d)\.(\d{6})", text)
+    if found is None:
+        raise ValueError(f"stamp ({text}) is neither seconds nor date and time")
+    numbers = [int(each) for each in found.groups()]
+    return calendar.timegm((*numbers[:6], 0, 0, 0)) * SECOND_NS + numbers[6] * 1000
+
+
+def _words(identifier: int, flags: int, length: int, data: list[str]) -> tuple[int, int, int, int]:
+    """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError for what is not a classic frame."""
+    if length > 8:
+        raise ValueError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
+    if len(data) != length or not all(re.fullmatch("[0-9A-Fa-f]{2}", byte) for byte in data):
+        raise ValueError(f"frame {identifier:x} has {length} bytes and the data {' '.join(data)[:40]!r}")
+    lo, hi = words_of_data(bytes.fromhex("".join(data)))
+    return identifier, flags | length, lo, hi
+
+
+def _busmaster_frame(line: str) -> Frame:
+    found = BUSMASTER.fullmatch(line.strip())
+    if found is None:
+        raise ValueError(f"not `time direction bus identifier kind length data`: {line.strip()[:60]!r}")
+    seconds = int(found["h"]) * 3600 + int(found["m"]) * 60 + int(found["s"])
+    part_ns = 100_000 if len(found["part"]) == 4 else 1_000_000  # version 2 writes ms without zeros in front
+    time_ns = seconds * SECOND_NS + int(found["part"]) * part_ns
+    kind, identifier, length = found["kind"].lower(), int(found["id"], 16), int(found["length"])
+    flags = FLAG_EXTENDED if kind[0] == "x" else 0
+    if "r" in kind:
+        return found["bus"], time_ns, identifier, flags | FLAG_REMOTE | min(length, 8), 0, 0
+    return found["bus"], time_ns, *_words(identifier, flags, length, found["data"].split()[:length])
+
+
+def _csv(log: RecordedFrames) -> Iterator[Frame]:
+    """python-can's table or SavvyCAN's."""
+    with log.source.open(encoding="utf-8", errors="replace") as file:
+        header = file.readline(200).strip().lower()
+    if header == PYTHON_CAN_HEADER:
+        yield from _by_lines(log, can.CSVReader, _text_lines(log), re.compile(r"\s*[\d.]"))
+        return
+    if not header.startswith(SAVVYCAN_HEADER):
+        raise UserError(f"{log.source}: a .csv of frames begins with {PYTHON_CAN_HEADER!r} or as SavvyCAN writes it")
+    place = {name: index for index, name in enumerate(header.split(","))}
+    for number, line in enumerate(_text_lines(log), 1):
+        if number == 1 or not line.strip():
+            continue
+        log.read += 1
+        cells = [cell.strip() for cell in line.split(",")]
+        try:
+            flags = FLAG_EXTENDED if cells[place["extended"]].lower() == "true" else 0
+            length = int(cells[place["len"]])
+            words = _words(int(cells[place["id"]], 16), flags, length, cells[place["d1"] : place["d1"] + length])
+            yield cells[place["bus"]], int(cells[0]) * 1000, *words
+        except (ValueError, IndexError, KeyError) as error:
+            if not line.endswith("\n"):
+                log.lose("cut_off", 1, f"in line {number}")
+                return
+            raise UserError(f"{log.source}:{number}: not a frame as SavvyCAN writes it ({error})") from None

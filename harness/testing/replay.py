@@ -20,6 +20,8 @@ from ranger_sim.harness.testing.frames import Frame, frame_type
 if TYPE_CHECKING:
     from ranger_sim.harness.testing.bench import BoardAlone
 
+LOST = 0.01  # of a recording's frames: with more lost it is another traffic
+
 
 def read_log(path: str | pathlib.Path, bus: str | None = None) -> list[Frame]:
     """Frames of a recording in order of time. `bus`: that of a file with one channel, e.g. "can1" for vcan0.
@@ -34,8 +36,15 @@ def read_log(path: str | pathlib.Path, bus: str | None = None) -> list[Frame]:
             raise UserError(f"{source}: a folder without can1.log ... can4.log, so not that of a walk")
     found = []
     for file, name in files:
-        for channel, time_ns, identifier, flags, lo, hi in read_frames(file):
+        log = read_frames(file)
+        for channel, time_ns, identifier, flags, lo, hi in log:
             found.append(frame_type(RANGER)(time_ns, name or channel, identifier, flags, lo, hi))
+        lost = sum(count for _, count, _ in log.losses)
+        if lost > LOST * log.read:
+            reasons = "; ".join(f"{count} {reason.replace('_', ' ')}, {where}" for reason, count, where in log.losses)
+            raise UserError(
+                f"{file}: {lost} of {log.read} frames are lost ({reasons}): such a recording is not replayed"
+            )
     if not found:
         raise UserError(f"{source}: there is no frame in this recording")
     return sorted(found)

@@ -11,6 +11,8 @@ MACHINES = {
     "walk": "walk:Walk",
 }
 
+ROBOT = ("motor-bench", "leg-swing", "ankle", "walk")  # those that measure the robot, whose simulator can have a cause
+
 
 def made(experiment: str) -> Any:
     """The class of a machine; loaded only when it is asked for."""

@@ -68,7 +68,7 @@ class LegSwing:
     name = "leg-swing"
     quantities = (
         Quantity("hip_angle_rad", "rad", "of the leg from the vertical"),
-        Quantity("current_A", "A", "of the hip's motor"),
+        Quantity("current_A", "A", "of the hip's motor", drives=True),
         Quantity("voltage_V", "V", "at the motor's terminals", needed=False),
     )
 

@@ -8,7 +8,7 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import csv_file, measurement, robodaq, run_folder
 
 MEASUREMENTS = (".mf4", ".mdf", ".dat")
-FRAMES = (".log", ".blf", ".asc", ".trc")  # read at the CAN room's edge, then `frames.decode`
+FRAMES = (".log", ".blf", ".asc", ".trc", ".db")  # read at the CAN room's edge, then `frames.decode`
 
 
 def read(

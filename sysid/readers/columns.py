@@ -7,7 +7,7 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import units
-from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding, Repair
+from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.units import Unit
 
 EPOCH_S = 1e8  # stamps beyond this (three years) are of a calendar; floats would resolve them to 0.2 us only
@@ -15,10 +15,14 @@ EPOCH_S = 1e8  # stamps beyond this (three years) are of a calendar; floats woul
 
 @dataclasses.dataclass(frozen=True)
 class Label:
-    """What a column is called in SI, with its unit; None when nothing says the unit."""
+    """What a column is called in SI, with its unit; None when nothing says the unit.
+
+    unknown: what the file says of a unit that is not known, where nothing else says the unit.
+    """
 
     name: str
     unit: Unit | None
+    unknown: str = ""
 
 
 def mapping_of(texts: list[str]) -> dict[str, str]:
@@ -57,15 +61,27 @@ def label(source: str, column: str, unit_text: str | None, mapping: Mapping[str,
                 f"{source}: {column} is in {unit.text or 'parts of one'}, it cannot become {given} "
                 f"({new_unit.text or 'parts of one'})"
             )
-    return Label(units.si_name(stem, unit) if in_name and unit is not None else stem, unit)
+    unknown = unit_text.strip() if unit is None and unit_text is not None else ""
+    return Label(units.si_name(stem, unit) if in_name and unit is not None else stem, unit, unknown)
 
 
-def add(dataset: Dataset, column: str, named: Label, time_s: Array, value: Array, resolution: float = 0.0) -> None:
-    """Put a column into the dataset, in SI; what was done is recorded there."""
+def add(
+    dataset: Dataset,
+    column: str,
+    named: Label,
+    time_s: Array,
+    value: Array,
+    resolution: float = 0.0,
+    losses: tuple[Loss, ...] = (),
+) -> None:
+    """Put a column into the dataset, in SI; what was done is recorded there. losses: what was read and is left out."""
     if named.name in dataset.channels:
         raise UserError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
     unit = named.unit
-    if unit is None:
+    if named.unknown:
+        text = f"{column}: its unit {named.unknown[:40]!r} is not known (--map {column}=NAME_UNIT says it)"
+        dataset.findings.append(Finding(named.name, "unknown_unit", *ends(time_s), 0.0, "", text))
+    elif unit is None:
         dataset.findings.append(
             Finding(named.name, "no_unit", *ends(time_s), 0.0, "", f"{column}: nothing says its unit", "note")
         )
@@ -78,7 +94,7 @@ def add(dataset: Dataset, column: str, named: Label, time_s: Array, value: Array
         dataset.repairs.append(Repair(named.name, "renamed", 0, f"{column} is called {named.name}"))
     factor = unit.factor if unit is not None else 1.0
     dataset.channels[named.name] = Channel(
-        named.name, unit.text if unit is not None else "", time_s, value, abs(factor) * resolution, column
+        named.name, unit.text if unit is not None else "", time_s, value, abs(factor) * resolution, column, losses
     )
 
 

@@ -1,9 +1,10 @@
-"""Text tables: a header line with names and units, one row per instant.
+"""Text tables: a header line with names and units, one row per sample.
 
-Told and handled: a byte order mark, UTF-16, comment lines (#, %, //), a line of units below the header, separators
-comma, semicolon, tab and spaces, decimal commas beside semicolons or tabs, stamps in s, ms, us or as ISO dates. A cell
-without content is an instant at which this channel has no sample; one that is no number becomes "not a number" and a
-finding. Without a header the columns are column_1, column_2 ..., and `mapping` names them.
+Read without a word: a byte order mark, UTF-16, comment lines (#, %, //), a line of units below the header, separators
+comma, semicolon, tab and spaces, decimal commas next to semicolons or tabs or in quotes, stamps in s, ms, us or ns, as
+dates and times in one column or two (stamps.py), as times of the day, or as a spreadsheet's days. A cell without
+content is a time at which this channel has no sample; one that is not a number becomes "not a number" and a finding.
+Without a header the columns are column_1, column_2 ..., and `mapping` names them.
 """
 
 import csv
@@ -12,17 +13,21 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import units
-from ranger_sim.sysid.dataset import Array, Dataset, Finding, Repair
-from ranger_sim.sysid.readers import columns
+from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss, Repair
+from ranger_sim.sysid.readers import columns, stamps
 
 COMMENTS = ("#", "%", "//")
 EMPTY = ("", "-", "na", "n/a", "null", "none")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-CLOCKS = ("datetime", "date_time", "date", "utc")  # columns that hold ISO dates, besides those called time
+CLOCKS = ("datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock")  # besides those called time
+SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
+FASTEST_S = 2e-5  # a step below it is none of a machine's, but may be a spreadsheet's part of a day
+SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
 SNIFFED_CELLS = 50
 NAMED_LINES = 3  # of the places of a finding, so many are named
 LARGEST_BYTES = 2_000_000_000
@@ -43,16 +48,17 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
     names, unit_texts, rows = _header(dataset, rows, decimal_comma)
     mapping = dict(mapping or {})
     columns.check_mapping(dataset, mapping, names)
-    cells = _grid(dataset, rows, names)
-    time_column, time_s = _time(dataset, names, unit_texts, cells, mapping, time_unit, decimal_comma)
-    time_s = columns.from_zero(dataset, time_s)
+    dataset.rows = len(rows)
+    cells, lost = _grid(dataset, rows, names)
+    time_columns, time_s = _time(dataset, names, unit_texts, cells, mapping, time_unit, decimal_comma)
     stamped = np.isfinite(time_s)
     if not stamped.all():
         text = f"{int((~stamped).sum())} rows have no stamp and are left out"
         dataset.repairs.append(Repair("", "no_stamp", int((~stamped).sum()), text))
         dataset.findings.append(Finding("", "no_stamp", *columns.ends(time_s), float((~stamped).sum()), "rows", text))
+        lost += (Loss("no_stamp", int((~stamped).sum()), f"in line {rows[int(np.argmin(stamped))][0]}"),)
     for index, name in enumerate(names):
-        if index == time_column:
+        if index in time_columns:
             continue
         named = columns.label(dataset.name, name, unit_texts[index], mapping)
         value, present, finest = _numbers(dataset, named.name, rows, cells[index], time_s, decimal_comma)
@@ -61,9 +67,10 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
             text = f"{name}: has no number in it, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
             continue
-        columns.add(dataset, name, named, time_s[kept], value[kept], finest)
+        columns.add(dataset, name, named, time_s[kept], value[kept], finest, lost)
     if not dataset.channels:
-        raise UserError(f"{path}: there is no channel beside the time column {names[time_column]}")
+        called = " and ".join(names[index] for index in sorted(time_columns))
+        raise UserError(f"{path}: there is no channel beside the time column {called}")
     return dataset
 
 
@@ -125,7 +132,9 @@ def _separator(lines: list[tuple[int, str]]) -> tuple[str, bool]:
             points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
             return separator, commas > 0 and points == 0
     if any("," in line for line in some):
-        return ",", False
+        quoted = [cell for line in some if '"' in line for cell in _cells(line, ",")]
+        commas = sum(bool(DECIMAL_COMMA.fullmatch(cell)) for cell in quoted)
+        return ",", commas > 0 and not any("." in cell and NUMBER.fullmatch(cell) for cell in quoted)
     return (" ", False) if any(" " in line.strip() for line in some[1:]) else (",", False)
 
 
@@ -150,7 +159,7 @@ def _header(
 ) -> tuple[list[str], list[str | None], list[tuple[int, list[str]]]]:
     """(names, what a line of units says of each, the rest of the rows)."""
     number, first = rows[0]
-    if all(_is_number(cell) or cell.lower() in EMPTY or _date_s(cell) is not None for cell in first):
+    if all(_is_number(cell) or cell.lower() in EMPTY or stamps.is_stamp(cell) for cell in first):
         names = [f"column_{place}" for place in range(1, len(first) + 1)]
         text = f"line {number} holds numbers: the table has no names, its columns are column_1 to {names[-1]}"
         dataset.findings.append(Finding("", "no_header", 0.0, 0.0, float(len(names)), "columns", text))
@@ -163,26 +172,30 @@ def _header(
             raise UserError(f"{dataset.name}:{number}: two columns are called {name[:60]}")
     unit_texts: list[str | None] = [None] * len(names)
     if len(rows) > 1:
-        second = [cell.strip("[]()") for cell in rows[1][1]]
-        known = [units.unit_of(cell) for cell in second]
-        if len(second) == len(names) and any(second) and all(u is not None for u in known):
-            if not any(map(_is_number, second)):
+        second = [cell if units.unit_of(cell) is not None else cell.strip("[]()") for cell in rows[1][1]]
+        # a row in which nothing is a number or a stamp holds units, when it holds one that is known
+        if len(second) == len(names) and not any(_is_number(cell) or stamps.is_stamp(cell) for cell in second if cell):
+            if any(cell and units.unit_of(cell) is not None for cell in second):
                 return names, list(second), rows[2:]
     return names, unit_texts, rows[1:]
 
 
-def _grid(dataset: Dataset, rows: list[tuple[int, list[str]]], names: list[str]) -> list[list[str]]:
-    """Cells by column. Rows that are too long or too short are left out, and told."""
+def _grid(
+    dataset: Dataset, rows: list[tuple[int, list[str]]], names: list[str]
+) -> tuple[list[list[str]], tuple[Loss, ...]]:
+    """(cells by column, rows that are left out because they are too long or too short)."""
+    lost: tuple[Loss, ...] = ()
     wrong = [number for number, cells in rows if not _fits(cells, len(names))]
     if wrong:
         some = ", ".join(str(number) for number in wrong[:NAMED_LINES]) + (" ..." if len(wrong) > NAMED_LINES else "")
         text = f"{len(wrong)} rows do not have {len(names)} cells and are left out (line {some})"
         dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(wrong)), "rows", text))
         dataset.repairs.append(Repair("", "ragged", len(wrong), text))
+        lost = (Loss("ragged", len(wrong), f"in line {wrong[0]}"),)
         rows[:] = [(number, cells) for number, cells in rows if _fits(cells, len(names))]
     if not rows:
         raise UserError(f"{dataset.name}: the table has no row below its header")
-    return [[cells[index] for _, cells in rows] for index in range(len(names))]
+    return [[cells[index] for _, cells in rows] for index in range(len(names))], lost
 
 
 def _fits(cells: list[str], count: int) -> bool:
@@ -197,45 +210,100 @@ def _time(
     mapping: Mapping[str, str],
     time_unit: str | None,
     decimal_comma: bool,
-) -> tuple[int, Array]:
-    """(index of the time column, stamps in s; not a number where there is none)."""
-    for index, name in enumerate(names):
-        stem, unit = units.split(mapping.get(name, name))
-        if stem.lower() not in (*units.TIME_WORDS, *CLOCKS):
-            continue
-        some = cells[index][:SNIFFED_CELLS]
-        if sum(_date_s(cell) is not None for cell in some) > len(some) // 2:
-            dates = [_date_s(cell) for cell in cells[index]]
-            stamps = np.array([np.nan if date is None else date for date in dates])
-            dataset.repairs.append(Repair("", "dates", len(stamps), f"{name}: dates are read as seconds"))
-            return index, stamps
-        said = units.unit_of(unit_texts[index] or "") if unit_texts[index] else None
-        unit = said or unit or (units.unit_of(time_unit) if time_unit else None)
-        plain = _plain_numbers(cells[index], decimal_comma)
-        stamps = plain if plain is not None else np.array([_value(cell, decimal_comma) for cell in cells[index]])
-        if unit is None:
-            text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
-            dataset.findings.append(Finding("", "unit_assumed", *columns.ends(stamps), 1.0, "s", text))
-            unit = units.Unit(("s",))
-        if unit.numerator != ("s",) or unit.denominator:
-            raise UserError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
-        if unit.factor != 1.0:
-            text = f"{name}: times {unit.factor:g}, now in s"
-            dataset.repairs.append(Repair("", "si_unit", len(stamps), text))
-        return index, stamps * unit.factor
-    raise UserError(
-        f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
-        "--map NAME=t_s says which it is"
-    )
+) -> tuple[set[int], Array]:
+    """(indices of the columns that hold time, stamps in s; NaN where a row has none)."""
+    split = [units.split(mapping.get(name, name)) for name in names]
+    candidates = [k for k, (stem, _) in enumerate(split) if stem.lower() in (*units.TIME_WORDS, *CLOCKS)]
+    if not candidates:
+        raise UserError(
+            f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
+            "--map NAME=t_s says which it is"
+        )
+    written = {k: found for k in candidates if (found := stamps.of(cells[k])) is not None}
+    numbers = [k for k in candidates if k not in written]
+    if not written or (numbers and not any(each.has_time for each in written.values())):
+        index = (numbers or candidates)[0]
+        dates = set(written)
+        time_s = _counted(
+            dataset, names[index], split[index][1], unit_texts[index], cells[index], time_unit, decimal_comma
+        )
+        return {index, *dates}, time_s
+    whole = [k for k in written if written[k].has_date and written[k].has_time]
+    chosen = whole[:1] or [k for k in written if written[k].has_date][:1]
+    if not whole:
+        chosen += [k for k in written if written[k].has_time][:1]
+    time_ns = np.sum([written[k].time_ns for k in chosen], axis=0)
+    missing = np.any([written[k].time_ns == stamps.NONE for k in chosen], axis=0)
+    called = " and ".join(names[k] for k in chosen)
+    with_date = any(written[k].has_date for k in chosen)
+    first_ns = int(time_ns[~missing][0]) if with_date and not missing.all() else 0
+    text = f"{called}: {'dates are' if with_date else 'times of the day are'} read as seconds"
+    if with_date:
+        text += f", 0 is {np.datetime64(first_ns, 'ns')}"
+    dataset.repairs.append(Repair("", "dates", len(time_ns), text))
+    return set(chosen), np.where(missing, np.nan, (time_ns - first_ns) * 1e-9)
 
 
-def _date_s(cell: str) -> float | None:
-    """An ISO date as seconds since 1970, None for everything else."""
-    if not re.match(r"\d{4}-\d\d-\d\d", cell):
-        return None
+def _counted(
+    dataset: Dataset,
+    name: str,
+    unit: units.Unit | None,
+    unit_text: str | None,
+    cells: list[str],
+    time_unit: str | None,
+    decimal_comma: bool,
+) -> Array:
+    """Stamps in s of a column of numbers; NaN where a row has none."""
+    said = units.unit_of(unit_text) if unit_text else None
+    unit = said or unit or (units.unit_of(time_unit) if time_unit else None)
+    plain = _plain_numbers(cells, decimal_comma)
+    time_s = plain if plain is not None else np.array([_value(cell, decimal_comma) for cell in cells])
+    if len(time_s) and np.isfinite(time_s).mean() < 0.5:
+        first = next((cell for cell in cells if cell and not _is_number(cell)), "")
+        raise UserError(
+            f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
+            "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
+        )
+    if unit is None:
+        unit = _assumed(dataset, name, time_s)
+    if unit.numerator != ("s",) or unit.denominator:
+        raise UserError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
+    if unit.factor == 1.0:
+        return columns.from_zero(dataset, time_s)
+    text = f"{name}: times {unit.factor:g}, now in s"
+    dataset.repairs.append(Repair("", "si_unit", len(time_s), text))
+    whole = _whole_numbers(cells)
+    if whole is not None and len(whole) and float(whole[0]) * unit.factor >= columns.EPOCH_S:
+        columns.from_zero(dataset, time_s[:1] * unit.factor)  # for its note; whole numbers are subtracted below
+        return (whole - whole[0]) * unit.factor
+    return columns.from_zero(dataset, time_s * unit.factor)
+
+
+def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
+    """The unit of stamps that nothing says: seconds, or a spreadsheet's days where seconds cannot be."""
+    steps = np.diff(time_s[np.isfinite(time_s)])
+    usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
+    ends = columns.ends(time_s)
+    if 0.0 < usual < FASTEST_S and all(SPREADSHEET_DAYS[0] < end < SPREADSHEET_DAYS[1] for end in ends):
+        text = (
+            f"{name}: {ends[0]:.10g} is taken for a spreadsheet's day: samples would be {usual:.3g} s apart otherwise"
+        )
+        dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
+        return units.Unit(("s",), (), 86400.0)
+    text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
+    if usual > SLOWEST_S:
+        smaller = next((unit for unit in ("ms", "us", "ns") if usual * units.ATOMS[unit][1] <= SLOWEST_S), "ns")
+        better = usual * units.ATOMS[smaller][1]
+        text += f", which are {usual:.6g} s apart; --time-unit {smaller} would make them {better:g} s"
+    dataset.findings.append(Finding("", "unit_assumed", *ends, 1.0, "s", text))
+    return units.Unit(("s",))
+
+
+def _whole_numbers(cells: list[str]) -> NDArray[np.int64] | None:
+    """A column of whole numbers, exactly; None for any other."""
     try:
-        return float((np.datetime64(cell.rstrip("Z"), "ns") - np.datetime64(0, "ns")) / np.timedelta64(1, "s"))
-    except ValueError:
+        return np.array(list(map(int, cells)), dtype=np.int64)
+    except (ValueError, OverflowError):
         return None
 
 

@@ -2,22 +2,24 @@
 
 The frames come from whoever can read the recording (candump, BLF, ASC ... are read at the edge of the CAN room): this
 room knows only their numbers. A channel is called Message.signal; the robot's own messages have one signal `value`,
-whose channel is called like the message. Stamps are those of the recording; a stamp that a message carries
+whose channel is called like the message. A message that comes on several buses is as many channels, called
+can0.Message.signal; `buses` chooses among them. Stamps are those of the recording; a stamp that a message carries
 (`time_ms`) is a channel of its own, Message.time_s, so that the two clocks can be compared.
 """
 
 import pathlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid.dataset import Dataset, Finding
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
 
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
+Key = tuple[str, str, str]  # bus, message, signal
 EXTENDED_BIT = 1 << 31  # keeps extended identifiers apart from standard ones
 LENGTH_BITS = 15
 MOST_BYTES = 8
@@ -28,17 +30,23 @@ def decode(
     frames: Iterable[Frame],
     databases: Iterable[str | pathlib.Path],
     mapping: Mapping[str, str] | None = None,
+    buses: Collection[str] = (),
 ) -> Dataset:
-    """The signals of all frames that the DBC files know. UserError when there is none, or a file cannot be read."""
+    """The signals of all frames that the DBC files know. buses: those whose frames are read; all without any.
+
+    UserError when there is none, a bus has no frame, or a file cannot be read.
+    """
     dataset = Dataset(name, {})
     mapping = dict(mapping or {})
     messages = messages_of(databases)
-    samples: dict[tuple[str, str], tuple[list[int], list[float], str]] = {}
+    samples: dict[Key, tuple[list[int], list[float], str]] = {}
     unknown: dict[int, int] = {}
-    broken: dict[str, int] = {}
+    broken: dict[tuple[str, str], int] = {}
     first_ns: int | None = None
-    for _, time_ns, identifier, flags, lo, hi in frames:
-        if flags & (FLAG_ERROR | FLAG_REMOTE):
+    seen: set[str] = set()
+    for bus, time_ns, identifier, flags, lo, hi in frames:
+        seen.add(bus)
+        if flags & (FLAG_ERROR | FLAG_REMOTE) or (buses and bus not in buses):
             continue
         first_ns = time_ns if first_ns is None else first_ns
         message = messages.get(identifier | (EXTENDED_BIT if flags & FLAG_EXTENDED else 0))
@@ -49,27 +57,40 @@ def decode(
         try:
             decoded = message.decode(data, decode_choices=False)
         except Exception:  # too short, or a multiplexer's value that has no signals: of many kinds
-            broken[message.name] = broken.get(message.name, 0) + 1
+            broken[bus, message.name] = broken.get((bus, message.name), 0) + 1
             continue
         for signal, value in decoded.items():
-            key = (message.name, signal)
+            key = (bus, message.name, signal)
             if key not in samples:
                 unit = message.get_signal_by_name(signal).unit or ""
                 samples[key] = ([], [], unit)
             samples[key][0].append(time_ns)
             samples[key][1].append(float(value))
+    for bus in buses:
+        if bus not in seen:
+            raise UserError(f"{name}: --bus {bus}: unknown bus (available: {', '.join(sorted(seen))})")
     if not samples or first_ns is None:
         raise UserError(f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others)")
-    _tell(dataset, unknown, broken)
-    called = {key: key[0] if key[1] == "value" else f"{key[0]}.{key[1]}" for key in samples}
-    columns.check_mapping(dataset, mapping, list(called.values()))
+    of_message: dict[str, list[str]] = {}
+    for bus, message, _ in samples:
+        of_message.setdefault(message, [])
+        if bus not in of_message[message]:
+            of_message[message].append(bus)
+
+    def called(bus: str, message: str, signal: str = "value") -> str:
+        of_bus = f"{bus}." if len(of_message.get(message, ())) > 1 and bus else ""
+        return of_bus + (message if signal == "value" else f"{message}.{signal}")
+
+    _tell(dataset, unknown, {called(*key): count for key, count in broken.items()}, of_message)
+    columns.check_mapping(dataset, mapping, [called(*key) for key in samples])
     begin_ns = first_ns if first_ns * 1e-9 > columns.EPOCH_S else 0
     if begin_ns:
         columns.from_zero(dataset, np.array([begin_ns * 1e-9]))  # for its note; whole nanoseconds are subtracted below
     for key, (stamps, values, unit) in samples.items():
         time_s = np.array([(stamp - begin_ns) * 1e-9 for stamp in stamps], dtype=np.float64)
-        named = columns.label(dataset.name, called[key], unit, mapping)
-        columns.add(dataset, called[key], named, time_s, np.array(values))
+        named = columns.label(dataset.name, called(*key), unit, mapping)
+        lost = (Loss("broken_frames", broken[key[:2]]),) if key[:2] in broken else ()
+        columns.add(dataset, called(*key), named, time_s, np.array(values), losses=lost)
     return dataset
 
 
@@ -86,14 +107,30 @@ def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
             said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
             raise UserError(f"{path}: not a DBC file that cantools can read ({said})") from None
         for message in database.messages:
-            found[message.frame_id | (EXTENDED_BIT if message.is_extended_frame else 0)] = message
+            key = message.frame_id | (EXTENDED_BIT if message.is_extended_frame else 0)
+            if key in found and found[key].name != message.name:
+                raise UserError(
+                    f"{path}: the identifier {message.frame_id:#x} is {message.name} here and {found[key].name} in "
+                    "another DBC file; read one bus at a time (--bus) with its own file"
+                )
+            found[key] = message
     if not found:
         raise UserError("a recording of CAN frames needs a DBC file with messages (--dbc FILE)")
     return found
 
 
-def _tell(dataset: Dataset, unknown: dict[int, int], broken: dict[str, int]) -> None:
-    """What was left out."""
+def _tell(
+    dataset: Dataset, unknown: dict[int, int], broken: dict[str, int], of_message: Mapping[str, list[str]]
+) -> None:
+    """What was left out, and what came on several buses."""
+    several = {message: buses for message, buses in of_message.items() if len(buses) > 1}
+    if several:
+        message, buses = next(iter(several.items()))
+        text = (
+            f"{len(several)} messages came on several buses ({message} on {', '.join(buses)}) and are as many channels "
+            f"({buses[0]}.{message} ...); --bus chooses one"
+        )
+        dataset.findings.append(Finding("", "several_buses", 0.0, 0.0, float(len(several)), "messages", text, "note"))
     if unknown:
         some = ", ".join(f"{each:#x}" for each in sorted(unknown)[:5])
         text = f"{sum(unknown.values())} frames have identifiers that the DBC file does not know ({some})"

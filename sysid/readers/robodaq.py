@@ -1,8 +1,8 @@
 """The robot's text logs: `NAME<tab>id<tab>` per variable, then `id<tab>value<tab>robot time in ms` per sample.
 
-`ranger-sim daq --log FILE.txt` writes them, as the robot's own logging program did (docs/robot.md, C6.1). The log says
-no units: the caller passes those it knows. Logs of 2015 have no names; what an id means depends on the robot's program
-of that day, so their channels are called id_14, and a mapping names them.
+`ranger-sim daq --log FILE.txt` writes them, as the robot's own logging program did (docs/robot.md, C6.1), which pads
+its numbers with spaces. The log says no units: the caller passes those it knows. Logs of 2015 have no names; what an id
+means depends on the robot's program of that day, so their channels are called id_14, and a mapping names them.
 """
 
 import pathlib
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid.dataset import Dataset, Finding, Repair
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.readers import columns
 
 SNIFFED_LINES = 40
@@ -22,16 +22,19 @@ def is_one(path: pathlib.Path) -> bool:
     """True when most of the first lines look like such a log's."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
-            lines = [line.rstrip("\r\n") for _, line in zip(range(SNIFFED_LINES), file, strict=False)]
+            lines = [line for _, line in zip(range(SNIFFED_LINES), file, strict=False) if line.strip()]
     except OSError:
         return False
-    lines = [line for line in lines if line.strip()]
-    return sum(bool(_kind(line)) for line in lines) > LOG_PART * len(lines)
+    return sum(bool(_kind(_parts(line))) for line in lines) > LOG_PART * len(lines)
 
 
-def _kind(line: str) -> str:
+def _parts(line: str) -> list[str]:
+    """What lies between the tabs, without the spaces that pad it."""
+    return [part.strip() for part in line.split("\t")]
+
+
+def _kind(parts: list[str]) -> str:
     """ "name", "sample", or nothing."""
-    parts = line.split("\t")
     if len(parts) in (2, 3) and parts[1].isdigit() and not any(parts[2:]) and not _is_number(parts[0]):
         return "name"
     if len(parts) in (3, 4) and parts[0].isdigit() and not any(parts[3:]) and all(map(_is_number, parts[1:3])):
@@ -60,12 +63,13 @@ def read(
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             for number, line in enumerate(file, 1):
-                parts = line.rstrip("\r\n").split("\t")
-                kind = _kind("\t".join(parts))
+                parts = _parts(line)
+                kind = _kind(parts)
+                dataset.rows += bool(line.strip())
                 if kind == "sample":
                     samples.setdefault(parts[0], []).append((float(parts[2]), float(parts[1])))
                 elif kind == "name":
-                    names[parts[1]] = parts[0].strip()
+                    names[parts[1]] = parts[0]
                 elif line.strip():
                     odd.append(number)
     except OSError as error:
@@ -76,6 +80,7 @@ def read(
         text = f"{len(odd)} lines are not id, value, time, and are left out (the first: line {odd[0]})"
         dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(odd)), "rows", text))
         dataset.repairs.append(Repair("", "ragged", len(odd), text))
+        dataset.losses.append(Loss("ragged", len(odd), f"in line {odd[0]}"))
     if not names:
         text = "the log has no names; what an id means depends on the robot's program of its day"
         dataset.findings.append(Finding("", "no_header", 0.0, 0.0, float(len(samples)), "columns", text))
@@ -85,15 +90,14 @@ def read(
         pair = np.array(pairs)
         written = pair[:, 0] != 0.0
         again = np.zeros(len(pair), dtype=bool)
-        again[1:] = (pair[1:] == pair[:-1]).all(axis=1)  # idle channels repeat value and stamp
+        again[1:] = written[1:] & (pair[1:] == pair[:-1]).all(axis=1)  # idle channels repeat value and stamp
         kept = written & ~again
         named = columns.label(dataset.name, called[key], units.get(called[key]), mapping)
         if not kept.any():
             continue  # a variable that was never written
-        if (~kept).any():
-            text = f"{int((~kept).sum())} samples that were never written or came again are left out"
-            dataset.repairs.append(Repair(named.name, "repeated", int((~kept).sum()), text))
-        columns.add(dataset, called[key], named, pair[kept, 0] * 1e-3, pair[kept, 1])
+        counts = {"never_written": int((~written).sum()), "repeated": int(again.sum())}
+        lost = tuple(Loss(reason, count) for reason, count in counts.items() if count)
+        columns.add(dataset, called[key], named, pair[kept, 0] * 1e-3, pair[kept, 1], losses=lost)
     if not dataset.channels:
         raise UserError(f"{path}: no variable of this log was ever written")
     return dataset

@@ -4,7 +4,7 @@ import json
 import pathlib
 from collections.abc import Mapping
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.sysid.dataset import Dataset, Finding
 from ranger_sim.sysid.readers import measurement
 
@@ -17,7 +17,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     if not (folder / VARIABLES).is_file():
         raise UserError(f"{folder}: this is no folder of a walk, it has no {VARIABLES} (walk --log decides)")
     dataset = measurement.read(folder / VARIABLES, mapping, truth)
-    dataset.name = folder.resolve().name
+    dataset.name = printable(folder.resolve().name)
     try:
         summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
     except (OSError, ValueError):

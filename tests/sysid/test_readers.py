@@ -3,6 +3,7 @@
 import math
 import os
 import pathlib
+import warnings
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import channels, repairs, units
+from ranger_sim.sysid import channels, repairs, sanity, units
+from ranger_sim.sysid.dataset import Loss
 from ranger_sim.sysid.readers import columns, csv_file, read
 from ranger_sim.tools.recordings.datasets import open_recording
 from tests.boards.original_images import DATA
@@ -119,6 +121,144 @@ def test_one_table_in_many_dresses(table, text):
     assert data[name].unit == "V"
     assert data[name].value.tolist() == pytest.approx([1.5, 2.5])
     assert data[name].time_s.tolist() == pytest.approx([0.0, 1.0])
+
+
+UNITS = "t,a,speed,mode,w\ns,mA,{},enum,{}\n0,1,2,3,4\n0.1,1,2,3,4\n"
+
+
+def test_one_unknown_word_leaves_the_other_units_of_its_row(table):
+    data = table(UNITS.format("U/min", "furlong"))
+    assert {name: channel.unit for name, channel in data.channels.items()} == {
+        "a": "A", "speed": "rad/s", "mode": "", "w": ""
+    }  # fmt: skip
+    assert data["speed"].value == pytest.approx([math.pi / 15] * 2) and data["a"].value == pytest.approx([1e-3] * 2)
+    (said,) = [each for each in data.findings if each.kind == "unknown_unit"]
+    assert said.channel == "w" and "'furlong' is not known (--map w=NAME_UNIT says it)" in said.text
+    assert sanity.doubts(data.findings) == [said]
+    named = table(UNITS.format("rpm", "furlong"), mapping={"w": "speed_mm_s"})
+    assert named["speed_m_per_s"].value == pytest.approx([4e-3] * 2) and not sanity.doubts(named.findings)
+
+
+def test_a_row_of_words_in_which_no_unit_is_known_is_read_as_data(table):
+    data = table("t_s,a_V\nstart,low\n0,1\n1,2\n")
+    assert data["a_V"].value.tolist() == [1.0, 2.0] and data["a_V"].losses == (Loss("no_stamp", 1, "in line 2"),)
+
+
+def test_an_index_in_brackets_stays_in_the_name(table):
+    data = table("t_s,xyz[0],xyz[1]\n0,1,2\n1,3,4\n")
+    assert set(data.channels) == {"xyz[0]", "xyz[1]"} and data["xyz[1]"].unit == ""
+
+
+STAMPS = [
+    ("time", "2026-11-05 09:30:{:06.3f}"),
+    ("time", "2026-11-05T09:30:{:06.3f}Z"),
+    ("time", "2026-11-05T09:30:{:06.3f}+01:00"),
+    ("time", "2026/11/05 09:30:{:06.3f}"),
+    ("Zeit", "05.11.2026 09:30:{:06.3f}"),
+    ("Datum", "5.11.2026 9:30:{:06.3f}"),
+    ("timestamp", "11/05/2026 09:30:{:06.3f} PM"),
+    ("timestamp", "11/05/2026 09:30:{:06.3f} a.m."),
+    ("Time", "09:30:{:06.3f}"),
+    ("Uhrzeit", "09:30:{:06.3f}"),
+]
+
+
+@pytest.mark.parametrize(("name", "form"), STAMPS, ids=[form for _, form in STAMPS])
+@pytest.mark.parametrize("comma", [False, True])
+def test_stamps_of_many_forms_are_the_same_seconds(table, name, form, comma):
+    rows = [f"{form.format(0.25 * k)};{1.5 * k}\n" for k in range(8)]
+    text = f"{name};a_V\n{''.join(rows)}"
+    data = table(text.replace(".", ",") if comma and "." not in form.split(" ")[0] and "m." not in form else text)
+    assert data["a_V"].value == pytest.approx(1.5 * np.arange(8.0))
+    assert data["a_V"].time_s - data["a_V"].time_s[0] == pytest.approx(0.25 * np.arange(8), abs=1e-9)
+    assert not data.findings and data["a_V"].losses == ()
+
+
+def test_a_date_and_a_time_in_two_columns_are_one_stamp(table):
+    rows = "".join(f"{day:02d}.11.2026;{clock};{k}\n" for k, (day, clock) in enumerate(
+        [(30, "23:59:59,50"), (30, "23:59:59,75"), (30, "23:59:59,99")]))  # fmt: skip
+    data = table(f"Datum;Uhrzeit;a_V\n{rows}01.12.2026;00:00:00,25;3\n")
+    assert set(data.channels) == {"a_V"}
+    assert data["a_V"].time_s == pytest.approx([0.0, 0.25, 0.49, 0.75])
+
+
+def test_a_date_next_to_seconds_is_left_out(table):
+    data = table("Date,t_s,a_V\n2026-11-05,0,1\n2026-11-05,0.5,2\n")
+    assert data["a_V"].time_s.tolist() == [0.0, 0.5] and set(data.channels) == {"a_V"}
+
+
+def test_day_and_month_are_taken_as_the_rows_allow(table):
+    def times(*stamps):
+        return table("time,a_V\n" + "".join(f"{each} 00:00:00,1\n" for each in stamps))["a_V"].time_s.tolist()
+
+    assert times("11/29/2026", "11/30/2026") == times("29/11/2026", "30/11/2026") == [0.0, 86400.0]
+    assert times("30/11/2026", "01/12/2026") == [0.0, 86400.0]  # a thirtieth month does not exist
+    assert times("11/05/2026", "12/05/2026") == [0.0, 86400.0]  # a day, and not a month, which it could be too
+
+
+def test_a_recording_across_midnight_goes_on(table):
+    clock = [f"23:59:{58 + 0.1 * k:06.3f}" if k < 20 else f"00:00:{0.1 * (k - 20):06.3f}" for k in range(40)]
+    data = table("time,a_V\n" + "".join(f"{each},{k}\n" for k, each in enumerate(clock)))
+    assert repairs.mend(data)["a_V"].time_s == pytest.approx(86398.0 + 0.1 * np.arange(40))
+
+
+def test_a_spreadsheets_days_are_known_by_what_seconds_cannot_be(table):
+    def read_of(step_days):
+        rows = "".join(f"{45231.5 + step_days * k:.12f},{k}\n" for k in range(40))
+        return table("Time,a_V\n" + rows)
+
+    data = read_of(0.01 / 86400.0)
+    assert np.diff(data["a_V"].time_s) == pytest.approx([0.01] * 39, rel=1e-3)  # a float has 0.6 us of such days
+    assert [each.size for each in data.findings if each.kind == "unit_assumed"] == [86400.0]
+    assert np.diff(read_of(0.01)["a_V"].time_s) == pytest.approx([0.01] * 39)  # may be seconds, and so they are
+    given = table("Time,a_V\n45231.5,1\n45231.6,2\n", time_unit="d")["a_V"]
+    assert given.time_s - given.time_s[0] == pytest.approx([0.0, 8640.0])
+
+
+def test_whole_nanoseconds_of_the_epoch_keep_every_one(table):
+    begin = 1_519_844_087_028_000_001
+    data = table("timestamp_ns,a_V\n" + "".join(f"{begin + 7 * k},{k}\n" for k in range(5)))
+    assert data["a_V"].time_s == pytest.approx(7e-9 * np.arange(5), rel=1e-9, abs=0.0)
+
+
+def test_stamps_that_are_not_read_are_named(table):
+    with pytest.raises(
+        UserError, match=r"table.csv: time: stamps such as 'half past nine' are not read \(numbers, 2026"
+    ):
+        table("time,a_V\nhalf past nine,1\nten,2\n")
+    assert "--time-unit us would make them 0.01 s" in table("timestamp,a\n8123456,1\n8133456,2\n").findings[0].text
+
+
+def test_decimal_commas_in_quotes_are_read(table):
+    data = table('t_s,a_V\n"0,00","1,500"\n"0,01","1234,500"\n')
+    assert data["a_V"].value.tolist() == [1.5, 1234.5] and data["a_V"].time_s.tolist() == [0.0, 0.01]
+
+
+CASES = DATA.parent / "cases"
+
+
+@pytest.mark.skipif(not CASES.exists(), reason=f"no cases in {CASES.name}/")
+@pytest.mark.parametrize(
+    "file",
+    [*sorted(CASES.glob("07-stamp-forms/*.csv")), *sorted(CASES.glob("20-time-of-day/*.csv"))],
+    ids=lambda path: path.stem,
+)
+def test_the_cases_of_stamps_are_ten_milliseconds_apart(file):
+    (channel,) = read(file).channels.values()
+    assert channel.unit == "V" and channel.value[:4].tolist() == [1.5, 2.25, -3.125, 1234.5]
+    rounding_s = 1e-5 if "excel" in file.stem else 1e-9  # ten decimals of a day
+    assert np.diff(channel.time_s) == pytest.approx([0.01] * (len(channel.value) - 1), abs=rounding_s)
+
+
+@pytest.mark.skipif(not CASES.exists(), reason=f"no cases in {CASES.name}/")
+def test_the_cases_of_a_row_of_units_have_them():
+    for name in ("a_units_umin", "a_units_state"):
+        data = read(CASES / "06-units-row" / f"{name}.csv")
+        units_of = {key: each.unit for key, each in data.channels.items() if key != "mode"}
+        assert units_of == {"voltage": "V", "current": "A", "speed": "rad/s", "torque": "N m", "angle": "rad"}
+    turning = read(CASES / "06-units-row" / "30_units2.csv")["Drehzahl"]
+    assert turning.value == pytest.approx([2.0 * math.pi] * 3)
+    assert set(read(CASES / "09-index-as-unit" / "14_ulog.csv").channels) == {"xyz[0]", "xyz[1]", "noutputs"}
 
 
 def test_the_separator_is_that_of_the_first_fifty_lines(table):
@@ -256,6 +396,42 @@ def test_a_log_without_names_keeps_its_numbers_and_says_so(tmp_path):
     assert {each.kind: each.size for each in data.findings} == {"ragged": 1.0, "no_header": 2.0, "no_unit": 0.0}
 
 
+def test_the_robots_own_log_of_2015_is_read_as_its_program_wrote_it(tmp_path):
+    """Numbers padded with spaces, idle variables with stamp 0, samples that come again (docs/robot.md, C6.1)."""
+    lines = [
+        "  14\t1.533984E-3\t   151042",
+        " 194\t4.446710E-2\t   151045",
+        " 229\t0.000000E+0\t        0",
+        "  14\t1.533984E-3\t   151042",
+        "  14\t-2.301000E-3\t   151048",
+        " 138\t4.591775E-41\t   151048",
+    ]
+    path = tmp_path / "Test.txt"
+    path.write_text("\r\n".join([*lines, ""]))
+    data = read(path, {"id_14": "hip_angle_rad"})
+    assert data["hip_angle_rad"].value.tolist() == [1.533984e-3, -2.301e-3]
+    assert data["hip_angle_rad"].time_s == pytest.approx([151.042, 151.048])
+    assert data["id_194"].value.tolist() == [4.44671e-2] and set(data.channels) == {"hip_angle_rad", "id_194", "id_138"}
+    assert (data.rows, data.losses, data["hip_angle_rad"].losses) == (6, [], (Loss("repeated", 1),))
+
+
+def test_the_names_of_a_log_of_2016_may_be_padded_too(tmp_path):
+    path = tmp_path / "Test.txt"
+    path.write_text("ID_TIMESTAMP\t   0\t\nID_MCH_ANGLE\t  14\t\n  14\t5.0E-1\t   1000\n  14\t6.0E-1\t   1002\n")
+    assert read(path)["ID_MCH_ANGLE"].value.tolist() == [0.5, 0.6]
+
+
+def test_every_row_of_a_table_is_kept_or_left_out_with_its_reason(table):
+    text = "t_s,a_V,b_V\n0,1,2\n0.1,1\n,1,2\n0.2,x,2\n0.3,1,\n0.4,1,2\n0.5,1,2,7,8\n0.6,1,2\n"
+    data = table(text)
+    assert data.rows == 8
+    read_of = (Loss("ragged", 2, "in line 3"), Loss("no_stamp", 1, "in line 4"))
+    assert data["a_V"].losses == data["b_V"].losses == read_of
+    assert (data["a_V"].read, data["b_V"].read) == (8, 7)  # an empty cell is an instant without a sample
+    mended = repairs.mend(data)["a_V"]
+    assert (mended.read, mended.losses[2]) == (8, Loss("not_finite", 1, "at 0.2 s")) and len(mended.value) == 4
+
+
 def test_a_measurement_file_keeps_units_and_leaves_out_what_no_instrument_sees(tmp_path):
     from ranger_sim.tools.recordings import variables_file
 
@@ -291,6 +467,57 @@ def test_a_measurement_begins_at_zero_and_its_groups_keep_their_distance(tmp_pat
     data = read(tmp_path / "late.mf4")
     assert data["a_A" if "a_A" in data else "a"].time_s.tolist() == pytest.approx((early - start_s).tolist())
     assert data["b_V" if "b_V" in data else "b"].time_s.tolist() == pytest.approx((late - start_s).tolist())
+
+
+def measured(path, raw, conversion):
+    """A measurement file with one channel of raw numbers and a conversion of them, 10 ms apart."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from asammdf import MDF, Signal
+
+        with MDF(version="4.10") as file:
+            time_s = 0.01 * np.arange(len(raw))
+            signal = Signal(np.array(raw, dtype=np.uint16), time_s, name="speed", unit="rpm", conversion=conversion)
+            file.append([signal])
+            file.save(path, overwrite=True)
+    return read(path)
+
+
+@pytest.mark.parametrize(
+    ("conversion", "values"),
+    [
+        ({"val_0": 65535, "text_0": "SNA"}, [10.0, 20.0, 40.0]),
+        ({"val_0": 65535, "text_0": "SNA", "default_addr": {"a": 0.5, "b": 1.0}}, [6.0, 11.0, 21.0]),
+        ({"lower_0": 65000, "upper_0": 65535, "text_0": "error"}, [10.0, 20.0, 40.0]),
+        ({"lower_0": 0, "upper_0": 1000, "text_0": {"a": 2.0, "b": 0.0}, "default_addr": "SNA"}, [20.0, 40.0, 80.0]),
+    ],
+    ids=["a value", "a value, the others scaled", "a range", "all but a range"],
+)
+def test_a_text_for_some_values_leaves_the_others(tmp_path, conversion, values):
+    data = measured(tmp_path / "a.mf4", [10, 20, 65535, 40], conversion)
+    channel = data["speed"]
+    assert channel.value == pytest.approx(np.array(values) * math.pi / 30)
+    assert channel.time_s == pytest.approx([0.0, 0.01, 0.03]) and channel.losses == (Loss("text", 1, "at 0.02 s"),)
+    (said,) = data.findings
+    assert (said.kind, said.size, said.text) == (
+        "text",
+        1.0,
+        "1 of 4 values have a text instead of a number and are left out",
+    )
+    assert said.kind in sanity.KINDS and channel.read == 4
+
+
+def test_states_that_all_have_a_name_are_their_numbers(tmp_path):
+    names = {f"val_{k}": k for k in range(3)} | {f"text_{k}": f"state {k}" for k in range(3)}
+    data = measured(tmp_path / "a.mf4", [0, 2, 1, 1], names)
+    assert data["speed"].losses == () and data["speed"].value == pytest.approx(np.array([0, 2, 1, 1]) * math.pi / 30)
+
+
+@pytest.mark.skipif(not CASES.exists(), reason=f"no cases in {CASES.name}/")
+def test_the_case_of_a_value_that_is_not_available():
+    data = read(CASES / "15-mf4-partial-text" / "d_sna.mf4")
+    assert (len(data["speed"].value), data["speed"].read, data["speed"].unit) == (9, 10, "rad/s")
+    assert data["speed"].value[0] == pytest.approx(1000.0 * math.pi / 30)
 
 
 def test_a_broken_measurement_file_is_told_in_a_line(tmp_path):

@@ -230,3 +230,31 @@ def test_an_equation_has_no_less_noise_than_its_floor():
     recording, _ = repeated(generator(3, "repeats"))
     recording.floors = {"force": 1.0}
     assert Regression([recording]).whitening["force"].deviation == pytest.approx(1.0, rel=0.02)
+
+
+def two_equations(names, seed=9):
+    """A recording in which each of these equations has a slope of its own, and noise in common."""
+    rng = generator(seed, "two equations")
+    common, x = rng.normal(size=SIZE), np.sin(np.arange(SIZE) * 0.1)
+    table = Table(np.arange(SIZE) * 1e-3, {}, (slice(0, SIZE),), "held")
+    valid = np.ones(SIZE, dtype=bool)
+    equations = {
+        name: Equation(name, "M", "m", "N", 2.0 * x + common + rng.normal(size=SIZE), {f"slope_{name}": x}, valid)
+        for name in names
+    }
+    return Recording(table, {}, equations)
+
+
+@pytest.mark.parametrize(("trained", "held"), [(("one",), ("one", "other")), (("one", "other"), ("one",))])
+def test_held_out_data_are_judged_in_the_equations_that_training_has_too(trained, held):
+    known = Regression([two_equations(trained)])
+    made = Regression([two_equations(held, 10)], noise=known)
+    assert (made.equations, made.names, made.shared) == (["one"], ["slope_one"], {})
+    assert made.values["slope_one"] == pytest.approx(2.0, abs=0.15)
+    assert made.whitened([{"other": np.ones((SIZE, 1))}]) == {}
+
+
+def test_held_out_data_without_an_equation_of_the_training_are_refused_in_a_line():
+    known = Regression([two_equations(("one",))])
+    with pytest.raises(UserError, match="held: no equation that the other recordings have can be made of it"):
+        Regression([two_equations(("other",))], noise=known)

@@ -11,7 +11,8 @@ PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c
 BASES = ("s", "A", "V", "W", "ohm", "H", "rad", "m", "N", "Nm", "Pa", "Hz", "K")
 HOUR_s = 60.0 * 60.0
 OTHERS = {  # a word: (what it is in SI, its SI unit)
-    "min": (60.0, "s"), "h": (HOUR_s, "s"), "sec": (1.0, "s"), "Amp": (1.0, "A"), "Volt": (1.0, "V"), "J": (1.0, "J"),
+    "min": (60.0, "s"), "h": (HOUR_s, "s"), "d": (24.0 * HOUR_s, "s"),
+    "sec": (1.0, "s"), "Amp": (1.0, "A"), "Volt": (1.0, "V"), "J": (1.0, "J"),
     "Wh": (HOUR_s, "J"), "kWh": (1e3 * HOUR_s, "J"), "Ohm": (1.0, "ohm"), "Ω": (1.0, "ohm"), "bar": (1e5, "Pa"),
     "deg": (math.radians(1.0), "rad"), "°": (math.radians(1.0), "rad"), "degree": (math.radians(1.0), "rad"),
     "degrees": (math.radians(1.0), "rad"), "rev": (math.radians(360.0), "rad"), "turn": (math.radians(360.0), "rad"),
@@ -50,6 +51,13 @@ def test_each_word_is_worth_what_its_prefix_says(word):
         ("degC", 1.0, 0.0, "C"),
         ("%", 0.01, 0.0, ""),
         ("percent", 0.01, 0.0, ""),
+        *(
+            (each, math.radians(360.0) / 60.0, 0.0, "rad/s")
+            for each in ("U/min", "Umdr/min", "r/min", "rev/min", "1/min", "min-1", "min^-1", "min⁻¹")
+        ),
+        *((each, 1.0, 0.0, each[0]) for each in ("Arms", "A rms", "A_rms", "Vrms", "Aeff")),
+        ("enum", 1.0, 0.0, ""),
+        ("bool", 1.0, 0.0, ""),
         ("1", 1.0, 0.0, ""),
         ("-", 1.0, 0.0, ""),
         ("", 1.0, 0.0, ""),
@@ -78,6 +86,12 @@ def test_one_and_nothing_of_a_unit_are_what_they_are_in_si(text, one, zero, kind
         ("mm^3", "m3", "m3", 1e-9),
         ("(mm) / (ms)", "m/s", "m_per_s", 1.0),
         ("N·mm·s", "N m s", "N_m_s", 1e-3),
+        ("rad*s^-1", "rad/s", "rad_per_s", 1.0),
+        ("rad s-1", "rad/s", "rad_per_s", 1.0),
+        ("deg·s⁻²", "rad/s2", "rad_per_s2", math.radians(1.0)),
+        ("mm.s^-2", "m/s2", "m_per_s2", 1e-3),
+        ("V s mm^(-1)", "V s/m", "V_s_per_m", 1e3),
+        ("ms^-1", "1/s", "per_s", 1e3),
     ],
 )
 def test_products_quotients_and_powers_multiply_their_factors(text, kind, suffix, factor):
@@ -114,6 +128,27 @@ def test_a_column_is_split_where_its_unit_begins(column, stem, suffix, factor):
     assert units.si_name(found, unit) == (f"{stem}_{suffix}" if suffix else stem)
 
 
-@pytest.mark.parametrize("column", ["current_min", "current_1", "height_h", "A", "motor [furlong]", "V_V_V_V_V_V_V_x"])
+@pytest.mark.parametrize(
+    "column",
+    [
+        "current_min",
+        "current_1",
+        "current_d",
+        "height_h",
+        "A",
+        "motor [furlong]",
+        "V_V_V_V_V_V_V_x",
+        "xyz[1]",
+        "walk_state",
+        "brake_flag",
+        "motor_A-1",
+    ],
+)
 def test_what_only_looks_like_a_unit_stays_in_the_name(column):
     assert units.split(column)[1] is None
+
+
+def test_a_number_in_brackets_is_an_index_and_behind_a_space_a_pure_number():
+    assert units.split("xyz[1]") == ("xyz[1]", None) and units.split("q[0]") == ("q[0]", None)
+    stem, unit = units.split("ratio [1]")
+    assert (stem, unit.text, unit.factor) == ("ratio", "", 1.0)

@@ -320,6 +320,23 @@ def test_a_state_that_is_no_whole_number_is_refused(tmp_path, capsys):
     assert "no whole number" in capsys.readouterr().err
 
 
+def test_a_walk_whose_rows_are_out_of_order_is_the_same_walk_and_one_with_losses_is_refused(tmp_path, capsys):
+    path = csv(tmp_path, walk_by_hand(4))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    answers = []
+    for rows in (lines[1:], lines[:0:-1]):
+        path.write_text("\n".join([lines[0], *rows]), encoding="utf-8")
+        cli.main(["compare-walk", str(path), "--steps", "14", "--json", "-"])
+        answers.append(json.loads(capsys.readouterr().out)["misfit"])
+    assert answers[0] == answers[1]
+    torn = [line[:9] if number % 40 == 0 else line for number, line in enumerate(lines[1:])]
+    path.write_text("\n".join([lines[0], *torn]), encoding="utf-8")
+    assert cli.main(["compare-walk", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "walk.csv: hip_angle_rad: " in said and "2.56 % where 1 % are accepted" in said and said.count("\n") == 1
+    assert cli.main(["compare-walk", str(path), "--steps", "14", "--accept-loss", "3%", "--json", "-"]) in (0, 1)
+
+
 def test_an_offset_hidden_in_an_emulated_walk_is_measured():
     """The leg angle shown 0.03 rad too far forward, in a walk of another seed; one candidate, to keep it short."""
     name = "sensor_offset at leg angle"

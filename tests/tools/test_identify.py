@@ -145,3 +145,14 @@ def test_an_effect_that_the_model_lacks_marks_the_values_as_not_physical(folder,
     assert "something that is not in the model moves it" in " ".join(capsys.readouterr().out.split())
     found, _ = told(capsys, "stall", "--data", str(folder / "stall.csv"))
     assert found["fits"][0]["unexplained"] is False
+
+
+def test_a_recording_of_which_much_is_lost_gives_no_values(folder, tmp_path, capsys):
+    lines = (folder / "stall.csv").read_text().splitlines()
+    torn = tmp_path / "torn.csv"
+    torn.write_text("\n".join([*lines[:2], "x", *lines[3:]]))
+    assert main(["identify", "stall", "--data", str(torn)]) == 2
+    said = capsys.readouterr().err
+    assert "torn.csv: " in said and f"1 of {len(lines) - 1} samples are lost" in said and said.count("\n") == 1
+    found, code = told(capsys, "stall", "--data", str(torn), "--accept-loss", "50%")
+    assert code == 0 and found["fits"][0]["parameters"]

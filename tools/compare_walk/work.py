@@ -21,10 +21,10 @@ from scipy.stats import t as t_distribution
 
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
-from ranger_sim.sysid import channels, inspection, sanity
+from ranger_sim.sysid import channels, inspection, losses, repairs, sanity
 from ranger_sim.sysid.dataset import Array, Finding
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
@@ -76,7 +76,9 @@ def read(options: argparse.Namespace) -> tuple[gait.Walk, list[Finding]]:
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *gait.CHANNELS)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(options.log, findings)
-    return gait.of_dataset(dataset), findings
+    mended = repairs.mend(dataset, findings)
+    losses.stop_if_too_many(mended, gait.CHANNELS, options.accept_loss)
+    return gait.of_dataset(mended), findings
 
 
 @contextlib.contextmanager
@@ -108,7 +110,7 @@ def compare(log: str, measured: gait.Walk, emulator: emulate.Emulator, causes: b
     walked = walked[-emulator.settled :]
     features = np.mean([each.features for each in walked], axis=0)
     answer: dict[str, Any] = {
-        "log": pathlib.Path(log).name,
+        "log": printable(pathlib.Path(log).name),
         "controller": emulator.scenario.controller,
         "body": emulator.scenario.body,
         "model": emulator.scenario.model_file,

@@ -45,6 +45,13 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--gear", type=number(least=0.01, most=1e4), metavar="N", help="of the motor bench's gearbox (14)"
     )
+    command.add_argument(
+        "--repair",
+        action="append",
+        default=[],
+        metavar="CHANNEL",
+        help="put right what looks wrong in a channel that drives the machine as well (repeatable)",
+    )
     command.add_argument("--seed", type=whole_number(), default=0, metavar="N", help="of the bootstrap (0)")
     command.add_argument(
         "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"

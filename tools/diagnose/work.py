@@ -9,7 +9,7 @@ import json
 import pathlib
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,21 +17,22 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import model_file, predicted_ties, repairs, sanity
+from ranger_sim.foundation.user_error import UserError, printable
+from ranger_sim.sysid import losses, model_file, predicted_ties, repairs, sanity
 from ranger_sim.sysid.channels import named_for
-from ranger_sim.sysid.dataset import Dataset, Finding, Table
+from ranger_sim.sysid.dataset import Dataset, Finding, Repair, Table
 from ranger_sim.sysid.diagnose import Progress as Progressed
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
-from ranger_sim.sysid.machines import MACHINES, made
+from ranger_sim.sysid.machines import MACHINES, ROBOT, made
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.recordings import datasets
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
+MOST_GAPS = 4  # more of them are one line on a screen; report and JSON have all
 LEAST_ROWS = 50  # below, filters are longer than the data; what says anything has some hundreds
 
 
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         found = of_options(options, lambda what, share: bar.update(task, description=what, completed=share))
         if folder is not None:
             bar.update(task, description="report")
-            write(found, folder, shlex.join(["ranger-sim", *sys.argv[1:]]))
+            write(found, folder, printable(shlex.join(["ranger-sim", *sys.argv[1:]])))
     if options.json == "-":
         print(_json(found.answer))
     else:
@@ -74,7 +75,7 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
         replace_file(path, model_file.model_text(found).encode())
         found.answer["model_file"] = str(path)
         for each in model_file.effects_found(found):
-            if each.term is None:
+            if each.term is None and found.machine.name in ROBOT:  # others have simulators of their own
                 found.answer["evidence"].setdefault("without_form", []).append(
                     {"name": each.known.cause, "at": each.known.at, "reason": each.no_form}
                 )
@@ -87,8 +88,11 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
     """The diagnosis that a command line asks for."""
     machine = machine_of(options.experiment, options.gear)
     known = model_file.read(options.model, machine).effects if options.model else []
-    data = [_prepared(datasets.open_with(options, path), machine, options.experiment) for path in options.data]
-    held = [_prepared(datasets.open_with(options, path), machine, options.experiment) for path in options.holdout]
+    experiment, accepted = options.experiment, options.accept_loss
+    data, held = (
+        [prepared(datasets.open_with(options, path), machine, experiment, accepted, options.repair) for path in paths]
+        for paths in (options.data, options.holdout)
+    )
     if options.holdout_part is not None:
         if held:
             raise UserError(f"--holdout-part {options.holdout_part:g}: there are files to hold out already (--holdout)")
@@ -96,19 +100,30 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
     return _diagnosed(machine, data, held, options.seed, known, progress)
 
 
-def _parted(data: Sequence[tuple], part: float) -> tuple[list[tuple], list[tuple]]:
-    """The first and the last part of each recording by time; what was odd in it is told once."""
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    """A recording ready for work: its table, what is odd in it, what was repaired, and what became of its samples."""
+
+    table: Table
+    findings: list[Finding]
+    repairs: list[Repair]
+    ledger: Mapping[str, Any]
+
+
+def _parted(data: Sequence[Prepared], part: float) -> tuple[list[Prepared], list[Prepared]]:
+    """The first and the last part of each recording by time; what is said of its data is said of the first."""
     if not 0.0 < part < 1.0:
         raise UserError(f"--holdout-part {part:g}: allowed is what lies between 0 and 1")
-    first: list[tuple] = []
-    last: list[tuple] = []
-    for table, findings in data:
+    first: list[Prepared] = []
+    last: list[Prepared] = []
+    for each in data:
+        table = each.table
         begin, end = float(table.time_s[0]), float(table.time_s[-1])
         row = int(np.searchsorted(table.time_s, end - part * (end - begin)))
-        first.append((table.part(slice(0, row)), findings))
+        first.append(dataclasses.replace(each, table=table.part(slice(0, row))))
         rest = table.part(slice(row, None))
         rest.name = f"{table.name} from {table.time_s[row]:.1f} s on"
-        last.append((rest, []))
+        last.append(Prepared(rest, [], [], {}))
     return first, last
 
 
@@ -118,7 +133,7 @@ def answer(
     """What `--json` prints, for programs: files and held-out files, or a part of each, of one experiment."""
     machine = machine_of(experiment)
     data, held = (
-        [_prepared(datasets.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
+        [prepared(datasets.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
     )
     if holdout_part is not None:
         data, held = _parted(data, holdout_part)
@@ -159,57 +174,86 @@ def machine_of(experiment: str, gear: float | None = None) -> Machine:
     return machine
 
 
-def _prepared(dataset: Dataset, machine: Machine, experiment: str) -> tuple[Table, list[Finding]]:
-    """The table of a recording, mended, and what was odd in it; UserError for data that are not what they say."""
+def prepared(
+    dataset: Dataset,
+    machine: Machine,
+    experiment: str,
+    accepted: float = losses.ACCEPTED,
+    asked: Collection[str] = (),
+) -> Prepared:
+    """A recording mended, its channels on one time base.
+
+    accepted: share of a channel's samples that may be lost. asked: inputs of the machine that are repaired all the
+    same. UserError for data that are not what they say, or of which too much is lost.
+    """
     if experiment in MACHINES:
         dataset = named_for(dataset, experiment)
     missing = [each.name for each in machine.quantities if each.needed and each.name not in dataset]
-    if missing:
-        there = ", ".join(dataset.channels) or "none"
-        raise UserError(f"{dataset.name}: {machine.name} needs {', '.join(missing)}; there are {there}")
     names = [each.name for each in machine.quantities if each.name in dataset]
+    if missing or not names:
+        wanted = ", ".join(missing) or "one of its channels"
+        there = ", ".join(dataset.channels) or "none"
+        raise UserError(
+            f"{dataset.name}: {machine.name} needs {wanted}; there are {there} (--map NAME=CHANNEL names it)"
+        )
+    for name in asked:
+        if name not in names:
+            raise UserError(f"--repair {name}: unknown channel of {dataset.name} (available: {', '.join(names)})")
     dataset.channels = {name: dataset.channels[name] for name in names}
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
+    dataset.repairs = [each for each in dataset.repairs if each.channel in ("", *names)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
+    inputs = {each.name for each in machine.quantities if each.is_input} - set(asked)
+    mended = repairs.mend(dataset, findings, inputs)
+    losses.stop_if_too_many(mended, names, accepted)
     needed = [each.name for each in machine.quantities if each.needed]
-    for doubt in sanity.doubts(dataset, findings):
+    for doubt in sanity.doubts(findings):
         if doubt.kind == "noise" and doubt.channel not in needed:
             continue  # a channel at rest; what it is needed for says more
+        if doubt.kind == "slow_samples" and experiment not in MACHINES:
+            continue  # a user's own machine may be a tank
         place = f"{doubt.channel}: " if doubt.channel else ""
         raise UserError(f"{dataset.name}: {place}{doubt.text}; nothing is concluded from such data")
     if experiment in MACHINES:  # a user's own machine may have a setting for a channel
         for each in machine.quantities:
-            if each.needed and np.ptp(dataset[each.name].value[np.isfinite(dataset[each.name].value)]) == 0.0:
+            if each.needed and np.ptp(mended[each.name].value) == 0.0:
                 raise UserError(f"{dataset.name}: {each.name}: one value all the time; nothing is concluded from that")
-    mended = repairs.mend(dataset, findings)
-    names = [name for name in names if name in mended]
     own = getattr(machine, "table", None)  # of a machine whose channels come at rates of their own
     table = own(mended, names) if own is not None else mended.table(names)
     if len(table) < LEAST_ROWS:
         raise UserError(f"{dataset.name}: {len(table)} rows with all channels, at least {LEAST_ROWS} are needed")
-    return table, findings
+    return Prepared(table, mended.findings, mended.repairs, mended.ledger())
 
 
 def _diagnosed(
     machine: Machine,
-    data: Sequence[tuple],
-    held: Sequence[tuple],
+    data: Sequence[Prepared],
+    held: Sequence[Prepared],
     seed: int,
     known: Sequence[KnownEffect] = (),
     progress: Progressed = lambda what, share: None,
 ) -> Diagnosis:
     findings = [
-        {**dataclasses.asdict(finding), "recording": table.name} for table, found in (*data, *held) for finding in found
+        {**dataclasses.asdict(finding), "recording": each.table.name}
+        for each in (*data, *held)
+        for finding in each.findings
     ]
-    tables = [table for table, _ in data]
+    tables = [each.table for each in data]
     names = ", ".join(table.name for table in tables)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows ends as no number, which is told below
-            found = diagnose(machine, tables, [table for table, _ in held], seed, findings, known, progress)
+            found = diagnose(machine, tables, [each.table for each in held], seed, findings, known, progress)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
+    found.answer["data_repairs"] = [
+        {**dataclasses.asdict(repair), "recording": each.table.name}
+        for each in (*data, *held)
+        for repair in each.repairs
+        if repair.kind in repairs.KINDS
+    ]
+    found.answer["data_ledger"] = {each.table.name: each.ledger for each in (*data, *held) if each.ledger}
     wrong = _no_number(found.answer)
     if wrong:
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")
@@ -237,9 +281,22 @@ def _show(found: Diagnosis, console: Console) -> None:
         console.print(f"{name} comes out as {value}, which no machine has", highlight=False, soft_wrap=True)
     for name in answer["evidence"].get("refused_by_holdout", ()):
         console.print(f"{name} is in these data and not in the held-out ones: refused", highlight=False, soft_wrap=True)
-    for finding in answer["data_findings"]:
-        place = ": ".join(each for each in (finding["recording"], finding["channel"]) if each)
-        console.print(f"data: {place}: {finding['text']}", highlight=False, soft_wrap=True)
+    findings, gaps = answer["data_findings"], [each for each in answer["data_findings"] if each["kind"] == "gap"]
+    if len(gaps) > MOST_GAPS:
+        findings = [each for each in findings if each["kind"] != "gap"]
+        longest = max(gaps, key=lambda each: each["size"])
+        text = (
+            f"gaps in {len({each['channel'] for each in gaps})} channels; the longest is {longest['size']:.4g} s at "
+            f"{longest['start_s']:.4g} s, in {longest['channel']}"
+        )
+        findings.append({"recording": longest["recording"], "channel": "", "text": text})
+    for word, lines in (("data", findings), ("repaired", answer["data_repairs"])):
+        together: dict[tuple[str, str], list[str]] = {}  # what is said of several channels alike is one line
+        for each in lines:
+            together.setdefault((each["recording"], each["text"]), []).append(each["channel"])
+        for (recording, text), channels in together.items():
+            place = ": ".join(each for each in (recording, ", ".join(filter(None, channels))) if each)
+            console.print(f"{word}: {place}: {text}", highlight=False, soft_wrap=True)
     for each in answer["evidence"]["known"]:
         values = ", ".join(
             f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])}; "

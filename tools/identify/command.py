@@ -7,6 +7,7 @@ import argparse
 from typing import Any
 
 from ranger_sim.tools.command_line.units import number, whole_number
+from ranger_sim.tools.recordings import datasets
 
 # as sysid/identify/registry.py has them; a test holds both together
 BENCHES = {
@@ -33,6 +34,7 @@ def register(commands: Any) -> None:
     command.add_argument("bench", metavar="BENCH", help=f"{', '.join(BENCHES)}, or all: tables 2 and 3")
     command.add_argument("--data", metavar="FILE", help="your recording; for all a folder with BENCH.csv of each")
     command.add_argument("--map", action="append", default=[], metavar="OLD=NEW", help="name of a column of the file")
+    datasets.add_accept_loss(command)
     command.add_argument(
         "--known",
         action="append",

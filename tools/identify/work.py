@@ -18,9 +18,9 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.plant import terms
-from ranger_sim.sysid import readers, sanity
+from ranger_sim.sysid import losses, readers, repairs, sanity
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
@@ -123,15 +123,23 @@ def machine_with(options: argparse.Namespace, console: Console) -> coverage.Mach
     return dataclasses.replace(coverage.ROBOT, terms=made)
 
 
-def recorded(name: str, path: pathlib.Path, mapping: dict[str, str], console: Console) -> Dataset:
-    """A user's recording of a bench; what is odd in a series of samples is told."""
+def recorded(
+    name: str, path: pathlib.Path, mapping: dict[str, str], console: Console, accepted: float = losses.ACCEPTED
+) -> Dataset:
+    """A user's recording of a bench; what is odd in a series of samples is reported.
+
+    accepted: share of a channel's samples that may be lost. UserError when more is.
+    """
     data = readers.read(path, mapping)
     if name in ("pendulum", "ankle-sine"):  # the others are single readings
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(str(path), findings)
-        for finding in findings:
+        if name == "ankle-sine":  # the legs of a pendulum may each have stamps of their own
+            data = repairs.mend(data, findings, [each for each in data.channels if each.startswith(("target", "cmd"))])
+        for finding in data.findings if name == "ankle-sine" else findings:
             if finding.severity != "note":
                 console.print(escape(f"{path.name}: {finding.channel}: {finding.text}"))
+    losses.stop_if_too_many(data, data.channels, accepted)
     return data
 
 
@@ -143,7 +151,7 @@ def identify_one(
     tell = before(console)
     if options.data is not None:
         path = pathlib.Path(options.data)
-        recordings = {bench.name: recorded(bench.name, path, mapping_of(options.map), console)}
+        recordings = {bench.name: recorded(bench.name, path, mapping_of(options.map), console, options.accept_loss)}
         fits = {bench.name: alone(bench, recordings[bench.name], known, gear=options.gear, tell=tell)}
         truth: dict[str, float] = {}
     else:
@@ -175,7 +183,9 @@ def identify_all(
         if lacking:
             raise UserError(f"--data {options.data}: for all a folder is needed; {lacking[0]}.csv is not in it")
         mapping = mapping_of(options.map)
-        recordings = {name: recorded(name, folder / f"{name}.csv", mapping, console) for name in OF_TABLES}
+        recordings = {
+            name: recorded(name, folder / f"{name}.csv", mapping, console, options.accept_loss) for name in OF_TABLES
+        }
     tell = before(console)
     of_motor = (recordings["stall"], recordings["cantilever"], recordings["pulley"])
     of_legs = (recordings["level"], recordings["hang"], recordings["pendulum"])
@@ -245,7 +255,7 @@ def told_of(options: argparse.Namespace, fits: dict[str, Fit], truth: dict[str, 
     ]
     return {
         "bench": options.bench,
-        "data": options.data,
+        "data": None if options.data is None else printable(options.data),
         "seed": options.seed if options.data is None else None,
         "gear": options.gear,
         "fits": [fit_as_data(title, found) for title, found in fits.items()],

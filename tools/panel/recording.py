@@ -178,8 +178,8 @@ def read(path: str, databases: Sequence[str], frames: Decoded | None) -> Dataset
     """The channels of one recording, those of a simulated body among them. frames: keeps them where it has some."""
     if (pathlib.Path(path) / run_folder.VARIABLES).is_file():
         return run_folder.read(path, truth=True)
-    reader = None if frames is None else frames.passing
-    return datasets.open_recording(path, databases=databases, read_frames=reader)
+    each_frame = None if frames is None else frames.take
+    return datasets.open_recording(path, databases=databases, each_frame=each_frame)
 
 
 def inside_of(

@@ -94,3 +94,14 @@ def test_what_cannot_be_replayed_is_told(recorded, tmp_path):
             path.write_text(text, encoding="utf-8")
         with pytest.raises(UserError, match=str(path)):
             read_log(path)
+
+
+def test_a_recording_that_is_cut_off_is_not_replayed(recorded, tmp_path):
+    path = tmp_path / "a.blf"
+    with can.Logger(path) as writer:
+        for number in range(4000):
+            writer(can.Message(timestamp=0.01 * number, arbitration_id=291, data=bytes(8), is_extended_id=False))
+    assert len(read_log(path, bus="can1")) == 4000
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(UserError, match=r"a.blf: \d+ of 4000 frames are lost \(\d+ cut off, behind byte"):
+        read_log(path, bus="can1")

@@ -2,17 +2,22 @@
 
 import io
 import json
+import os
+import pathlib
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rich.console import Console
 
 from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines import MACHINES, made
 from ranger_sim.tools.cli import main
+from ranger_sim.tools.diagnose import work
 from tests.examples import examples
-from tests.sysid.test_diagnose import cart_run
+from tests.sysid.test_diagnose import Cart, cart_run
 
 ROWS = 400
 
@@ -67,7 +72,7 @@ REFUSED = {
     "rows of other lengths": lambda names, rows: text_of(names, rows).replace("\n0", ",7,8\n0", 200),
     "all constant": lambda names, rows: text_of(names, np.column_stack([rows[:, 0], np.ones_like(rows[:, 1:])])),
     "no time passes": lambda names, rows: text_of(names, with_column(rows, 0, 1.0)),
-    "stamps go back": lambda names, rows: text_of(names, rows[::-1]),
+    "two recordings in one file": lambda names, rows: text_of(names, with_column(rows, 0, rows[:, 0] % 0.4)),
     "stamps in ms": lambda names, rows: text_of(names, with_column(rows, 0, 1000.0 * rows[:, 0])),
     "every stamp twice": lambda names, rows: text_of(names, with_column(rows, 0, np.repeat(rows[::2, 0], 2))),
     "endless digits": lambda names, rows: ",".join(names) + "\n" + (",".join(["9" * 400] * len(names)) + "\n") * 50,
@@ -159,3 +164,41 @@ def test_no_mutilation_of_a_file_leads_to_a_traceback(edits, tmp_path, capsys):
         assert said.out == "" and said.err.count("\n") == 1 and said.err.startswith("ranger-sim: ")
     else:
         assert said.err == "" and said.out.startswith("cart: ")
+
+
+def test_a_name_of_a_file_that_is_not_utf_8_is_escaped_in_the_answer(tmp_path, capsys):
+    path = pathlib.Path(os.fsdecode(os.fsencode(tmp_path) + b"/m\xe9ss.csv"))
+    path.write_text(cart_text())
+    machine, out = "tests.sysid.test_diagnose:Cart", tmp_path / "found"
+    assert main(["diagnose", str(path), "--experiment", machine, "--out", str(out), "--json", "-"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert list(told["data_ledger"]) == ["m\\udce9ss.csv"]
+    for name in ("report.html", "extended.toml", "diagnosis.json"):
+        assert "\\udce9ss.csv" in (out / name).read_text(encoding="utf-8")
+
+
+def walk_with_gaps():
+    """What a diagnosis has to print of a recording with many gaps, and no gain."""
+    gaps = [
+        {"recording": "walk", "channel": f"{name}_rad", "kind": "gap", "start_s": 1.0 * k, "end_s": 2.0,
+         "size": 0.1 * k, "unit": "s", "text": f"no sample for {0.1 * k:.4g} s, usual are 0.002 s", "severity": "note"}
+        for name in ("hip", "knee") for k in range(1, 4)
+    ]  # fmt: skip
+    return diagnose(Cart(), [cart_run(1, drag=0.02)], [], 0, gaps)
+
+
+def test_many_gaps_are_one_line_on_a_screen_and_a_gain_is_shown_where_one_was_measured():
+    found = walk_with_gaps()
+    found.answer["data_repairs"] = []
+    console = Console(file=io.StringIO(), width=200)
+    work._show(found, console)
+    printed = console.file.getvalue()
+    assert "data: walk: gaps in 2 channels; the longest is 0.3 s at 3 s, in hip_rad\n" in printed
+    assert "no sample for" not in printed and "gain on" not in printed
+
+
+def test_a_slow_machine_of_ones_own_may_have_slow_samples(tmp_path, capsys):
+    run = cart_run(1, drag=0.02)
+    columns = np.column_stack([1e3 * run.time_s, *run.columns.values()])[:2000]  # steps of some seconds
+    code, told = diagnosed(tmp_path / "a.csv", capsys, text_of(["t_s", *run.columns], columns))
+    assert code in (0, 1) and "slow_samples" in {each["kind"] for each in told["data_findings"]}

@@ -6,11 +6,10 @@ import array
 import asyncio
 import json
 import pathlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ranger_sim.can_bus.edge.logs import read_log
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import BUS_BIT_RATE
@@ -97,7 +96,7 @@ class RunLogs:
 class Decoded:
     """The frames of a recording that is read with DBC files, in memory with 24 bytes each.
 
-    `passing` is what they are read from; after it `done`.
+    Each goes through `take`; after the last one `done`.
     """
 
     missing = NO_RATE
@@ -110,15 +109,13 @@ class Decoded:
         self.buses: list[Bus] = []
         self.errors = ErrorList()
 
-    def passing(self, path: pathlib.Path) -> Iterator[frames.Frame]:
-        """Every frame of the recording."""
-        for frame in read_log(path):
-            bus, time_ns, identifier, flags, low, high = frame
-            if self.first_ns is None and not flags & (FLAG_ERROR | FLAG_REMOTE):
-                self.first_ns = time_ns
-            words = self.words.setdefault(bus or path.stem, array.array("q"))
-            words.extend((time_ns, low << 12 | flags << 4, high << 29 | identifier))
-            yield frame
+    def take(self, frame: frames.Frame) -> None:
+        """Keep the next frame of the recording."""
+        bus, time_ns, identifier, flags, low, high = frame
+        if self.first_ns is None and not flags & (FLAG_ERROR | FLAG_REMOTE):
+            self.first_ns = time_ns
+        words = self.words.setdefault(bus or self.path.stem, array.array("q"))
+        words.extend((time_ns, low << 12 | flags << 4, high << 29 | identifier))
 
     def done(self, group: str, shift_s: float) -> None:
         """All have passed. Their time 0 is that of the channels."""

@@ -1,0 +1,96 @@
+"""Stamps as people and programs write them: dates, times of the day, or both, as whole nanoseconds.
+
+A date is year-month-day, or day and month with the year behind, between dots, strokes or slashes; a time of the day has
+hours and minutes, seconds with either decimal mark, AM or PM, and a zone behind it. Where day and month may be either
+way round, the way is taken that all rows allow and that takes less time from first to last.
+"""
+
+import calendar
+import dataclasses
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+DAY_NS, SECOND_NS = 86_400_000_000_000, 1_000_000_000
+DATE = (
+    r"(?P<year>\d{4})[-/.](?P<month>\d\d?)[-/.](?P<day>\d\d?)"
+    r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4})"
+)
+TIME = (
+    r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+    r"\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
+)
+STAMP = re.compile(rf"(?:(?P<date>{DATE})(?:[T ]\s*(?=\d))?)?(?P<time>{TIME})?")
+NONE = np.iinfo(np.int64).min  # in an array: no stamp
+
+
+@dataclasses.dataclass(frozen=True)
+class Stamps:
+    """time_ns: shape (n,), NONE where a cell is not a stamp. has_date, has_time: what the cells hold."""
+
+    time_ns: NDArray[np.int64]
+    has_date: bool
+    has_time: bool
+
+
+def is_stamp(cell: str) -> bool:
+    """True for a date, a time of the day, or both."""
+    found = STAMP.fullmatch(cell)
+    return found is not None and bool(found["date"] or found["time"])
+
+
+def of(cells: list[str]) -> Stamps | None:
+    """The stamps of a column; None when most of its cells are not dates or times."""
+    found = [STAMP.fullmatch(cell) if cell else None for cell in cells]
+    good = [each for each in found if each is not None and each[0]]
+    if 2 * len(good) <= len(cells):
+        return None
+    has_date, has_time = bool(good[0]["date"]), bool(good[0]["time"])
+    ways = [_all_of(found, month_first) for month_first in (False, True)]
+    counts = [int((way != NONE).sum()) for way in ways]
+    spans = [np.ptp(way[way != NONE]) if count else 0 for way, count in zip(ways, counts, strict=True)]
+    usual = "/" in (good[0]["date"] or "")  # strokes and dots have the day first
+    best = min((0, 1), key=lambda way: (-counts[way], spans[way], bool(way) != usual))
+    return Stamps(ways[best], has_date, has_time) if counts[best] else None
+
+
+def _all_of(found: list[re.Match[str] | None], month_first: bool) -> NDArray[np.int64]:
+    days: dict[str, int | None] = {}
+    stamps = np.full(len(found), NONE, dtype=np.int64)
+    for number, each in enumerate(found):
+        if each is None or not each[0]:
+            continue
+        date = each["date"] or ""
+        if date not in days:
+            days[date] = _day(each, month_first) if date else 0
+        day, part_ns = days[date], _time_of_day_ns(each) if each["time"] else 0
+        if day is not None and part_ns is not None:
+            stamps[number] = day * DAY_NS + part_ns
+    return stamps
+
+
+def _day(found: re.Match[str], month_first: bool) -> int | None:
+    """Days since 1970; None for a date that is not in the calendar."""
+    if found["year"]:
+        year, month, day = (int(found[name]) for name in ("year", "month", "day"))
+    else:
+        year, first, second = (int(found[name]) for name in ("late", "first", "second"))
+        month, day = (first, second) if month_first else (second, first)
+    if not 1 <= month <= 12 or not 1 <= day <= calendar.monthrange(max(year, 1), month)[1]:
+        return None
+    return calendar.timegm((year, month, day, 0, 0, 0, 0, 0, 0)) // 86_400
+
+
+def _time_of_day_ns(found: re.Match[str]) -> int | None:
+    """Nanoseconds since midnight, of UTC where the zone is said; None for a time that no clock shows."""
+    hour, minute, second = int(found["h"]), int(found["m"]), int(found["s"] or 0)
+    half = (found["half"] or "").lower()
+    if hour > (12 if half else 24) or minute > 59 or second > 60:
+        return None
+    if half:
+        hour = hour % 12 + (12 if half[0] == "p" else 0)
+    zone = found["zone"] or "Z"
+    away = 0 if zone == "Z" else (int(zone[1:3]) * 60 + int(zone[-2:])) * (-1 if zone[0] == "-" else 1)
+    seconds = hour * 3600 + (minute - away) * 60 + second
+    return seconds * SECOND_NS + int((found["part"] or "0").ljust(9, "0"))
