@@ -11,8 +11,11 @@
 examples/servo is a whole one.
 """
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+
+import numpy as np
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.foundation import wallclock
@@ -77,6 +80,7 @@ class Machine:
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
         self.logbook = Logbook(self.recorder, log)
         kept = self.recorder.words if self.logbook.records_words and words[1] is not None else None
+        accept_lists(plant)
         sampler = Sampler(plant, words[1], self.recorder.samples, kept, self.start_ns)
         self.loop: Any = lockstep.Lockstep(plant, list(self.boards.values()), self.buses, sampler, self.start_ns)
         self.wiring = wiring
@@ -276,10 +280,11 @@ class Machine:
             self.slot_views[board] = slot_view(self, board)
         return self.slot_views[board]
 
-    def wire(self, bus: str = "can1", since_s: float = 0.0) -> Any:
+    def wire(self, bus: str = "can1", since_s: float | None = None) -> Any:
         """Frames on a bus, their periods and latencies, as assertions: a `harness.testing.wire.Wire`.
 
-        Frames are kept from the first call on, or from power-up in a machine that harness.testing made.
+        Frames of the last 20 s are kept from the first call on, or from power-up with log="full" and in a machine that
+        harness.testing made. since_s: of the time since power-up; UserError where they are not kept so far back.
         """
         from ranger_sim.harness.testing.wire import wire_of
 
@@ -345,3 +350,10 @@ class Machine:
         for fault in self.faults:
             if fault.twin is not None:
                 fault.twin.close()
+
+
+def accept_lists(plant: Any) -> None:
+    """A body's `fill_sample` in Python gets an array of numpy: `row[:2] = [angle, rate]` is refused by a buffer."""
+    fill = plant.fill_sample
+    if inspect.isfunction(getattr(type(plant), "fill_sample", None)):
+        plant.fill_sample = lambda row: fill(np.asarray(row))

@@ -25,7 +25,6 @@ from ranger_sim.can_bus.edge.taps import (
     RECEIVED,
     SENT,
     STATE,
-    Event,
     overflow_frame,
 )
 from ranger_sim.foundation import wallclock
@@ -37,6 +36,8 @@ HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started
 
 class AttachedLink(Link):
     """A client's place on a bus of another process. UserError when that process or its channel is not there."""
+
+    acknowledge_hint = "`ranger-sim bus --acknowledge` adds a silent node that does"
 
     def __init__(
         self,
@@ -94,17 +95,6 @@ class AttachedLink(Link):
         if self.state == LISTENING:
             raise LinkError(f"{self.label}: {LISTENING_TEXT}")
 
-    def receive(self, timeout: float | None) -> Event | None:
-        """The oldest frame, waiting up to `timeout` s (None: for ever). LinkError when the other side is gone."""
-        with self.changed:
-            event = self._take()
-            if event is None:
-                self._wait(lambda: bool(self.arrived), timeout)
-                event = self._take()
-                if event is None:
-                    self._check()
-            return event
-
     def activate(self) -> None:
         """Take part again."""
         self._control(wire.ACTIVATE)
@@ -127,6 +117,8 @@ class AttachedLink(Link):
     def fileno(self) -> int:
         """A descriptor that is readable when `receive` has something, or may have after a look."""
         with self.changed:
+            if self.closed:
+                self._check()
             if self.epoll is None:
                 self._make_signal()
                 self.epoll = select.epoll()

@@ -24,7 +24,10 @@ class BusHost:
         self.servers.append(server)
 
     def turn(self, patience_s: float = LONGEST_NAP_S) -> None:
-        """Once round: what clients want, the time that has passed, what clients get; then wait for the next thing."""
+        """Once round: what clients want, the time that has passed, what clients get; then wait for the next thing.
+
+        Nothing is read of clients behind the last advance: a frame of theirs would wait for the end of the nap.
+        """
         due = NEVER
         for bus in self.buses:
             bus.advance()
@@ -34,7 +37,7 @@ class BusHost:
             due = min(due, bus.advance())
         if any(tap.events for bus in self.buses for tap in bus.taps.taps):
             for server in self.servers:
-                server.poll(0)
+                server.deliver()
         nap = min([patience_s, *(server.patience_s() for server in self.servers)])
         if due < NEVER and not any(bus.held() for bus in self.buses):
             nap = min(nap, self.buses[0].seconds_until(due))

@@ -9,9 +9,11 @@ import os
 import sys
 import threading
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 
 from ranger_sim.can_bus.edge.taps import DROPPED, ERROR_ACTIVE, SENT, STATE, Event, overflow_frame
+from ranger_sim.foundation import wallclock
 
 log = logging.getLogger("can.ranger_sim")
 
@@ -20,6 +22,9 @@ RECEIVE_QUEUE = 100_000  # frames kept for a reader; chosen by us: 20 MB, and 4 
 # not move for this long nobody acknowledges anything (SocketCAN says at once that there is no buffer space); chosen by
 # us: hundreds of attempts of the longest frame at 125 kbit/s.
 UNHEARD_S = 1.0
+# A `receive` that is under way when its link is closed runs out its time, but no longer than this: who closes a bus and
+# then stops the thread that reads it (python-can's Notifier waits 1 s at a time) is not too late.
+RUN_OUT_S = 1.0
 STALE_S = 60.0  # a wait without a limit is cut into pieces of this length
 FOR_EVER = 1e18
 BUS_OFF_TEXT = "bus-off, nothing can be sent (state = ACTIVE asks for recovery)"
@@ -35,7 +40,9 @@ class QueueFullError(LinkError):
 
 
 class Link:
-    """A place on a bus: frames that came in, room for frames to go out, the state of the controller."""
+    """A place on a bus: frames that came in, frames to go out, the state of the controller."""
+
+    acknowledge_hint = ""  # what a client can do that is alone
 
     def __init__(self, label: str, receive_own: bool, queue_limit: int) -> None:
         self.label = label
@@ -75,6 +82,34 @@ class Link:
             self.arrived.append(overflow_frame(event[1]))
         self.arrived.append(event)
 
+    def receive(self, timeout: float | None) -> Event | None:
+        """The oldest frame, waiting up to `timeout` s (None: without limit).
+
+        None when there is none in time, or when the link is closed meanwhile. LinkError when it was closed before, or
+        when the other side is gone.
+        """
+        with self.changed:
+            if self.closed:
+                self._check()
+            if not self.arrived:
+                end = FOR_EVER if timeout is None else wallclock.monotonic_s() + max(timeout, 0.0)
+                self._wait(lambda: bool(self.arrived), timeout)
+                if self.closed:
+                    self.changed.wait(max(min(end - wallclock.monotonic_s(), RUN_OUT_S), 0.0))
+                    return None
+            event = self._take()
+            if event is None:
+                self._check()
+            return event
+
+    def _wait(self, ready: Callable[[], bool], timeout: float | None) -> None:
+        """Until `ready()`, or the time is over, or nothing more will happen."""
+        raise NotImplementedError
+
+    def _check(self) -> None:
+        """LinkError when this link carries nothing any more."""
+        raise NotImplementedError
+
     def _take(self) -> Event | None:
         """The oldest frame that has arrived, or None."""
         if not self.arrived:
@@ -107,4 +142,4 @@ class Link:
     def _why(self) -> str:
         if self.state == ERROR_ACTIVE:
             return ""
-        return f" (the controller is error passive, counters {self.counters}: does anybody acknowledge?)"
+        return f" (error passive, counters {self.counters}: no node acknowledges? {self.acknowledge_hint})"

@@ -1,10 +1,10 @@
 """A bus of its own clock: private buses are released by the wall clock, or run as fast as frames are offered."""
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.taps import TRANSMIT_QUEUE, Tap, Taps
+from ranger_sim.can_bus.edge.taps import ORDER, TRANSMIT_QUEUE, Tap, Taps
 from ranger_sim.can_bus.transmit_buffers import NODE_SHIFT
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
 # bit/s; chosen by us, because it is the fastest that classic CAN adapters do (ISO 11898-2)
@@ -54,6 +54,7 @@ class PacedBus:
 
     `speed`: virtual over wall time; 0.0 passes time only while there is something to send, at once. Stamps plus
     `epoch_ns` are nanoseconds since 1970 (at another speed than 1: of when it was opened, plus virtual time).
+    `acknowledge`: see `add_acknowledger`.
     """
 
     def __init__(
@@ -64,6 +65,7 @@ class PacedBus:
         seed: int = 0,
         bit_error_rate: float = 0.0,
         depth: int = TRANSMIT_QUEUE,
+        acknowledge: bool = False,
     ) -> None:
         try:
             self.bus = Bus(channel, bitrate, seed, log_capacity=0)
@@ -79,6 +81,17 @@ class PacedBus:
         self.time = 0
         self.epoch_ns = wallclock.epoch_ns()
         self.started_ns = wallclock.monotonic_ns()
+        self.acknowledger: EventQueue | None = None
+        if acknowledge:
+            self.add_acknowledger()
+
+    def add_acknowledger(self) -> None:
+        """A node that acknowledges every frame and sends none, so that a client may be alone. One is enough."""
+        if self.acknowledger is None:
+            self.advance()
+            self.acknowledger = EventQueue(64)
+            node = self.bus.add_node(f"{self.channel} acknowledger", self.acknowledger, 1, ORDER)
+            self.bus.nodes[node].listening = False
 
     def add(self, name: str) -> Tap:
         """A new client, from now on."""
@@ -104,6 +117,8 @@ class PacedBus:
         such repetitions are passed over, and the frame goes out as soon as somebody joins.
         """
         bus, taps = self.bus, self.taps
+        if self.acknowledger is not None:
+            self.acknowledger.clear()  # error states of a node without a program
         until = self.time if self.held() else self.now()
         bit_ns = 1_000_000_000 // self.bitrate
         for _ in range(BURST):

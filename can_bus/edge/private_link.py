@@ -25,9 +25,13 @@ class PrivateBus:
         self.paced = paced
         self.lock = threading.RLock()
         self.links: list[PrivateLink] = []
+        self.due = NEVER  # the next time of interest; threads that wait for time to pass sleep no longer than to here
 
     def pass_time(self) -> int:
-        """Up to now; every link gets what happened. Returns the next instant of interest. The lock is held."""
+        """Up to now; every link gets its events. Returns the next time of interest, ns. The lock is held.
+
+        Where that comes nearer, every thread that sleeps wakes, for all of them may sleep until the former one.
+        """
         while True:
             due = self.paced.advance()
             for link in self.links:
@@ -36,11 +40,18 @@ class PrivateBus:
                     link.tap.events = []
                     link.hear(events)
             if due > self.paced.time:  # otherwise there was more than one call does
-                return due
+                break
+        if due < self.due:
+            for link in self.links:
+                link.changed.notify_all()
+        self.due = due
+        return due
 
 
 class PrivateLink(Link):
     """A client's place on a private bus of this process."""
+
+    acknowledge_hint = "acknowledge=True adds a silent node that does"
 
     def __init__(
         self,
@@ -91,19 +102,6 @@ class PrivateLink(Link):
                     raise LinkError(f"{self.label}: {BUS_OFF_TEXT}")
                 raise LinkError(f"{self.label}: {LISTENING_TEXT}")
             self.bus.pass_time()
-            self._wake_sleepers()
-
-    def receive(self, timeout: float | None) -> Event | None:
-        """The oldest frame, waiting up to `timeout` s (None: for ever)."""
-        with self.changed:
-            event = self._take()
-            if event is None:
-                self._check()
-                self._wait(lambda: bool(self.arrived), timeout)
-                event = self._take()
-                if event is None:
-                    self._check()
-            return event
 
     def activate(self) -> None:
         """Take part again."""
@@ -111,7 +109,6 @@ class PrivateLink(Link):
             self._check()
             self.tap.activate(self.bus.paced.time)
             self.bus.pass_time()
-            self._wake_sleepers()
 
     def listen(self) -> None:
         """Receive only."""
@@ -163,8 +160,6 @@ class PrivateLink(Link):
             self.bus.links.remove(self)
             self.bus.paced.taps.remove(self.tap)
             self.bus.pass_time()
-            for link in self.bus.links:
-                link.changed.notify_all()
             self.changed.notify_all()
         if self.pump is not None and self.pump is not threading.current_thread():
             self.pump.join()
@@ -177,12 +172,6 @@ class PrivateLink(Link):
     def _check(self) -> None:
         if self.closed:
             raise LinkError(f"{self.label}: is shut down")
-
-    def _wake_sleepers(self) -> None:
-        """The next instant of interest may have come nearer: who sleeps until the old one must look again."""
-        for link in self.bus.links:
-            if link is not self:
-                link.changed.notify_all()
 
     def _wait(self, ready: Callable[[], bool], timeout: float | None) -> None:
         """Until `ready()` or the time is over; passes the bus's time."""

@@ -8,9 +8,10 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 import can
+import can.bus
 from can.broadcastmanager import CyclicSendTaskABC, ThreadBasedCyclicSendTask
 
 from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, names_running
@@ -44,6 +45,8 @@ STATES = {
 }
 TRUE_WORDS = ("1", "true", "yes", "on")
 
+T = TypeVar("T")
+
 _private: dict[str, PrivateBus] = {}  # the private buses of this process
 _private_lock = threading.Lock()
 
@@ -54,9 +57,10 @@ class RangerSimBus(can.BusABC):
     channel: "can1", or "NAME/can1" for the robot or host of that name. robot: its name (default "ranger", whose
     absence is no error). private: True opens a private bus even if a robot runs. bitrate: of a private bus (default
     1 Mbit/s); attached, it must be the bus's own. speed: 1.0 by the wall clock, "max" as fast as frames are sent;
-    private only, as are bit_error_rate (0 ... 0.1 per bit) and seed of the disturbances. receive_own_messages: also
-    get what was sent, once it is on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames
-    kept for the reader; what comes after is dropped, counted (`statistics`) and told by an error frame.
+    private only, as are bit_error_rate (0 ... 0.1 per bit), seed of the disturbances, and acknowledge: True adds a
+    silent node that acknowledges every frame, for a bus with one user. receive_own_messages: also get what was sent,
+    once it is on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames kept for the reader;
+    what comes after is dropped, counted (`statistics`) and reported by an error frame.
 
     Stamps of a robot are its own time since power-up, those of other buses seconds since 1970.
     """
@@ -73,6 +77,7 @@ class RangerSimBus(can.BusABC):
         speed: float | str | None = None,
         bit_error_rate: float | str | None = None,
         seed: int | str | None = None,
+        acknowledge: bool | str = False,
         receive_own_messages: bool | str = False,
         listen_only: bool | str = False,
         rx_queue_size: int | str = RECEIVE_QUEUE,
@@ -82,7 +87,8 @@ class RangerSimBus(can.BusABC):
         name, slash, bus_name = str(channel).rpartition("/")
         named = bool(slash or robot)
         name = name or robot or DEFAULT_NAME
-        self._wanted_private = {"speed": speed, "bit_error_rate": bit_error_rate, "seed": seed}
+        self._wanted_private: dict[str, Any] = {"speed": speed, "bit_error_rate": bit_error_rate, "seed": seed}
+        self._wanted_private["acknowledge"] = True if _truth(acknowledge) else None
         own, listen = _truth(receive_own_messages), _truth(listen_only)
         try:
             if not bus_name:
@@ -166,6 +172,9 @@ class RangerSimBus(can.BusABC):
             ):
                 if want is not None and want != have:
                     raise UserError(f"ranger_sim: the private bus {channel} is open with {what} {have:g}, not {want:g}")
+            if wanted["acknowledge"]:
+                with bus.lock:
+                    bus.paced.add_acknowledger()
             return PrivateLink(bus, channel, listen, own, limit)
 
     # ---- what python-can asks of an interface
@@ -187,6 +196,18 @@ class RangerSimBus(can.BusABC):
         except (LinkError, UserError) as fault_of_link:
             raise can.CanOperationError(str(fault_of_link)) from None
 
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        """The oldest message, waiting up to `timeout` s (None: without limit).
+
+        None when there is none in time. Also when the bus is shut down meanwhile, once the time is over or after one
+        second. can.CanOperationError when it was shut down before, or when the robot has gone.
+        """
+        # python-can's own loop would call a bus again that has been shut down meanwhile
+        message, _ = self._recv_internal(timeout)
+        if message is not None:
+            can.bus.LOG.log(self.RECV_LOGGING_LEVEL, "Received: %s", message)
+        return message
+
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         end = None if timeout is None or self._filters is None else wallclock.monotonic_s() + timeout
         while True:
@@ -205,7 +226,7 @@ class RangerSimBus(can.BusABC):
 
     def fileno(self) -> int:
         """A descriptor to wait on, as asyncio and select want it."""
-        return self._link.fileno()
+        return self._asked(self._link.fileno)
 
     def flush_tx_buffer(self) -> None:
         """Drop what waits to be sent."""
@@ -281,10 +302,12 @@ class RangerSimBus(can.BusABC):
             raise can.CanOperationError(f"{self._link.label}: errors can be injected on a private bus only")
         with self._link.changed:
             self._link.bus.paced.bus.inject_errors(count, position)
+            self._link.bus.pass_time()
 
-    def _asked(self, action: Callable[[], None]) -> None:
+    @staticmethod
+    def _asked(action: Callable[[], T]) -> T:
         try:
-            action()
+            return action()
         except LinkError as fault:
             raise can.CanOperationError(str(fault)) from None
 

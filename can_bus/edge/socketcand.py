@@ -67,10 +67,10 @@ class SocketcandServer(StreamServer[_Client]):
         self.texts: dict[Event, bytes] = {}  # frames of this poll as all clients are told them
         self.host, self.port = listener.getsockname()
 
-    def poll(self, now_ns: int) -> int:
-        """As every server; each frame is put into words once, however many clients hear it."""
+    def deliver(self) -> None:
+        """As every server; each frame is put into words once, however many clients receive it."""
         self.texts.clear()
-        return super().poll(now_ns)
+        super().deliver()
 
     def patience_s(self) -> float:
         """Until kept frames may follow the answer to rawmode."""

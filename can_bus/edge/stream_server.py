@@ -63,14 +63,18 @@ class StreamServer(Door[Client]):
         self.look(now_ns)
         for taps in self.own:
             taps.poll(now_ns)
+        self.deliver()
+        busy = any(taps.queued for taps in self.channels.values())
+        return now_ns + (QUICK_POLL_NS if busy else NEXT_POLL_NS)
+
+    def deliver(self) -> None:
+        """Frames of the buses out."""
         for client in self.peers:
             self._tell(client)
         self.write()
         for client in self.peers:
             if client.tap is not None:
                 client.tap.held = len(client.outgoing) > self.held_above
-        busy = any(taps.queued for taps in self.channels.values())
-        return now_ns + (QUICK_POLL_NS if busy else NEXT_POLL_NS)
 
     def patience_s(self) -> float:
         """Wall-clock seconds after which a poll has something to do even if nothing else happens."""

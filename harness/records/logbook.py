@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.records.recorder import Recorder
 
@@ -108,6 +109,11 @@ class Logbook:
     def _as_rows(self, name: str, block: bytes) -> Any:
         stream = self.streams[name]
         return np.frombuffer(block, dtype=np.float64 if stream.is_real else np.int64).reshape(-1, stream.columns)
+
+    @property
+    def reach_ns(self) -> int:
+        """How far back it has what passed, ns."""
+        return {"none": 0, "window": self.window_ns}.get(self.mode, NEVER)
 
     @property
     def records_words(self) -> bool:

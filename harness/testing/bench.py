@@ -181,7 +181,7 @@ class Bench:
         """What was measured with a limit."""
         return self.observed.figures
 
-    def wire(self, bus: str | None = None, since_s: float = 0.0) -> Wire:
+    def wire(self, bus: str | None = None, since_s: float | None = None) -> Wire:
         """Periods and latencies of the frames on a bus (the first one), as assertions."""
         return Wire(self.observed, bus if bus is not None else next(iter(self.buses)), since_s, self.time_s)
 

@@ -71,14 +71,19 @@ def frame_type(names: Names) -> type[Frame]:
 
 
 class FrameKeeper:
-    """Keeps the frames of the last `window_s` that pass through `streams`: {bus: its FrameStream}."""
+    """Keeps the frames of the last `window_s` that pass through `streams`: {bus: its FrameStream}.
 
-    def __init__(self, streams: dict[str, Any], names: Names, window_s: float = WINDOW_S) -> None:
+    `from_ns`: since when they are kept, by bus; above 0 for a keeper that was made when time had passed already.
+    """
+
+    def __init__(self, streams: dict[str, Any], names: Names, window_s: float = WINDOW_S, from_ns: int = 0) -> None:
         self.streams = streams
         self.names = names
         self.frame = frame_type(names)
         self.window_ns = round(window_s * 1e9)
         self.blocks: dict[str, collections.deque[tuple[int, bytes]]] = {}
+        self.late_ns = from_ns
+        self.from_ns = dict.fromkeys(streams, from_ns)
         for name, stream in streams.items():
             stream.flush()
             self.blocks[name] = collections.deque()
@@ -90,11 +95,28 @@ class FrameKeeper:
         def keep(last_time_ns: int, block: bytes) -> None:
             blocks.append((last_time_ns, block))
             while blocks[0][0] < last_time_ns - self.window_ns:
-                blocks.popleft()
+                self.from_ns[name] = blocks.popleft()[0] + 1
             if other is not None:
                 other(last_time_ns, block)
 
         return keep
+
+    def add_earlier(self, bus: str, block: bytes) -> None:
+        """Frames of a bus from before the keeper was made, in their order."""
+        if block:
+            self.blocks[bus].append((memoryview(block).cast("q")[-ROW], block))
+
+    def check(self, bus: str, since_ns: int | None = None) -> None:
+        """UserError where frames are asked for that are not kept: those since then, or, None, any of a late keeper."""
+        if bus not in self.streams:
+            return  # `frames` says it
+        self.streams[bus].flush()
+        begin_ns = self.from_ns[bus]
+        if since_ns is None and self.late_ns and not self.blocks[bus] or since_ns is not None and since_ns < begin_ns:
+            raise UserError(
+                f"bus {bus}: frames before {begin_ns * 1e-9:.6g} s (the time that frames show) are not kept; kept are "
+                f"the last {self.window_ns * 1e-9:g} s, from the first call of wire() or with log='full'"
+            )
 
     def frames(self, bus: str, identifiers: set[int] | None = None, since_ns: int = 0) -> list[Frame]:
         """Frames of a bus in their order; only those identifiers (None: all), from `since_ns` on."""

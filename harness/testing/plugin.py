@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ranger_sim.harness.machine import Machine
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.testing.bench import BoardAlone, BusAlone
+    from ranger_sim.harness.testing.forking import ForkedTest
     from ranger_sim.harness.testing.health import Expected, Health
     from ranger_sim.harness.testing.making import Order
 
@@ -97,6 +98,7 @@ ALONE = pytest.StashKey[Any]()
 TOLD = pytest.StashKey[dict[Any, int]]()
 ROBOTS = pytest.StashKey[list[Watched]]()
 BRANCH = pytest.StashKey[bool]()
+FORKED: pytest.StashKey[ForkedTest] = pytest.StashKey()  # of a test that runs in a process of its own, in the parent
 SHELTERED = pytest.StashKey[bool]()  # in a process of its own, in which programs in C run as well
 
 
@@ -134,6 +136,7 @@ def pytest_configure(config: pytest.Config) -> None:
     for marker in MARKERS:
         config.addinivalue_line("markers", marker)
     config.stash[WARMED_UP] = WarmedUp()
+    config.pluginmanager.register(Reports(), "ranger_sim reports of forked tests")
     if option(config, "scope") not in SCOPES:
         raise pytest.UsageError(f"--ranger-scope is {option(config, 'scope')!r}, allowed are {', '.join(SCOPES)}")
     for name in ("fork", "sanitize"):
@@ -263,28 +266,6 @@ class Maker:
 # --- running a test ---------------------------------------------------------------------------------------
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
-    """A test of a warmed-up robot runs in a branch of it: a forked process; one of firmware in C in one of its own."""
-    sheltered = wants_shelter(item)
-    if not sheltered and not wants_branch(item):
-        return None
-    from ranger_sim.harness.testing import forking
-
-    if sheltered:
-        if not forking.possible(item.config):
-            return None
-        item.stash[SHELTERED] = True
-        forking.run(item, nextitem)
-        return True
-    order = order_for(item, item.config, wants_branch(item))
-    if not forking.possible(item.config) or not item.config.stash[WARMED_UP].prepare(order):
-        return None
-    item.stash[BRANCH] = True
-    forking.run(item, nextitem)
-    return True
-
-
 def wants_shelter(item: pytest.Item) -> bool:
     """Whether a test has a board that runs C, in a fixture of its own.
 
@@ -342,6 +323,27 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
             pytest.fail(wrong, pytrace=False)
         if reason:
             pytest.skip(reason)
+    fork(item)
+
+
+def fork(item: pytest.Item) -> None:
+    """A test of a warmed-up robot runs in a branch of it: a forked process; one of firmware in C in one of its own."""
+    shelter, fixture = wants_shelter(item), wants_branch(item)
+    if not shelter and not fixture:
+        return
+    from ranger_sim.harness.testing import forking
+
+    if item.stash.get(forking.CHILD, False) or not forking.possible(item.config):
+        return
+
+    def prepare() -> bool:
+        item.stash[SHELTERED] = shelter
+        item.stash[BRANCH] = not shelter and item.config.stash[WARMED_UP].prepare(order_for(item, item.config, fixture))
+        return shelter or item.stash[BRANCH]
+
+    if FORKED in item.stash:
+        item.stash[FORKED].close()
+    item.stash[FORKED] = forking.ForkedTest(item, prepare)
 
 
 def backend_of(item: pytest.Item) -> str:
@@ -462,6 +464,23 @@ def expected_of(item: pytest.Item) -> Expected:
     if unknown := [name for name in others if name not in allowed]:
         raise UserError(f"mark expects({unknown[0]}=...): what can be expected is {', '.join(allowed)}")
     return Expected(errors, **others)
+
+
+class Reports:
+    """A plugin of its own, as a module has one function for each hook: reports of forked tests.
+
+    What the test's process reported comes before what pytest would make of the outcome here.
+    """
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> pytest.TestReport | None:
+        return item.stash[FORKED].report_of(call) if FORKED in item.stash else None
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Plugins have added what they know in both processes."""
+        if vars(report).pop("forked", False):
+            report.sections = list(dict.fromkeys(report.sections))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from ranger_sim.foundation.quantities import duration_text, nanoseconds
 from ranger_sim.harness.testing.figures import Observed
-from ranger_sim.harness.testing.frames import Frame, FrameKeeper
+from ranger_sim.harness.testing.frames import WINDOW_S, Frame, FrameKeeper
 
 SHOWN = 3  # offending places in a message
 
@@ -66,12 +66,13 @@ class Intervals:
 
 
 class Wire:
-    """Frames on bus `bus` from `since_s` on, as far as they are kept (the last 20 s; frames.py).
+    """Frames on bus `bus` from `since_s` on; None: all that are kept (the last 20 s; frames.py).
 
-    What is asserted is noted in `observed.figures`, for reports.
+    UserError where none can be there: frames since a time before they were kept, or none yet in a machine that passed
+    time before it was asked for them. What is asserted is noted in `observed.figures`, for reports.
     """
 
-    def __init__(self, observed: Observed, bus: str, since_s: float = 0.0, now_s: float = 0.0) -> None:
+    def __init__(self, observed: Observed, bus: str, since_s: float | None = None, now_s: float = 0.0) -> None:
         self.observed = observed
         self.bus = bus
         self.since_s = since_s
@@ -82,7 +83,9 @@ class Wire:
     def frames(self, *names: str | int) -> list[Frame]:
         """Frames of these variables (or identifiers), in their order; without a name, all."""
         wanted = {self.keeper.names.identifier(name) for name in names} if names else None
-        return list(self.keeper.frames(self.bus, wanted, round(self.since_s * 1e9)))
+        since_ns = None if self.since_s is None else round(self.since_s * 1e9)
+        self.keeper.check(self.bus, since_ns)
+        return list(self.keeper.frames(self.bus, wanted, since_ns or 0))
 
     # --- periods ------------------------------------------------------------------------------------------
 
@@ -199,13 +202,21 @@ class Wire:
 
 
 def observe(robot: Any) -> Observed:
-    """What is kept beside `robot`; from the first call on its frames are kept."""
+    """What is kept with `robot`; from the first call on its frames are kept, and before it those of its log."""
     if robot.observed is None:
         streams = {bus.name: stream for bus, stream in zip(robot.buses, robot.recorder.frames, strict=True)}
-        robot.observed = Observed(FrameKeeper(streams, robot.names))
+        now_ns, log = robot.loop.time, robot.logbook
+        late = now_ns > robot.start_ns
+        from_ns = max(robot.start_ns, now_ns - min(round(WINDOW_S * 1e9), log.reach_ns)) if late else 0
+        keeper = FrameKeeper(streams, robot.names, from_ns=0 if from_ns == robot.start_ns else from_ns)
+        for number, bus in enumerate(streams, start=1):
+            for rows in log.kept(f"can{number}") if late else ():
+                keeper.add_earlier(bus, rows[rows[:, 0] >= from_ns].tobytes())
+        robot.observed = Observed(keeper)
     return robot.observed
 
 
-def wire_of(robot: Any, bus: str, since_s: float = 0.0) -> Wire:
+def wire_of(robot: Any, bus: str, since_s: float | None = None) -> Wire:
     """The frames on a bus of the robot."""
-    return Wire(observe(robot), bus, since_s + robot.start_ns * 1e-9, robot.loop.time * 1e-9)
+    start_s = robot.start_ns * 1e-9
+    return Wire(observe(robot), bus, None if since_s is None else since_s + start_s, robot.loop.time * 1e-9)

@@ -368,6 +368,40 @@ def test_a_host_naps_no_longer_than_its_servers_are_patient(monkeypatch):
     assert naps == [0.5, 0.1]
 
 
+def test_a_host_reads_of_its_clients_before_it_passes_time_and_not_behind(monkeypatch):
+    """A frame that is read behind the last advance would wait for the end of the nap."""
+    monkeypatch.setattr(host_module.descriptors, "wait", lambda read, write, nap: None)
+    bus = PacedBus("can1")
+    host = BusHost([bus])
+    steps = []
+    monkeypatch.setattr(bus, "advance", lambda: steps.append("advance") or 0)
+
+    class Server:
+        def poll(self, now):
+            steps.append("poll")
+
+        def deliver(self):
+            steps.append("deliver")
+
+        def patience_s(self):
+            return 1.0
+
+        def filenos(self):
+            return []
+
+        filenos_to_write = filenos
+
+        def close(self):
+            pass
+
+    host.serve(Server())
+    tap = bus.taps.add("client")
+    tap.tell_state(0)
+    steps.clear()
+    host.turn(0.5)
+    assert steps == ["advance", "poll", "advance", "deliver"]
+
+
 # --- fuzz ---------------------------------------------------------------------------------------------------
 
 RECORDS = st.one_of(

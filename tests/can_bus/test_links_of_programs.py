@@ -409,13 +409,32 @@ def test_private_links_hear_each_other_with_stamps_since_the_epoch(clock):
     assert one.bus.links == []
 
 
-def test_who_sends_wakes_the_others_who_sleep_until_an_instant_that_has_come_nearer(clock):
-    links_of_bus = private(3)
+class Waking:
+    """A condition of a link, which notes that its threads wake."""
+
+    def __init__(self, link, woken, number):
+        self.link, self.woken, self.number = link, woken, number
+
+    def __enter__(self):
+        self.link.bus.lock.acquire()
+
+    def __exit__(self, *_):
+        self.link.bus.lock.release()
+
+    def notify_all(self):
+        self.woken.append(self.number)
+
+
+def test_threads_of_every_link_wake_when_the_next_event_comes_nearer_and_only_then(clock):
+    """Each sleeps until the next event; a sender's own reader is one of them."""
+    links_of_bus = private(3, speed=1.0)
     woken = []
     for number, link in enumerate(links_of_bus):
-        link.changed = SimpleNamespace(notify_all=lambda number=number: woken.append(number))
-    links_of_bus[1]._wake_sleepers()
-    assert woken == [0, 2]
+        link.changed = Waking(link, woken, number)
+    links_of_bus[1].send(0x123, 0, 0, 0, None)  # from never to the frame's end
+    assert woken == [0, 1, 2]
+    links_of_bus[0].send(0x124, 0, 0, 0, None)  # behind that frame
+    assert woken == [0, 1, 2]
 
 
 def test_a_private_queue_that_stays_full_and_a_controller_that_is_off_are_told(clock):
@@ -424,7 +443,7 @@ def test_a_private_queue_that_stays_full_and_a_controller_that_is_off_are_told(c
         one.send(number, 0, 0, 0, 0.0)
     with pytest.raises(QueueFullError, match="link 0: the transmit queue stayed full"):
         one.send(4, 0, 0, 0, 0.0)
-    with pytest.raises(QueueFullError, match="does anybody acknowledge"):
+    with pytest.raises(QueueFullError, match="acknowledge=True adds a silent node"):
         one.send(4, 0, 0, 0, None)
     one.flush()
     assert one.dropped_frames == 3 and one.tap.queued == 0

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ranger_sim.can_bus.edge import attached_link, python_can
+from ranger_sim.can_bus.edge import attached_link, links, python_can
 from ranger_sim.can_bus.edge.private_link import PrivateLink
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.events import NEVER
 
 from .hosting import fresh_name, hosted
 
@@ -211,7 +212,7 @@ def test_a_full_queue_blocks_until_the_timeout_and_then_raises(bus):
     for number in range(64):
         alone.send(message(number), timeout=0)
     for timeout in (0, 0.01):
-        with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*does anybody acknowledge"):
+        with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*acknowledge=True adds"):
             alone.send(message(0x99), timeout=timeout)
     other = bus()
     assert [each.arbitration_id for each in drained(other)] == list(range(64))
@@ -221,7 +222,7 @@ def test_without_a_timeout_sending_where_nobody_acknowledges_raises_once_the_que
     alone = bus(speed="max")
     for number in range(64):
         alone.send(message(number))
-    with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*does anybody acknowledge"):
+    with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*acknowledge=True adds"):
         alone.send(message(0x99))
     other = bus()
     for number in range(64, 300):  # there is somebody: sending waits for places again
@@ -232,7 +233,7 @@ def test_without_a_timeout_sending_where_nobody_acknowledges_raises_once_the_que
 def test_attached_sending_where_nobody_acknowledges_raises_as_well(monkeypatch):
     monkeypatch.setattr(attached_link, "UNHEARD_S", 0.05)
     with hosted("can1") as (name, _), can.Bus(interface="ranger_sim", channel=f"{name}/can1") as alone:
-        with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*does anybody acknowledge"):
+        with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*ranger-sim bus --acknowledge"):
             for number in range(65):
                 alone.send(message(number))
 
@@ -368,6 +369,158 @@ def heard_by_asyncio(sender, receiver, count):
         return found
 
     return asyncio.run(run())
+
+
+def in_thread(work):
+    """(thread, list that gets what `work()` returns or raises)."""
+    found = []
+
+    def run():
+        try:
+            found.append(work())
+        except Exception as fault:
+            found.append(fault)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread, found
+
+
+class Asleep:
+    """Waits until a thread sleeps in a link: `until()` returns once the link's wait has begun."""
+
+    def __init__(self, monkeypatch, link):
+        self.begun = threading.Event()
+        waiting = link._wait
+
+        def wait(ready, timeout):
+            self.begun.set()  # the lock is held: who has it next finds the thread asleep
+            waiting(ready, timeout)
+
+        monkeypatch.setattr(link, "_wait", wait)
+        self.link = link
+
+    def until(self):
+        assert self.begun.wait(60), "the thread does not begin to wait"
+        with self.link.changed:
+            pass
+
+
+def test_a_thread_that_waits_is_woken_by_its_own_bus_that_sends(bus, monkeypatch):
+    """It sleeps for a minute where nothing wakes it."""
+    own, _ = bus(receive_own_messages=True), bus()
+    asleep = Asleep(monkeypatch, own._link)
+    thread, found = in_thread(lambda: own.recv(50))
+    asleep.until()
+    begun = wallclock.monotonic_s()
+    own.send(message(0x123))
+    thread.join(60)
+    assert found[0].arbitration_id == 0x123
+    assert wallclock.monotonic_s() - begun < 20  # a guard: it takes 0.5 ms
+
+
+def test_a_thread_that_waits_is_woken_by_a_node_that_joins(bus, monkeypatch):
+    alone = bus(receive_own_messages=True, bitrate=10_000)
+    alone.send(message(0x123))
+    while alone.statistics()["transmit_errors"] < 128:  # error passive: its attempts go on and are not seen
+        alone.recv(0)
+    drained(alone)
+    asleep = Asleep(monkeypatch, alone._link)
+    thread, found = in_thread(lambda: alone.recv(50))
+    asleep.until()
+    begun = wallclock.monotonic_s()
+    bus()
+    thread.join(60)
+    assert found[0].arbitration_id == 0x123
+    assert wallclock.monotonic_s() - begun < 20
+
+
+# ---- a call that is under way when the bus is shut down
+
+
+@pytest.mark.parametrize("attached", [False, True], ids=["private", "attached"])
+@pytest.mark.parametrize("timeout", [50, None])
+def test_a_recv_under_way_when_its_bus_is_shut_down_returns_none_and_later_calls_raise(
+    bus, monkeypatch, attached, timeout
+):
+    monkeypatch.setattr(links, "RUN_OUT_S", 0.0)
+    with hosted("can1") as (name, _):
+        one = bus(f"{name}/can1", private=False) if attached else bus()
+        asleep = Asleep(monkeypatch, one._link)
+        thread, found = in_thread(lambda: one.recv(timeout))
+        asleep.until()
+        one.shutdown()
+        thread.join(60)
+        assert found == [None]
+        with pytest.raises(can.CanOperationError, match="is shut down"):
+            one.recv(timeout)
+        with pytest.raises(can.CanOperationError, match="is shut down"):
+            one.fileno()
+
+
+@pytest.mark.parametrize("attached", [False, True], ids=["private", "attached"])
+def test_a_notifier_that_is_stopped_after_its_bus_is_shut_down_ends_without_an_error(bus, monkeypatch, attached):
+    """Its call runs out its time, as on python-can's `virtual`: at once it would call a second time, which raises."""
+    with hosted("can1") as (name, _):
+        one = bus(f"{name}/can1", private=False) if attached else bus()
+        asleep = Asleep(monkeypatch, one._link)
+        notifier = can.Notifier(one, [lambda _: None], timeout=1.0)
+        asleep.until()
+        one.shutdown()
+        notifier.stop(60)
+        assert not notifier._readers[0].is_alive() and notifier.exception is None
+
+
+def test_what_arrived_is_not_read_after_the_shutdown(bus):
+    a, b = bus(speed="max"), bus()
+    a.send(message(1))
+    b.shutdown()
+    with pytest.raises(can.CanOperationError, match="is shut down"):
+        b.recv(0)
+
+
+# ---- a bus with one user
+
+
+def test_a_silent_node_acknowledges_where_a_program_is_alone(bus, clock):
+    alone = bus(acknowledge="yes", receive_own_messages=True)
+    alone.send(message(0x55))
+    clock.to(1_000_000)
+    assert [(each.arbitration_id, each.is_error_frame) for each in drained(alone)] == [(0x55, False)]
+    assert alone.statistics()["transmit_errors"] == 0 and alone.state == can.BusState.ACTIVE
+
+
+def test_the_silent_node_can_join_later_and_is_one_however_often_it_is_asked_for(bus, clock):
+    alone = bus()
+    alone.send(message(0x55))
+    clock.to(20_000_000)
+    assert alone.state == can.BusState.PASSIVE
+    others = [bus(acknowledge=True, listen_only=True) for _ in range(2)]
+    clock.to(21_000_000)
+    assert alone.statistics()["sent"] == 1
+    assert [node.name for node in alone._link.bus.paced.bus.nodes].count(f"{bus.channel} acknowledger") == 1
+    assert [each.arbitration_id for each in drained(others[0])] == [0x55]
+
+
+def test_the_silent_node_keeps_no_errors(bus, clock):
+    """Its messages are thrown away as time passes: a bus with noise may be open for days."""
+    one = bus(acknowledge=True)
+    one.inject_errors(20)
+    one.send(message(0x55))
+    clock.to(20_000_000)
+    assert drained(one)  # the errors
+    clock.to(21_000_000)
+    one.recv(0)
+    assert one._link.bus.paced.acknowledger.head_time == NEVER
+
+
+def test_an_attached_bus_gets_its_silent_node_where_it_is_started(bus):
+    with hosted("can1", acknowledge=True) as (name, _):
+        alone = bus(f"{name}/can1", private=False, receive_own_messages=True)
+        alone.send(message(0x55))
+        assert alone.recv(60).arbitration_id == 0x55
+        with pytest.raises(can.CanInitializationError, match="acknowledge can only be set where that is started"):
+            bus(f"{name}/can1", private=False, acknowledge=True)
 
 
 @pytest.mark.parametrize("speed", [1, "max"])

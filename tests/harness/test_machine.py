@@ -78,13 +78,13 @@ def firmware(tmp_path_factory):
     return build(manifest).path, manifest.hardware
 
 
-def machine(firmware, wiring=WIRING, end_rad=1e9):
+def machine(firmware, wiring=WIRING, end_rad=1e9, body=Wheel):
     library, hardware = firmware
     boards = {
         name: NativeBoard(name, library, phase_ns=phase_ns, hardware=hardware)
         for name, phase_ns in (("LEFT", 0), ("RIGHT", 300_000))
     }
-    return contextlib.closing(Machine(Wheel(end_rad), boards, {"can1": 3_000_000}, wiring, seed=1, log="full"))
+    return contextlib.closing(Machine(body(end_rad), boards, {"can1": 3_000_000}, wiring, seed=1, log="full"))
 
 
 @needs_a_compiler
@@ -199,3 +199,20 @@ def test_nothing_of_ranger_is_needed():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+class Listed(Wheel):
+    """It writes its sample by a slice, which a buffer refuses of a list."""
+
+    def fill_sample(self, row):
+        row[:2] = [self.angle_rad, self.rate_rad_per_s]
+
+
+@needs_a_compiler
+def test_a_body_in_python_may_write_its_sample_as_a_list(firmware):
+    shown = []
+    for body in (Wheel, Listed):
+        with machine(firmware, body=body) as robot:
+            robot.until("angle_rad > 0.5", within="1 s")
+            shown.append((robot.quantities(), robot.trace_digest()))
+    assert shown[0] == shown[1]

@@ -40,6 +40,11 @@ def register(commands: Any) -> None:
         help="share of disturbed bits, 0 to 0.1 (default 0)",
     )
     command.add_argument("--seed", type=whole_number(0), default=0, help="seed of the disturbances (default 0)")
+    command.add_argument(
+        "--acknowledge",
+        action="store_true",
+        help="a silent node acknowledges every frame, so that a program may be alone on a bus",
+    )
     server_options.add_options(command)
     command.add_argument(
         "--seconds",
@@ -91,7 +96,15 @@ def run(options: argparse.Namespace) -> int:
         if not channel or "/" in channel or any(c.isspace() for c in channel):
             raise UserError(f"bus: {channel!r} is no name for a bus: no slash and no blank, please")
     buses = [
-        PacedBus(channel, options.bitrate, speed, options.seed, options.bit_error_rate) for channel in options.channel
+        PacedBus(
+            channel,
+            options.bitrate,
+            speed,
+            options.seed,
+            options.bit_error_rate,
+            acknowledge=options.acknowledge,
+        )
+        for channel in options.channel
     ]
     host = BusHost(buses)
     servers, lines = open_servers({bus.channel: bus.taps for bus in buses}, options, buses[0].epoch_ns)

@@ -145,6 +145,42 @@ def test_of_more_frames_than_fit_the_last_ones_are_kept():
     assert [frame.time_ns for frame in keeper.latest(3)] == [3997 * MS, 3998 * MS, 3999 * MS]
 
 
+@pytest.mark.parametrize(("log", "kept"), [("full", True), ("window", True), ("none", False)])
+def test_frames_from_before_they_were_asked_for_come_from_the_log_or_are_refused(log, kept):
+    watched, late = Ranger(Scenario(seed=3)), Ranger(Scenario(seed=3), log)
+    watched.wire()
+    for robot in (watched, late):
+        robot.run_for(0.05)
+    if kept:
+        assert late.wire().frames() == watched.wire().frames()
+    else:
+        with pytest.raises(UserError, match=r"^bus can1: frames before .* s .* are not kept; .* log='full'$"):
+            late.wire().frames()
+        with pytest.raises(UserError, match="are not kept"):
+            late.wire().period("MCH_ANGLE")
+    for robot in (watched, late):
+        robot.run_for(0.05)
+    assert late.wire("can1", since_s=0.05).frames() == watched.wire("can1", since_s=0.05).frames()
+    assert late.wire().frames() == (watched if kept else late).wire("can1", since_s=0.0 if kept else 0.05).frames()
+    if not kept:
+        with pytest.raises(UserError, match="are not kept"):
+            late.wire("can1", since_s=0.01).frames()
+    late.close()
+
+
+def test_frames_that_are_too_old_to_be_kept_are_refused():
+    stream = FrameStream(0)
+    keeper = FrameKeeper({"can1": stream}, RANGER, window_s=0.1)
+    for number in range(4000):
+        stream.add(number * MS, ANGLE, 8, 0, 0)
+    recorded = Observed(keeper)
+    assert Wire(recorded, "can1").frames() and Wire(recorded, "can1", since_s=3.95).frames()
+    with pytest.raises(UserError, match=r"^bus can1: frames before 3\.\d+ s .* are not kept; kept are the last 0\.1 s"):
+        Wire(recorded, "can1", since_s=1.0).frames()
+    with pytest.raises(UserError, match="bus 'can9': there is none"):
+        Wire(recorded, "can9", since_s=1.0)
+
+
 def test_the_robot_publishes_at_the_rates_of_its_table():
     robot = Ranger(Scenario(seed=3))
     robot.wire()

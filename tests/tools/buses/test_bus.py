@@ -38,6 +38,20 @@ def test_programs_of_any_kind_meet_on_a_hosted_bus():
         assert host.ended() == (0, "")
 
 
+def test_a_program_may_be_alone_on_a_bus_with_a_silent_node():
+    name = fresh_name()
+    with Program("-m", "ranger_sim", "bus", "--name", name, "--acknowledge") as host:
+        host.until("can1: 1000000 bit/s")
+        with can.Bus(
+            interface="ranger_sim", channel=f"{name}/can1", receive_own_messages=True, ignore_config=True
+        ) as alone:
+            alone.send(can.Message(arbitration_id=0x100, is_extended_id=False))
+            assert alone.recv(60).arbitration_id == 0x100
+        host.process.send_signal(signal.SIGINT)
+        host.until("can1: 1 frames, 0 error frames")
+        assert host.ended() == (0, "")
+
+
 def test_it_ends_by_itself_when_asked_to(capsys):
     assert cli.main(["bus", "--name", fresh_name(), "--seconds", "0.01", "--speed", "max"]) == 0
     assert "as fast as frames are sent" in capsys.readouterr().out
