@@ -117,7 +117,10 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     log = log_of(options)
     firmware = firmware_of(options, console)
     images = images_of(options)
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, options.in_process, images)) as robot:
+    deadline_s = options.board_deadline
+    with contextlib.closing(
+        Ranger(scenario, log, quirks, profile, firmware, options.in_process, images, deadline_s)
+    ) as robot:
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
