@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError, printable
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import libraries
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 
 EXIT_DONE = 0
@@ -101,11 +101,26 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns the process's exit code. A user's mistake is one line and code 2."""
+    """Run one command; returns the process's exit code. A library that is not installed is one line and code 2."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return run(words)
+    except ModuleNotFoundError as error:
+        command = next((word for word in words if not word.startswith("-")), "")
+        text = libraries.missing(error, command or "the command line")
+        if text is None:
+            raise
+        return misuse(text)
+
+
+def run(arguments: list[str]) -> int:
+    """The same, where every library is there. A user's mistake is one line and code 2."""
+    from ranger_sim.tools.command_line import terminal  # only here: it needs a library itself
+
     terminal.stand_in_for_closed_streams()
     try:
         options = parser().parse_args(arguments)
-        options.arguments = list(sys.argv[1:] if arguments is None else arguments)
+        options.arguments = arguments
         code: int = options.run(options)
         sys.stdout.flush()
         return code
@@ -115,7 +130,8 @@ def main(arguments: list[str] | None = None) -> int:
         print("ranger-sim: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output left, e.g. `| head`
-        return output_closed()
+        terminal.lead_nowhere(sys.stdout)
+        return EXIT_DONE
     except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
         place = error.filename or (terminal.OUTPUT if terminal.output_is_stuck() else None)
         return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
@@ -127,12 +143,6 @@ def misuse(text: str) -> int:
     """Say what is wrong, on standard error."""
     print(f"ranger-sim: {text}", file=sys.stderr)
     return EXIT_MISUSE
-
-
-def output_closed() -> int:
-    """Nobody reads standard output any more: let the interpreter flush into nothing."""
-    terminal.lead_nowhere(sys.stdout)
-    return EXIT_DONE
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array, Dataset, Finding
 from ranger_sim.sysid.readers import columns
@@ -31,8 +30,10 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     mapping = dict(mapping or {})
     said = ""
     with _silence():
+        import asammdf  # only here: a second
+
         try:
-            found = list(_channels(path, truth))
+            found = list(_channels(asammdf.MDF(path), truth))
         except UserError:
             raise
         except Exception as error:  # what a broken file makes of asammdf is of many kinds
@@ -58,11 +59,10 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     return dataset
 
 
-def _channels(path: pathlib.Path, truth: bool) -> Iterator[tuple[str, str, Array, Array | None]]:
+def _channels(measurement: Any, truth: bool) -> Iterator[tuple[str, str, Array, Array | None]]:
     """(name, unit, stamps, values or None when they are no numbers) of every channel that is no group's clock."""
-    asammdf = imported("asammdf")
     seen: set[str] = set()
-    with asammdf.MDF(path) as file:
+    with measurement as file:
         for number, group in enumerate(file.groups):
             master = file.masters_db.get(number)
             for index, channel in enumerate(group.channels):
