@@ -8,6 +8,7 @@ whose channel is called like the message. Stamps are those of the recording; a s
 
 import pathlib
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
