@@ -45,7 +45,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--gear", type=number(least=0.01, most=1e4), metavar="N", help="of the motor bench's gearbox (14)"
     )
-    command.add_argument("--seed", type=whole_number(), default=0, metavar="N", help="of the bootstrap (0)")
+    command.add_argument("--seed", type=whole_number(0), default=0, metavar="N", help="of the bootstrap (0)")
     command.add_argument(
         "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"
     )

@@ -61,7 +61,7 @@ SCENARIO = (
     Option(
         "--seed",
         f"chooses crystals, phases, noise and footholds (default {Scenario.seed})",
-        whole_number(),
+        whole_number(0),
         "N",
         Scenario.seed,
         always=True,
