@@ -13,6 +13,11 @@ SOURCES := $(shell find -L ranger_sim \( -name '*.py' -o -name '*.pxd' \) -not -
 
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
+	@echo
+	@echo "next ('. $(VENV)/bin/activate' makes it ranger-sim without the path):"
+	@echo "    $(VENV)/bin/ranger-sim panel --walk    # Ranger walks, in your browser"
+	@echo "    $(VENV)/bin/ranger-sim walk --fault 'MCH.joint_encoder:stuck@step 6' --out runs/fault    # with a fault"
+	@echo "    $(VENV)/bin/ranger-sim new my-machine    # boards in C, a bus and a body of your own, with tests"
 
 # Tests of a robot at a pace of the wall clock have both cores to themselves; the others go side by side.
 WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_daq.py tests/system/test_processes.py \
@@ -57,7 +62,7 @@ bench: $(VENV)/.walk
 setup: $(VENV)/.all
 
 # Once: the environment, packages (locked with hashes, without index addresses: the machine's own pip settings say where
-# from) and the library; then only what changed. set_up.py says how. A walk needs fewer packages than the tests do.
+# from) and the library; then only what changed. set_up.py says how. Commands need fewer packages than the tests do.
 $(VENV)/.walk: set_up.py requirements.lock pyproject.toml setup.py $(SOURCES)
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "ranger-sim needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.12")'
 	@$(PYTHON) set_up.py walk --venv $(VENV)

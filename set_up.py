@@ -1,11 +1,11 @@
 """Sets up everything that `make walk` or `make test` needs: environment, packages, compiled library, command.
 
-    python3 set_up.py walk      # what a walk needs
-    python3 set_up.py all       # all of pyproject.toml: what reads DBC files, fits and tests besides
+    python3 set_up.py walk      # what the package needs: every command of the README runs
+    python3 set_up.py all       # all of pyproject.toml: its extras, and what tests, lints and documents besides
     python3 set_up.py lint      # all packages, and nothing compiled: enough for `make lint`
 
-Packages come from requirements.lock, by hash; for a walk without those in LATER. The sources are compiled (setup.py)
-while packages are still being installed: Cython and setuptools come first. What was done before is not done again. One
+Packages come from requirements.lock, by hash. The sources are compiled (setup.py) while packages are still being
+installed, which takes less time: Cython and setuptools come first. What was done before is not done again. One
 line tells how far it is; what the tools say is in build/setup.log.
 
 Runs before anything is installed: only Python's own library here.
@@ -22,19 +22,6 @@ import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 LOG = HERE / "build" / "setup.log"
-LATER = {
-    "cantools",
-    "cffi",
-    "h11",
-    "perfetto",
-    "pyelftools",
-    "pyvcd",
-    "scipy",
-    "shtab",
-    "starlette",
-    "uvicorn",
-    "websockets",
-}  # DBC files and firmware of users, fits, timelines, completion, the panel in a browser: a first walk need not wait
 
 
 class SetUpError(Exception):
@@ -47,8 +34,11 @@ def name_of(requirement):
 
 
 def for_a_walk(project):
-    """Names of the packages that a walk needs; `project`: the content of pyproject.toml."""
-    return {name_of(each) for each in project["project"]["dependencies"]} - LATER
+    """Names of the packages that every command needs, and pytest, for which the package is a plugin.
+
+    project: the content of pyproject.toml.
+    """
+    return {name_of(each) for each in project["project"]["dependencies"]} | {"pytest"}
 
 
 def part_of_lock(lock, wanted):

@@ -6,7 +6,7 @@ import dataclasses
 from fractions import Fraction
 
 from ranger_sim.foundation.numbers import float32
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, did_you_mean
 
 LARGEST_CAN_ID = 2031  # identifiers 2032-2047 are illegal: their first 7 bits are recessive (robot.md N1.5)
 LARGEST_ID = 0xFFFF  # ids have 16 bits (appendix 4.1)
@@ -169,7 +169,10 @@ class Table:
         for variable in self.variables:
             if variable.name == wanted.upper() or str(variable.id) == wanted:
                 return variable
-        raise UserError(f"no variable has the name or id {wanted!r}; `ranger-sim table list` shows them all")
+        hint = did_you_mean(wanted.upper(), (variable.name for variable in self.variables))
+        raise UserError(
+            f"unknown variable {wanted!r}: {f'{hint} ' if hint else ''}`ranger-sim table list` shows them all"
+        )
 
     def published_by(self, board: str) -> tuple[Variable, ...]:
         """Variables that `board` publishes, by id."""

@@ -1,5 +1,12 @@
 """The one exception for what a user did wrong."""
 
+import difflib
+from collections.abc import Iterable
+
+LONGEST_NAME = 100  # letters of a name that is compared with others
+LEAST_ALIKE = 0.7  # of 1, as difflib measures it: two letters swapped in a word of four are 0.75
+MOST_NAMED = 2
+
 
 def printable(text: str) -> str:
     """`text` on one line that a terminal only shows: what is no printable character is written as its escape.
@@ -21,3 +28,11 @@ class UserError(Exception):
 
     def __str__(self) -> str:
         return "\n".join(self.args)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """`did you mean 'walk'?`, the known names that begin so or are near a mistyped one; empty where none is."""
+    names = list(known)
+    begun = [each for each in names if name and each.startswith(name)][:MOST_NAMED]
+    near = begun or difflib.get_close_matches(name[:LONGEST_NAME], names, MOST_NAMED, LEAST_ALIKE)
+    return f"did you mean {' or '.join(map(repr, near))}?" if near else ""

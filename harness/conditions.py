@@ -140,8 +140,8 @@ def condition(wanted: str | Condition | Callable[[Any], Any]) -> Condition:
     text = " ".join(wanted.split())
     if text == "fell":
         return Fell(text)
-    if match := re.fullmatch(r"step (\d+)", text):
-        return Step(text, int(match.group(1)))
+    if match := re.fullmatch(r"step ?(\d+)", text):
+        return Step(f"step {match.group(1)}", int(match.group(1)))
     if match := re.fullmatch(r"(\w+) in (\w+)", text):
         return State(text, match.group(1), match.group(2))
     if match := re.fullmatch(NOTED, text):

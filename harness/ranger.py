@@ -45,6 +45,7 @@ from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.outside import bus_schedule
 from ranger_sim.harness.outside.profile import Profile
+from ranger_sim.harness.processes.guard import DEADLINE_S
 from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.records.strike_watch import StrikeWatch
@@ -93,6 +94,7 @@ class Ranger(Machine):
         firmware: Mapping[str, Firmware | str | os.PathLike] | None = None,  # boards that run C, by folder
         in_process: bool = False,  # their programs run here: faster, but a crash of one of them ends this process
         images: Mapping[str, Image | str | os.PathLike] | None = None,  # boards that run a firmware image, by file
+        board_deadline_s: float = DEADLINE_S,  # without an answer of a board's own process; 0: never (debuggers)
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.controller = controllers.load(self.scenario.controller)
@@ -125,6 +127,7 @@ class Ranger(Machine):
             }
         self._try_firmware(start_ns)
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
+        self.board_deadline_s = board_deadline_s
         self.processes: Apart | None = None
         self.deaths: list[dict[str, Any]] = []  # boards whose process has ended (harness/processes/apart.py)
         self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})

@@ -28,7 +28,7 @@ class Scenario:
 
     controller: name of a parameter set in boards/main_brain/parameters, or the path of a .toml file.
     body: name of a body in plant/bodies, or the path of a .toml file.
-    seed: any integer; chooses every crystal, phase, noise and foothold.
+    seed: 0 or more; chooses every crystal, phase, noise and foothold.
     slope_rad: positive downhill. floor_roughness_m: standard deviation of the height per foothold.
     start_uptime_ms: network time at power-up, so that wraps and long runs can be tested.
     battery_charge: of the packs at power-up, 1 is full. battery_capacity_Wh: of all of them together.
@@ -51,8 +51,8 @@ class Scenario:
             value = getattr(self, name)
             if not (isinstance(value, int | float) and math.isfinite(value) and low <= value <= high):
                 raise UserError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
-        if not isinstance(self.seed, int) or isinstance(self.seed, bool):
-            raise UserError(f"scenario: seed is {self.seed!r}, a whole number is expected")
+        if not isinstance(self.seed, int) or isinstance(self.seed, bool) or self.seed < 0:
+            raise UserError(f"scenario: seed is {self.seed!r}, a whole number from 0 on is expected")
         for name in ("controller", "body", "model_file"):
             value = getattr(self, name)
             if not isinstance(value, str | os.PathLike) and (name, value) != ("model_file", None):

@@ -1,13 +1,12 @@
 """The command `ranger-sim`: every subcommand is one module of this package (or a room's own `cli`)."""
 
 import argparse
-import difflib
 import sys
 from typing import Any, NoReturn
 
 from ranger_sim import __version__
-from ranger_sim.foundation.user_error import UserError, printable
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.foundation.user_error import UserError, did_you_mean, printable
+from ranger_sim.tools.command_line import libraries
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 
 EXIT_DONE = 0
@@ -17,10 +16,10 @@ EXIT_INTERRUPTED = 130
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser that complains in one line, and takes `-1s` for a value."""
+    """An argument parser that complains in one line, takes `-1s` for a value, and options by their whole names only."""
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:
-        super().__init__(*arguments, **settings)
+        super().__init__(*arguments, **{"allow_abbrev": False, **settings})
         self._negative_number_matcher = NEGATIVE_VALUE  # argparse's own knows -1 and -0.5, not -1s
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -29,10 +28,16 @@ class OneLineParser(argparse.ArgumentParser):
         if unknown:
             named = [each.partition("=")[0] for each in unknown if each.startswith("--")]
             known = [each for action in self._actions for each in action.option_strings]
-            near = difflib.get_close_matches(named[0], known, 2, 0.8) if named else []
-            hint = f"; meant was perhaps {' or '.join(near)}" if near else ""
-            self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
+            hint = did_you_mean(named[0], known) if named else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{f'; {hint}' if hint else ''}")
         return options, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """As argparse's, with the names that are near a mistyped one, or else all."""
+        if action.choices is not None and value not in action.choices:
+            known = [str(each) for each in action.choices]
+            hint = did_you_mean(str(value), known) or f"available: {', '.join(known)}"
+            raise argparse.ArgumentError(action, f"unknown {value!r}; {hint}")
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong and where help is; exit code 2."""
@@ -69,6 +74,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"ranger-sim {__version__}")
     commands: Any = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands.add_parser("help", help="what a command does and takes: ranger-sim help COMMAND")
     walk.register(commands)
     info.register(commands)
     table_command.register(commands)
@@ -101,11 +107,28 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns the process's exit code. A user's mistake is one line and code 2."""
+    """Run one command; returns the process's exit code. A library that is not installed is one line and code 2."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words[:1] == ["help"]:
+        words = [*words[1:], "--help"]
+    try:
+        return run(words)
+    except ModuleNotFoundError as error:
+        command = next((word for word in words if not word.startswith("-")), "")
+        text = libraries.missing(error, command or "the command line")
+        if text is None:
+            raise
+        return misuse(text)
+
+
+def run(arguments: list[str]) -> int:
+    """The same, where every library is there. A user's mistake is one line and code 2."""
+    from ranger_sim.tools.command_line import terminal  # only here: it needs a library itself
+
     terminal.stand_in_for_closed_streams()
     try:
         options = parser().parse_args(arguments)
-        options.arguments = list(sys.argv[1:] if arguments is None else arguments)
+        options.arguments = arguments
         code: int = options.run(options)
         sys.stdout.flush()
         return code
@@ -115,7 +138,8 @@ def main(arguments: list[str] | None = None) -> int:
         print("ranger-sim: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output left, e.g. `| head`
-        return output_closed()
+        terminal.lead_nowhere(sys.stdout)
+        return EXIT_DONE
     except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
         place = error.filename or (terminal.OUTPUT if terminal.output_is_stuck() else None)
         return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
@@ -127,12 +151,6 @@ def misuse(text: str) -> int:
     """Say what is wrong, on standard error."""
     print(f"ranger-sim: {text}", file=sys.stderr)
     return EXIT_MISUSE
-
-
-def output_closed() -> int:
-    """Nobody reads standard output any more: let the interpreter flush into nothing."""
-    terminal.lead_nowhere(sys.stdout)
-    return EXIT_DONE
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from ranger_sim.can_bus.bounds import Message, message
 from ranger_sim.foundation.events import FLAG_EXTENDED
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 
 if TYPE_CHECKING:
@@ -22,7 +21,8 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     Period: GenMsgCycleTime, in ms; deadline the same; no jitter; every node sends its frames by priority. Bit rate: as
     given, else the file's attribute Baudrate. UserError for what cannot be read or is not classic CAN.
     """
-    cantools = imported("cantools")
+    import cantools  # only here: half a second
+
     try:
         database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
     except OSError as error:

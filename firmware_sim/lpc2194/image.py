@@ -10,7 +10,6 @@ import os
 import pathlib
 from typing import Any
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 
 # LPC2194 user manual, memory map
@@ -102,8 +101,9 @@ def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple
 
 def _from_elf(path: pathlib.Path, content: bytes) -> Image:
     """Segments are loaded where their physical address says: initialised data lie in flash behind the code."""
-    elffile = imported("elftools.elf.elffile")
-    broken = imported("elftools.common.exceptions").ELFError
+    from elftools.common.exceptions import ELFError  # only here: files of Intel HEX need none of it
+    from elftools.elf import elffile
+
     try:
         elf = elffile.ELFFile(io.BytesIO(content))
         machine = elf["e_machine"]
@@ -128,7 +128,7 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
         if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
             raise UserError(f"{path}: truncated: the file has {len(content)} bytes, its section table ends behind them")
         symbols = _symbols(elf)
-    except (broken, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
+    except (ELFError, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
         reason = str(error) or type(error).__name__
         raise UserError(f"{path}: a damaged or truncated ELF file: {reason}") from None
     return Image(path, _checked(path, pieces), symbols)
@@ -136,10 +136,11 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
 
 def _symbols(elf: Any) -> tuple[Symbol, ...]:
     """Functions and variables of an ELFFile, without the mapping symbols ($a, $t, $d) and sections' own."""
-    tables = imported("elftools.elf.sections").SymbolTableSection
+    from elftools.elf.sections import SymbolTableSection
+
     found = []
     for section in elf.iter_sections():
-        if not isinstance(section, tables):
+        if not isinstance(section, SymbolTableSection):
             continue
         for symbol in section.iter_symbols():
             kind = symbol["st_info"]["type"]

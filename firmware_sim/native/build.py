@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from typing import Any
 
 from ranger_sim.firmware_sim.native.manifest import Manifest
 from ranger_sim.firmware_sim.native.trial import tried
@@ -33,6 +32,8 @@ OPTIONS = (
 )  # fmt: skip
 # Its own functions come first, whatever else is loaded; what is missing is told now and not at loading.
 LINKING = ("-shared", "-Wl,-Bsymbolic", "-Wl,--no-undefined")
+# A call of these ends the process as a failure that says where it was made (runtime.c).
+ENDING = ("exit", "_exit", "_Exit", "quick_exit")
 # -O1 and functions as they were written keep lines and variables true; findings are told, and the program goes on.
 SANITIZING = (
     "-O1",
@@ -109,7 +110,7 @@ def build(
         with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as making:
             warnings = _compile(program, options, watching, sources, pathlib.Path(making), manifest)
             made = pathlib.Path(making) / "library.so"
-            tried(f"{path}", path, manifest.folder, lambda record: _look_at(made, path, record))
+            tried(f"{path}", path, manifest.folder, made=made)
             stamp.unlink(missing_ok=True)
             made.replace(path)
             if coverage:
@@ -126,13 +127,6 @@ def _keep_notes(making: pathlib.Path, place: pathlib.Path) -> None:
     place.mkdir()
     for note in making.glob("*.gcno"):
         note.replace(place / note.name)
-
-
-def _look_at(made: pathlib.Path, shown: pathlib.Path, record: Any) -> None:
-    """UserError for a library without the entry points."""
-    from ranger_sim.firmware_sim.native.library import Library  # only here: it loads cffi
-
-    Library(made, shown).leave_record_in(record)
 
 
 def _compile(
@@ -158,7 +152,10 @@ def _compile(
         failed |= code != 0
         said += text
     if not failed:
-        code, text = run_compiler([program, *watching, *objects, *LINKING, "-lm", "-o", str(making / "library.so")])
+        wrapped = [f"-Wl,--wrap={name}" for name in ENDING]
+        code, text = run_compiler(
+            [program, *watching, *objects, *LINKING, *wrapped, "-lm", "-o", str(making / "library.so")]
+        )
         failed = code != 0
         said += text
     if failed:

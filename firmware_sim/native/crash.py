@@ -1,7 +1,8 @@
-"""Where a program in C was when a signal ended its process: the runtime leaves a record, this tells it in words.
+"""Where a program in C was when it ended its process: the runtime leaves a record, this says it in words.
 
-The record is `RECORD` numbers: the signal, plus `OVERFLOW` when the stack was left; then places in the library's code
-from its beginning, the innermost function first, 0 for none.
+The record is `RECORD` numbers: the signal, plus `OVERFLOW` when the stack was left, or `EXITED` plus the code where the
+program called exit; then places in the library's code from its beginning, the innermost function first, 0 for none. The
+program can write over it, as over all memory of its process: nothing in it is taken for granted.
 """
 
 import json
@@ -13,8 +14,13 @@ import subprocess
 from collections.abc import Sequence
 from typing import Any
 
+from ranger_sim.foundation.user_error import printable
+
 RECORD = 7
 OVERFLOW = 256  # OVERFLOW_FLAG of runtime.c
+EXITED = 512  # EXIT_FLAG of runtime.c
+LARGEST_PLACE = 1 << 48  # bytes; a library is smaller by far
+UNREADABLE = "the record of its end is not readable: its program wrote over it"
 ASKED = signal.SIGXCPU  # sent to a program that lets no time pass, to be told where it is
 LONGEST_S = 20.0  # binutils read some megabytes of debug information at most
 UNKNOWN = "??"  # what addr2line says for what it does not know
@@ -45,8 +51,12 @@ class Notebook:
         for number in range(ENTRIES):
             entry = self.words[number * ENTRY_WORDS :][:ENTRY_WORDS]
             if entry[0]:
-                board, library, sources = json.loads(entry[RECORD + 1 :].tobytes()[: entry[RECORD]])
-                return f"{board}: {told(pathlib.Path(library), pathlib.Path(sources), entry[:RECORD].tolist())}"
+                try:
+                    board, library, sources = json.loads(entry[RECORD + 1 :].tobytes()[: max(0, entry[RECORD])])
+                    paths = pathlib.Path(library), pathlib.Path(sources)
+                except (ValueError, TypeError, RecursionError):
+                    return f"a board with a program in C: {UNREADABLE}"
+                return printable(f"{board}: {told(*paths, entry[:RECORD].tolist())}")
         return ""
 
 
@@ -67,14 +77,20 @@ def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) ->
 
     library: the file with its debug information; sources: folder that files are told relative to.
     """
-    number = record[0] % OVERFLOW
-    if number == 0:
+    if record[0] == 0:
         return ""
+    number = record[0] % OVERFLOW
     places = [place for place in record[1:RECORD] if place]
-    if number == ASKED:
+    if any(not 0 < place < LARGEST_PLACE for place in places):
+        return UNREADABLE
+    if EXITED <= record[0] < EXITED + OVERFLOW:
+        what = f"it called exit({number})"
+    elif not 0 < record[0] < EXITED or number not in signal.valid_signals():
+        return UNREADABLE
+    elif number == ASKED:
         what = "its program let no time pass"
     else:
-        what = f"{signal.Signals(number).name} ({signal.strsignal(number)})"
+        what = f"{_name_of(number)} ({signal.strsignal(number)})"
         if record[0] & OVERFLOW:
             what = f"stack overflow, {what}"
     if not places:
@@ -82,6 +98,14 @@ def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) ->
     lines = lines_of(library, sources, places)
     once = [line for i, line in enumerate(lines) if line not in lines[:i]]  # a recursion is told once
     return f"{what} in {', called from '.join(once)}"
+
+
+def _name_of(number: int) -> str:
+    """SIGSEGV; a real-time signal has no name."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def lines_of(library: pathlib.Path, sources: pathlib.Path, places: Sequence[int]) -> list[str]:
@@ -95,8 +119,10 @@ def lines_of(library: pathlib.Path, sources: pathlib.Path, places: Sequence[int]
         return offsets
     command = [program, "-f", "-e", str(library), *(f"0x{place:x}" for place in places)]
     try:
-        done = subprocess.run(command, capture_output=True, check=False, timeout=LONGEST_S, text=True)
-    except (subprocess.TimeoutExpired, OSError):
+        done = subprocess.run(
+            command, capture_output=True, check=False, timeout=LONGEST_S, encoding="utf-8", errors="replace"
+        )
+    except (subprocess.TimeoutExpired, OSError, ValueError):  # the last: no path of a file
         return offsets
     said = done.stdout.splitlines()
     if len(said) != 2 * len(places):

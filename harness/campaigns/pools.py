@@ -8,7 +8,9 @@ group is asked for again; a run at which `ATTEMPTS` processes died is "crashed".
 import contextlib
 import importlib
 import json
+import logging
 import queue
+import ssl
 import subprocess
 import sys
 import threading
@@ -18,6 +20,7 @@ from typing import Any
 from ranger_sim.foundation.user_error import UserError
 
 ATTEMPTS = 3
+DASK_LOGS = ("distributed", "distributed.client")  # those that print by themselves
 COMMAND = (sys.executable, "-m", "ranger_sim.harness.campaigns.group")
 
 Request = dict[str, Any]
@@ -151,30 +154,44 @@ def work_of(request: Request) -> list[Result]:
 
 
 class DaskPool:
-    """The workers of a Dask cluster: the one at `address`, or one of `jobs` workers on this machine.
+    """The workers of a Dask cluster: that of the scheduler at `address`, or one of `jobs` workers on this machine.
 
-    A worker that dies gives nothing back; the scheduler gives its groups to another one. UserError when Dask is not
-    installed or the scheduler cannot be reached.
+    The own one is encrypted, accepts its own certificate alone and is bound to the loopback address (dask_cluster.py).
+    tls: Dask's names of the files of certificates for `address` (`tls_ca_file`, `tls_client_cert`, `tls_client_key`).
+    A worker that dies gives nothing back; the scheduler gives its groups to another one. UserError when the
+    scheduler cannot be reached or goes away.
     """
 
-    def __init__(self, address: str | None, jobs: int) -> None:
-        try:
-            distributed: Any = importlib.import_module("distributed")
-        except ImportError:
-            raise UserError("Dask is not installed: pip install 'ranger-sim[dask]', or --pool local") from None
-        self.distributed = distributed
+    def __init__(self, address: str | None, jobs: int, tls: dict[str, str] | None = None) -> None:
+        self.distributed: Any = importlib.import_module("distributed")  # only here: most campaigns need no Dask
+        for name in DASK_LOGS:  # a lost connection is a line of ours, not a traceback in a log
+            for handler in logging.getLogger(name).handlers:
+                handler.setLevel(logging.CRITICAL)
+        self.address = address
         self.cluster: Any = None
-        try:
-            if address is None:
-                self.cluster = distributed.LocalCluster(
-                    n_workers=jobs, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-                )
-            self.client: Any = distributed.Client(address if address is not None else self.cluster, timeout="10s")
-        except (OSError, TimeoutError, ValueError) as error:
-            raise UserError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
+        if address is None:
+            from ranger_sim.harness.campaigns.dask_cluster import OwnCluster
+
+            self.cluster = OwnCluster(jobs)
+            self.client: Any = self.cluster.client()
+        else:
+            self.client = self._client_of(address, tls or {})
         workers = len(self.client.scheduler_info(n_workers=-1)["workers"])
         self.jobs = max(1, workers)
         self.told = f"{workers} Dask worker{'s' if workers != 1 else ''}" + (f" at {address}" if address else "")
+
+    def _client_of(self, address: str, tls: dict[str, str]) -> Any:
+        """The client of a scheduler that runs already."""
+        encrypted = {**tls, "require_encryption": True} if tls else {}
+        try:
+            security = self.distributed.Security(**encrypted)
+            return self.distributed.Client(address, timeout="10s", security=security)
+        except OSError as error:
+            if error.filename or isinstance(error, ssl.SSLError):  # a file of the certificates, not the scheduler
+                raise UserError(f"--scheduler {address}: TLS files: {error}") from None
+            raise UserError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
+        except (TimeoutError, ValueError, RuntimeError) as error:
+            raise UserError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
 
     def run(self, requests: list[Request]) -> Iterator[Result]:
         """The results of all requests, those of a group together."""
@@ -185,6 +202,12 @@ class DaskPool:
                     yield from done.result()
                 except self.distributed.KilledWorker as error:
                     raise UserError(f"campaign: Dask's workers died again and again: {error}") from None
+                except self.distributed.CancelledError:
+                    where = f" at {self.address}" if self.address else ""
+                    raise UserError(
+                        f"campaign: the Dask scheduler{where} went away; results are kept, and the same command runs "
+                        "what is missing"
+                    ) from None
                 done.release()
         finally:
             self.client.cancel([future for future in futures if not future.done()])

@@ -1,8 +1,9 @@
 """Some boards of a robot, or all, each in a process of its own; the rest of the robot is in this one and passes time.
 
 It is the lockstep of this folder without a supervisor: virtual time, the same bytes as in one process. The processes
-begin when time first passes, so that something may be done to the boards before. A process beside them watches: nobody
-waits for a board that is gone or stands still. They end with `close`, or with this process, however that ends.
+begin when time first passes, so that something may be done to the boards before. A further process watches them
+(guard.py): a board that is gone or gives no answer is not waited for. They end with `close`, or with this process,
+however that ends.
 """
 
 from __future__ import annotations
@@ -21,15 +22,14 @@ from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
+from ranger_sim.harness.processes.guard import DEADLINE_S, Guard
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.wiring import ranger as wiring
 
-PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
 RESET = 1  # mode of a bus node
-STOPPED = ("T", "t")  # states of a process that somebody has stopped, a debugger perhaps
 
 
 class Apart:
@@ -57,7 +57,8 @@ class Apart:
         self.children = {name: fork(self._board(name, stage)) for name in names}
         self.numbers = tuple(self.children.values())  # of the processes, also of those that have ended
         self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
-        self.guard = fork(self._look_after)
+        in_c = frozenset(robot.firmware)
+        self.guard = fork(Guard(self.blocks, self.children, self.watches, in_c, robot.board_deadline_s).watch)
         loop = robot.loop
         show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
         self.remotes = {
@@ -73,25 +74,6 @@ class Apart:
             return board_process.serve(self.robot, name, self.blocks[name], stage, self.settings, False)
 
         return body
-
-    def _look_after(self) -> int:
-        """In a process of its own: mark the block of a board that has ended, and wake who waits for it."""
-        open_watches = {descriptor: name for name, descriptor in self.watches.items()}
-        turns: dict[str, int] = {}
-        while open_watches:
-            ready, _ = descriptors.wait(list(open_watches), [], PATIENCE_S)
-            for descriptor in ready:
-                block = self.blocks[open_watches.pop(descriptor)]
-                block.words[places.FATE] = places.GONE
-                os.eventfd_write(block.answer_descriptor, 1)
-            for name, block in self.blocks.items() if not ready else ():
-                turn = block.words[places.ASKED]
-                stands = turn != block.words[places.ANSWERED] and turns.get(name) == turn
-                if stands and kernel.state_of(self.children[name]) not in STOPPED:
-                    block.leave_fault(f"no answer for {PATIENCE_S:g} s; it is killed")
-                    os.kill(self.children[name], signal.SIGKILL)
-                turns[name] = turn
-        return 0
 
     @contextlib.contextmanager
     def processor(self) -> Iterator[None]:
@@ -109,7 +91,7 @@ class Apart:
             if remote.gone and name in self.children and not self.ended:
                 code = os.waitstatus_to_exitcode(os.waitpid(self.children.pop(name), 0)[1])
                 how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
-                why = self._where(name) or self.blocks[name].fault()
+                why = ": ".join(filter(None, (self.blocks[name].fault(), self._where(name))))
                 loop = self.robot.loop
                 self.deaths.append({"board": name, "time_s": self.robot.time_s, "how": how, "why": why})
                 wires = loop.wires[loop.place(name)]
@@ -147,7 +129,7 @@ class Apart:
         self.bury()
         for name, process in list(self.children.items()):
             self.remotes[name].dismiss()
-            descriptors.wait([self.watches[name]], [], PATIENCE_S)
+            descriptors.wait([self.watches[name]], [], DEADLINE_S)
             del self.children[name]
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)

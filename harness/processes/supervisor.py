@@ -25,6 +25,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
+from ranger_sim.harness.processes.guard import is_awaited
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.requests import Request
 from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
@@ -433,9 +434,10 @@ class Supervisor:
                 continue
             words = block.words
             turn = words[places.ASKED]
-            if turn == words[places.ANSWERED] or turn != child.turn:
+            awaited = is_awaited(block)
+            if not awaited or turn != child.turn:
                 child.turn, child.turn_since_s = turn, now
-                child.turn_cpu_s = kernel.processor_time_s(child.process) if turn != words[places.ANSWERED] else 0.0
+                child.turn_cpu_s = kernel.processor_time_s(child.process) if awaited else 0.0
                 continue
             if self.is_held(name, words):
                 child.turn_since_s = now

@@ -166,10 +166,15 @@ def firmware(robot: Any, board: str) -> dict:
         "folder": str(made.folder),
         "own_process": bool(robot.loop.board(board).apart),
         "lost_s": death["time_s"] if death is not None else None,
-        "why": (death["why"] or None) if death is not None else None,
+        "why": cause_of(death) if death is not None else None,
         "findings": [dataclasses.asdict(each) for each in found_in(robot, board)],
         "coverage": ran(made, is_whole=death is None or bool(death["why"])),
     }
+
+
+def cause_of(death: dict) -> str | None:
+    """What ended a board's process, as far as it is known."""
+    return death["why"] or (f"its process {death['how']}" if "how" in death else None)
 
 
 def found_in(robot: Any, board: str) -> list[Any]:

@@ -1,11 +1,11 @@
 """Which formats a timeline can be written in, by the suffix of the file."""
 
+import importlib
 import pathlib
 import tempfile
 from collections.abc import Callable
 from typing import IO
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timeline import mcap_file, perfetto_file, vcd_file
 from ranger_sim.harness.timeline.model import Events
@@ -36,7 +36,7 @@ def format_of(path: pathlib.Path) -> Callable[[Events, IO[bytes], str], None]:
 def check_target(path: pathlib.Path) -> None:
     """Before a run: the suffix is known, what writes it is installed, and a file can be written there."""
     format_of(path)
-    imported(LIBRARIES[path.suffix])
+    importlib.import_module(LIBRARIES[path.suffix])
     if path.is_dir():
         raise UserError(f"trace {path}: that is a folder, not a file")
     try:

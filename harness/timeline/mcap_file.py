@@ -6,11 +6,11 @@ of the body's, and in the channel's metadata of all. Time is virtual, from the s
 `/events` has steps, falls, faults and overruns as messages of the type `foxglove.Log`, for Foxglove's log panel.
 """
 
+import importlib
 from typing import IO, Any
 
 import numpy as np
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.harness.timeline.model import Counter, Events
 
 PACKAGE = "ranger_sim"
@@ -19,7 +19,7 @@ LOG_LEVELS = {"UNKNOWN": 0, "DEBUG": 1, "INFO": 2, "WARNING": 3, "ERROR": 4, "FA
 
 def write(events: Events, file: IO[bytes], title: str) -> None:
     """The whole timeline into `file`; `title` is kept as metadata. The same timeline gives the same bytes."""
-    writer = imported("mcap.writer").Writer(file)
+    writer = importlib.import_module("mcap.writer").Writer(file)
     writer.start(profile="", library="ranger-sim")
     writer.add_metadata("run", {"title": title})
     groups: dict[tuple[str, ...], list[Counter]] = {}
@@ -42,8 +42,8 @@ def write(events: Events, file: IO[bytes], title: str) -> None:
 
 def message_type(name: str, fields: list[str]) -> tuple[Any, bytes]:
     """(class of a message of doubles, the description of it that MCAP keeps)."""
-    descriptor_pb2 = imported("google.protobuf.descriptor_pb2")
-    pool = imported("google.protobuf.descriptor_pool").DescriptorPool()
+    descriptor_pb2 = importlib.import_module("google.protobuf.descriptor_pb2")
+    pool = importlib.import_module("google.protobuf.descriptor_pool").DescriptorPool()
     described = descriptor_pb2.FileDescriptorProto(name=f"{PACKAGE}/{name}.proto", package=PACKAGE, syntax="proto3")
     message = described.message_type.add(name=name)
     for number, field in enumerate(fields, start=1):
@@ -55,7 +55,7 @@ def message_type(name: str, fields: list[str]) -> tuple[Any, bytes]:
         )
     pool.Add(described)
     found = pool.FindMessageTypeByName(f"{PACKAGE}.{name}")
-    made = imported("google.protobuf.message_factory").GetMessageClass(found)
+    made = importlib.import_module("google.protobuf.message_factory").GetMessageClass(found)
     return made, descriptor_pb2.FileDescriptorSet(file=[described]).SerializeToString()
 
 
@@ -105,10 +105,10 @@ def level_of(path: tuple[str, ...], name: str) -> int:
 
 def log_type() -> tuple[Any, bytes]:
     """(class of `foxglove.Log`, the description of it with what it needs), field by field as Foxglove published it."""
-    descriptor_pb2 = imported("google.protobuf.descriptor_pb2")
+    descriptor_pb2 = importlib.import_module("google.protobuf.descriptor_pb2")
     kinds = descriptor_pb2.FieldDescriptorProto
     stamp = descriptor_pb2.FileDescriptorProto()
-    imported("google.protobuf.timestamp_pb2").DESCRIPTOR.CopyToProto(stamp)
+    importlib.import_module("google.protobuf.timestamp_pb2").DESCRIPTOR.CopyToProto(stamp)
     described = descriptor_pb2.FileDescriptorProto(name="foxglove/Log.proto", package="foxglove", syntax="proto3")
     described.dependency.append(stamp.name)
     log = described.message_type.add(name="Log")
@@ -127,8 +127,9 @@ def log_type() -> tuple[Any, bytes]:
         start=1,
     ):
         log.field.add(name=field, number=number, type=kind, type_name=of, label=kinds.LABEL_OPTIONAL)
-    pool = imported("google.protobuf.descriptor_pool").DescriptorPool()
+    pool = importlib.import_module("google.protobuf.descriptor_pool").DescriptorPool()
     pool.Add(stamp)
     pool.Add(described)
-    made = imported("google.protobuf.message_factory").GetMessageClass(pool.FindMessageTypeByName("foxglove.Log"))
+    factory = importlib.import_module("google.protobuf.message_factory")
+    made = factory.GetMessageClass(pool.FindMessageTypeByName("foxglove.Log"))
     return made, descriptor_pb2.FileDescriptorSet(file=[stamp, described]).SerializeToString()

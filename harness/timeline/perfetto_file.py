@@ -5,13 +5,13 @@ there are many as a template whose numbers `packing.py` fills in. A track's pack
 effect; tracks follow one another, which readers sort by time. The same timeline gives the same bytes.
 """
 
+import importlib
 import itertools
 import struct
 from typing import IO, Any
 
 import numpy as np
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.harness.timeline.model import Counter, Events, Instants, Slices
 from ranger_sim.harness.timeline.packing import INNER_BEGINS, INNER_ENDS, OUTER_BEGINS, OUTER_ENDS, PacketPacker, nested
 
@@ -22,8 +22,8 @@ CHUNK_ROWS = 200_000  # slices that are laid out at once: some 50 MB of arrays
 
 
 def library() -> Any:
-    """The schema's classes. UserError where the package is missing."""
-    return imported(SCHEMA)
+    """The schema's classes."""
+    return importlib.import_module(SCHEMA)
 
 
 def write(events: Events, file: IO[bytes], title: str) -> None:

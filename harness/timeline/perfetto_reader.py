@@ -1,13 +1,13 @@
 """Reads a Perfetto trace of track events back, through the schema of the `perfetto` package."""
 
 import dataclasses
+import importlib
 import pathlib
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timeline.packing import index_packets
 from ranger_sim.harness.timeline.perfetto_file import library
@@ -110,7 +110,7 @@ def read_instants(path: pathlib.Path) -> tuple[int, int, dict[str, list[ReadSlic
 
 def take(path: pathlib.Path, reader: "Reader", schema: Any, packet: bytes) -> None:
     """One packet of the file for the reader. UserError for what `Writer` would not have written."""
-    decode_error = imported("google.protobuf.message").DecodeError
+    decode_error = importlib.import_module("google.protobuf.message").DecodeError
     try:
         reader.take(schema.TracePacket.FromString(packet))
     except (KeyError, decode_error):

@@ -10,7 +10,6 @@ from typing import IO, Any
 
 import numpy as np
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.harness.timeline.model import Events, Slices
 
 IDENTIFIER_BITS = 11
@@ -19,7 +18,8 @@ Change = tuple[int, int, Any]  # ns, number of the variable, value
 
 def write(events: Events, file: IO[bytes], title: str) -> None:
     """The whole timeline into `file`; `title` is its comment. The same timeline gives the same bytes."""
-    vcd = imported("vcd")
+    import vcd  # only here
+
     text = io.TextIOWrapper(file, encoding="ascii", write_through=True)
     # no date: the same run gives the same bytes
     with vcd.VCDWriter(text, timescale="1 ns", date="", comment=title, version="ranger-sim") as writer:

@@ -9,11 +9,11 @@ can0.Message.signal; `buses` chooses among them. Stamps are those of the recordi
 
 import pathlib
 from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
@@ -96,11 +96,12 @@ def decode(
 
 def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
     """Messages by identifier, of all files together."""
-    cantools = imported("cantools")
+    import cantools  # only here: half a second
+
     found: dict = {}
     for path in databases:
         try:
-            database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
+            database: Any = cantools.database.load_file(str(path), database_format="dbc", strict=False)
         except OSError as error:
             raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
         except Exception as error:  # what a broken file makes of cantools is of many kinds

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
@@ -33,8 +32,10 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     mapping = dict(mapping or {})
     said = ""
     with _silence():
+        import asammdf  # only here: a second
+
         try:
-            found = list(_channels(path, truth))
+            found = list(_channels(asammdf.MDF(path), truth))
         except UserError:
             raise
         except Exception as error:  # what a broken file makes of asammdf is of many kinds
@@ -68,14 +69,15 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     return dataset
 
 
-def _channels(path: pathlib.Path, truth: bool) -> Iterator[tuple[str, str, Array, Array | None, NDArray[np.bool_]]]:
+def _channels(
+    measurement: Any, truth: bool
+) -> Iterator[tuple[str, str, Array, Array | None, NDArray[np.bool_]]]:
     """(name, unit, stamps, values, which of them have a text instead) of every channel that is no group's clock.
 
     The values are None when they are not numbers at all.
     """
-    asammdf = imported("asammdf")
     seen: set[str] = set()
-    with asammdf.MDF(path) as file:
+    with measurement as file:
         for number, group in enumerate(file.groups):
             master = file.masters_db.get(number)
             for index, channel in enumerate(group.channels):

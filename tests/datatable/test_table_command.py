@@ -67,7 +67,7 @@ def test_show_as_json_is_json_only(capsys):
 
 @pytest.mark.parametrize("wanted", ["MCH_ANGEL", "99999", ""])
 def test_show_of_an_unknown_variable_is_one_clear_line(wanted):
-    with pytest.raises(UserError, match="no variable has the name or id") as caught:
+    with pytest.raises(UserError, match="unknown variable") as caught:
         run("show", wanted)
     assert "\n" not in str(caught.value)
 

@@ -1,10 +1,12 @@
 """Campaigns of the whole robot: a branch is the run, and whoever is killed, the results are the same."""
 
 import contextlib
+import importlib.util
 import json
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 
@@ -31,6 +33,8 @@ start = ["step 2"]
 """
 RUNS, HEALTHY = 6, 1
 PATIENCE_S = 300.0  # on a machine that does other things
+
+needs_dask = pytest.mark.skipif(not importlib.util.find_spec("distributed"), reason="Dask is not installed")
 
 
 @pytest.fixture
@@ -100,11 +104,12 @@ def test_a_run_branched_off_the_golden_run_is_the_run_from_power_up(few, tmp_pat
         campaign.close()
 
 
-def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path):
+@pytest.mark.parametrize("pool", ["local", pytest.param("dask", marks=needs_dask)])
+def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path, pool):
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    run(few, whole, "--pool", "local", "--jobs", "2")
+    run(few, whole, "--jobs", "2")
     process = subprocess.Popen(
-        campaign_command(few, killed, "--pool", "local", "--jobs", "1"), cwd=ROOT, stderr=subprocess.DEVNULL
+        campaign_command(few, killed, "--jobs", "1", "--pool", pool), cwd=ROOT, stderr=subprocess.DEVNULL
     )
     until_results(process, killed, 2)
     workers = []
@@ -118,44 +123,207 @@ def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path):
         os.close(worker)
     before = results_in(killed)
     assert HEALTHY + 2 <= len(before) < HEALTHY + RUNS
-    told = run(few, killed, "--pool", "local", "--jobs", "2").stderr
+    told = run(few, killed, "--jobs", "2").stderr
     assert f"{len(before) - HEALTHY} of them are there already" in told
     after = results_in(killed)
     assert len(after) == HEALTHY + RUNS and after == results_in(whole)
     assert {key: after[key] for key in before} == before
 
 
-def test_a_dask_cluster_that_loses_a_worker_gives_the_same_results(few, tmp_path):
-    pytest.importorskip("distributed", reason="Dask is not installed")
-    local, cluster = tmp_path / "local", tmp_path / "cluster"
-    run(few, local, "--pool", "local", "--jobs", "2")
+TABLES = ("tcp", "tcp6", "udp", "udp6")
+LOOPBACK = "0100007F"  # 127.0.0.1 as proc(5) writes it
+UNIX_LISTENS = 0x10000  # __SO_ACCEPTCON
+
+
+def listening(process):
+    """[(process, kind, local address)]: sockets of a process and its descendants at which others can arrive.
+
+    Every TCP and UDP socket counts that is not a connection, and every Unix socket that listens.
+    """
+    found = []
+    for each in [process, *descendants(process)]:
+        own = set()
+        for descriptor in pathlib.Path(f"/proc/{each}/fd").iterdir():
+            with contextlib.suppress(FileNotFoundError):
+                own.add(os.readlink(descriptor))
+        for table in TABLES:
+            for line in pathlib.Path(f"/proc/{each}/net/{table}").read_text().splitlines()[1:]:
+                fields = line.split()
+                if f"socket:[{fields[9]}]" in own and fields[2].endswith(":0000"):  # no remote end
+                    found.append((each, table, fields[1]))
+        for line in pathlib.Path(f"/proc/{each}/net/unix").read_text().splitlines()[1:]:
+            fields = line.split()
+            if f"socket:[{fields[6]}]" in own and int(fields[3], 16) & UNIX_LISTENS:
+                found.append((each, "unix", fields[7] if len(fields) > 7 else ""))
+    return found
+
+
+def go_on(processes):
+    for each in processes:
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            os.kill(each, signal.SIGCONT)
+
+
+def runs_of_groups(processes):
+    """Those that run a group of the campaign (group.py), or a branch of one."""
+    return [each for each in processes if b"campaigns.group" in pathlib.Path(f"/proc/{each}/cmdline").read_bytes()]
+
+
+@contextlib.contextmanager
+def campaign_at_work(path, folder, *more):
+    """A campaign that has a result and has not ended, every process of it stopped inside."""
+    process = subprocess.Popen(
+        campaign_command(path, folder, *more), cwd=ROOT, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    try:
+        until_results(process, folder, 1)
+        tree = [process.pid, *descendants(process.pid)]
+        for each in tree:
+            os.kill(each, signal.SIGSTOP)
+        yield process
+        go_on(tree)
+        assert process.wait(PATIENCE_S) == 0
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_what_listens_is_seen():
+    """The reader that the next tests trust."""
+    with socket.create_server(("127.0.0.1", 0)) as listener, socket.socket(socket.AF_UNIX) as local:
+        local.bind("")
+        local.listen()
+        port = listener.getsockname()[1]
+        with socket.socket(type=socket.SOCK_DGRAM) as datagrams:
+            datagrams.bind(("127.0.0.1", 0))
+            found = [(table, address) for _, table, address in listening(os.getpid())]
+    assert ("tcp", f"{LOOPBACK}:{port:04X}") in found
+    assert {table for table, _ in found} >= {"tcp", "udp", "unix"}
+
+
+def test_a_campaign_opens_no_network_port(few, tmp_path):
+    """Whatever is installed: Dask works only where it is asked for."""
+    with campaign_at_work(few, tmp_path / "out", "--jobs", "2") as process:
+        assert len(descendants(process.pid)) >= 2
+        assert listening(process.pid) == []
+
+
+STRANGER = """
+import os, socket, ssl, sys
+import distributed
+
+def answer(port, wrapped):
+    with socket.create_connection(("127.0.0.1", port), 10) as plain:
+        with wrapped(plain) as it:
+            it.settimeout(10)
+            it.sendall(b"GET / HTTP/1.0\\r\\n\\r\\n")
+            return it.recv(100)
+
+encrypted = ssl.create_default_context()
+encrypted.check_hostname, encrypted.verify_mode = False, ssl.CERT_NONE
+other = distributed.Security.temporary()
+if os.geteuid() == 0:  # another user, where that is possible; from here on, as the interpreter may be root's alone
+    os.setgroups([])
+    os.setresuid(65534, 65534, 65534)
+for port in map(int, sys.argv[1:]):
+    for wrapped in (lambda plain: plain, encrypted.wrap_socket):
+        try:
+            got = answer(port, wrapped)
+        except OSError:
+            got = b""
+        assert got in (b"",) or got[:1] == b"\\x15", (port, got)  # nothing, or the alert record of TLS
+    for address, security in ((f"tcp://127.0.0.1:{port}", None), (f"tls://127.0.0.1:{port}", other)):
+        try:
+            distributed.Client(address, timeout="1s", security=security)
+        except OSError:
+            continue
+        raise AssertionError(f"{address} serves a stranger")
+print("refused")
+"""
+
+
+@needs_dask
+def test_a_dask_cluster_of_its_own_is_on_the_loopback_address_and_refuses_who_lacks_its_certificate(few, tmp_path):
+    out = tmp_path / "out"
+    with campaign_at_work(few, out, "--pool", "dask", "--jobs", "2") as process:
+        found = listening(process.pid)
+        assert {table for _, table, _ in found} == {"tcp"}
+        assert {address.partition(":")[0] for _, _, address in found} == {LOOPBACK}
+        ports = sorted(int(address.partition(":")[2], 16) for _, _, address in found)
+        assert len(ports) == 5  # the scheduler, and a worker and its nanny twice; no pages
+        tree = [process.pid, *descendants(process.pid)]
+        waiting = runs_of_groups(tree)
+        assert waiting  # so the cluster is there until the stranger has tried everything
+        go_on(set(tree) - set(waiting))
+        stranger = subprocess.run(
+            [sys.executable, "-c", STRANGER, *map(str, ports)],
+            cwd="/",
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
+        assert stranger.stdout == "refused\n", stranger.stderr
+    run(few, tmp_path / "local")
+    assert results_in(out) == results_in(tmp_path / "local")
+
+
+@pytest.fixture
+def outside_cluster(tmp_path):
+    """(address, options, scheduler, workers) of Dask's own programs, with TLS."""
+    import distributed
+
+    security = distributed.Security.temporary()
+    files = {"ca-file": security.tls_ca_file, "cert": security.tls_client_cert, "key": security.tls_client_key}
+    options = []
+    for name, text in files.items():
+        path = tmp_path / f"{name}.pem"
+        path.write_text(text)
+        options += [f"--tls-{name}", str(path)]
     where = tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "distributed.cli."]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": ROOT}
     with contextlib.ExitStack() as started:
 
-        def start(program, *options):
-            command = [*dask[:2], dask[2] + program, "--scheduler-file", str(where), "--no-dashboard", *options]
-            process = subprocess.Popen(command, **quiet)
+        def start(program, *more):
+            command = [sys.executable, "-m", f"distributed.cli.{program}", "--scheduler-file", str(where), *options]
+            process = subprocess.Popen([*command, "--no-dashboard", *more], **quiet)
             started.callback(process.wait)
             started.callback(process.kill)
             return process
 
-        start("dask_scheduler", "--port", "0", "--host", "127.0.0.1")
+        scheduler = start("dask_scheduler", "--port", "0", "--host", "tls://127.0.0.1")
         workers = [start("dask_worker", "--nthreads", "1", "--no-nanny", "--name", name) for name in ("a", "b")]
-        address = address_in(where, workers[0])
-        process = subprocess.Popen(
-            campaign_command(few, cluster, "--scheduler", address), cwd=ROOT, stderr=subprocess.PIPE, text=True
-        )
-        started.callback(process.kill)
+        yield address_in(where, workers[0], security), options, scheduler, workers
+
+
+@needs_dask
+@pytest.mark.parametrize("killed", ["worker", "scheduler"])
+def test_a_dask_cluster_that_loses_a_part_gives_the_same_results(few, tmp_path, outside_cluster, killed):
+    """A worker's work is done by another; without a scheduler the campaign ends in a line, and goes on without Dask."""
+    address, options, scheduler, workers = outside_cluster
+    local, cluster = tmp_path / "local", tmp_path / "cluster"
+    run(few, local)
+    process = subprocess.Popen(
+        campaign_command(few, cluster, "--scheduler", address, *options), cwd=ROOT, stderr=subprocess.PIPE, text=True
+    )
+    try:
         until_results(process, cluster, 1)
-        os.kill(workers[0].pid, signal.SIGKILL)
+        (scheduler if killed == "scheduler" else workers[0]).kill()
         _, told = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0, told
+    finally:
+        process.kill()
+    assert "Traceback" not in told
+    if killed == "scheduler":
+        assert process.returncode == 2, told
+        assert f"campaign: the Dask scheduler at {address} went away" in told
+        run(few, cluster)
+    else:
+        assert process.returncode == 0, told
+        assert "warning" not in told
     assert results_in(cluster) == results_in(local)
 
 
-def address_in(where, worker):
+def address_in(where, worker, security):
     """The scheduler's address, when two workers have come to it."""
     import distributed
 
@@ -167,20 +335,53 @@ def address_in(where, worker):
         with contextlib.suppress(FileNotFoundError, ValueError):
             address = json.loads(where.read_text())["address"]
             break
-    with distributed.Client(address, timeout="60s") as client:
+    with distributed.Client(address, timeout="60s", security=security) as client:
         client.wait_for_workers(2, timeout=PATIENCE_S)
     return address
 
 
+@needs_dask
+def test_a_scheduler_without_tls_is_used_with_a_warning_of_one_line(few, tmp_path):
+    done = refused(few, tmp_path / "out", "--scheduler", "tcp://127.0.0.1:1")
+    warning, mistake = done.stderr.splitlines()
+    assert warning.startswith("warning: the Dask scheduler at tcp://127.0.0.1:1 is used without TLS: ")
+    assert "no Dask scheduler there" in mistake
+
+
+@pytest.mark.parametrize(
+    "options, wanted",
+    [
+        (["--tls-cert", "x"], "--tls-cert: only with --scheduler"),
+        (["--scheduler", "tcp://h:1", "--tls-cert", "x"], "--scheduler tcp://h:1: with --tls-cert the address begins"),
+        (["--scheduler", "tls://h:1", "--tls-ca-file", "none"], "--tls-ca-file none: no such file"),
+        (["--scheduler", "tls://h:1", "--tls-ca-file", __file__], "--tls-ca-file: --tls-cert is missing"),
+        (["--scheduler", "tls://h:1", "--pool", "local"], "--scheduler and --pool local"),
+    ],
+)
+def test_options_of_tls_that_do_not_fit_are_refused_in_one_line(few, tmp_path, options, wanted):
+    (line,) = refused(few, tmp_path / "out", *options).stderr.splitlines()
+    assert wanted in line
+
+
+@needs_dask
+def test_files_that_are_not_certificates_are_refused_in_one_line(few, tmp_path):
+    given = [each for option in ("ca-file", "cert", "key") for each in (f"--tls-{option}", __file__)]
+    (line,) = refused(few, tmp_path / "out", "--scheduler", "tls://127.0.0.1:1", *given).stderr.splitlines()
+    assert "--scheduler tls://127.0.0.1:1: TLS files: " in line
+
+
 def test_what_cannot_be_reached_or_read_is_told_in_one_line(few, tmp_path):
     for arguments, wanted in (
-        ((few, tmp_path / "out", "--scheduler", "tcp://127.0.0.1:1"), "no Dask scheduler there"),
         ((few, tmp_path / "out", "--replay", "nothing"), "the plan has no such run of this version"),
         ((tmp_path / "none.toml", tmp_path / "out"), "No such file"),
     ):
-        if "--scheduler" in arguments and not pools.importlib.util.find_spec("distributed"):
-            wanted = "Dask is not installed"
-        done = subprocess.run(
-            campaign_command(*arguments), cwd=ROOT, capture_output=True, text=True, check=False, timeout=PATIENCE_S
-        )
-        assert done.returncode == 2 and wanted in done.stderr and "Traceback" not in done.stderr
+        assert wanted in refused(*arguments).stderr
+
+
+def refused(path, folder, *more):
+    """A campaign that does not begin."""
+    done = subprocess.run(
+        campaign_command(path, folder, *more), cwd=ROOT, capture_output=True, text=True, check=False, timeout=PATIENCE_S
+    )
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    return done

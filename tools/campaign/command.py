@@ -22,10 +22,16 @@ def register(commands: Any) -> None:
     )
     command.add_argument(
         "--pool",
-        choices=("dask", "local"),
-        help="a Dask cluster of this machine's processes, or plain processes (default: dask where it is installed)",
+        choices=("local", "dask"),
+        help="plain processes of this machine (the default), or a Dask cluster of its own, encrypted",
     )
-    command.add_argument("--scheduler", metavar="ADDRESS", help="a Dask cluster that runs already, as tcp://host:8786")
+    command.add_argument("--scheduler", metavar="ADDRESS", help="a Dask cluster that runs already, as tls://host:8786")
+    for option, what in (
+        ("--tls-ca-file", "certificate of the authority"),
+        ("--tls-cert", "certificate"),
+        ("--tls-key", "key"),
+    ):
+        command.add_argument(option, metavar="FILE", help=f"{what} (PEM) for --scheduler tls://...")
     command.add_argument("--report", action="store_true", help="run nothing, write tables and page of what there is")
     command.add_argument(
         "--document", metavar="FILE.md", help="also put the tables into this document, between its two marks"

@@ -2,7 +2,6 @@
 
 import argparse
 import csv
-import importlib.util
 import io
 import json
 import os
@@ -26,6 +25,9 @@ from ranger_sim.tools.command_line.files import replace_file, writable_folder
 TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
 TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"
 TABLES_END = "<!-- end -->\n"
+ENCRYPTED = "tls://"
+# option (as argparse names it): what Dask calls it
+TLS_FILES = {"tls_ca_file": "tls_ca_file", "tls_cert": "tls_client_cert", "tls_key": "tls_client_key"}
 EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 
 
@@ -33,8 +35,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
     console = terminal.console(stderr=True)
     wanted = plan.load(options.file)
-    if options.scheduler and options.pool == "local":
-        raise UserError("--scheduler and --pool local: a scheduler is Dask's")
+    check_scheduler(options)
     folder = writable_folder(options.out or pathlib.Path("runs") / "campaigns" / wanted.name)
     campaign = engine.Campaign(wanted, folder)
     try:
@@ -57,12 +58,39 @@ def run(options: argparse.Namespace) -> int:
         campaign.close()
 
 
-def pool_of(options: argparse.Namespace) -> Any:
-    """Who does the runs."""
+def check_scheduler(options: argparse.Namespace) -> None:
+    """UserError for options of a Dask scheduler that do not fit together."""
+    if options.scheduler and options.pool == "local":
+        raise UserError("--scheduler and --pool local: a scheduler is Dask's")
+    given = [f"--{name.replace('_', '-')}" for name in TLS_FILES if getattr(options, name)]
+    if not given:
+        return
+    if not options.scheduler:
+        raise UserError(f"{', '.join(given)}: only with --scheduler; --pool dask makes its own certificate")
+    if not options.scheduler.startswith(ENCRYPTED):
+        raise UserError(f"--scheduler {options.scheduler}: with {', '.join(given)} the address begins with {ENCRYPTED}")
+    for name in TLS_FILES:
+        option = f"--{name.replace('_', '-')}"
+        file = getattr(options, name)
+        if not file:
+            raise UserError(f"{', '.join(given)}: {option} is missing; a Dask scheduler with TLS needs all three")
+        if not os.path.isfile(file):
+            raise UserError(f"{option} {file}: no such file")
+
+
+def pool_of(options: argparse.Namespace, console: Console) -> Any:
+    """Who does the runs: processes of this machine unless Dask is asked for."""
     jobs = options.jobs or len(os.sched_getaffinity(0))
-    wants_dask = options.scheduler or options.pool == "dask"
-    if wants_dask or (options.pool is None and importlib.util.find_spec("distributed")):
-        return pools.DaskPool(options.scheduler, jobs)
+    if options.scheduler and not options.scheduler.startswith(ENCRYPTED):
+        console.print(
+            f"warning: the Dask scheduler at {options.scheduler} is used without TLS: everyone who can reach it can "
+            "run code on its workers and on this computer",
+            highlight=False,
+            soft_wrap=True,
+        )
+    if options.scheduler or options.pool == "dask":
+        tls = {dask: getattr(options, name) for name, dask in TLS_FILES.items() if getattr(options, name)}
+        return pools.DaskPool(options.scheduler, jobs, tls)
     return pools.LocalPool(jobs)
 
 
@@ -70,7 +98,7 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
     """Run what is missing, with a progress bar, or a line every ten seconds where there is no terminal."""
     campaign.take_known()
     total, before = campaign.foreseen, len(campaign.cases)
-    pool = pool_of(options)
+    pool = pool_of(options, console)
     console.print(
         f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.told}"
         + (f"; {before} of them are there already" if before else ""),

@@ -5,8 +5,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from ranger_sim.foundation.libraries import imported
-
 SHELLS = ("bash", "zsh", "fish")
 FILES = {"FILE", "PROFILE", "DATA", "LOG", "FIGURES", "PAGE"}  # what help calls a value that is, or may be, a file
 
@@ -32,7 +30,8 @@ def run(options: argparse.Namespace) -> int:
 
 def script(whole: argparse.ArgumentParser, shell: str) -> str:
     """The script of a shell for a command line."""
-    shtab: Any = imported("shtab")
+    import shtab  # only here
+
     for action in actions(whole):
         kind = completed(action)
         if kind is not None:

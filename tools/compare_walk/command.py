@@ -33,7 +33,7 @@ def register(commands: Any) -> None:
         metavar="RAD",
         help="of the floor, positive downhill (0)",
     )
-    command.add_argument("--seed", type=whole_number(), default=1, help="of the emulated walks (1)")
+    command.add_argument("--seed", type=whole_number(0), default=1, help="of the emulated walks (1)")
     command.add_argument(
         "--steps",
         type=whole_number(12),

@@ -52,7 +52,7 @@ def register(commands: Any) -> None:
         metavar="CHANNEL",
         help="put right what looks wrong in a channel that drives the machine as well (repeatable)",
     )
-    command.add_argument("--seed", type=whole_number(), default=0, metavar="N", help="of the bootstrap (0)")
+    command.add_argument("--seed", type=whole_number(0), default=0, metavar="N", help="of the bootstrap (0)")
     command.add_argument(
         "--out", metavar="DIR", help="folder for report.html, diagnosis.json and extended.toml, made if missing"
     )

@@ -14,9 +14,12 @@ from ranger_sim.firmware_sim.native import image_build, sanitizers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.processes import kernel
+from ranger_sim.harness.processes.guard import DEADLINE_S
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.options import Option
-from ranger_sim.tools.command_line.units import word
+from ranger_sim.tools.command_line.units import TIMES, quantity, word
+
+LONGEST_DEADLINE_S = 86_400.0
 
 FIRMWARE = Option(
     "--firmware",
@@ -34,6 +37,14 @@ SANITIZE = Option(
 IN_PROCESS = Option(
     "--in-process",
     "run the firmware in the walk's own process instead of one of its own: faster, but a crash ends the walk",
+    of_run=False,
+)
+BOARD_DEADLINE = Option(
+    "--board-deadline",
+    f"end the process of a firmware that gives no answer for so long (default {DEADLINE_S:g}s); 0s: never, to debug it",
+    quantity(TIMES, "s", least=0.0, most=LONGEST_DEADLINE_S),
+    f"{DEADLINE_S:g}s",
+    DEADLINE_S,
     of_run=False,
 )
 COVERAGE = Option(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
-import importlib.util
 import json
 import pathlib
 import tempfile
@@ -45,8 +44,7 @@ def run(options: argparse.Namespace) -> int:
         raise UserError(f"fmu {options.file!r}: a file that ends in .fmu is expected")
     if path.is_dir():
         raise UserError(f"fmu {options.file!r}: this is a folder")
-    if importlib.util.find_spec("pythonfmu3") is None:
-        raise UserError("fmu needs pythonfmu3, which is not installed: pip install 'ranger-sim[fmi]'")
+    importlib.import_module("pythonfmu3")  # before anything is made
     writable_folder(path.parent)
     scenario = Scenario(
         controller=options.controller,

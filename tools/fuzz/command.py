@@ -45,7 +45,7 @@ def register(commands: Any) -> None:
         "--cases", type=whole_number(1), default=CASES, metavar="N", help=f"cases for each target (default {CASES})"
     )
     command.add_argument(
-        "--seed", type=whole_number(), default=1, metavar="S", help="the same seed gives the same cases (default 1)"
+        "--seed", type=whole_number(0), default=1, metavar="S", help="the same seed gives the same cases (default 1)"
     )
     command.add_argument("--json", metavar="FILE|-", help="what was counted, as JSON; - prints it and nothing else")
     command.set_defaults(run=run, refuse=command.error)

@@ -43,7 +43,7 @@ def register(commands: Any) -> None:
         help="what is known already, as outer_cm=0.72+-0.004",
     )
     command.add_argument("--gear", type=number(above=0.0), default=GEAR, help="of the bench's gearbox (default 14)")
-    command.add_argument("--seed", type=whole_number(), default=1, help="of the virtual instruments (default 1)")
+    command.add_argument("--seed", type=whole_number(0), default=1, help="of the virtual instruments (default 1)")
     command.add_argument(
         "--model", metavar="FILE", help="model file whose terms and motor the virtual bench has (of `diagnose --out`)"
     )

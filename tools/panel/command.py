@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import importlib
 import os
 import signal
 import socket
@@ -15,7 +16,6 @@ from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.libraries import imported
 from ranger_sim.foundation.peers import listening_address
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
@@ -80,8 +80,8 @@ def run(options: argparse.Namespace) -> int:
         raise UserError(f"panel: {len(options.recordings)} recordings; one, or two over each other, are possible")
     if options.align and len(options.recordings) != 2:
         raise UserError("panel: --align lays two recordings over each other")
-    for library in ("uvicorn", "starlette", "websockets"):
-        imported(library)
+    for library in ("uvicorn", "starlette", "h11", "websockets"):
+        importlib.import_module(library)  # before anything is started
     address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     with contextlib.ExitStack() as stack:

@@ -34,7 +34,7 @@ ROBOT = {
     "tcot": "0.28",
     "delay": "14 ± 3 ms",
     "walked": "65.2 km in 30.8 h",
-    "energy": "493 Wh in 30.8 h",
+    "energy": "493 Wh, 7.56 Wh/km",  # for 65.243 km
 }
 
 
@@ -151,7 +151,7 @@ def tiles(summary: dict) -> list[dict]:
             of_the_robot("delay"),
         ),
         ("walked", f"{length_text(summary['distance_m'])} in {since_release(summary)}", of_the_robot("walked")),
-        ("energy used", energy_text(summary["energy_Wh"]["total"]), of_the_robot("energy")),
+        ("energy used", energy_used(summary), of_the_robot("energy")),
         (
             "batteries",
             "empty" if summary["battery"]["empty"] else f"{100.0 * summary['battery']['charge']:.0f} %",
@@ -159,6 +159,12 @@ def tiles(summary: dict) -> list[dict]:
         ),
     )
     return [{"name": name, "value": value, "beside": beside} for name, value, beside in rows]
+
+
+def energy_used(summary: dict) -> str:
+    """What the batteries gave since it was let go, and for each kilometre, which can be compared."""
+    used_Wh, km = summary["energy_Wh"]["total"], summary["distance_m"] / 1000.0
+    return energy_text(used_Wh) + (f", {used_Wh / km:.2f} Wh/km" if km > 0.0 else "")
 
 
 def since_release(summary: dict) -> str:

@@ -117,7 +117,10 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     log = log_of(options)
     firmware = firmware_of(options, console)
     images = images_of(options)
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, options.in_process, images)) as robot:
+    deadline_s = options.board_deadline
+    with contextlib.closing(
+        Ranger(scenario, log, quirks, profile, firmware, options.in_process, images, deadline_s)
+    ) as robot:
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
@@ -336,7 +339,8 @@ def print_summary(summary: dict, floor_friction: float, console: Console) -> Non
         f"{end_text(summary)}; "
         f"controller {summary['controller']}, body {summary['body']}; "
         f"step {figure(summary['mean_step_length_m'], '{:.3f} m')}, {figure(summary['mean_step_time_s'], '{:.3f} s')}; "
-        f"{figure(summary['total_power_W'], '{:.1f} W')}, TCOT {figure(summary['tcot'], '{:.3f}')}; "
+        f"{figure(summary['total_power_W'], '{:.1f} W')} (motors {figure(summary['motor_power_W'], '{:.1f} W')}), "
+        f"TCOT {figure(summary['tcot'], '{:.3f}')}; "
         f"{summary['realtime_factor']:.1f} x real time {'compiled' if summary['compiled'] else 'interpreted'}; "
         f"trace {summary['trace_digest'][:16]}",
         highlight=False,

@@ -20,7 +20,7 @@ from ranger_sim.tools.command_line.units import (
     whole_number,
     word,
 )
-from ranger_sim.tools.firmware.command import IN_PROCESS
+from ranger_sim.tools.firmware.command import BOARD_DEADLINE, IN_PROCESS
 from ranger_sim.tools.firmware.command import OPTIONS as FIRMWARE
 from ranger_sim.tools.firmware.gdb_options import ALLOW_NETWORK, GDB
 from ranger_sim.tools.firmware.images import OPTIONS as IMAGES
@@ -61,7 +61,7 @@ SCENARIO = (
     Option(
         "--seed",
         f"chooses crystals, phases, noise and footholds (default {Scenario.seed})",
-        whole_number(),
+        whole_number(0),
         "N",
         Scenario.seed,
         always=True,
@@ -142,6 +142,7 @@ WALK = (
     faults.MODULE,
     *FIRMWARE,
     IN_PROCESS,
+    BOARD_DEADLINE,
     *IMAGES,
     GDB,
     ALLOW_NETWORK,
@@ -158,7 +159,10 @@ def add_run_options(command: Any) -> None:
 def add_walk_options(command: Any) -> None:
     """All options of `walk`."""
     add_run_options(command)
-    add_all(command, (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, *IMAGES, GDB, ALLOW_NETWORK))
+    add_all(
+        command,
+        (faults.FAULT, PROOF, faults.MODULE, *FIRMWARE, IN_PROCESS, BOARD_DEADLINE, *IMAGES, GDB, ALLOW_NETWORK),
+    )
     trace.add_options(command)
 
 

@@ -45,7 +45,7 @@ def register(commands: Any) -> None:
         "--time", type=quantity(TIMES, "s", 0.0), metavar="2s", help=f"virtual time of the run ({USUAL_TIME_S:g} s)"
     )
     length.add_argument("--steps", type=whole_number(1), metavar="N", help="run until so many steps")
-    command.add_argument("--seed", type=whole_number(), default=1, metavar="N", help="seed of the run (1)")
+    command.add_argument("--seed", type=whole_number(0), default=1, metavar="N", help="seed of the run (1)")
     command.add_argument(
         "--edge-rate",
         type=number(least=0.0, most=1e9),

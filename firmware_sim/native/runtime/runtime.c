@@ -274,6 +274,7 @@ void fw_can_write_IER(uint32_t controller, uint32_t value) { HOST2(can_write_IER
 #define PLACES 6u           /* of the program's functions, innermost first */
 #define MOST_FRAMES 64u     /* looked at for them: between them are frames of the harness */
 #define OVERFLOW_FLAG 256   /* in the record's first number, beside the signal */
+#define EXIT_FLAG 512       /* in its place: the program called exit, whose code is added */
 #define NEAR_WORDS 1024u    /* of the stack, looked at where there are no frames */
 #define NEAR_STACK 65536u   /* bytes: an access so near to the stack pointer that fails has left the stack */
 
@@ -323,6 +324,8 @@ static struct {
     uintptr_t end;
     char stack[131072]; /* the handler's own: the program's may be what is used up */
 } watch;
+
+void __real__exit(int code) __attribute__((noreturn));
 
 /* The two words of a frame: the frame before, and where it goes on. By the kernel, as nothing need be there. */
 static int frame_at(uintptr_t address, uintptr_t words[2])
@@ -391,10 +394,19 @@ static char *hexadecimal(char *to, uint64_t number)
     return to;
 }
 
+static void say(const char *text)
+{
+    const char *end = text;
+    while (*end)
+        end++;
+    if (write(2, text, (size_t)(end - text)) < 0)
+        return;
+}
+
 /* Only what is allowed in a signal's handler. */
 static void tell_places(uint32_t count)
 {
-    char text[32 * PLACES], *to = text;
+    char text[32 * PLACES + 1], *to = text;
     for (uint32_t i = 0; i < count; i++) {
         *to++ = ' ';
         *to++ = '0';
@@ -402,12 +414,45 @@ static void tell_places(uint32_t count)
         to = hexadecimal(to, (uint64_t)watch.record[1 + i]);
     }
     *to++ = '\n';
-    const char *end = watch.message;
-    while (*end)
-        end++;
-    if (write(2, watch.message, (size_t)(end - watch.message)) >= 0 && write(2, text, (size_t)(to - text)) >= 0)
-        return;
+    *to = 0;
+    say(watch.message);
+    say(text);
 }
+
+/* The program ends the process by itself: a failure, whatever code it chose. */
+static void leave(int code, void *frame)
+{
+    char text[16], *to = text + sizeof text - 1;
+    *to = 0;
+    for (uint32_t rest = (uint32_t)code & 0xFFu; to == text + sizeof text - 1 || rest > 0; rest /= 10)
+        *--to = (char)('0' + rest % 10);
+    if (watch.record != NULL) {
+        for (uint32_t i = 0; i <= PLACES; i++)
+            watch.record[i] = 0;
+        const uint32_t count = note_frames(0, (uintptr_t)frame);
+        watch.record[0] = EXIT_FLAG + (code & 0xFF);
+        if (watch.message != NULL)
+            tell_places(count);
+    }
+    if (watch.record == NULL ? getenv("RANGER_SIM_TRIAL") == NULL : watch.message != NULL) {
+        say("ranger-sim: firmware in C ended this process: it called exit(");
+        say(to);
+        say(")\n");
+    }
+    if (watch.record == NULL && getenv("RANGER_SIM_TRIAL") != NULL)
+        __real__exit(code); /* the other process reports it */
+#ifdef FW_COVERAGE
+    __gcov_dump();
+#endif
+    signal(SIGABRT, SIG_DFL);
+    raise(SIGABRT);
+    __real__exit(1);
+}
+
+void __wrap_exit(int code) { leave(code, __builtin_frame_address(0)); }
+void __wrap__exit(int code) { leave(code, __builtin_frame_address(0)); }
+void __wrap__Exit(int code) { leave(code, __builtin_frame_address(0)); }
+void __wrap_quick_exit(int code) { leave(code, __builtin_frame_address(0)); }
 
 static void note_signal(int number, siginfo_t *what, void *context)
 {
@@ -488,6 +533,14 @@ EXPORTED int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message)
 }
 
 #else
+
+void __real__exit(int code) __attribute__((noreturn));
+
+/* Not a success, whatever code it chose. */
+void __wrap_exit(int code) { __real__exit(code != 0 ? code : 1); }
+void __wrap__exit(int code) { __real__exit(code != 0 ? code : 1); }
+void __wrap__Exit(int code) { __real__exit(code != 0 ? code : 1); }
+void __wrap_quick_exit(int code) { __real__exit(code != 0 ? code : 1); }
 
 EXPORTED int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message)
 {

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import platform
 import re
 import shutil
 import signal
@@ -12,16 +13,20 @@ import subprocess
 import sys
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native import crash, trial
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import places, supervisor
+from ranger_sim.harness.processes import guard, places, supervisor
+from ranger_sim.harness.processes.block import Block
+from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import Supervisor
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
-from tests.firmware_sim.native.support import COMPILER, folder_with
+from tests.firmware_sim.native.support import COMPILER, SCHEDULE, TIMER, folder_with, library_of
 from tests.harness.processes.test_supervisor import Said
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -300,7 +305,7 @@ def test_in_the_walks_own_process_an_endless_loop_ends_the_walk_in_the_same_way(
     [
         ("*(volatile uint32_t *)8 = 1;", r"SIGSEGV \(Segmentation fault\) in firmware_start\(\) at small\.c:\d+"),
         ("while (1) sink++;", r"its program let no time pass in firmware_start\(\) at small\.c:\d+"),
-        ("_exit(5);", "it ended its process with code 5"),
+        ("_exit(5);", r"it called exit\(5\) in firmware_start\(\) at small\.c:\d+"),
     ],
 )
 def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tmp_path, start, told):
@@ -308,6 +313,219 @@ def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tm
     done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
     assert (done.returncode, found) == (2, None)
     assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program does not get through its start: {told}\n", done.stderr)
+
+
+EXITS = ("exit(0);", "_exit(0);", "_Exit(0);", "quick_exit(0);")
+CONSTRUCTOR = "__attribute__((constructor)) static void early(void)\n{\n    %s\n}\n"
+RAW = '__asm__ volatile("syscall" : : "a"(231), "D"(0));'  # exit_group(0) of Linux, by no function
+
+needs_amd64 = pytest.mark.skipif(platform.machine() != "x86_64", reason="the system call is written for x86-64")
+
+
+def leaving(function):
+    """A program that calls what ends a process: quick_exit is of C11."""
+    return "#include <unistd.h>\n__attribute__((noreturn)) void quick_exit(int);\n" + function
+
+
+def refused(folder):
+    """The line with which a walk refuses a program."""
+    done, found = walked(folder)
+    assert (done.returncode, found) == (2, None)
+    (line,) = done.stderr.splitlines()
+    return line
+
+
+@needs_compiler
+@pytest.mark.parametrize("end", ["_exit(0);", pytest.param(RAW, marks=needs_amd64)])
+def test_a_library_that_ends_the_process_that_loads_it_is_refused_and_never_a_success(tmp_path, end):
+    """Whatever code it ends with: the trial says how far it came over a pipe."""
+    source = program(leaving(WELL + "\n" + CONSTRUCTOR % end))[0]
+    line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
+    assert "its program does not get through its loading (what runs in it before firmware_start" in line
+    assert line.endswith("): it ended its process with code 0")
+
+
+@needs_compiler
+def test_a_library_that_is_up_to_date_is_tried_before_a_walk_loads_it(tmp_path):
+    """It was built where its constructor did nothing."""
+    end = f'if (access("{tmp_path / "now"}", F_OK) == 0) _exit(0);'
+    folder = folder_with(tmp_path / "fw", program(leaving(WELL + "\n" + CONSTRUCTOR % end))[0], MANIFEST)
+    assert walked(folder)[1]["failed_boards"] == []
+    (tmp_path / "now").touch()
+    assert "fw: MCH: its program does not get through its loading" in refused(folder)
+
+
+@needs_compiler
+@needs_addr2line
+def test_a_start_that_calls_exit_is_refused_with_its_place(tmp_path):
+    source = program(WELL)[0].replace("{ fw_can_start", "{ exit(0); fw_can_start")
+    line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
+    assert re.search(
+        r"does not get through its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line
+    )
+
+
+@needs_compiler
+@needs_addr2line
+@pytest.mark.parametrize("end", EXITS)
+def test_a_board_that_calls_exit_in_a_walk_is_lost_there_and_the_summary_says_where(tmp_path, end):
+    function = f"__attribute__((noinline)) static void break_down(void)\n{{\n    {end} /* HERE */\n}}"
+    source, remarks = program(leaving(function), slots=100)
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
+    assert done.returncode == 1
+    assert found["failed_boards"] == ["MCH"] and found["time_s"] == pytest.approx(0.2)
+    lost = found["firmware"]["MCH"]
+    assert lost["why"].startswith(
+        f"it called exit(0) in break_down() at small.c:{remarks['HERE']}, called from control()"
+    )
+
+
+@needs_compiler
+@needs_amd64
+def test_a_board_that_ends_its_process_by_the_system_call_is_lost_too(tmp_path):
+    source = program(f"static void break_down(void) {{ {RAW} }}", slots=100)[0]
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
+    assert (done.returncode, found["failed_boards"]) == (1, ["MCH"])
+    assert found["firmware"]["MCH"]["why"] == "its process ended with code 0"
+
+
+@needs_compiler
+def test_in_the_walks_own_process_exit_is_never_a_success_and_is_named(tmp_path):
+    source = program("static void break_down(void) { exit(0); }", slots=100)[0]
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST), "--in-process")
+    assert (done.returncode, found) == (-signal.SIGABRT, None)
+    assert "ranger-sim: MCH: its program has ended this process, where: addr2line " in done.stderr
+    assert "ranger-sim: firmware in C ended this process: it called exit(0)" in done.stderr
+
+
+@needs_compiler
+def test_a_board_that_nothing_watches_yet_does_not_end_its_process_with_success(tmp_path):
+    """A board of a machine of one's own, whose start leaves only where it was not tried."""
+    start = f'void firmware_start(void) {{ if (access("{tmp_path / "now"}", F_OK) == 0) exit(0); }}\n'
+    source = "#include <stdlib.h>\n#include <unistd.h>\n" + TIMER + SCHEDULE + start
+    library = library_of(folder_with(tmp_path / "fw", source))
+    (tmp_path / "now").touch()
+    board = f"from ranger_sim.firmware_sim.native.native_board import NativeBoard; NativeBoard('A', {str(library)!r})"
+    done = subprocess.run(
+        [sys.executable, "-c", board], cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
+    assert done.returncode == -signal.SIGABRT
+    assert done.stderr == "ranger-sim: firmware in C ended this process: it called exit(0)\n"
+
+
+HANGS = {
+    "raise(SIGSTOP);": r"its process was stopped (SIGSTOP) for 1 s: its program let no time pass in ",
+    "pause();": "no answer for 1 s: its program let no time pass in break_down() at small.c:",
+    "sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); for (;;) pause();": "no answer for 1 s",
+    "for (int each = 3; each < 1024; each++) close(each);": "its answers no longer arrive (descriptors of its process",
+}
+
+
+@needs_compiler
+@needs_addr2line
+@pytest.mark.parametrize("end", HANGS, ids=["stops itself", "sleeps", "blocks signals", "closes descriptors"])
+def test_a_walk_waits_for_no_board_without_a_sign_of_life_and_says_why_it_was_lost(tmp_path, end):
+    head = "#define _POSIX_C_SOURCE 200809L\n#include <signal.h>\n#include <unistd.h>\n"
+    function = f"__attribute__((noinline)) static void break_down(void)\n{{\n    {end}\n    sink++;\n}}"
+    source = head + program(function, slots=100)[0]
+    done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST), "--board-deadline", "1s")
+    assert (done.returncode, found["failed_boards"]) == (1, ["MCH"])
+    assert found["firmware"]["MCH"]["why"].startswith(HANGS[end])
+    assert found["time_s"] == pytest.approx(0.2)
+
+
+@needs_compiler
+def test_in_up_a_board_that_closes_its_descriptors_is_killed_too(tmp_path):
+    function = "static void break_down(void) { for (int each = 3; each < 1024; each++) close(each); }"
+    folder = folder_with(tmp_path / "fw", "#include <unistd.h>\n" + program(function, slots=100)[0], MANIFEST)
+    done = up(folder, tmp_path / "summary.json")
+    assert re.search(r"MCH \(process \d+\) hangs: no answer for", done.stderr)
+    assert done.returncode == 1
+    assert "MCH" in json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["failed_boards"]
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("start", "told"),
+    [
+        ("raise(SIGSTOP);", "no answer for 0.3 s"),
+        ("pause();", "no answer for 0.3 s"),
+        ("for (int each = 3; each < 1024; each++) close(each);", "it ended its process with code 1"),
+    ],
+)
+def test_a_start_without_a_sign_of_life_is_refused(tmp_path, monkeypatch, start, told):
+    monkeypatch.setattr(trial, "PATIENCE_S", 0.3)
+    head = "#define _POSIX_C_SOURCE 200809L\n#include <signal.h>\n#include <unistd.h>\n"
+    source = head + program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start")
+    folder = folder_with(tmp_path / "fw", source, MANIFEST)
+    with pytest.raises(UserError, match=re.escape(f"MCH: its program does not get through its start: {told}")):
+        Ranger(firmware={"MCH": folder})
+
+
+@dataclasses.dataclass
+class Owing:
+    """A board's process that owes an answer, as the guard sees it: `state` and processor time are what /proc says."""
+
+    guard: Guard
+    block: Block
+    sent: list
+    state: str = "S"
+    used_s: float = 0.0
+
+
+@pytest.fixture
+def owing(monkeypatch):
+    block = Block("MCH", 0, 0)
+    made = Owing(Guard({"MCH": block}, {"MCH": 2**22}, {}, frozenset({"MCH"}), 10.0), block, [])
+    monkeypatch.setattr(guard.os, "kill", lambda process, number: made.sent.append(number))
+    monkeypatch.setattr(guard.kernel, "state_of", lambda process: made.state)
+    monkeypatch.setattr(guard.kernel, "processor_time_s", lambda process: made.used_s)
+    block.words[places.ASKED], block.words[places.ANSWERED] = 5, 4
+    yield made
+    block.close()
+
+
+def looks(owing, count):
+    for _ in range(count):
+        owing.guard.look("MCH")
+
+
+def test_a_board_without_an_answer_is_asked_where_it_is_after_the_deadline_and_then_killed(owing):
+    looks(owing, guard.LOOKS)
+    assert owing.sent == []
+    looks(owing, 1)
+    assert owing.sent == [crash.ASKED, signal.SIGCONT]
+    looks(owing, 1)
+    assert owing.sent == [crash.ASKED, signal.SIGCONT, signal.SIGKILL]
+    assert owing.block.fault() == "no answer for 10 s"
+
+
+def test_every_answer_is_a_sign_of_life(owing):
+    for turn in range(6, 40):
+        looks(owing, guard.LOOKS)
+        owing.block.words[places.ASKED], owing.block.words[places.ANSWERED] = turn, turn - 1
+    assert owing.sent == []
+
+
+@pytest.mark.parametrize(("state", "used_s"), [("t", 0.0), ("R", 4.9)], ids=["in a debugger", "on a busy machine"])
+def test_a_board_that_cannot_answer_yet_is_waited_for(owing, state, used_s):
+    looks(owing, 1)
+    owing.state, owing.used_s = state, used_s
+    looks(owing, 10 * guard.LOOKS)
+    assert owing.sent == []
+
+
+def test_a_board_whose_answer_is_there_or_is_not_waited_for_is_left_alone(owing):
+    owing.block.words[places.ANSWERED] = 5
+    looks(owing, 10 * guard.LOOKS)  # nothing waits
+    owing.block.words[places.PLANT_SLEEPS] = 1
+    os.eventfd_write(owing.block.answer_descriptor, 1)
+    looks(owing, 10 * guard.LOOKS)  # its answer arrived, and is read when the machine has time
+    assert owing.sent == []
+    os.eventfd_read(owing.block.answer_descriptor)
+    looks(owing, guard.LOOKS)
+    assert owing.sent == [signal.SIGKILL]
+    assert owing.block.fault().startswith("its answers no longer arrive (descriptors of its process are closed)")
 
 
 def up(folder, summary):
@@ -326,6 +544,40 @@ def test_a_record_without_places_says_that_it_was_outside_of_the_program(tmp_pat
     record = [signal.SIGBUS, 0, 0, 0, 0, 0, 0]
     told = crash.told(tmp_path / "small.so", tmp_path, record)
     assert told == f"SIGBUS ({signal.strsignal(signal.SIGBUS)}), outside of the program's code"
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        [200, 1],
+        [255, 1],
+        [-1, 1],
+        [2**63 - 1, 1],
+        [-(2**63), 1],
+        [signal.SIGSEGV, -1],
+        [signal.SIGSEGV, 2**62],
+        [1024, 0],
+    ],
+)
+def test_a_record_that_the_program_wrote_over_is_named_so(tmp_path, record):
+    told = crash.told(tmp_path / "small.so", tmp_path, [*record, 0, 0, 0, 0, 0])
+    assert told == "the record of its end is not readable: its program wrote over it"
+
+
+@given(st.lists(st.integers(-(2**63), 2**63 - 1), min_size=crash.RECORD, max_size=crash.RECORD))
+def test_no_record_ends_in_a_traceback(record):
+    assert crash.told(pathlib.Path("small.so"), pathlib.Path("sources"), record) or record[0] == 0
+
+
+@given(st.integers(-(2**63), 2**63 - 1), st.binary(max_size=64))
+def test_no_notebook_ends_in_a_traceback(length, scribbled):
+    notebook = crash.Notebook()
+    record = notebook.new_record("MCH", pathlib.Path("small.so"), pathlib.Path("sources"))
+    record[0] = signal.SIGSEGV
+    assert notebook.told().startswith("MCH: SIGSEGV (")
+    notebook.words[crash.RECORD] = length
+    notebook.words.cast("B")[8 * (crash.RECORD + 1) :][: len(scribbled)] = scribbled
+    assert "SIGSEGV" in notebook.told() or crash.UNREADABLE in notebook.told()
 
 
 def test_no_record_says_nothing(tmp_path):

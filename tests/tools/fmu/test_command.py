@@ -1,6 +1,5 @@
 """`ranger-sim fmu`: mistakes are one line, and no file is left."""
 
-import importlib.util
 import os
 
 import pytest
@@ -37,9 +36,3 @@ def test_a_mistake_is_one_line(arguments, expected, tmp_path, monkeypatch, capsy
     (tmp_path / "none" / "at").mkdir()
     assert expected in told(capsys, *arguments)
     assert [each for each in os.listdir(tmp_path) if each.startswith("body")] == []
-
-
-def test_without_pythonfmu3_it_says_what_to_install(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    assert "pip install 'ranger-sim[fmi]'" in told(capsys, str(tmp_path / "body.fmu"))
-    assert not list(tmp_path.iterdir())

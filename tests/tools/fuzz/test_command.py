@@ -10,8 +10,8 @@ from ranger_sim.tools.fuzz import Finding, command, profiles
 
 def test_targets_are_fuzzed_with_the_seed_and_the_cases_asked_for(capsys, monkeypatch):
     monkeypatch.setattr(profiles, "run", lambda cases, seed: {"cases": cases, "seed": seed})
-    assert cli.main(["fuzz", "profiles", "--cases", "7", "--seed", "-3"]) == 0
-    assert capsys.readouterr().out == "profiles: cases 7, seed -3\n"
+    assert cli.main(["fuzz", "profiles", "--cases", "7", "--seed", "3"]) == 0
+    assert capsys.readouterr().out == "profiles: cases 7, seed 3\n"
 
 
 def test_the_same_seed_gives_the_same_cases_and_another_others(capsys):

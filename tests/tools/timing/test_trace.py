@@ -78,7 +78,7 @@ def test_what_cannot_be_written_is_told_in_one_line_before_anything_runs(
 def test_a_library_that_is_missing_is_told_before_anything_runs(capsys, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "vcd", None)  # what an environment without it looks like
     code, text = told(capsys, "walk", "--steps", "100000", "--trace", str(tmp_path / "run.vcd"))
-    assert code == 2 and "this needs pyvcd, which is missing" in text and text.count("\n") == 1
+    assert code == 2 and "walk needs the library pyvcd, which is not installed" in text and text.count("\n") == 1
 
 
 def test_a_time_that_is_none_is_refused(capsys):

@@ -1,0 +1,127 @@
+"""A library that is not installed: one line that names it, the command, and what installs it here; exit code 2."""
+
+import importlib.metadata
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+from ranger_sim import loading
+from ranger_sim.tools.command_line import libraries
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+HIDING = """
+import sys
+
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == sys.argv[1]:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Hidden())
+from ranger_sim.tools.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+CAMPAIGN = '[vary]\nseed = [1]\nfault = ["UI.imu:gyro_bias@4s"]\n'
+# every library of pyproject.toml, by a command that needs it
+NEEDED = {
+    "asammdf": ["diagnose run.mf4 --experiment motor-bench"],
+    "can": ["bus", "check-bus x", "up --bus can1=virtual:x --steps 1"],
+    "cantools": ["can-bounds --dbc x.dbc"],
+    "cffi": [f"walk --time 50ms --firmware MCH={ROOT / 'examples' / 'hip_in_c'}"],
+    "cryptography": ["campaign few.toml --out c --pool dask"],
+    "distributed": ["campaign few.toml --out c --pool dask", "campaign few.toml --out c --scheduler tls://x:1"],
+    "elftools": ["walk --image MCH=hip.axf"],
+    "h11": ["panel"],
+    "jinja2": ["walk --time 50ms --out o"],
+    "mcap": ["walk --time 50ms --trace t.mcap"],
+    "numpy": ["walk --time 50ms", "diagnose run.csv --experiment motor-bench"],
+    "perfetto": ["walk --time 50ms --trace t.pftrace"],
+    "plotly": ["walk --time 50ms --out o"],
+    "pythonfmu3": ["fmu b.fmu"],
+    "rich": ["info", "walk --time 50ms"],
+    "scipy": [
+        "diagnose run.csv --experiment motor-bench",
+        "identify all --out f",
+        "campaign few.toml --out c",
+        "compare-walk run.csv",
+        "diagnose-figures run.csv",
+        "causes --experiment motor-bench --channels angle",
+    ],
+    "serial": ["up --time 50ms --daq-port /dev/nowhere"],
+    "shtab": ["completion bash"],
+    "starlette": ["panel"],
+    "uvicorn": ["panel"],
+    "vcd": ["walk --time 50ms --trace t.vcd"],
+    "websockets": ["panel --walk"],
+}
+OF_INTERPRETED_RUNS = {"cython"}  # compiled modules do without, and plain ones do not start without
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "few.toml").write_text(CAMPAIGN)
+    (tmp_path / "hip.axf").write_bytes(b"\x7fELF")
+    for name in ("run.csv", "run.mf4", "x.dbc"):
+        (tmp_path / name).write_text("t,angle\n0,1\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize(("library", "command"), [(name, each) for name, several in NEEDED.items() for each in several])
+def test_a_missing_library_is_named_in_one_line_with_what_installs_it(library, command, folder):
+    done = subprocess.run(
+        [sys.executable, "-c", HIDING, library, *command.split()],
+        cwd=folder,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 2, done.stderr
+    *before, line = done.stderr.splitlines()
+    package = libraries.PACKAGES.get(library, library)
+    name = command.split()[0]
+    assert line.startswith(
+        f"ranger-sim: {name} needs the library {package}, which is not installed; this installs it: "
+    )
+    assert "Traceback" not in done.stderr
+    if "--out o" not in command:  # there the walk has ended, and said so
+        assert before == []
+
+
+def test_every_library_of_the_package_is_hidden_once():
+    listed = importlib.metadata.requires("ranger-sim")
+    tools = {"docs", "dev"}
+    packages = {
+        libraries._name(line)
+        for line in listed
+        if not (found := re.search(r"extra == ['\"](.+?)['\"]", line)) or found[1] not in tools
+    }
+    hidden = {libraries._name(libraries.PACKAGES.get(each, each)) for each in NEEDED}
+    assert packages - OF_INTERPRETED_RUNS <= hidden | {"protobuf"}
+
+
+def test_a_library_of_the_package_comes_by_pip_as_it_asks_for_it(monkeypatch):
+    monkeypatch.setattr(sys, "executable", str(pathlib.Path.cwd() / "env" / "bin" / "python"))
+    assert libraries.installs("scipy") == 'env/bin/python -m pip install "scipy>=1.12"'
+    assert libraries.installs("of_a_user") == 'env/bin/python -m pip install "of_a_user"'
+
+
+def test_an_extra_comes_whole_by_make_where_make_made_the_environment_and_else_by_pip(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/elsewhere/bin/python")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    by_pip = libraries.installs("mcap")
+    assert re.fullmatch(r'/elsewhere/bin/python -m pip install "mcap>=[\d.]+"', by_pip)
+    (tmp_path / "installed-walk.txt").touch()
+    monkeypatch.chdir(loading.HOUSE)
+    assert libraries.installs("mcap") == "make setup"
+    monkeypatch.chdir(tmp_path)
+    assert libraries.installs("mcap") == f"make -C {loading.HOUSE} setup"
+
+
+@pytest.mark.parametrize("module", ["ranger_sim.nothing", "fcntl", ""])
+def test_what_is_not_a_library_stays_a_fault_of_the_program(module):
+    assert libraries.missing(ModuleNotFoundError("no", name=module), "walk") is None
