@@ -1,19 +1,19 @@
 """The command `ranger-sim`: every subcommand is one module of this package (or a room's own `cli`)."""
 
 import argparse
+import contextlib
 import difflib
 import sys
 from typing import Any, NoReturn
 
 from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError, printable
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import interrupts, streams
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
 EXIT_MISUSE = 2
-EXIT_INTERRUPTED = 130
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -102,22 +102,26 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the process's exit code. A user's mistake is one line and code 2."""
-    terminal.stand_in_for_closed_streams()
+    is_own_process = streams.take_over()
+    if is_own_process:
+        interrupts.end_in_order()
     try:
         options = parser().parse_args(arguments)
         options.arguments = list(sys.argv[1:] if arguments is None else arguments)
-        code: int = options.run(options)
+        alone = streams.results_alone() if getattr(options, "json", None) == "-" else contextlib.nullcontext()
+        with alone:
+            code: int = options.run(options)
         sys.stdout.flush()
         return code
     except UserError as mistake:
         return misuse(str(mistake))
     except KeyboardInterrupt:
+        if is_own_process:
+            interrupts.end_at_once()
         print("ranger-sim: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of our output left, e.g. `| head`
-        return output_closed()
+        return interrupts.EXIT_INTERRUPTED
     except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
-        place = error.filename or (terminal.OUTPUT if terminal.output_is_stuck() else None)
+        place = error.filename or ("standard output" if streams.is_stuck() else None)
         return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
     except MemoryError:
         return misuse(f"{options.command}: out of memory")
@@ -127,12 +131,6 @@ def misuse(text: str) -> int:
     """Say what is wrong, on standard error."""
     print(f"ranger-sim: {text}", file=sys.stderr)
     return EXIT_MISUSE
-
-
-def output_closed() -> int:
-    """Nobody reads standard output any more: let the interpreter flush into nothing."""
-    terminal.lead_nowhere(sys.stdout)
-    return EXIT_DONE
 
 
 if __name__ == "__main__":
