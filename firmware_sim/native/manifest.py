@@ -20,10 +20,10 @@ inputs = { 2 = 0, 1 = 1 }    # multiplexer code = analog place
 import dataclasses
 import pathlib
 import re
-import tomllib
 from typing import Any
 
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter, SpiDevice
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 
 FILE = "firmware.toml"
@@ -49,15 +49,9 @@ def load(folder: str | pathlib.Path) -> Manifest:
     """The manifest in `folder`; UserError that names file, key and value for whatever is wrong with it."""
     folder = pathlib.Path(folder)
     path = folder / FILE
-    try:
-        with path.open("rb") as file:
-            found = tomllib.load(file)
-    except (FileNotFoundError, NotADirectoryError):
-        raise UserError(f"{folder}: no {FILE} in it, so it is no folder of firmware") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: {error}") from None
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+    if not path.exists():
+        raise UserError(f"{folder}: no {FILE} in it, so it is not a folder of firmware")
+    found = toml_file.load(path)
     _known(path, "", found, ("firmware", "defines", "hardware"))
     firmware = _table(path, found, "firmware")
     _known(path, "firmware.", firmware, ("name", "sources", "include", "tables", "master", "options"))
