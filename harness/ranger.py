@@ -33,6 +33,7 @@ from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.firmware_sim.native import coverage, crash
 from ranger_sim.firmware_sim.native.trial import tried
+from ranger_sim.foundation.quantities import Duration
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
@@ -267,7 +268,7 @@ class Ranger(Machine):
             if self.printed is not None:
                 self.printed.poll()
 
-    def until(self, wanted: Wanted, within: str = "60 s") -> float:
+    def until(self, wanted: Wanted, within: Duration = "60 s") -> float:
         """Pass time until a condition holds, as any machine does.
 
         What boards noted that run in processes of their own is asked of them at each step then, which takes time.
