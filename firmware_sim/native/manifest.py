@@ -2,7 +2,7 @@
 
 [firmware]
 name = "hip"                 # of the library
-sources = ["*.c"]            # patterns, relative to this file
+sources = ["*.c"]            # patterns, relative to this file; C++ is refused, also next to them where this is left out
 include = ["."]              # folders of headers beside ours
 tables = ["mch"]             # generated C of these boards' data tables, compiled along
 master = "../table"          # folder of the master table that they are of; left out: Ranger's
@@ -27,6 +27,8 @@ from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 
 FILE = "firmware.toml"
+DEFAULT_SOURCES = ["*.c"]
+CPLUSPLUS = (".cpp", ".cc", ".cxx", ".c++", ".C")
 NAME = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -61,7 +63,7 @@ def load(folder: str | pathlib.Path) -> Manifest:
     return Manifest(
         folder=folder,
         name=name,
-        sources=_sources(path, folder, _texts(path, firmware, "sources", ["*.c"])),
+        sources=_sources(path, folder, _texts(path, firmware, "sources", DEFAULT_SOURCES), "sources" in firmware),
         include=tuple(_folder(path, folder, each) for each in _texts(path, firmware, "include", ["."])),
         tables=tuple(_texts(path, firmware, "tables", [])),
         master=_master(path, folder, firmware),
@@ -91,7 +93,7 @@ def _texts(path: pathlib.Path, firmware: dict, key: str, default: list[str]) -> 
     return found
 
 
-def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str]) -> tuple[pathlib.Path, ...]:
+def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str], given: bool) -> tuple[pathlib.Path, ...]:
     sources: list[pathlib.Path] = []
     for pattern in patterns:
         try:
@@ -101,6 +103,11 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str]) -> t
         if not matching:
             raise UserError(f"{path}: firmware.sources: {pattern!r} matches no file in {folder}")
         sources += [each for each in matching if each not in sources]
+    beside = [] if given else [each for each in sorted(folder.iterdir()) if each not in sources]
+    for each in (*sources, *beside):
+        if each.suffix in CPLUSPLUS:
+            way_out = "" if each in sources else f" (firmware.sources = {DEFAULT_SOURCES} leaves it out)"
+            raise UserError(f"{path}: {each.name} is C++, and firmware is built from C alone{way_out}")
     return tuple(sources)
 
 
