@@ -132,7 +132,10 @@ def admitted(line: bytes) -> Request:
 
 def _object(line: bytes) -> dict[str, Any]:
     """The JSON object of a line."""
-    content = json_text.loads(line, "a request")
+    try:
+        content = json_text.loads(line, "a request")
+    except json_text.JsonError as mistake:
+        raise UserError(f"a request is one line with a JSON object ({mistake.reason})") from None
     if not isinstance(content, dict):
         raise UserError("a request is one line with a JSON object")
     return content
