@@ -3,7 +3,7 @@
 [firmware]
 name = "hip"                 # of the library
 sources = ["*.c"]            # patterns, relative to this file; C++ is refused, also next to them where this is left out
-include = ["."]              # folders of headers beside ours
+include = ["."]              # folders of headers, in addition to ours
 tables = ["mch"]             # generated C of these boards' data tables, compiled along
 master = "../table"          # folder of the master table that they are of; left out: Ranger's
 options = ["-O2"]            # more for the compiler, behind ours
@@ -103,8 +103,8 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str], give
         if not matching:
             raise UserError(f"{path}: firmware.sources: {pattern!r} matches no file in {folder}")
         sources += [each for each in matching if each not in sources]
-    beside = [] if given else [each for each in sorted(folder.iterdir()) if each not in sources]
-    for each in (*sources, *beside):
+    others = [] if given else [each for each in sorted(folder.iterdir()) if each not in sources]
+    for each in (*sources, *others):
         if each.suffix in CPLUSPLUS:
             way_out = "" if each in sources else f" (firmware.sources = {DEFAULT_SOURCES} leaves it out)"
             raise UserError(f"{path}: {each.name} is C++, and firmware is built from C alone{way_out}")

@@ -147,8 +147,8 @@ class Wire:
         for each in self._elsewhere(cause):
             waited = round(self.now_s * 1e9) - each.time_ns
             if each.time_ns > answered and waited > allowed and (condition is None or condition(each)):
-                told = f"no effect for {duration_text(waited)}, allowed is at most {given_text(at_most)}"
-                self._fail(f"{found.what}: {told}", [each])
+                why = f"no effect for {duration_text(waited)}, allowed is at most {given_text(at_most)}"
+                self._fail(f"{found.what}: {why}", [each])
         return found
 
     # --- values -------------------------------------------------------------------------------------------

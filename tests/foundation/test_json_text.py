@@ -16,7 +16,7 @@ def test_what_the_standard_has_is_read():
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ('{"at": 1e400}', "1e400 is not a finite number"),
         ('{"at": -1e999}', "-1e999 is not a finite number"),
@@ -32,8 +32,8 @@ def test_what_the_standard_has_is_read():
         (b'"\xff"', "not UTF-8 text (byte 1)"),
     ],
 )
-def test_anything_else_is_refused_with_its_place(text, told):
+def test_anything_else_is_refused_with_its_place(text, message):
     with pytest.raises(UserError) as error:
         json_text.loads(text, "a request")
-    assert str(error.value).startswith(f"a request: {told}")
+    assert str(error.value).startswith(f"a request: {message}")
     assert len(str(error.value)) < 200

@@ -48,7 +48,7 @@ def test_anything_else_as_a_duration_is_one_clear_error(duration):
     )
 
 
-def test_a_duration_is_told_as_it_was_given():
+def test_a_duration_is_printed_as_it_was_given():
     assert [given_text(each) for each in ("20ms", 0.02, 0)] == ["20ms", "20 ms", "0 ns"]
 
 

@@ -29,7 +29,7 @@ def test_a_file_reads_with_and_without_a_byte_order_mark_on_either_system(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         ("a = 1\nb = \n", ":2:5: not valid TOML: Invalid value"),
         ("a = 1\n[b\n", ":2:3: not valid TOML: Expected ']' at the end of a table declaration"),
@@ -42,10 +42,10 @@ def test_a_file_reads_with_and_without_a_byte_order_mark_on_either_system(tmp_pa
         (f"a = {'9' * 5000}", ": not valid TOML: Exceeds the limit (4300 digits) for integer string conversion"),
     ],
 )
-def test_a_mistake_is_told_with_file_line_and_column(tmp_path, content, told):
+def test_a_mistake_is_reported_with_file_line_and_column(tmp_path, content, message):
     with pytest.raises(UserError) as error:
         load(tmp_path, content)
-    assert str(error.value).startswith(f"{tmp_path / 'mine.toml'}{told}")
+    assert str(error.value).startswith(f"{tmp_path / 'mine.toml'}{message}")
     assert len(str(error.value).splitlines()) == 1
 
 
@@ -54,7 +54,7 @@ LONGEST = ".".join("k" * 16) + " = 1"
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         ("a = " + "[" * 33 + "]" * 33, ":1:37: nested more than 32 levels deep"),
         ("\n\na = " + "{b = " * 100_000 + "1" + "}" * 100_000, ":3:165: nested more than 32 levels deep"),
@@ -65,11 +65,11 @@ LONGEST = ".".join("k" * 16) + " = 1"
         ("#" * (1 << 20) + "#", ": larger than 1048576 bytes"),
     ],
 )
-def test_a_file_beyond_a_limit_is_refused_at_once(tmp_path, content, told):
+def test_a_file_beyond_a_limit_is_refused_at_once(tmp_path, content, message):
     begun = process_cpu_s()
     with pytest.raises(toml_file.TomlError) as error:
         load(tmp_path, content)
-    assert str(error.value).endswith(f"mine.toml{told}")
+    assert str(error.value).endswith(f"mine.toml{message}")
     assert process_cpu_s() - begun < 1.0  # milliseconds; a key of 50,000 parts took 15 s
 
 
@@ -91,7 +91,7 @@ def test_many_keys_of_one_file_are_read(tmp_path):
     assert len(load(tmp_path, text)) == 3001
 
 
-def test_what_cannot_be_opened_is_told_as_the_system_says(tmp_path):
+def test_what_cannot_be_opened_is_reported_as_the_system_says(tmp_path):
     for name, why in (("none.toml", "No such file or directory"), ("", "Is a directory"), ("\0", "not the name")):
         with pytest.raises(UserError, match=why):
             toml_file.load(f"{tmp_path}/{name}", "body file")

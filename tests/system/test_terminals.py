@@ -109,5 +109,5 @@ def test_a_campaign_that_was_interrupted_says_how_it_continues(at_work):
     terminal = at_work("campaign")
     terminal.press(CTRL_C)
     assert terminal.wait() == INTERRUPTED
-    told = " ".join(re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", terminal.shown).split())
-    assert re.search(r"interrupted: \d+ of \d+ runs are kept in kept; the same command continues there", told)
+    shown = " ".join(re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", terminal.shown).split())
+    assert re.search(r"interrupted: \d+ of \d+ runs are kept in kept; the same command continues there", shown)

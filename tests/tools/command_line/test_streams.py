@@ -40,8 +40,8 @@ def test_in_a_process_of_another_program_its_streams_stay(capsys):
     with streams.results_alone():
         print("aside")
         streams.print_result("result")
-    told = capsys.readouterr()
-    assert (told.out, told.err) == ("result\n", "aside\n") and sys.stdout is before
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ("result\n", "aside\n") and sys.stdout is before
 
 
 def test_what_is_printed_to_a_reader_that_has_left_vanishes():
