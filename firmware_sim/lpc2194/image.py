@@ -168,7 +168,7 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
 def _newer_architecture(elf: Any) -> str:
     """What the build attributes of an ELFFile ask for beyond ARMv4T; empty when that is enough, or nothing is said."""
     sections = imported("elftools.elf.sections").ARMAttributesSection
-    found = {}
+    found: dict[str, Any] = {}
     for section in elf.iter_sections():
         if isinstance(section, sections):
             for part in section.iter_subsections():
