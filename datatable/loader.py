@@ -12,7 +12,6 @@ import io
 import keyword
 import pathlib
 import re
-import tomllib
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
@@ -35,6 +34,7 @@ from ranger_sim.datatable.model import (
     Variable,
 )
 from ranger_sim.datatable.routing import unreachable
+from ranger_sim.foundation import toml_file
 from ranger_sim.loading import OWN_TABLE
 
 MASTER_FOLDER = pathlib.Path(__file__).parent / "master"
@@ -290,15 +290,12 @@ def read_boards(
     text = read_text(path, faults)
     if text is None:
         return nothing
-    report = faults.at(path.name, 1, "")
     try:
-        content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, ValueError) as error:
-        report("", f"is not TOML: {error}")
+        content = toml_file.loads(text.encode(), path.name)
+    except toml_file.TomlError as error:
+        faults.at(path.name, error.line or 1, "")("", error.reason)
         return nothing
-    except RecursionError:
-        report("", "is nested too deeply")
-        return nothing
+    report = faults.at(path.name, 1, "")
     for key in content:
         if key not in ("buses", "boards"):
             report(shown(key), "is not a section; the sections are buses and boards")

@@ -1,6 +1,7 @@
 """Quantities as people write them: 60s, 1.5 km, 1mm, 70 %, 450 us."""
 
 import math
+import numbers
 import re
 
 from ranger_sim.foundation.user_error import UserError
@@ -10,6 +11,8 @@ ENERGIES_WH = {"Wh": 1.0, "kWh": 1e3}
 SHARES = {"%": 1e-2}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
 TIMES = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+Duration = str | float  # "20 ms", or a number of seconds
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
@@ -30,6 +33,27 @@ def nanoseconds(duration: str, what: str = "duration") -> int:
     if value < 0.0:
         raise UserError(f"{what} {duration!r}: it must not be below 0")
     return round(value * 1e9)
+
+
+def duration_ns(duration: Duration, what: str = "duration") -> int:
+    """`duration`, as "20 ms" or as a number of seconds, in whole ns. UserError names `what` for anything else."""
+    if isinstance(duration, str) and re.search(r"[a-z]\s*$", duration):
+        seconds = in_base_units(duration, TIMES)
+    elif isinstance(duration, numbers.Real) and not isinstance(duration, bool):
+        seconds = float(duration)
+    else:
+        seconds = None
+    if seconds is None or not math.isfinite(seconds) or seconds < 0.0:
+        raise UserError(
+            f"{what} {duration!r}: a time from 0 on is needed, as text such as '20 ms' (units {', '.join(TIMES)}) or "
+            "as a number of seconds"
+        )
+    return round(seconds * 1e9)
+
+
+def given_text(duration: Duration) -> str:
+    """A duration as it was written, or with its unit when it is a number of seconds."""
+    return duration if isinstance(duration, str) else duration_text(duration_ns(duration))
 
 
 def duration_text(time_ns: float) -> str:

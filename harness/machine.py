@@ -20,7 +20,7 @@ import numpy as np
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER, STAGE_BUS
-from ranger_sim.foundation.quantities import duration_text, nanoseconds
+from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import lockstep, waiting
 from ranger_sim.harness.faults import network_places
@@ -177,15 +177,16 @@ class Machine:
             return True
         return bool(self.ended)
 
-    def run_for(self, seconds: float) -> None:
-        """Pass `seconds` of virtual time, or less when the machine can go no further."""
+    def run_for(self, duration: Duration) -> None:
+        """Pass so much virtual time ("20 ms", or a number of seconds), or less when the machine can go no further."""
+        seconds = duration_ns(duration, "run_for") * 1e-9
         self.run(StopRule(time_s=self.time_s + seconds), seconds)
 
     def condition(self, wanted: Wanted) -> Condition:
         """The condition that is written in `wanted` (harness/waiting.py)."""
         return waiting.condition(wanted, self.plant.sample_names, self.names, tuple(self.boards))
 
-    def until(self, wanted: Wanted, within: str = "60 s") -> float:
+    def until(self, wanted: Wanted, within: Duration = "60 s") -> float:
         """Pass time until a condition holds; returns the virtual time since power-up, s.
 
         ConditionNotMetError, an AssertionError, when it does not hold `within` this time from now, or the machine can
@@ -193,7 +194,7 @@ class Machine:
         """
         __tracebackhide__ = True
         waited = Waiting(self, self.condition(wanted))
-        begun_ns, patience_ns = self.loop.time, nanoseconds(within, "until: within")
+        begun_ns, patience_ns = self.loop.time, duration_ns(within, "until: within")
         stop = StopRule(time_s=(begun_ns + patience_ns - self.start_ns) * 1e-9) if patience_ns else None
         self.loop.watchers.append(waited)
         try:

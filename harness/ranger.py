@@ -6,6 +6,7 @@ by the tables of harness/wiring/ranger.py; `harness/lockstep.py` then passes tim
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import difflib
 import os
@@ -32,6 +33,7 @@ from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.firmware_sim.native import coverage, crash
 from ranger_sim.firmware_sim.native.trial import tried
+from ranger_sim.foundation.quantities import Duration
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
@@ -41,6 +43,7 @@ from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.firmware import image_boards, native_boards
 from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.firmware.native_firmware import Firmware
+from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.outside import bus_schedule
@@ -95,6 +98,7 @@ class Ranger(Machine):
         in_process: bool = False,  # their programs run here: faster, but a crash of one of them ends this process
         images: Mapping[str, Image | str | os.PathLike] | None = None,  # boards that run a firmware image, by file
         board_deadline_s: float = DEADLINE_S,  # without an answer of a board's own process; 0: never (debuggers)
+        printed: Printed | None = None,  # takes what programs in C print; without it they print on standard output
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.controller = controllers.load(self.scenario.controller)
@@ -125,6 +129,7 @@ class Ranger(Machine):
                 name: dataclasses.replace(each, counts=each.counts or place / name) if each.coverage else each
                 for name, each in self.firmware.items()
             }
+        self.printed = printed
         self._try_firmware(start_ns)
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
         self.board_deadline_s = board_deadline_s
@@ -174,7 +179,14 @@ class Ranger(Machine):
                 board = self.new_board(name, start_ns + self._stream(name)[1], record)
                 board.counters()
 
-            tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+            with self._printing(name):
+                tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+            if self.printed is not None:
+                self.printed.drop(name)  # its program will print that again
+
+    def _printing(self, board: str) -> contextlib.AbstractContextManager[None]:
+        """Inside, what programs in C print in this process is the output of `board`."""
+        return self.printed.during(board) if self.printed is not None else contextlib.nullcontext()
 
     def new_board(self, name: str, power_up_ns: int, record: Any = None) -> Any:
         """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired.
@@ -185,7 +197,8 @@ class Ranger(Machine):
         if name in self.firmware:
             from ranger_sim.harness.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
-            board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
+            with self._printing(name):
+                board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
             board.counts = self.firmware[name].counts
             if record is None and self.is_watched:  # one that takes another's place
                 self._watch(board)
@@ -247,12 +260,18 @@ class Ranger(Machine):
         """
         __tracebackhide__ = True
         apart = self.start()
-        if apart is None:
-            return Machine.run(self, stop, slice_s)
-        with apart.processor():
-            return Machine.run(self, stop, slice_s)
+        here = "+".join(name for name in self.firmware if not self.loop.board(name).apart)
+        try:
+            with self._printing(here) if here else contextlib.nullcontext():
+                if apart is None:
+                    return Machine.run(self, stop, slice_s)
+                with apart.processor():
+                    return Machine.run(self, stop, slice_s)
+        finally:
+            if self.printed is not None:
+                self.printed.poll()
 
-    def until(self, wanted: Wanted, within: str = "60 s") -> float:
+    def until(self, wanted: Wanted, within: Duration = "60 s") -> float:
         """Pass time until a condition holds, as any machine does.
 
         What boards noted that run in processes of their own is asked of them at each step then, which takes time.

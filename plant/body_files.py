@@ -12,10 +12,10 @@ file, key, value, limit.
 import dataclasses
 import functools
 import pathlib
-import tomllib
 from collections.abc import Iterator
 from typing import Any
 
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.electrics.electrics import ElectricsParameters
 from ranger_sim.plant.electrics.motor_parameters import MotorParameters
@@ -126,7 +126,7 @@ def _load(name: str, users: tuple[str, ...]) -> BodyFile:
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not name.endswith(".toml") and name not in available():
         raise UserError(f"body {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
-    data = _read(path)
+    data = toml_file.load(path, "body file")
     base_name = data.get("base")
     if isinstance(base_name, str) and (base_name in users or base_name == path.stem):
         raise UserError(f"{path}: base {base_name!r} leads back to this body")
@@ -158,19 +158,6 @@ def _load(name: str, users: tuple[str, ...]) -> BodyFile:
         sources,
         parameters,
     )
-
-
-def _read(path: pathlib.Path) -> dict[str, Any]:
-    try:
-        text = path.read_bytes().decode()
-    except OSError as error:
-        raise UserError(f"body file {path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise UserError(f"body file {path}: not UTF-8 text (byte {error.start})") from None
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"body file {path}: not valid TOML: {error}") from None
 
 
 def _faults(data: dict[str, Any]) -> Iterator[str]:

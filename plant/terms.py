@@ -18,9 +18,9 @@ torques are asked for only when there are any, and sensors and windings keep the
 import dataclasses
 import math
 import pathlib
-import tomllib
 from typing import Any
 
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.mechanics import term_torques as torques
@@ -488,13 +488,7 @@ def load(path: str | pathlib.Path) -> Model:
 def content_of(path: str | pathlib.Path) -> dict[str, Any]:
     """The tables of a model file; of [diagnosis] kinds are checked, and that numbers are finite."""
     path = pathlib.Path(path)
-    try:
-        with path.open("rb") as file:
-            content = tomllib.load(file)
-    except OSError as error:
-        raise UserError(f"{path}: the model file cannot be read ({error.strerror or error})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: this is no TOML file ({error})") from None
+    content = toml_file.load(path)
     unknown = [key for key in content if key not in ("term", "title", "diagnosis")]
     if unknown:
         raise UserError(

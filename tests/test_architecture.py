@@ -47,6 +47,7 @@ ONLY_IN = {
     "_pytest": ("harness/testing/forking.py", "tools/mutate/serve.py"),
     "rich": ("tools/", "datatable/cli.py"),
     "time": ("foundation/wallclock.py",),
+    "tomllib": ("foundation/toml_file.py",),
     "random": (),
     "datetime": ("foundation/wallclock.py",),
 }

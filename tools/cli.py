@@ -1,18 +1,18 @@
 """The command `ranger-sim`: every subcommand is one module of this package (or a room's own `cli`)."""
 
 import argparse
+import contextlib
 import sys
 from typing import Any, NoReturn
 
 from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError, did_you_mean, printable
-from ranger_sim.tools.command_line import libraries
+from ranger_sim.tools.command_line import interrupts, libraries, streams
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
 EXIT_MISUSE = 2
-EXIT_INTERRUPTED = 130
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -123,25 +123,26 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run(arguments: list[str]) -> int:
     """The same, where every library is there. A user's mistake is one line and code 2."""
-    from ranger_sim.tools.command_line import terminal  # only here: it needs a library itself
-
-    terminal.stand_in_for_closed_streams()
+    is_own_process = streams.take_over()
+    if is_own_process:
+        interrupts.end_in_order()
     try:
         options = parser().parse_args(arguments)
         options.arguments = arguments
-        code: int = options.run(options)
+        alone = streams.results_alone() if getattr(options, "json", None) == "-" else contextlib.nullcontext()
+        with alone:
+            code: int = options.run(options)
         sys.stdout.flush()
         return code
     except UserError as mistake:
         return misuse(str(mistake))
     except KeyboardInterrupt:
+        if is_own_process:
+            interrupts.end_at_once()
         print("ranger-sim: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of our output left, e.g. `| head`
-        terminal.lead_nowhere(sys.stdout)
-        return EXIT_DONE
+        return interrupts.EXIT_INTERRUPTED
     except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
-        place = error.filename or (terminal.OUTPUT if terminal.output_is_stuck() else None)
+        place = error.filename or ("standard output" if streams.is_stuck() else None)
         return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
     except MemoryError:
         return misuse(f"{options.command}: out of memory")

@@ -9,7 +9,6 @@ a UserError of one line: file, key, value, limit.
 
 import math
 import pathlib
-import tomllib
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -17,6 +16,7 @@ from ranger_sim.boards.main_brain import programs
 from ranger_sim.boards.main_brain.programs import parameter_rows
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import mb as table_ids
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 
 FOLDER = pathlib.Path(__file__).parent / "parameters"
@@ -106,7 +106,7 @@ def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
         raise UserError(f"{asked}: unknown; there are {', '.join(available())}, or give a .toml file")
     if path.resolve() in [each.resolve() for each in users]:
         raise UserError(f"{asked} leads back to this set")
-    data = _read(path)
+    data = toml_file.load(path, "controller file")
     place = str(path)
     _only(data, ("title", "description", "program", "base", "parameters", "reasons", "operator"), place)
     title = _text(data, "title", place, path.stem)
@@ -145,19 +145,6 @@ def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
     else:
         raise UserError(f"{place}: [operator] is missing; give it or a base")
     return Controller(path.stem, place, title, description, program, base_name, values, changes, reasons, operator)
-
-
-def _read(path: pathlib.Path) -> dict:
-    try:
-        text = path.read_bytes().decode()
-    except OSError as error:
-        raise UserError(f"controller file {path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise UserError(f"controller file {path}: not UTF-8 text (byte {error.start})") from None
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"controller file {path}: not valid TOML: {error}") from None
 
 
 def _only(data: dict, allowed: tuple, place: str) -> None:

@@ -7,7 +7,6 @@ What is read is given by functions, so that all of it can be tested without an i
 from __future__ import annotations
 
 import dataclasses
-import json
 import pathlib
 import subprocess
 from collections.abc import Callable, Mapping
@@ -15,7 +14,7 @@ from typing import Any
 
 import can
 
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import json_text, wallclock
 
 WARNING_LEVEL = 96  # of the error counters: ISO 11898-1
 FEW_TO_WAIT = 100  # frames; the kernel's default of 10 overflows when a slot's commands go out together (chosen by us)
@@ -68,8 +67,8 @@ def read_link(device: str, sys_folder: pathlib.Path = pathlib.Path("/sys/class/n
 def parse_link(text: str, device: str) -> dict[str, Any]:
     """The one link in the JSON of `ip`; NotReadError when it is not that."""
     try:
-        found = json.loads(text)
-    except ValueError:
+        found = json_text.loads(text, "ip")
+    except json_text.JsonError:
         raise NotReadError("ip gave no JSON: a version before 4.14, or busybox's") from None
     links = (
         [one for one in found if isinstance(one, dict) and one.get("ifname") == device]

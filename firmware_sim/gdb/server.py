@@ -268,6 +268,9 @@ class GdbServer(Door[_Client]):
             self._reply(peer, b"E10")  # EBUSY
             return
         reply = self.stub.answer(payload)
+        if self.stub.console:
+            self._say(self.stub.console)
+            self.stub.console = ""
         if reply is not None:
             self._reply(peer, reply)
         self._skip_idle()
@@ -284,6 +287,6 @@ class GdbServer(Door[_Client]):
         peer.answer(peer.latest)
 
     def _say(self, text: str) -> None:
-        """A line on the debugger's console; the protocol has that only before a stop reply."""
+        """Lines on the debugger's console; the protocol has that before a stop reply and the answer of `monitor`."""
         if self.client is not None:
             self.client.answer(packets.framed(b"O" + text.encode().hex().encode()))

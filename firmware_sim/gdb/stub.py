@@ -20,9 +20,14 @@ CRC_POLYNOMIAL = 0x04C11DB7  # of qCRC: most significant bit first, begun with o
 HELP = """\
 monitor time            the board's virtual time, cycles, instructions
 monitor reset           the processor's reset input: supervisor mode, address 0; memory and devices stay
+monitor reset halt      the same, as editors send it (also reset init): a processor that is debugged stays halted
+monitor halt            where it is halted
 monitor read ADDRESS    load a device's register as the program does, with all that this does
 monitor help            this
 """
+
+
+STALE = "gdb shows its registers after: maintenance flush register-cache\n"
 
 
 class BadRequestError(Exception):
@@ -67,6 +72,7 @@ class Stub:
         self.acknowledged = True
         self.resumes = False
         self.leaves = False
+        self.console = ""  # for the debugger's console, before the answer
         self.stop = b"T%02xthread:1;" % SIGNAL_TRAP
         self.texts = {b"target.xml": description(), b"": self.target.memory_map()}
 
@@ -280,15 +286,22 @@ class Stub:
             words = bytes.fromhex(rest.decode("ascii")).decode("utf-8").split()
         except ValueError:
             raise BadRequestError from None
-        return self._monitored(words).encode().hex().encode()
+        answer = self._monitored(words)
+        if answer is None:
+            self.console = f"monitor {' '.join(words)[:40]}: unknown command\n{HELP}"
+            return b"E01"
+        return answer.encode().hex().encode()
 
-    def _monitored(self, words: list[str]) -> str:
+    def _monitored(self, words: list[str]) -> str | None:
+        """What a command of `monitor` answers; None for an unknown one."""
         target = self.target
         if words == ["time"]:
             return target.told_time() + "\n"
-        if words == ["reset"]:
+        if words in (["reset"], ["reset", "halt"], ["reset", "init"]):
             target.core.reset()
-            return f"{target.board.name}: reset\n"
+            return f"{target.board.name}: reset, halted at {target.core.pc:#010x}\n{STALE}"
+        if words == ["halt"]:
+            return f"{target.board.name}: halted at {target.core.pc:#010x}\n"
         if words[:1] == ["read"] and len(words) == 2:
             try:
                 address = int(words[1], 0)
@@ -297,7 +310,7 @@ class Stub:
                 return f"monitor read {words[1]}: {error}\n"
         if words in ([], ["help"]):
             return HELP
-        return f"monitor {' '.join(words)[:40]}: there is no such command\n{HELP}"
+        return None
 
 
 Handler = Callable[[Stub, bytes], bytes | None]

@@ -59,7 +59,8 @@ def description() -> str:
         "</feature>",
         '<feature name="ranger-sim.arm7.banked">',
         *(f'<reg name="{name}" bitsize="32" type="uint32" group="system"/>' for name in BANKED),
-        f'<reg name="{CYCLES}" bitsize="64" type="uint64" group="system"/>',
+        # time does not go back: gdb leaves it out when it restores registers after a call
+        f'<reg name="{CYCLES}" bitsize="64" type="uint64" group="system" save-restore="no"/>',
         "</feature>",
         "</target>",
     ]

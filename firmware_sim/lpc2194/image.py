@@ -8,6 +8,7 @@ import dataclasses
 import io
 import os
 import pathlib
+import re
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
@@ -15,6 +16,14 @@ from ranger_sim.foundation.user_error import UserError
 # LPC2194 user manual, memory map
 FLASH = (0x00000000, 0x40000)
 RAM = (0x40000000, 0x4000)
+
+# Addenda to the ABI for the Arm architecture 2023Q3, 3.3.5.2: Tag_CPU_arch, from 0 on
+ARCHITECTURES = (
+    "before ARMv4", "ARMv4", "ARMv4T", "ARMv5T", "ARMv5TE", "ARMv5TEJ", "ARMv6", "ARMv6KZ", "ARMv6T2", "ARMv6K",
+    "ARMv7", "ARMv6-M", "ARMv6S-M", "ARMv7E-M", "ARMv8-A", "ARMv8-R", "ARMv8-M baseline", "ARMv8-M mainline",
+)  # fmt: skip
+ARMV4T = 2
+PROFILES = {"A": "-A", "R": "-R", "M": "-M"}  # Tag_CPU_arch_profile, of ARMv7
 
 HEX_DATA, HEX_END, HEX_SEGMENT, HEX_SEGMENT_START, HEX_LINEAR, HEX_LINEAR_START = range(6)
 # record type -> (what its bytes mean, how many they are)
@@ -74,10 +83,27 @@ def read(path: str | os.PathLike) -> Image:
     elif content.lstrip().startswith(b":"):
         image = _from_hex(path, content)
     else:
-        raise UserError(f"{path}: neither an ELF file nor Intel HEX: it begins with {content[:4]!r}")
+        raise UserError(f"{path}: {_other_kind(path, content)}")
     if not image.segments:
         raise UserError(f"{path}: there is nothing in it for flash or RAM")
+    first = image.segments[0][0]
+    if first >= RAM[0]:
+        raise UserError(
+            f"{path}: linked into RAM ({first:#010x}), where a debugger loads it; the processor starts in flash, at "
+            f"{FLASH[0]:#010x}: link it for that"
+        )
     return image
+
+
+def _other_kind(path: pathlib.Path, content: bytes) -> str:
+    """What a file is that is neither ELF nor HEX, and what makes it one of them."""
+    target = path.with_suffix(".hex").name
+    if re.match(rb"\s*S[0-9][0-9A-Fa-f]{2}", content):
+        return f"Motorola S-records, not ELF or Intel HEX: arm-none-eabi-objcopy -I srec -O ihex {path.name} {target}"
+    return (
+        f"neither an ELF file nor Intel HEX: it begins with {content[:4]!r}. A plain binary does not say where it "
+        f"belongs; one for the beginning of the flash: arm-none-eabi-objcopy -I binary -O ihex {path.name} {target}"
+    )
 
 
 def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple[int, bytes], ...]:
@@ -114,6 +140,11 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
                 f"{path}: an ELF file for {elf.elfclass} bit, {order}-endian {machine.removeprefix('EM_')}; "
                 "the LPC2194 is a 32 bit, little-endian ARM"
             )
+        if built_for := _newer_architecture(elf):
+            raise UserError(
+                f"{path}: built for {built_for}, by its build attributes; the LPC2194 is an ARM7TDMI-S, "
+                f"{ARCHITECTURES[ARMV4T]} (-mcpu=arm7tdmi)"
+            )
         if elf["e_type"] != "ET_EXEC":
             raise UserError(f"{path}: an ELF file that is not linked into an image ({elf['e_type']}, not ET_EXEC)")
         pieces = []
@@ -132,6 +163,28 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
         reason = str(error) or type(error).__name__
         raise UserError(f"{path}: a damaged or truncated ELF file: {reason}") from None
     return Image(path, _checked(path, pieces), symbols)
+
+
+def _newer_architecture(elf: Any) -> str:
+    """What the build attributes of an ELFFile ask for beyond ARMv4T; empty when that is enough, or nothing is said."""
+    from elftools.elf.sections import ARMAttributesSection  # only here: a walk without images does without
+
+    found: dict[str, Any] = {}
+    for section in elf.iter_sections():
+        if isinstance(section, ARMAttributesSection):
+            for part in section.iter_subsections():
+                for of_file in part.iter_subsubsections("TAG_FILE"):
+                    found |= {each.tag: each.value for each in of_file.iter_attributes()}
+    number = found.get("TAG_CPU_ARCH", 0)
+    if number <= ARMV4T:
+        return ""
+    name = ARCHITECTURES[number] if number < len(ARCHITECTURES) else f"a newer ARM (Tag_CPU_arch {number})"
+    profile = found.get("TAG_CPU_ARCH_PROFILE", 0)
+    if name == "ARMv7":
+        name += PROFILES.get(chr(profile), "")
+    processor = found.get("TAG_CPU_NAME", "")
+    # gas gives the architecture's name again where the processor is not said: "7-M" of ARMv7-M
+    return f"{name} ({processor})" if processor and not name.endswith(processor) else name
 
 
 def _symbols(elf: Any) -> tuple[Symbol, ...]:

@@ -2,8 +2,8 @@
 
 [firmware]
 name = "hip"                 # of the library
-sources = ["*.c"]            # patterns, relative to this file
-include = ["."]              # folders of headers beside ours
+sources = ["*.c"]            # patterns, relative to this file; C++ is refused, also next to them where this is left out
+include = ["."]              # folders of headers, in addition to ours
 tables = ["mch"]             # generated C of these boards' data tables, compiled along
 master = "../table"          # folder of the master table that they are of; left out: Ranger's
 options = ["-O2"]            # more for the compiler, behind ours
@@ -20,13 +20,15 @@ inputs = { 2 = 0, 1 = 1 }    # multiplexer code = analog place
 import dataclasses
 import pathlib
 import re
-import tomllib
 from typing import Any
 
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter, SpiDevice
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 
 FILE = "firmware.toml"
+DEFAULT_SOURCES = ["*.c"]
+CPLUSPLUS = (".cpp", ".cc", ".cxx", ".c++", ".C")
 NAME = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -49,15 +51,9 @@ def load(folder: str | pathlib.Path) -> Manifest:
     """The manifest in `folder`; UserError that names file, key and value for whatever is wrong with it."""
     folder = pathlib.Path(folder)
     path = folder / FILE
-    try:
-        with path.open("rb") as file:
-            found = tomllib.load(file)
-    except (FileNotFoundError, NotADirectoryError):
-        raise UserError(f"{folder}: no {FILE} in it, so it is no folder of firmware") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: {error}") from None
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+    if not path.exists():
+        raise UserError(f"{folder}: no {FILE} in it, so it is not a folder of firmware")
+    found = toml_file.load(path)
     _known(path, "", found, ("firmware", "defines", "hardware"))
     firmware = _table(path, found, "firmware")
     _known(path, "firmware.", firmware, ("name", "sources", "include", "tables", "master", "options"))
@@ -67,7 +63,7 @@ def load(folder: str | pathlib.Path) -> Manifest:
     return Manifest(
         folder=folder,
         name=name,
-        sources=_sources(path, folder, _texts(path, firmware, "sources", ["*.c"])),
+        sources=_sources(path, folder, _texts(path, firmware, "sources", DEFAULT_SOURCES), "sources" in firmware),
         include=tuple(_folder(path, folder, each) for each in _texts(path, firmware, "include", ["."])),
         tables=tuple(_texts(path, firmware, "tables", [])),
         master=_master(path, folder, firmware),
@@ -97,7 +93,7 @@ def _texts(path: pathlib.Path, firmware: dict, key: str, default: list[str]) -> 
     return found
 
 
-def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str]) -> tuple[pathlib.Path, ...]:
+def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str], given: bool) -> tuple[pathlib.Path, ...]:
     sources: list[pathlib.Path] = []
     for pattern in patterns:
         try:
@@ -107,6 +103,11 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str]) -> t
         if not matching:
             raise UserError(f"{path}: firmware.sources: {pattern!r} matches no file in {folder}")
         sources += [each for each in matching if each not in sources]
+    others = [] if given else [each for each in sorted(folder.iterdir()) if each not in sources]
+    for each in (*sources, *others):
+        if each.suffix in CPLUSPLUS:
+            way_out = "" if each in sources else f" (firmware.sources = {DEFAULT_SOURCES} leaves it out)"
+            raise UserError(f"{path}: {each.name} is C++, and firmware is built from C alone{way_out}")
     return tuple(sources)
 
 

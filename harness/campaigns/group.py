@@ -366,8 +366,11 @@ def main() -> int:
     os.dup2(2, 1)  # what a user's fault module prints is no result
 
     def emit(result: Result) -> None:
-        results.write(json.dumps(result) + "\n")
-        results.flush()
+        try:
+            results.write(json.dumps(result) + "\n")
+            results.flush()
+        except BrokenPipeError:  # the process that asked has ended: no result is of use any more
+            os._exit(1)
 
     request = sys.stdin.readline()
     if not request:  # who asked is gone already

@@ -9,10 +9,10 @@ import itertools
 import math
 import pathlib
 import string
-import tomllib
 from collections.abc import Iterator
 from typing import Any
 
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.quantities import LENGTHS, SHARES, in_base_units, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
@@ -259,15 +259,7 @@ def walk_value(name: str, value: Any, path: str) -> Any:
 def load(name: str | pathlib.Path) -> Plan:
     """The plan in a file."""
     path = pathlib.Path(name)
-    try:
-        data = tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise UserError(f"campaign file {path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise UserError(f"campaign file {path}: not UTF-8 text (byte {error.start})") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"campaign file {path}: not valid TOML: {error}") from None
-    return of_data(data, str(path))
+    return of_data(toml_file.load(path, "campaign file"), str(path))
 
 
 def of_data(data: dict[str, Any], path: str) -> Plan:

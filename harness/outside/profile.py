@@ -18,11 +18,11 @@ from __future__ import annotations
 import dataclasses
 import functools
 import pathlib
-import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from ranger_sim.datatable.model import ROUTER, Table
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside.bus_schedule import (
     MOST_ROWS,
@@ -142,16 +142,11 @@ class _Reader:
     def content(self, path: pathlib.Path) -> dict[str, Any] | None:
         """The tables of a TOML file; None with a fault when it cannot be read."""
         try:
-            return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-        except OSError as error:
-            self.fault("", None, f"cannot be read: {error.strerror}")
-        except UnicodeDecodeError as error:
-            self.fault("", None, f"not UTF-8 text (byte {error.start})")
-        except RecursionError:
-            self.fault("", None, "is nested too deeply")
-        except ValueError as error:  # TOMLDecodeError, a path with a null byte, dates that are none
-            self.fault("", None, f"not valid TOML: {_plain(str(error))}")
-        return None
+            return toml_file.load(path)
+        except toml_file.TomlError as error:
+            place = f"line {error.line}, column {error.column}: " if error.line else ""
+            self.fault("", None, f"{place}{error.reason}")
+            return None
 
     def only(self, table: Mapping[str, Any], allowed: tuple[str, ...], place: str) -> None:
         """A fault for each key that is not allowed."""

@@ -59,6 +59,8 @@ def serve(
     kernel.begin_process(f"ranger-{name}", settings)
     place = wiring.BOARDS.index(name)
     board = robot.boards[name]
+    if robot.printed is not None and name in robot.firmware:
+        robot.printed.lead(name)
     said = []
     crash_record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS]
     if fresh:

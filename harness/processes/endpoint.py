@@ -21,7 +21,6 @@ from ranger_sim.harness.processes.kinds import (
     NOTE,
     NOTE_ACTIVITY,
     NOTE_COUNTERS,
-    NOTE_WORDS,
     SET_WORD,
     TO_BOARD,
 )
@@ -45,6 +44,7 @@ from ranger_sim.harness.processes.places import (
     MAX_SLOT_CYCLES,
     NEXT_OUTPUT,
     NEXT_TIME,
+    NOTE_WORDS,
     OVERRUNS,
     PACE_TIME_NS,
     PACE_WALL_NS,

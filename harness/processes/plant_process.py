@@ -49,6 +49,8 @@ class PlantRun:
         self.deaths: list[dict] = []
         self.gave_way: dict[int, str] = {}  # by the fault's number
         robot.deaths = self.deaths
+        if robot.printed is not None:
+            robot.printed.show = lambda line: self.tell(printed=line)  # the terminal is the supervisor's
         self.next_status_s = 0.0
         self.orders = 0  # that changed the robot at `orders_ns` of its time
         self.orders_ns = -1

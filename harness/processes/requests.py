@@ -7,12 +7,12 @@ UserError of one line that names the fault; nothing of it reaches the robot.
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.parameters import shown
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import ErrorNoted
 from ranger_sim.harness.faults.fault import Fault
@@ -131,21 +131,11 @@ def admitted(line: bytes) -> Request:
 
 
 def _object(line: bytes) -> dict[str, Any]:
-    """The JSON object of a line, as the standard has it: numbers are finite, a name comes once."""
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        content = dict(pairs)
-        if len(content) != len(pairs):
-            raise UserError("a request has each field once")
-        return content
-
-    def finite(text: str) -> float:
-        raise UserError(f"a request: {text} is no number in JSON")
-
+    """The JSON object of a line."""
     try:
-        content = json.loads(line, object_pairs_hook=once, parse_constant=finite)
-    except (ValueError, RecursionError):  # broken, not UTF-8, a number of thousands of digits, nested too deeply
-        content = None
+        content = json_text.loads(line, "a request")
+    except json_text.JsonError as mistake:
+        raise UserError(f"a request is one line with a JSON object ({mistake.reason})") from None
     if not isinstance(content, dict):
         raise UserError("a request is one line with a JSON object")
     return content

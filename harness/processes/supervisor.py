@@ -332,6 +332,8 @@ class Supervisor:
                 self.view.say(f"{news['gone']} is off its bus since {news['time_s']:.3f} s of the robot's time")
             if "said" in news:
                 self.view.say(news["said"])
+            if "printed" in news:
+                self.robot.printed.show(news["printed"])
             if "failed" in news:
                 self.failure, self.ending = news["failed"], True
             if "collecting" in news:  # from here on boards end because they are told to

@@ -45,7 +45,7 @@ from ranger_sim.foundation.events import (
     EventQueue,
     Outbox,
 )
-from ranger_sim.foundation.quantities import duration_text, nanoseconds
+from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text
 from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import ConditionNotMetError
@@ -91,7 +91,7 @@ class Node:
         what: str | int,
         value: float | bytes = 0.0,
         stamp_ms: int | None = None,
-        at: str = "0 s",
+        at: Duration = "0 s",
         extended: bool = False,
     ) -> None:
         """Send a variable of the table, or bytes under an identifier of any other kind, `at` so long from now.
@@ -99,7 +99,7 @@ class Node:
         `stamp_ms`: its time word; the network time if it is not given.
         """
         identifier = RANGER.identifier(what)
-        due_ns = self.bench.now + nanoseconds(at, "at")
+        due_ns = self.bench.now + duration_ns(at, "at")
         if isinstance(value, bytes):
             if len(value) > 8:
                 raise UserError(f"send {what!r}: {len(value)} bytes, a frame has up to 8")
@@ -149,7 +149,7 @@ class Node:
         """Forget what was received."""
         self.heard.clear()
 
-    def wait_for(self, what: str | int, within: str = "100 ms") -> Frame:
+    def wait_for(self, what: str | int, within: Duration = "100 ms") -> Frame:
         """Pass time until the next frame of a variable has come; AssertionError when it has not `within` this time."""
         before = len(self.received(what))
         self.bench.until(lambda: len(self.received(what)) > before, within, f"a frame {what} on {self.bus.name}")
@@ -185,26 +185,26 @@ class Bench:
         """Periods and latencies of the frames on a bus (the first one), as assertions."""
         return Wire(self.observed, bus if bus is not None else next(iter(self.buses)), since_s, self.time_s)
 
-    def every(self, period: str, function: Callable[[float], Any]) -> None:
+    def every(self, period: Duration, function: Callable[[float], Any]) -> None:
         """Call `function(time_s)` now and then every `period`: a model of what hangs on the board."""
-        self.call_at(self.now, function, nanoseconds(period, "every"))
+        self.call_at(self.now, function, duration_ns(period, "every"))
 
     def call_at(self, time_ns: int, function: Callable[[float], Any], period_ns: int = 0) -> None:
         """Call `function(time_s)` at an instant, and again every `period_ns` if that is above 0."""
         self.called += 1
         heapq.heappush(self.calls, (time_ns, self.called, period_ns, function))
 
-    def run_for(self, duration: str) -> None:
-        """Pass so much virtual time: "20 ms"."""
-        self.run_to(self.now + nanoseconds(duration, "run_for"))
+    def run_for(self, duration: Duration) -> None:
+        """Pass so much virtual time: "20 ms", or a number of seconds."""
+        self.run_to(self.now + duration_ns(duration, "run_for"))
 
-    def until(self, condition: Callable[[], Any], within: str = "1 s", what: str = "") -> float:
+    def until(self, condition: Callable[[], Any], within: Duration = "1 s", what: str = "") -> float:
         """Pass time until `condition()` is true; the virtual time then, s. Looked at every 36 bits of the bus.
 
         ConditionNotMetError, an AssertionError, when it is not `within` this time.
         """
         __tracebackhide__ = True
-        begun, end = self.now, self.now + nanoseconds(within, "until: within")
+        begun, end = self.now, self.now + duration_ns(within, "until: within")
         while not condition():
             if self.now >= end:
                 text = what or getattr(condition, "__name__", "the condition")
@@ -279,16 +279,16 @@ class Pin:
         """Its level now."""
         return int(self.bench.chip.pins[self.number])
 
-    def set(self, level: int, at: str = "0 s") -> None:
+    def set(self, level: int, at: Duration = "0 s") -> None:
         """Drive it to 0 or 1, `at` so long from now."""
-        time_ns = self.bench.now + nanoseconds(at, "at")
+        time_ns = self.bench.now + duration_ns(at, "at")
         self.bench.chip.inbox.push(time_ns, ORDER_PINS, PIN_EDGE, self.number, 1 if level else 0, -1, 0)
 
-    def pulse(self, width: str, at: str = "0 s") -> None:
+    def pulse(self, width: Duration, at: Duration = "0 s") -> None:
         """High for so long."""
-        begin = nanoseconds(at, "at")
+        begin = duration_ns(at, "at")
         self.set(1, f"{begin} ns")
-        self.set(0, f"{begin + nanoseconds(width, 'pulse')} ns")
+        self.set(0, f"{begin + duration_ns(width, 'pulse')} ns")
 
 
 class Encoder:
@@ -300,11 +300,11 @@ class Encoder:
         self.level = 0
         bench.chip.listen_to_edges(self.buffer, pin_a, pin_b)
 
-    def turn(self, edges: int, period: str, forward: bool = True) -> None:
+    def turn(self, edges: int, period: Duration, forward: bool = True) -> None:
         """So many edges from now on, one each `period`; pass the time afterwards. Call it again when they are over."""
         if self.buffer.read == self.buffer.count:
             self.buffer.clear()
-        time_ns, period_ns = self.bench.now, nanoseconds(period, "turn: period")
+        time_ns, period_ns = self.bench.now, duration_ns(period, "turn: period")
         for _ in range(edges):
             time_ns += period_ns
             self.level ^= 1
@@ -440,11 +440,11 @@ class BoardAlone(Bench):
             raise UserError(f"{self.name}.can({number!r}): the board is on {there}")
         return self.node_on[name]
 
-    def uart(self, number: int, data: bytes, byte_time: str = "21714 ns") -> None:
+    def uart(self, number: int, data: bytes, byte_time: Duration = "21714 ns") -> None:
         """Bytes to a UART from now on, each taking so long (10 bits at 460,526 baud)."""
         time_ns = self.now
         for byte in data:
-            time_ns += nanoseconds(byte_time, "byte_time")
+            time_ns += duration_ns(byte_time, "byte_time")
             self.chip.inbox.push(time_ns, ORDER_PINS, UART_BYTE, number, byte, 0, 0, 0)
 
     def replay(self, frames: Iterable[Frame]) -> int:

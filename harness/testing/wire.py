@@ -13,7 +13,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from ranger_sim.foundation.quantities import duration_text, nanoseconds
+from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text, given_text
 from ranger_sim.harness.testing.figures import Observed
 from ranger_sim.harness.testing.frames import WINDOW_S, Frame, FrameKeeper
 
@@ -97,12 +97,12 @@ class Wire:
             self._fail(f"{name} on {self.bus}: {len(frames)} frames, a period needs two", frames)
         return Intervals(f"{name} on {self.bus}", list(zip(frames, frames[1:], strict=False)))
 
-    def assert_period(self, name: str | int, period: str, jitter: str = "0 us") -> Intervals:
+    def assert_period(self, name: str | int, period: Duration, jitter: Duration = "0 us") -> Intervals:
         """Every interval between frames of a variable is `period`, give or take `jitter`."""
         __tracebackhide__ = True
-        wanted, allowed = nanoseconds(period, "period"), nanoseconds(jitter, "jitter")
+        wanted, allowed = duration_ns(period, "period"), duration_ns(jitter, "jitter")
         found = self.period(name)
-        limit = f"{period} +- {jitter}"
+        limit = f"{given_text(period)} +- {given_text(jitter)}"
         self.observed.note(f"period of {found.what}", found.text(), limit)
         self._hold(found, limit, lambda each: abs(each - wanted) <= allowed)
         return found
@@ -135,30 +135,31 @@ class Wire:
             self._fail(f"{cause} to {effect} on {self.bus}: no effect after any cause ({told})", causes[-1:])
         return Intervals(f"{cause} to {effect} on {self.bus}", pairs)
 
-    def assert_latency(self, cause: str | int, effect: str | int, at_most: str, **conditions: Any) -> Intervals:
+    def assert_latency(self, cause: str | int, effect: str | int, at_most: Duration, **conditions: Any) -> Intervals:
         """After each frame of `cause` comes one of `effect` within `at_most`; `conditions` as of `latency`.
 
         A cause to which no effect has come is a miss if more than `at_most` has passed since.
         """
         __tracebackhide__ = True
-        allowed = nanoseconds(at_most, "at_most")
+        allowed = duration_ns(at_most, "at_most")
         found = self.latency(cause, effect, **conditions)
-        self.observed.note(f"latency of {found.what}", found.text(), at_most)
-        self._hold(found, f"at most {at_most}", lambda each: each <= allowed)
+        self.observed.note(f"latency of {found.what}", found.text(), given_text(at_most))
+        self._hold(found, f"at most {given_text(at_most)}", lambda each: each <= allowed)
         answered = found.pairs[-1][0].time_ns
         condition = conditions.get("cause_if")
         for each in self._elsewhere(cause):
             waited = round(self.now_s * 1e9) - each.time_ns
             if each.time_ns > answered and waited > allowed and (condition is None or condition(each)):
-                self._fail(f"{found.what}: no effect for {duration_text(waited)}, allowed is at most {at_most}", [each])
+                why = f"no effect for {duration_text(waited)}, allowed is at most {given_text(at_most)}"
+                self._fail(f"{found.what}: {why}", [each])
         return found
 
     # --- values -------------------------------------------------------------------------------------------
 
-    def assert_execution_time(self, board: str, at_most: str) -> float:
+    def assert_execution_time(self, board: str, at_most: Duration) -> float:
         """The longest slot that `board` itself measured and sent is not longer; returns it in s."""
         __tracebackhide__ = True
-        allowed = nanoseconds(at_most, "at_most")
+        allowed = duration_ns(at_most, "at_most")
         known = self.keeper.names.ids
         names = [f"{board}_EXECUTION_TIME", *(each for each in [f"{board}_MAX_EXECUTION_TIME"] if each in known)]
         frames = self.frames(*names)
@@ -166,9 +167,9 @@ class Wire:
             self._fail(f"{' and '.join(names)} on {self.bus}: no frame", [])
         longest = max(frames, key=lambda each: each.value)
         measured = duration_text(longest.value * 1e9)
-        self.observed.note(f"execution time of {board}", measured, at_most)
+        self.observed.note(f"execution time of {board}", measured, given_text(at_most))
         if longest.value * 1e9 > allowed:
-            self._fail(f"{board} measured a slot of {measured}, allowed is at most {at_most}", [longest])
+            self._fail(f"{board} measured a slot of {measured}, allowed is at most {given_text(at_most)}", [longest])
         return longest.value
 
     # --- inside -------------------------------------------------------------------------------------------

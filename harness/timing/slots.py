@@ -36,14 +36,14 @@ from ranger_sim.firmware_sim.activity import (
     WAIT_RAN,
 )
 from ranger_sim.firmware_sim.legend import Legend
-from ranger_sim.foundation.quantities import duration_text, nanoseconds
+from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text, given_text, nanoseconds
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timing import picture
 from ranger_sim.harness.timing.recording import Recording
 
 MAIN_LOOP = "main loop"
 Limit = int | str
-Instant = float | str  # s since power-up, or text with a unit
+Instant = Duration  # since power-up
 
 
 @dataclasses.dataclass(frozen=True)
@@ -415,14 +415,16 @@ class SlotView:
         cycles, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_CYCLES], INTERRUPT_RAN)
         self._compare(f"{name} cost", cycles, at_most, slot)
 
-    def assert_latency(self, name: str, at_most: str) -> None:
+    def assert_latency(self, name: str, at_most: Duration) -> None:
         """No request of interrupt `name` waited longer than `at_most` for the first instruction of its handler."""
         __tracebackhide__ = True
         self._named("interrupt", name, [source.name for source in self.legend.interrupts], self.interrupts)
-        limit_ns = nanoseconds(at_most, "limit")
+        limit_ns = duration_ns(at_most, "limit")
         latency_ns, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_LATENCY], INTERRUPT_RAN)
         if latency_ns > limit_ns:
-            told = f"{name} waited {duration_text(latency_ns)} for its service, at most {at_most} are allowed:"
+            told = (
+                f"{name} waited {duration_text(latency_ns)} for its service, at most {given_text(at_most)} are allowed:"
+            )
             self._fail(told, slot)
 
     def _compare(self, what: str, cycles: int, at_most: Limit, slot: Slot) -> None:
@@ -470,7 +472,7 @@ def _statistics(name: str, rows: np.ndarray, limit: int) -> Statistics:
 
 
 def _instant_ns(instant: Instant) -> int:
-    return nanoseconds(instant, "instant") if isinstance(instant, str) else round(instant * 1e9)
+    return duration_ns(instant, "instant")
 
 
 def _limit_text(limit: Limit) -> str:

@@ -11,10 +11,10 @@ All that is wrong with a file is a UserError of one line: file, place, value, wh
 """
 
 import pathlib
-import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.terms import is_number
 from ranger_sim.sysid.causes import CAUSES
@@ -35,14 +35,7 @@ FLAGS = ("endurance", "at_least")
 
 def load(path: pathlib.Path) -> dict[str, Any]:
     """The file's contents, its form checked; `question` makes a Question of it."""
-    try:
-        data = tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise UserError(f"{path}: not UTF-8 text (byte {error.start})") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"{path}: not valid TOML: {error}") from None
+    data = toml_file.load(path)
     allowed = ("title", "description", "run", *TABLES)
     for key, value in data.items():
         if key not in allowed:

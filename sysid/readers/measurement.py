@@ -69,9 +69,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     return dataset
 
 
-def _channels(
-    measurement: Any, truth: bool
-) -> Iterator[tuple[str, str, Array, Array | None, NDArray[np.bool_]]]:
+def _channels(measurement: Any, truth: bool) -> Iterator[tuple[str, str, Array, Array | None, NDArray[np.bool_]]]:
     """(name, unit, stamps, values, which of them have a text instead) of every channel that is no group's clock.
 
     The values are None when they are not numbers at all.

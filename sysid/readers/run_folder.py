@@ -1,9 +1,9 @@
 """The folder that `ranger-sim walk` leaves: variables.mf4, and in summary.json how the walk ended."""
 
-import json
 import pathlib
 from collections.abc import Mapping
 
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.sysid.dataset import Dataset, Finding
 from ranger_sim.sysid.readers import measurement
@@ -19,8 +19,8 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     dataset = measurement.read(folder / VARIABLES, mapping, truth)
     dataset.name = printable(folder.resolve().name)
     try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        summary = json_text.loads((folder / SUMMARY).read_bytes(), SUMMARY)
+    except (OSError, json_text.JsonError):
         text = f"{SUMMARY} is missing or cannot be read: how the walk ended is not known"
         dataset.findings.append(Finding("", "no_summary", 0.0, 0.0, 0.0, "", text, "note"))
         return dataset

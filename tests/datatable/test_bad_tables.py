@@ -103,7 +103,7 @@ def test_a_fault_in_the_variables_is_told_with_line_row_field_and_rule(tmp_path,
 
 
 BOARD_FAULTS = {
-    "not TOML": ("[boards.PC]", "[boards.PC", 1, "", "", "is not TOML"),
+    "not TOML": ("[boards.PC]", "[boards.PC", 6, "", "", "not valid TOML"),
     "unknown section": ("[buses]", "[lines]\n[buses]", 1, "", "'lines'", "not a section"),
     "unknown key": ("number = 3", "number = 3\ncolour = 1", 32, "LEG", "'colour'", "not a key"),
     "key missing": ("number = 3\n", "", 32, "LEG", "number", "is missing"),

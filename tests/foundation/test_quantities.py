@@ -1,8 +1,11 @@
 """Quantities as people write them."""
 
+import math
+
+import numpy as np
 import pytest
 
-from ranger_sim.foundation.quantities import TIMES, duration_text, in_base_units, nanoseconds
+from ranger_sim.foundation.quantities import TIMES, duration_ns, duration_text, given_text, in_base_units, nanoseconds
 from ranger_sim.foundation.user_error import UserError
 
 
@@ -23,6 +26,30 @@ def test_what_is_no_duration_is_refused_by_name(text):
 def test_a_negative_duration_is_refused():
     with pytest.raises(UserError, match="must not be below 0"):
         nanoseconds("-1 ns")
+
+
+@pytest.mark.parametrize(
+    ("duration", "ns"),
+    [("1 s", 10**9), ("20 ms", 20_000_000), ("500 us", 500_000), (1, 10**9), (0.02, 20_000_000), (0, 0), ("0 s", 0)],
+)
+def test_a_duration_is_text_or_a_number_of_seconds(duration, ns):
+    assert duration_ns(duration) == duration_ns(np.float64(ns * 1e-9)) == ns
+
+
+@pytest.mark.parametrize(
+    "duration", ["5", "ms", "", "-1 ms", -1, -0.5, math.nan, math.inf, True, None, b"1 s", [1], "1e400 s", "1 ms 2", 1j]
+)
+def test_anything_else_as_a_duration_is_one_clear_error(duration):
+    with pytest.raises(UserError) as error:
+        duration_ns(duration, "run_for")
+    assert str(error.value) == (
+        f"run_for {duration!r}: a time from 0 on is needed, as text such as '20 ms' (units ns, us, ms, s, min, h) or "
+        "as a number of seconds"
+    )
+
+
+def test_a_duration_is_printed_as_it_was_given():
+    assert [given_text(each) for each in ("20ms", 0.02, 0)] == ["20ms", "20 ms", "0 ns"]
 
 
 def test_a_unit_may_be_left_out_where_a_base_is_known():

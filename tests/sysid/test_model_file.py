@@ -254,7 +254,7 @@ def test_springs_and_cables_of_a_model_are_felt_where_they_are_pulled():
         ("[[diagnosis.effect]]\ncause = 'a'\nat = 'b'\nshape = { n = inf }\n", "are tables of numbers"),
         ("[[term]]\nform = 'cable_slack'\nat = 'inner_cable'\n", "motor-bench does not know cable_slack"),
         ("[weather]\n", "weather is not known here"),
-        ("a = [", "no TOML file"),
+        ("a = [", "not valid TOML"),
     ],
 )
 def test_what_is_wrong_in_a_model_file_is_told_in_a_line(text, line, tmp_path):

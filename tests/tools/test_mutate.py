@@ -8,7 +8,7 @@ import subprocess
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import HOUSE
+from ranger_sim.loading import CHECKOUT, PACKAGE
 from ranger_sim.tools.mutate import work
 from ranger_sim.tools.mutate.mutants import mutants
 
@@ -154,7 +154,7 @@ def test_tests_that_last_too_long_or_start_processes_count_for_what_they_may_not
 def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):
     for entry in work.known():
         path = entry.key.partition("::")[0]
-        of_file = mutants((HOUSE / path).read_text(encoding="utf-8"), path)
+        of_file = mutants((PACKAGE / path).read_text(encoding="utf-8"), path)
         assert entry.key in {each.key for each in of_file}, f"no such mutant any more: {entry.key}"
     listed = tmp_path / "equivalent.toml"
     listed.write_text('[[mutant]]\nkey = "a"\nreason = " "\n', encoding="utf-8")
@@ -212,12 +212,15 @@ def test_that_fails_in_a_second_process():
 def house(tmp_path_factory):
     """A checkout small enough to be mutated in a test."""
     root = tmp_path_factory.mktemp("mutate") / "house"
-    needed = ("ranger_sim/__init__.py", "ranger_sim/loading.py", "ranger_sim/declared_fields.py")
+    needed = ("ranger_sim/__init__.py", "ranger_sim/loading.py")
     for name in (*needed, "tools/__init__.py", "tools/mutate/__init__.py", "tools/mutate/serve.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(HOUSE / name, root / name)
+        shutil.copy(CHECKOUT / name, root / name)
     (root / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = "-p no:ranger_sim"\n', encoding="utf-8")
     (root / "plant").mkdir()
+    for folder in ("plant", "tools"):
+        (root / folder / "__init__.py").touch()
+        (root / "ranger_sim" / folder).symlink_to(f"../{folder}")
     (root / "plant" / "valve.py").write_text(VALVE, encoding="utf-8")
     (root / "tests").mkdir()
     (root / "tests" / "test_valve.py").write_text(TESTS, encoding="utf-8")
@@ -306,4 +309,3 @@ def test_rooms_have_mutants_and_no_key_twice():
         keys = [each.key for each in work.all_mutants(room)]
         assert len(keys) == len(set(keys)) > 300
         assert not any(key.startswith("datatable/generated/") for key in keys)
-    assert (HOUSE / "tests").is_dir()

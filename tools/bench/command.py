@@ -20,6 +20,7 @@ from typing import Any
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.tools.bench.cases import CASES, FRAMES, SIMULATED, YARDSTICK, measured
+from ranger_sim.tools.command_line import streams
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.help_text import named_lines
 from ranger_sim.tools.command_line.units import number, whole_number
@@ -180,7 +181,7 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     return EXIT_EXCEEDED if result.get("bounds", {}).get("exceeded") else 0
 
 

@@ -15,7 +15,7 @@ from rich.table import Table
 from ranger_sim.can_bus.bounds import Bound, response_times, utilisation
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import bus_schedule, profile
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import whole_number
 
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     else:
         console = terminal.console()
         for bus in buses:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from ranger_sim.harness.outside import bus_schedule, profile
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import TIMES, quantity
 
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     else:
         show(found, terminal.console())
     return EXIT_DONE if ready else EXIT_FAULT

@@ -19,7 +19,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import interrupts, terminal
 from ranger_sim.tools.command_line.files import replace_file, writable_folder
 
 TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
@@ -46,7 +46,17 @@ def run(options: argparse.Namespace) -> int:
         if options.report:
             campaign.take_known()
         else:
-            work(campaign, options, console)
+            try:
+                work(campaign, options, console)
+            except KeyboardInterrupt:
+                done = sum(campaign.result(case) is not None for case in campaign.cases)
+                console.print(
+                    f"interrupted: {done} of {campaign.foreseen} runs are kept in {folder}; the same command continues "
+                    "there",
+                    soft_wrap=True,
+                    highlight=False,
+                )
+                return interrupts.EXIT_INTERRUPTED
         told = summary.of(campaign)
         write(told, folder)
         if options.document:

@@ -28,7 +28,7 @@ def installs(package: str) -> str:
     """
     requirements, extra = _requirements(package)
     if extra and _made_by_make():
-        return "make setup" if pathlib.Path.cwd() == loading.HOUSE else f"make -C {loading.HOUSE} setup"
+        return "make setup" if pathlib.Path.cwd() == loading.CHECKOUT else f"make -C {loading.CHECKOUT} setup"
     return " ".join([_shown(sys.executable), "-m pip install", *(f'"{each}"' for each in requirements)])
 
 
@@ -60,8 +60,7 @@ def _name(requirement: str) -> str:
 
 def _made_by_make() -> bool:
     """True for the environment that `make walk` or `make setup` made in this checkout (set_up.py)."""
-    made = list(pathlib.Path(sys.prefix).glob("installed-*.txt"))
-    return bool(made) and (loading.HOUSE / "set_up.py").is_file()
+    return loading.CHECKOUT is not None and any(pathlib.Path(sys.prefix).glob("installed-*.txt"))
 
 
 def _shown(path: str) -> str:

@@ -1,11 +1,8 @@
-"""Where commands print: the console, and standard streams that are closed, full, or know few letters."""
+"""The console that commands print on. The streams below it: streams.py."""
 
-import contextlib
-import io
 import os
-import sys
 from collections.abc import Sequence
-from typing import IO, Any
+from typing import Any
 
 from rich.console import Console
 from rich.measure import Measurement
@@ -13,16 +10,14 @@ from rich.table import Table
 
 UNLIMITED = 10_000  # columns: more than any table of ours
 FILE_COLUMNS = 160  # of lines in a file or a pipe, where nothing is as wide as a window: tables stay whole
-OUTPUT = "standard output"
 
 
-class PatientConsole(Console):
-    """A console whose reader may leave without ending the command: its files are still to be finished."""
+class SteadyConsole(Console):
+    """A console that never hides the cursor: a program that is suspended or killed leaves a terminal that has one."""
 
-    def on_broken_pipe(self) -> None:
-        """Print into nothing from now on."""
-        self.quiet = True
-        lead_nowhere(self.file)
+    def show_cursor(self, show: bool = True) -> bool:
+        """Leave it as it is."""
+        return False
 
 
 def console(**settings: Any) -> Console:
@@ -30,7 +25,7 @@ def console(**settings: Any) -> Console:
 
     What is printed is text, and [brackets] in it are brackets, unless the settings ask for rich's markup.
     """
-    made = PatientConsole(**{"markup": False, **settings})
+    made = SteadyConsole(**{"markup": False, **settings})
     if not made.is_terminal and "COLUMNS" not in os.environ:
         made.width = FILE_COLUMNS
     return made
@@ -56,48 +51,3 @@ def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:
 def one_line(heading: str) -> str:
     """A heading without its break and its unit's brackets."""
     return heading.partition("\n")[0]
-
-
-def stand_in_for_closed_streams() -> None:
-    """Give the process three standard streams that take every letter.
-
-    A descriptor that is closed at the start leads nowhere from now on (the next file would get its number, and what
-    is printed with it). A letter that the stream's encoding has not is written as its escape.
-    """
-    for number in (0, 1, 2):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free: this one
-    for name, number in (("stdout", 1), ("stderr", 2)):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(number, "w", closefd=False))
-        stream = getattr(sys, name)
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-
-
-def print_now(text: str) -> None:
-    """Print on standard output, at once; a reader that has left misses it."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        lead_nowhere(sys.stdout)
-
-
-def output_is_stuck() -> bool:
-    """True when standard output does not take what waits in it, as on a full disk; what waits is given up."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        lead_nowhere(sys.stdout)
-        return True
-    return False
-
-
-def lead_nowhere(stream: IO[str]) -> None:
-    """Let what is still written to the stream vanish."""
-    with contextlib.suppress(OSError, ValueError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)

@@ -11,7 +11,6 @@ import dataclasses
 import json
 import pathlib
 import tempfile
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
@@ -105,7 +104,7 @@ def base_name(name: str) -> str:
 
 def write_model(path: str | None, offsets: Mapping[str, float], target: pathlib.Path) -> pathlib.Path:
     """A model file: the terms of `path` and these sensors' offsets."""
-    tables = [] if path is None else tomllib.loads(pathlib.Path(path).read_text(encoding="utf-8")).get("term", [])
+    tables = [] if path is None else terms.content_of(path).get("term", [])
     tables += [{"form": "sensor_offset", "at": place, "value": value} for place, value in offsets.items()]
     lines = []
     for table in tables:

@@ -26,7 +26,7 @@ from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
 from ranger_sim.sysid import channels, inspection, losses, repairs, sanity
 from ranger_sim.sysid.dataset import Array, Finding
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.compare_walk import emulate, figure, gait, hip_law, naming
 from ranger_sim.tools.compare_walk.candidates import BY_NAME
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     else:
         tell(answer, console)
     return 1 if answer["detected"] else 0

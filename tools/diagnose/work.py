@@ -26,7 +26,7 @@ from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import MACHINES, ROBOT, made
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.recordings import datasets
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
             bar.update(task, description="report")
             write(found, folder, printable(shlex.join(["ranger-sim", *sys.argv[1:]])))
     if options.json == "-":
-        print(_json(found.answer))
+        streams.print_result(_json(found.answer))
     else:
         if target is not None:
             replace_file(target, _json(found.answer).encode())

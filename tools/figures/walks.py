@@ -1,6 +1,5 @@
 """The simulator of a diagnosis from figures: walks of the emulated robot, and what they showed."""
 
-import concurrent.futures
 import contextlib
 import dataclasses
 import json
@@ -17,6 +16,7 @@ from ranger_sim.plant import body_files
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.figures.question import Candidate, Outcome, Point
 from ranger_sim.tools.command_line.files import replace_file
+from ranger_sim.tools.command_line.workers import workers
 
 LEAST_STEPS = 20  # that a walk is asked for: the summary leaves five of them out of its means
 # A walk that takes three times the time of such a walk stands still (chosen by us).
@@ -145,7 +145,7 @@ class Walks:
         with contextlib.ExitStack() as stack:
             each: Any = map
             if self.jobs > 1 and len(new) > 1:
-                each = stack.enter_context(concurrent.futures.ProcessPoolExecutor(self.jobs)).map
+                each = stack.enter_context(workers(self.jobs))
             found = zip(list(new), each(walk, list(new.values())), strict=True)
             for key in keys:
                 while key not in self.known:

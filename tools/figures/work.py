@@ -19,7 +19,7 @@ from ranger_sim.plant import body_files
 from ranger_sim.sysid.figures import file
 from ranger_sim.sysid.figures.diagnose import ROUNDS, Diagnosis, diagnose, values_of
 from ranger_sim.sysid.figures.question import Candidate, Figure, Question
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.figures.walks import FIGURES, Setup, Walks
 
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     if folder is not None:
         replace_file(folder / "diagnosis.json", text.encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     else:
         if target is not None:
             replace_file(target, text.encode())

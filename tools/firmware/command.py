@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.processes import kernel
 from ranger_sim.harness.processes.guard import DEADLINE_S
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.options import Option
 from ranger_sim.tools.command_line.units import TIMES, quantity, word
 
@@ -166,14 +166,20 @@ def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
         place = pathlib.Path(logs)
         command = [sys.executable, "-m", "ranger_sim", *options.arguments]
         parent = os.getpid()
-        interrupt = signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C comes to the run as well, which ends itself
-        run = subprocess.Popen(command, env=sanitizers.environment(place), preexec_fn=lambda: _begin(parent, interrupt))
-        end = signal.signal(signal.SIGTERM, lambda number, _frame: run.send_signal(number))
+        # Ctrl-C, and the end of the terminal, come to the run as well, which ends itself.
+        before = {each: signal.signal(each, signal.SIG_IGN) for each in (signal.SIGINT, signal.SIGHUP)}
+        run = subprocess.Popen(
+            command,
+            stdout=streams.result_descriptor(),
+            env=sanitizers.environment(place),
+            preexec_fn=lambda: _begin(parent, before),
+        )
+        before[signal.SIGTERM] = signal.signal(signal.SIGTERM, lambda number, _frame: run.send_signal(number))
         try:
             code = run.wait()
         finally:
-            signal.signal(signal.SIGINT, interrupt)
-            signal.signal(signal.SIGTERM, end)
+            for number, handler in before.items():
+                signal.signal(number, handler)
         found = sanitizers.findings(place, programs_in(folders))
     for each in found:
         print(f"ranger-sim: firmware: {each.told()}", file=sys.stderr)
@@ -183,8 +189,9 @@ def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
     return code or (EXIT_FOUND if found else 0)
 
 
-def _begin(parent: int, interrupt: Any) -> None:
-    """In the new process: it hears Ctrl-C, and does not outlive who waits for it."""
-    signal.signal(signal.SIGINT, interrupt)
+def _begin(parent: int, handlers: dict[signal.Signals, Any]) -> None:
+    """In the new process: Ctrl-C reaches it, and it does not outlive the one that waits for it."""
+    for each, handler in handlers.items():
+        signal.signal(each, handler)
     kernel.die_with_parent(parent)
     kernel.fix_addresses()

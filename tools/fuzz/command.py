@@ -8,6 +8,7 @@ import json
 import sys
 from typing import Any
 
+from ranger_sim.tools.command_line import streams
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.help_text import named_lines
 from ranger_sim.tools.command_line.units import whole_number
@@ -72,5 +73,5 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     return 0

@@ -8,7 +8,6 @@ import dataclasses
 import json
 import math
 import pathlib
-import sys
 from collections.abc import Iterable
 from typing import Any
 
@@ -27,7 +26,7 @@ from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identify import coverage, legs, motor
 from ranger_sim.sysid.identify.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
 from ranger_sim.sysid.readers.columns import mapping_of
-from ranger_sim.tools.command_line import files, terminal
+from ranger_sim.tools.command_line import files, streams, terminal
 from ranger_sim.tools.identify import page
 
 ALL = "all"
@@ -85,11 +84,11 @@ def write(told: dict, options: argparse.Namespace, target: pathlib.Path | None) 
     """The JSON where --json wants it."""
     if options.json is None:
         return
-    text = json.dumps(told, indent=2, allow_nan=False) + "\n"
+    text = json.dumps(told, indent=2, allow_nan=False)
     if target is None:
-        sys.stdout.write(text)
+        streams.print_result(text)
     else:
-        files.replace_file(target, text.encode())
+        files.replace_file(target, (text + "\n").encode())
 
 
 def known_of(text: str) -> Parameter:

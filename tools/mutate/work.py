@@ -10,11 +10,10 @@ import shutil
 import signal
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TextIO
 
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import toml_file, wallclock
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.loading import (
@@ -71,7 +70,7 @@ class Known:
 
 def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
     """What `equivalent.toml` lists. UserError for an entry without a reason, or one that stands there twice."""
-    rows = tomllib.loads(path.read_text(encoding="utf-8")).get("mutant", [])
+    rows = toml_file.load(path).get("mutant", [])
     found: list[Known] = []
     for row in rows:
         if set(row) != {"key", "reason"} or not row["reason"].strip():

@@ -7,7 +7,6 @@ import asyncio
 import contextlib
 import importlib
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -83,7 +82,6 @@ def run(options: argparse.Namespace) -> int:
     for library in ("uvicorn", "starlette", "h11", "websockets"):
         importlib.import_module(library)  # before anything is started
     address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends it as Ctrl-C does
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(listening(address, options.http_port))
         source = stack.enter_context(source_of(options, say))
@@ -186,10 +184,9 @@ def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
     )
     panel = PanelServer(source, token, names, say)
     shown = HERE if address in ("0.0.0.0", "::") else address
-    say(f"{source.title}: http://{shown}:{port}/?token={token}   (Ctrl-C ends it)")
-    server = http_server(panel)
     with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(server.serve(sockets=[listener]))
+        say(f"{source.title}: http://{shown}:{port}/?token={token}   (Ctrl-C ends it)")
+        asyncio.run(http_server(panel).serve(sockets=[listener]))
     if panel.refused:
         say("panel: refused: " + ", ".join(f"{count} {why}" for why, count in panel.refused.items()))
     return 0

@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hmac
-import json
 import math
 import os
 import pathlib
@@ -26,6 +25,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel import export, messages
 from ranger_sim.tools.panel.connections import Connections
@@ -54,6 +54,14 @@ MOST_POINTS = 4000
 PATIENCE_S = 30.0  # without a sign of the page
 CLOSE_POLICY, CLOSE_FULL, LEFT = 1008, 1013, 1006  # RFC 6455 and its registry
 BROKEN = {1002, 1003, 1007, 1009}  # the same: who is told so did not speak WebSocket, or too much at once
+
+
+def place_of(origin: str) -> str:
+    """Host and port of an Origin; empty for one that has none."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:  # brackets that hold no address
+        return ""
 
 
 class PanelServer:
@@ -95,7 +103,7 @@ class PanelServer:
         if host.rpartition(":")[0].strip("[]") not in self.hosts:
             return "another host's name"
         origin = asked.headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and place_of(origin) != host:
             return "a page of another site"
         token = asked.query_params.get("token") or asked.cookies.get(COOKIE) or ""
         return None if hmac.compare_digest(token.encode(), self.token.encode()) else "a wrong token"
@@ -254,11 +262,11 @@ class Session:
             return "too many requests"
         self.wishes -= 1.0
         try:
-            wish = json.loads(text)
-        except (ValueError, RecursionError):
-            return "a message that is no JSON"
+            wish = json_text.loads(text, "a message")
+        except json_text.JsonError:
+            return "a message that is not JSON"
         if not isinstance(wish, dict):
-            return "a message that is no JSON object"
+            return "a message that is not a JSON object"
         number = wish.pop("number", None)
         try:
             answer = await self.carry_out(wish)

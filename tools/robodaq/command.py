@@ -24,12 +24,11 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside.serial_ports import BLUETOOTH_BAUD, DAQ_BAUD, RealPort, reason_of
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import interrupts, streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import TIMES, quantity, whole_number
 from ranger_sim.tools.robodaq import catalogue, logs, parameter_files
 from ranger_sim.tools.robodaq.session import Session
-from ranger_sim.tools.run.walk import ctrl_c_noted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -133,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
 
         session.hear = hear
         view = View(session, asked, options)
-        interrupted = stack.enter_context(ctrl_c_noted())
+        interrupted = stack.enter_context(interrupts.noted())
         with view.shown():
             lost = work(session, asked, port, options, view, interrupted)
     return finish(session, asked, options, json_file, view, lost, bool(interrupted))
@@ -343,7 +342,7 @@ def finish(
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     else:
         for name in answered_reads:
             number = all_variables.ID_OF[name]
@@ -355,7 +354,7 @@ def finish(
         some = ", ".join(missing[:5]) + (f" and {len(missing) - 5} more" if len(missing) > 5 else "")
         view.console.print(f"ranger-sim daq: {options.port}: no answer for {some}", highlight=False, soft_wrap=True)
     if interrupted:
-        return 130
+        return interrupts.EXIT_INTERRUPTED
     return 1 if lost or missing else 0
 
 

@@ -14,6 +14,7 @@ import pathlib
 from collections.abc import Callable, Iterator
 from typing import Any, Self
 
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.command_line.files import writable_folder
 
@@ -29,6 +30,11 @@ FILES = (*BUS_LOGS, VARIABLES, REPORT, LCOV)  # beside the summary
 RESERVED = 65_536
 BROKEN_OFF = "the run has not ended, or was broken off: what is here is as far as it came"
 FAILURES = (OSError, MemoryError)  # of the machine: a file then stays partial, and the run goes on
+
+
+def printed_name(board: str) -> str:
+    """The file of what the program in C of a board has printed."""
+    return f"printed-{board}.txt"
 
 
 def partial(name: str) -> str:
@@ -138,7 +144,8 @@ class RunFolder:
             raise
 
     def _remove_older_run(self, is_new: bool) -> None:
-        names = [SUMMARY, *FILES, *map(partial, FILES)]
+        printed = sorted(each.name for each in self.path.glob(printed_name("*")))  # partial ones as well
+        names = [SUMMARY, *FILES, *map(partial, FILES), *printed]
         there = [name for name in names if (self.path / name).is_symlink() or (self.path / name).exists()]
         if not there:
             return
@@ -172,7 +179,7 @@ class RunFolder:
 def is_run_record(path: pathlib.Path) -> bool:
     """True for a summary or an incomplete.json of a run, whatever version wrote it."""
     try:
-        content = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        content = json_text.loads(path.read_bytes(), path.name)
+    except (OSError, json_text.JsonError):
         return False
     return isinstance(content, dict) and ("trace_digest" in content or {"complete", "command"} <= content.keys())

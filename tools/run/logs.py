@@ -3,11 +3,12 @@
 import functools
 import pathlib
 from collections.abc import Callable
-from typing import Any
+from typing import IO, Any
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.records.logbook import decoded
-from ranger_sim.tools.run.folder import BUS_LOGS, FAILURES, VARIABLES, RunFolder
+from ranger_sim.tools.run.folder import BUS_LOGS, FAILURES, VARIABLES, RunFolder, printed_name
 
 Takers = dict[str, Callable[[Any], None]]  # of rows, by the stream that they come from
 Close = Callable[[], None]
@@ -82,6 +83,41 @@ class RunLogs:
         part.is_open = False
         until = f", at {self.robot.time_s:.1f} s of the walk" if self.follows else ""
         self.folder.failed(part.name, error, until)
+
+
+class PrintedFiles:
+    """What the programs in C of a run print, in its folder: a file for each board that prints something."""
+
+    def __init__(self, printed: Printed, folder: RunFolder) -> None:
+        self.folder = folder
+        self.files: dict[str, IO[bytes] | None] = {}  # None: it could not be written any more
+        printed.keep = self.take
+
+    def take(self, board: str, data: bytes) -> None:
+        """More of a board's output."""
+        name = printed_name(board)
+        try:
+            if board not in self.files:
+                self.files[board] = self.folder.begin(name).open("wb", buffering=0)
+            file = self.files[board]
+            if file is not None:
+                file.write(data)
+        except FAILURES as error:
+            self._close(board)
+            self.folder.failed(name, error)
+
+    def finish(self) -> None:
+        """Give every file its name."""
+        for board, file in self.files.items():
+            if file is not None:
+                file.close()
+                self.folder.done(printed_name(board))
+        self.files.clear()
+
+    def _close(self, board: str) -> None:
+        file, self.files[board] = self.files.get(board), None
+        if file is not None:
+            file.close()
 
 
 def frame_part(bus: str, path: pathlib.Path) -> tuple[Takers, Close]:

@@ -33,7 +33,7 @@ from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
 from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.tools import faults
 from ranger_sim.tools.buses import server_options
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import interrupts, terminal
 from ranger_sim.tools.command_line.files import json_target, writable_folder
 from ranger_sim.tools.command_line.options import add_all
 from ranger_sim.tools.command_line.units import number, whole_number, word
@@ -43,6 +43,7 @@ from ranger_sim.tools.firmware.command import folders_of, run_sanitized, wants_a
 from ranger_sim.tools.firmware.images import OPTIONS as IMAGES
 from ranger_sim.tools.firmware.images import images_of
 from ranger_sim.tools.run import serial_options, walk, walk_options
+from ranger_sim.tools.run.logs import PrintedFiles
 from ranger_sim.tools.timing import trace
 
 if TYPE_CHECKING:
@@ -243,7 +244,12 @@ def run(options: argparse.Namespace) -> int:
         if name not in settings.boards:
             raise UserError(f"--image {name}={images[name].path}: {name} is not emulated in this profile")
     # in_process: the supervisor gives every board its process
-    with contextlib.closing(Ranger(scenario, log, quirks, profile, firmware, in_process=True, images=images)) as robot:
+    with (
+        walk.printed_by(firmware, console) as printed,
+        contextlib.closing(
+            Ranger(scenario, log, quirks, profile, firmware, in_process=True, images=images, printed=printed)
+        ) as robot,
+    ):
         outside, openers = external_buses(options, robot, profile)
         ends, lines = serial_options.connect(robot, options)
         servers, more = bus.open_servers({each.name: each for each in robot.buses}, options)
@@ -265,6 +271,7 @@ def run(options: argparse.Namespace) -> int:
         elsewhere: list[HardwareInTheLoop] = []
         timelines: list[Timeline | None] = []
         logs: list[RunLogs | None] = []
+        kept: list[PrintedFiles | None] = []
 
         def finish(robot: Ranger, run: PlantRun, interrupted: bool) -> int:
             summary = {**robot.summary(), "interrupted": interrupted}
@@ -278,6 +285,7 @@ def run(options: argparse.Namespace) -> int:
                 console.print(line, highlight=False, soft_wrap=True)
             end = StopRule(time_s=robot.time_s) if interrupted else stop
             summary["command"] = walk_options.command_again(options, end)
+            walk.finish_printed(printed, kept[0])
             is_complete = walk.finish(robot, summary, options, folder, logs[0], json_file, console)
             print_processes(summary["processes"], console)
             for timeline in timelines:
@@ -285,7 +293,7 @@ def run(options: argparse.Namespace) -> int:
             if not is_complete:
                 return walk.EXIT_INCOMPLETE
             if interrupted:
-                return 130
+                return interrupts.EXIT_INTERRUPTED
             if not all(fault["acted"] for fault in summary["faults"]):
                 return faults.EXIT_INVALID
             return 1 if summary["fell"] or summary["failed_boards"] else 0
@@ -312,6 +320,7 @@ def run(options: argparse.Namespace) -> int:
             for fault in wanted:
                 robot.arm(fault)
             logs.append(walk.logs_of(robot, options, folder))
+            kept.append(PrintedFiles(printed, folder) if printed is not None and folder is not None else None)
             timelines.append(trace.attach(robot, options))
             for each in outside:
                 console.print(

@@ -6,7 +6,7 @@ import argparse
 import contextlib
 import json
 import pathlib
-import signal
+import sys
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -20,13 +20,14 @@ from ranger_sim.harness import normal_errors
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.firmware.native_firmware import Firmware
+from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.outside.profile import load as load_profile
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
 from ranger_sim.tools import faults
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import interrupts, streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.command_line.units import duration_text, figure, length_text
 from ranger_sim.tools.firmware import gdb_options
@@ -34,13 +35,12 @@ from ranger_sim.tools.firmware.command import coverage_lines, folders_of, run_sa
 from ranger_sim.tools.firmware.images import images_of
 from ranger_sim.tools.run import serial_options, unexpected
 from ranger_sim.tools.run.folder import LCOV, REPORT, SUMMARY, RunFolder
-from ranger_sim.tools.run.logs import RunLogs, write_frames
+from ranger_sim.tools.run.logs import PrintedFiles, RunLogs, write_frames
 from ranger_sim.tools.run.walk_options import add_walk_options, command_again, log_of, scenario_of, stop_of
 from ranger_sim.tools.timing import trace
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import FrameType
 
     from ranger_sim.harness.faults.fault import Fault
     from ranger_sim.harness.ranger import Ranger
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 __all__ = ["walk", "write_frames"]
 
 DEFAULT_STEPS = 100
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXIT_INCOMPLETE = 2  # a file that was asked for is not whole: the disk is full
 SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
 TELL_EVERY_S = 60.0  # of the wall clock: a line of progress where there is no screen to draw it on (chosen by us)
@@ -74,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     if wants_another_process(options):
         return run_sanitized(options, folders_of(options))
     stop = stop_of(options) or StopRule(steps=DEFAULT_STEPS)
-    with ctrl_c_noted() as interrupted:
+    with interrupts.noted() as interrupted:
         return run_scenario(scenario_of(options), stop, options, interrupted)
 
 
@@ -117,10 +116,14 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     log = log_of(options)
     firmware = firmware_of(options, console)
     images = images_of(options)
-    deadline_s = options.board_deadline
-    with contextlib.closing(
-        Ranger(scenario, log, quirks, profile, firmware, options.in_process, images, deadline_s)
-    ) as robot:
+    with (
+        printed_by(firmware, console) as printed,
+        contextlib.closing(
+            Ranger(
+                scenario, log, quirks, profile, firmware, options.in_process, images, options.board_deadline, printed
+            )
+        ) as robot,
+    ):
         arm(robot, wanted, options.proof)
         timeline = trace.attach(robot, options)
         ends, places = serial_options.connect(robot, options)
@@ -134,6 +137,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             gdb_options.debuggers(robot, options, lambda: bool(interrupted), console) as doors,
             claimed(options, stop, console) if options.out else contextlib.nullcontext() as folder,
         ):
+            kept = PrintedFiles(printed, folder) if printed is not None and folder is not None else None
             logs = logs_of(robot, options, folder)
             if doors:
                 doors[0].wait_for_debugger()
@@ -142,12 +146,13 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
                 console.print(line, highlight=False, soft_wrap=True)
             summary = {**robot.summary(), "interrupted": bool(interrupted)}
             summary["command"] = command_again(options, StopRule(time_s=robot.time_s) if interrupted else stop)
+            finish_printed(printed, kept)
             is_complete = finish(robot, summary, options, folder, logs, json_file, console)
         trace.write(timeline, options, console)
     if not is_complete:
         return EXIT_INCOMPLETE
     if interrupted:
-        return 130
+        return interrupts.EXIT_INTERRUPTED
     if not all(fault["acted"] for fault in summary["faults"]):
         return faults.EXIT_INVALID
     return 1 if summary["fell"] or summary["failed_boards"] else 0
@@ -172,6 +177,38 @@ def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firm
         for line in each.warnings:
             console.print(line, highlight=False, markup=False, soft_wrap=True)
     return firmware
+
+
+@contextlib.contextmanager
+def printed_by(firmware: dict[str, Firmware], console: Console) -> Iterator[Printed | None]:
+    """Takes what the programs in C print; without a folder it is shown on standard error. None without such programs.
+
+    With `--json -` as well, which shows nothing else.
+    """
+    if not firmware:
+        yield None
+        return
+
+    def show(line: str) -> None:
+        if console.quiet:
+            print(line, file=sys.stderr)
+        else:
+            console.print(line, highlight=False, soft_wrap=True)
+
+    with contextlib.closing(Printed(show)) as printed:
+        try:
+            yield printed
+        except BaseException:
+            printed.finish()  # what a program said before it failed
+            raise
+
+
+def finish_printed(printed: Printed | None, kept: PrintedFiles | None) -> None:
+    """Pass on the rest of what the programs in C have printed."""
+    if printed is not None:
+        printed.finish()
+    if kept is not None:
+        kept.finish()
 
 
 def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
@@ -225,7 +262,7 @@ def finish(
     finally:  # whatever becomes of the folder
         text = json.dumps(summary, indent=2)
         if options.json == "-":
-            terminal.print_now(text)
+            streams.print_result(text)
         elif json_file is not None:
             replace_file(json_file, (text + "\n").encode())
     if folder is None:
@@ -236,28 +273,6 @@ def finish(
     if folder.files.get(name, "complete") == "complete":
         console.print(f"{pathlib.Path(name).stem}: {folder.path / name}", highlight=False, soft_wrap=True)
     return folder.is_complete
-
-
-@contextlib.contextmanager
-def ctrl_c_noted() -> Iterator[list[bool]]:
-    """Inside, the first Ctrl-C only fills the list, so that the files are finished; the second one breaks off.
-
-    The signals by which a system ends programs, or a terminal takes its own along, count as Ctrl-C.
-    """
-    interrupted: list[bool] = []
-
-    def note(_number: int, _frame: FrameType | None) -> None:
-        if interrupted:
-            raise KeyboardInterrupt
-        interrupted.append(True)
-
-    signals = [each for each in ENDING if signal.getsignal(each) is not signal.SIG_IGN]  # nohup ignores one
-    previous = {each: signal.signal(each, note) for each in signals}
-    try:
-        yield interrupted
-    finally:
-        for each, handler in previous.items():
-            signal.signal(each, handler)
 
 
 def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:

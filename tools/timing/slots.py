@@ -17,7 +17,7 @@ from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.timing import robot_figures, static_check
 from ranger_sim.harness.timing.slots import SlotView, Statistics
 from ranger_sim.harness.timing.static_check import OVERRUNS, BoardBound, FunctionBound
-from ranger_sim.tools.command_line import terminal
+from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import TIMES, number, quantity, whole_number
 
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        print(text)
+        streams.print_result(text)
     else:
         console = terminal.console(markup=True, highlight=False)
         for board in boards:

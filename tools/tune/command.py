@@ -15,7 +15,6 @@ the less the later it comes.
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
 import contextlib
 import dataclasses
 import pathlib
@@ -30,6 +29,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.units import LENGTHS, number, quantity, whole_number
+from ranger_sim.tools.command_line.workers import workers
 from ranger_sim.tools.tune.evolution import Evolution
 
 # What a walk should be, and the deviation that costs 1. Values: the robot's in May 2011 (0.35 m, 0.60 s, 11.3 W,
@@ -231,16 +231,6 @@ def run(options: argparse.Namespace) -> int:
     keep(changes)
     console.print(f"{out}: cost {cost:.3f}, {falls} falls in {len(task.seeds) * len(task.floors)} walks")
     return 1 if falls else 0
-
-
-@contextlib.contextmanager
-def workers(jobs: int) -> Iterator[Callable]:
-    """A `map` that runs in so many processes; 1: here."""
-    if jobs == 1:
-        yield map
-        return
-    with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
-        yield pool.map
 
 
 class Judge:

@@ -256,11 +256,17 @@ def test_continuing_elsewhere_and_the_processor_reset():
         assert client.ask("c") == "T05thread:1;"
         assert client.ask("s44") == "T05thread:1;"
         assert client.register(PC) == 0x48
-        assert client.monitor("reset") == "TINY: reset\n"
+        for words in ("reset", "reset halt", "reset init"):
+            client.ask(f"P{PC:x}=48000000")
+            assert client.monitor(words).startswith("TINY: reset, halted at 0x00000000\n")
+        assert client.monitor("halt") == "TINY: halted at 0x00000000\n"
         assert (client.register(PC), client.register(CPSR)) == (0, 0xD3)
         assert re.fullmatch(r"TINY: \d+ cycles, \d+ instructions\n", client.monitor("time"))
         assert "monitor read ADDRESS" in client.monitor("help")
-        assert "there is no such command" in client.monitor("explode")
+        client.put("qRcmd," + b"explode now".hex())
+        text = client.get()
+        assert text[:1] == "O" and "monitor explode now: unknown command\n" in bytes.fromhex(text[1:]).decode()
+        assert client.get() == "E01"  # gdb ends a script there
 
     session(tiny(), END, talk)
 

@@ -24,7 +24,7 @@ def program(tmp_path_factory):
     return tiny.build(tmp_path_factory.mktemp("program"))
 
 
-def debugged(machine, elf, commands, tmp_path):
+def debugged(machine, elf, commands, tmp_path, code=0):
     """What gdb prints when it obeys these commands, each after a line `> command`."""
     script = tmp_path / "script.gdb"
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
@@ -44,7 +44,7 @@ def debugged(machine, elf, commands, tmp_path):
         finally:
             server.close()
         done = future.result()
-    assert done.returncode == 0, done.stdout
+    assert done.returncode == code, done.stdout
     answers = {}
     for part in re.split(r"^> ", done.stdout, flags=re.MULTILINE)[1:]:
         command, _, answer = part.partition("\n")
@@ -108,6 +108,47 @@ def test_a_session_from_the_first_breakpoint_to_leaving(program, tmp_path):
     assert "push\t{r" in told["disassemble tick,+4"][0] or "stmfd" in told["disassemble tick,+4"][0]
     assert "detached" in told["detach"][0]
     assert machine.core.debugger is None
+
+
+def test_a_function_is_called_by_hand_and_everything_is_as_it_was(program, tmp_path):
+    elf, flash = program
+    machine = tiny.Machine(flash)
+    told = debugged(
+        machine,
+        elf,
+        [
+            "break remember",
+            "continue",
+            "print/x $lr",
+            "call weigh(5)",
+            "print weigh(6) + 1",
+            "print/x $lr",
+            "backtrace 1",
+        ],
+        tmp_path,
+    )
+    assert told["call weigh(5)"] == ["$2 = 16\n"]
+    assert told["print weigh(6) + 1"] == ["$3 = 20\n"]
+    assert told["print/x $lr"][0].split()[-1] == told["print/x $lr"][1].split()[-1]
+    assert "#0  remember (value=4)" in told["backtrace 1"][0]
+
+
+def test_what_editors_send_resets_and_halts(program, tmp_path):
+    elf, flash = program
+    machine = tiny.Machine(flash)
+    told = debugged(
+        machine,
+        elf,
+        ["break remember", "continue", "monitor halt", "monitor reset halt", "maintenance flush register-cache",
+         "print/x $pc", "load", "monitor reset halt", "tbreak weigh", "continue", "monitor explode"],
+        tmp_path,
+        code=1,
+    )  # fmt: skip
+    assert "TINY: halted at" in told["monitor halt"][0]
+    assert "TINY: reset, halted at 0x00000000" in told["monitor reset halt"][0]
+    assert told["print/x $pc"] == ["$1 = 0x0\n"]
+    assert "weigh (sample=" in told["continue"][1]
+    assert "monitor explode: unknown command" in told["monitor explode"][0]
 
 
 def test_load_programs_the_flash_and_compares_it(program, tmp_path):

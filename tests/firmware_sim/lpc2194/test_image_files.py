@@ -1,6 +1,8 @@
 """Image files: what is read out of ELF and Intel HEX, and one line for each that is none for this chip."""
 
+import shutil
 import struct
+import subprocess
 
 import pytest
 
@@ -51,6 +53,19 @@ END = record(1, 0, b"")
 def written(folder, data, name="program"):
     path = folder / name
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    return path
+
+
+needs_cross_compiler = pytest.mark.skipif(
+    shutil.which("arm-none-eabi-gcc") is None, reason="no cross compiler (apt-get install gcc-arm-none-eabi)"
+)
+
+
+def linked(folder, processor):
+    """A program of a loop, linked for a processor."""
+    source, path = written(folder, "void start(void) { for (;;) ; }\n", "loop.c"), folder / "loop.elf"
+    command = ["arm-none-eabi-gcc", f"-mcpu={processor}", "-nostdlib", "-Wl,-Ttext=0,-estart", source, "-o", path]
+    subprocess.run(command, check=True)
     return path
 
 
@@ -111,6 +126,13 @@ WRONG = {
     "behind": (END + record(0, 0, CODE), "program:2: more lines behind the end record"),
     "kind": (record(7, 0, CODE) + END, r"program:1: record type 7 is none of Intel HEX"),
     "long address": (record(4, 0, b"\x00\x00\x00") + END, "program:1: a record of type 4 has 2 bytes, this one 3"),
+    "S-records": (
+        "S00600004844521B\nS1130000000102030405060708090A0B0C0D0E0F74\n",
+        "Motorola S-records, .*: arm-none-eabi-objcopy -I srec -O ihex program program.hex$",
+    ),
+    "a plain binary": (CODE, "begins with .*: arm-none-eabi-objcopy -I binary -O ihex program program.hex$"),
+    "in RAM": (elf(((0x40000000, 0x40000000, CODE),)), r"linked into RAM \(0x40000000\), where a debugger loads it"),
+    "HEX in RAM": (record(4, 0, b"\x40\x00") + record(0, 4, b"ram!") + END, r"linked into RAM \(0x40000004\)"),
     "only an end": (END, "there is nothing in it for flash or RAM"),
 }
 
@@ -123,6 +145,45 @@ def test_what_is_no_image_is_told_in_one_line(tmp_path, name):
         read(path)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+NAMES = {
+    "cortex-m3": "ARMv7-M",
+    "cortex-m0": "ARMv6S-M",
+    "cortex-m4": "ARMv7E-M",
+    "cortex-a9": "ARMv7-A",
+    "arm926ej-s": "ARMv5TEJ",
+}
+
+
+@needs_cross_compiler
+@pytest.mark.parametrize("processor", NAMES)
+def test_an_image_for_a_newer_arm_is_refused_by_its_build_attributes(tmp_path, processor):
+    path = linked(tmp_path, processor)
+    with pytest.raises(UserError) as caught:
+        read(path)
+    assert str(caught.value) == (
+        f"{path}: built for {NAMES[processor]}, by its build attributes; the LPC2194 is an ARM7TDMI-S, ARMv4T "
+        "(-mcpu=arm7tdmi)"
+    )
+
+
+@needs_cross_compiler
+@pytest.mark.parametrize("processor", ["arm7tdmi", "arm7tdmi-s", "arm8"])
+def test_an_image_for_this_arm_or_an_older_one_is_read(tmp_path, processor):
+    assert read(linked(tmp_path, processor)).address_of("start") == 0
+
+
+@needs_cross_compiler
+@pytest.mark.parametrize(("kind", "option"), [("srec", "srec"), ("bin", "binary")])
+def test_the_line_for_another_format_makes_the_image_of_it(tmp_path, kind, option):
+    elf_file = linked(tmp_path, "arm7tdmi")
+    other = tmp_path / f"program.{kind}"
+    subprocess.run(["arm-none-eabi-objcopy", "-O", option, elf_file, other], check=True)
+    with pytest.raises(UserError) as caught:
+        read(other)
+    subprocess.run(str(caught.value).rpartition(": ")[2].split(), cwd=tmp_path, check=True)
+    assert read(tmp_path / "program.hex").segments == read(elf_file).segments
 
 
 def test_a_file_cut_anywhere_is_told_in_one_line(tmp_path):

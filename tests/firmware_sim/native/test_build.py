@@ -40,11 +40,25 @@ def lines(action, *arguments, **how):
 def test_a_wrong_manifest_is_one_line_that_names_file_and_key(tmp_path, manifest, told):
     folder = folder_with(tmp_path / "small", TIMER, manifest)
     (line,) = lines(load, folder)
-    assert line.startswith(f"{folder / 'firmware.toml'}: ") and told in line
+    assert line.startswith(f"{folder / 'firmware.toml'}:") and told in line
+
+
+@pytest.mark.parametrize("name", ["control.cpp", "control.cc", "control.cxx"])
+def test_cplusplus_next_to_c_is_refused_by_name(tmp_path, name):
+    folder = folder_with(tmp_path / "small", TIMER)
+    (folder / name).write_text("int x;\n")
+    assert lines(load, folder) == [
+        f"{folder / 'firmware.toml'}: {name} is C++, and firmware is built from C alone "
+        "(firmware.sources = ['*.c'] leaves it out)"
+    ]
+    (folder / "firmware.toml").write_text("[firmware]\nname = 'small'\nsources = ['*.c']\n")
+    assert [each.name for each in load(folder).sources] == ["small.c"]
+    (folder / "firmware.toml").write_text("[firmware]\nname = 'small'\nsources = ['*.c*']\n")
+    assert lines(load, folder) == [f"{folder / 'firmware.toml'}: {name} is C++, and firmware is built from C alone"]
 
 
 def test_a_folder_without_a_manifest_is_told(tmp_path):
-    assert lines(load, tmp_path) == [f"{tmp_path}: no firmware.toml in it, so it is no folder of firmware"]
+    assert lines(load, tmp_path) == [f"{tmp_path}: no firmware.toml in it, so it is not a folder of firmware"]
 
 
 def test_without_a_compiler_it_is_told_what_was_looked_for(tmp_path, monkeypatch):

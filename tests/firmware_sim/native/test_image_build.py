@@ -7,6 +7,7 @@ import struct
 
 import pytest
 
+from ranger_sim.firmware_sim.lpc2194 import image as image_file
 from ranger_sim.firmware_sim.native import image_build
 from ranger_sim.firmware_sim.native.image_build import FLASH_BYTES, RAM_BYTES, build_image
 from ranger_sim.firmware_sim.native.manifest import load
@@ -56,6 +57,12 @@ def test_the_vectors_stand_at_0_and_sum_up_to_0_as_the_boot_loader_asks(example)
     addresses = [word for place, word in enumerate(words[8:]) if place != 5]
     assert len(set(addresses)) == 7 and all(64 <= each < image.flash_bytes and each % 4 == 0 for each in addresses)
     assert max(content) < image.flash_bytes + 16 <= FLASH_BYTES and image.ram_bytes < RAM_BYTES
+
+
+@needs_cross_compiler
+def test_a_debugger_finds_the_start_of_the_program_by_its_name(example):
+    image = image_file.read(build_image(load(example)).path)
+    assert image.place_of(image.address_of("firmware_start")) == "firmware_start"
 
 
 @needs_cross_compiler

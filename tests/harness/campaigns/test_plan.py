@@ -200,7 +200,7 @@ def test_a_file_that_is_not_there_or_no_toml_is_named(tmp_path):
     with pytest.raises(UserError, match="No such file"):
         plan.load(tmp_path / "none.toml")
     (tmp_path / "bad.toml").write_text("title = ")
-    with pytest.raises(UserError, match=r"bad\.toml: not valid TOML"):
+    with pytest.raises(UserError, match=r"bad\.toml:1:9: not valid TOML"):
         plan.load(tmp_path / "bad.toml")
 
 

@@ -153,6 +153,20 @@ def test_the_board_is_that_of_the_robot_and_nothing_reaches_it_in_its_past():
     assert (counters.late_requests, counters.late_results, counters.errors) == (0, 0, 0)
 
 
+def test_a_time_is_text_or_a_number_of_seconds_wherever_one_is_given():
+    board = BoardAlone("MCH")
+    board.run_for(0.02)
+    board.run_for("20 ms")
+    assert board.now == 40_000_000
+    assert board.can().wait_for("MCH_ANGLE", within=0.01).value is not None
+    board.can().send("MCH_STATUS", 1.0, at=0.001)
+    with pytest.raises(ConditionNotMetError, match="never: not within 2 ms"):
+        board.until(lambda: False, within=0.002, what="never")
+    board.wire().assert_period("MCH_ANGLE", period=0.002, jitter=60e-6)
+    with pytest.raises(UserError, match="^run_for '20': a time from 0 on is needed"):
+        board.run_for("20")
+
+
 def test_how_time_is_cut_changes_nothing():
     frames = []
     for parts in (["20 ms"], ["1 us"] * 20 + ["13.37 ms"] + ["6.61 ms"]):

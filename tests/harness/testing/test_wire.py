@@ -129,7 +129,7 @@ def test_what_is_not_there_is_told_with_what_is_near(recording):
         recording.wire("can9")
     with pytest.raises(UserError, match="frame 'MCH_ANGEL': .*meant was perhaps MCH_ANGLE"):
         recording.wire().period("MCH_ANGEL")
-    with pytest.raises(UserError, match="jitter '3': a number with one of the units"):
+    with pytest.raises(UserError, match="jitter '3': a time from 0 on is needed"):
         recording.wire().assert_period("MCH_ANGLE", "2 ms", jitter="3")
 
 

@@ -252,7 +252,7 @@ def test_a_past_that_was_not_recorded_is_told_plainly():
         (lambda view: view.assert_function("d", at_most=1), "no function is named 'd'; there are a, b, c"),
         (lambda view: view.of_row(0).assert_function("c", at_most=1), "c ran in none of the 2"),
         (lambda view: view.assert_latency("x", at_most="1 us"), "no interrupt is named 'x'; there are"),
-        (lambda view: view.assert_latency("slot timer", at_most="8"), "a number with one of the units"),
+        (lambda view: view.assert_latency("slot timer", at_most="8"), "a time from 0 on is needed"),
         (lambda view: view.assert_within(-1), "limit -1: a whole number of cycles, or a time"),
         (lambda view: view.assert_within("450"), "a number with one of the units"),
         (lambda view: view.between("5 s", "6 s").overruns, "none was recorded"),

@@ -116,10 +116,10 @@ def test_an_extra_comes_whole_by_make_where_make_made_the_environment_and_else_b
     by_pip = libraries.installs("mcap")
     assert re.fullmatch(r'/elsewhere/bin/python -m pip install "mcap>=[\d.]+"', by_pip)
     (tmp_path / "installed-walk.txt").touch()
-    monkeypatch.chdir(loading.HOUSE)
+    monkeypatch.chdir(loading.CHECKOUT)
     assert libraries.installs("mcap") == "make setup"
     monkeypatch.chdir(tmp_path)
-    assert libraries.installs("mcap") == f"make -C {loading.HOUSE} setup"
+    assert libraries.installs("mcap") == f"make -C {loading.CHECKOUT} setup"
 
 
 @pytest.mark.parametrize("module", ["ranger_sim.nothing", "fcntl", ""])

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import re
 import signal
 import subprocess
@@ -139,6 +140,31 @@ def test_the_page_comes_back_when_the_connection_was_lost_and_the_robot_ends_wit
         with pytest.raises(UserError, match="no robot named"):
             control.ask(name, {"do": "status"})
         page.errors.clear()  # the browser tells of the refused connections
+
+
+def test_values_of_a_server_or_a_robot_that_stopped_are_shown_with_their_age(tmp_path):
+    with served("--walk") as (address, process), page_of(address, tmp_path) as page:
+        hand = Hand(page)
+        page.until("window.rangerPanel.span()[1] > 0.5")
+        hand.sees("text('age') === '' && document.getElementById('light').className === 'light good'")
+        process.send_signal(signal.SIGSTOP)
+        try:
+            hand.sees("text('light-text').startsWith('no message from the panel') && /^[2-9] s old$/.test(text('age'))")
+            assert page.value("document.getElementById('light').className") == "light off"
+            assert page.value("getComputedStyle(document.getElementById('clock')).textDecorationLine") == "line-through"
+        finally:
+            process.send_signal(signal.SIGCONT)
+        hand.sees("text('age') === '' && text('light-text') === 'no unexpected error'")
+        plant = control.ask(robot_name(page), {"do": "status"})["plant"]
+        os.kill(plant, signal.SIGSTOP)
+        try:
+            hand.sees("text('light-text') === 'no new values from the robot' && /^[2-9] s old$/.test(text('age'))")
+        finally:
+            os.kill(plant, signal.SIGCONT)
+        hand.sees("text('age') === ''")
+        control.ask(robot_name(page), {"do": "pause"})
+        hand.sees("state.pace.paused === true")
+        hand.sees("text('age') === ''")
 
 
 def test_on_a_telephone_no_view_is_wider_than_the_window_and_no_row_is_torn_into_many_lines(tmp_path):

@@ -177,6 +177,7 @@ def test_the_page_is_served_to_who_has_the_token_and_leaves_it_in_a_cookie(panel
         ("/?token=another", {}, "a wrong token"),
         (f"/?token={TOKEN}", {"Host": "evil.example:80"}, "another host's name"),
         (f"/?token={TOKEN}", {"Origin": "http://evil.example"}, "a page of another site"),
+        (f"/?token={TOKEN}", {"Origin": "http://[::1"}, "a page of another site"),
     ],
 )
 def test_who_has_no_token_or_comes_from_elsewhere_is_refused_with_a_reason(panel, path, headers, reason):
@@ -284,7 +285,12 @@ def test_a_wish_that_cannot_be_is_answered_with_its_fault(panel, wish, words):
 
 @pytest.mark.parametrize(
     ("text", "reason"),
-    [("{", "a message that is no JSON"), ("[" * 50_000, "a message that is no JSON"), ("[]", "no JSON object")],
+    [
+        ("{", "a message that is not JSON"),
+        ("[" * 50_000, "a message that is not JSON"),
+        ('{"do": "values", "channels": [], "at": 1e400, "number": 1}', "a message that is not JSON"),
+        ("[]", "not a JSON object"),
+    ],
 )
 def test_who_does_not_speak_json_is_sent_away_with_a_reason(panel, text, reason):
     it, address, _ = panel

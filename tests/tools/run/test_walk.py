@@ -14,6 +14,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.tools import cli
+from ranger_sim.tools.command_line import interrupts
 from ranger_sim.tools.command_line.units import duration_text
 from ranger_sim.tools.report import page
 from ranger_sim.tools.run import walk
@@ -130,7 +131,7 @@ def test_what_was_walked_before_ctrl_c_is_told(capsys, monkeypatch):
     def already():
         yield [True]
 
-    monkeypatch.setattr(walk, "ctrl_c_noted", already)
+    monkeypatch.setattr(interrupts, "noted", already)
     assert cli.main(["walk", "--distance", "65km"]) == 130
     told = " ".join(capsys.readouterr().err.split())
     assert "in 2.0 s, interrupted, on its feet;" in told

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import array
 import asyncio
-import json
 import pathlib
 from collections.abc import Sequence
 
 import numpy as np
 
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import BUS_BIT_RATE
@@ -157,8 +157,8 @@ class Decoded:
 def profile_of(folder: pathlib.Path) -> str | None:
     """The profile of buses and boards with which a walk was made, as its summary has it; None: the usual ones."""
     try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        summary = json_text.loads((folder / SUMMARY).read_bytes(), SUMMARY)
+    except (OSError, json_text.JsonError):
         return None
     found = summary.get("profile") if isinstance(summary, dict) else None
     return None if found is None else str(found)

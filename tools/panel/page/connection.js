@@ -6,6 +6,7 @@ const AGAIN_MS = [300, 1000, 3000];
 export function connect(heard) {
   let socket = null, tries = 0, number = 0, refused = false;
   let pictures = [];   // that came and are not painted
+  let heard_ms = performance.now();   // when the last message came
   const waiting = new Map();
 
   function open() {
@@ -14,7 +15,7 @@ export function connect(heard) {
     socket.binaryType = "arraybuffer";
     pictures = [];
     socket.onopen = () => { tries = 0; };
-    socket.onmessage = (event) => take(event.data);
+    socket.onmessage = (event) => { heard_ms = performance.now(); take(event.data); };
     socket.onclose = (event) => {
       for (const { fail } of waiting.values()) fail("the connection was lost");
       waiting.clear();
@@ -92,5 +93,5 @@ export function connect(heard) {
     send({ ...wish, number });
   });
   open();
-  return { send, ask };
+  return { send, ask, silent_ms: () => performance.now() - heard_ms };
 }

@@ -15,6 +15,7 @@ const by = (id) => document.getElementById(id);
 const VALUES_MS = 500;
 const MESSAGE_MS = 4000;
 const QUIET_MS = 600;      // after the cursor's last step it is said what stands there
+const OLD_MS = 1000;       // without a message or a newer value, what is shown is not live
 const DESCRIBED_MS = 1000; // between two descriptions of the robot
 const SHORTEST_S = 1e-3, LONGEST_S = 36_000;   // a plot's window
 const FIRST = [["hip_rad", "ankle_outer_rad", "ankle_inner_rad"], ["hip_A", "outer_A", "inner_A"], ["FSM_HIP", "FSM_FO", "FSM_FI"]];
@@ -59,12 +60,12 @@ const parameters = makeParameters(by("parameter-groups"), {
 
 const link = connect({
   hello: greet,
-  picture: (found, lost) => { span = found; shown++; light(lost); scrubber(); if (!held) triggered(); plots.values(performance.now()); },
+  picture: (found, lost) => { if (found[1] !== span[1]) newer_ms = performance.now(); span = found; shown++; light(lost); scrubber(); if (!held) triggered(); plots.values(performance.now()); },
   traces: (found) => plots.show(found),
   pose: (time, values) => { pose = values; by("clock").textContent = `${time.toFixed(3)} s`; stage.draw(values); bars(); describe(); },
   values: (found, time) => { if (time === instant()) { plots.stands(found, plots.cursor()); sayCursor(); } },
   state: (found) => { state = found; tell_state(); },
-  closed: (reason, refused) => { light(refused ? `refused: ${reason}` : `${reason}: trying again`); document.body.dataset.connected = "no"; },
+  closed: (reason, refused) => { document.body.dataset.connected = "no"; light(refused ? `refused: ${reason}` : `${reason}: trying again`); },
 });
 
 // ---- the beginning
@@ -250,12 +251,21 @@ function choose(name) {
 
 // ---- what is in no channel
 
-// lost: why nothing more comes
+// lost: why nothing more comes. What is shown of a robot is old when no message comes, or messages without news.
+let said_lost = "connecting", newer_ms = performance.now();
 function light(lost) {
+  said_lost = lost;
   const unexpected = (state.errors ?? []).filter((row) => !row.normal).length;
-  by("light").className = `light ${lost ? "off" : unexpected || state.ended ? "bad" : "good"}`;
-  put(by("light-text"), lost || (state.ended ? `ended: ${state.ended}` : unexpected ? `${unexpected} unexpected error${unexpected > 1 ? "s" : ""}` : can.has("live") ? "no unexpected error" : "recording"));
+  const silent_ms = link.silent_ms(), same_ms = performance.now() - newer_ms;
+  const live = hello && can.has("live") && !lost, mute = live && silent_ms > OLD_MS;
+  const old = mute || live && same_ms > OLD_MS && !state.ended && !state.pace?.paused;
+  put(by("age"), old || lost && can.has("live") ? `${Math.round(Math.max(silent_ms, same_ms) / 1000)} s old` : "");
+  document.body.dataset.old = old || lost && can.has("live") ? "yes" : "no";
+  by("light").className = `light ${lost || old ? "off" : unexpected || state.ended ? "bad" : "good"}`;
+  put(by("light-text"), lost || (mute ? "no message from the panel's server" : old ? "no new values from the robot" : state.ended ? `ended: ${state.ended}` : unexpected ? `${unexpected} unexpected error${unexpected > 1 ? "s" : ""}` : can.has("live") ? "no unexpected error" : "recording"));
 }
+
+setInterval(() => light(said_lost), OLD_MS / 4);   // also while nothing comes
 
 function tell_state() {
   if (!hello) return;

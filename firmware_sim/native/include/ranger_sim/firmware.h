@@ -121,8 +121,8 @@ typedef struct fw_schedule {
     fw_call on_near_limit;     /* a slot took more than 90 % of its length */
 } fw_schedule;
 
-/* From reset: set up the devices, attach the interrupts. */
-void firmware_start(void);
+/* From reset: set up the devices, attach the interrupts. Not inlined: a debugger finds it by its name. */
+__attribute__((noinline)) void firmware_start(void);
 /* The schedule, asked for once after firmware_start; it must stay where it is. */
 const fw_schedule *firmware_schedule(void);
 /* Or, instead of a schedule: the main loop. It is not expected to return. */

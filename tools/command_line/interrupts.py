@@ -1,0 +1,57 @@
+"""Ctrl-C, and the signals by which a system ends programs or a terminal takes its own along: they count as Ctrl-C."""
+
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Any
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+EXIT_INTERRUPTED = 130
+
+
+def end_in_order() -> None:
+    """From now on the first of them raises KeyboardInterrupt, so that files and processes are put away.
+
+    The second ends this process at once, and without a word.
+    """
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        end_at_once()
+        raise KeyboardInterrupt
+
+    _set(note)
+
+
+def end_at_once() -> None:
+    """From now on each of them ends this process, without a word."""
+    _set(signal.SIG_DFL)
+
+
+def leave_to_parent() -> None:
+    """In a process that another one ends: from now on none of them does anything here."""
+    _set(signal.SIG_IGN)
+
+
+@contextlib.contextmanager
+def noted() -> Iterator[list[bool]]:
+    """Inside, the first of them only fills the list, so that the files are finished; the second one breaks off."""
+    interrupted: list[bool] = []
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        if interrupted:
+            raise KeyboardInterrupt
+        interrupted.append(True)
+
+    previous = _set(note)
+    try:
+        yield interrupted
+    finally:
+        for each, handler in previous.items():
+            signal.signal(each, handler)
+
+
+def _set(handler: Callable[[int, FrameType | None], Any] | signal.Handlers) -> dict[signal.Signals, Any]:
+    """Give them a handler, as far as they are not ignored (nohup ignores one); what they had before."""
+    wanted = [each for each in ENDING if signal.getsignal(each) is not signal.SIG_IGN]
+    return {each: signal.signal(each, handler) for each in wanted}
