@@ -28,10 +28,9 @@ from setuptools.command.build_py import build_py
 from setuptools.modified import newer_group
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE / "dev")]
+sys.path.insert(0, str(HERE))
 try:
-    import declarations  # not in the package: what is installed has no use for it
-
+    from dev import declarations, stubs  # not in the package: what is installed has no use for them
     from ranger_sim import loading
 except ImportError as error:
     sys.exit(f"ranger-sim cannot be built: {error}")
@@ -200,7 +199,7 @@ class BuildWithStubs(build_py):
         super().run()
         if self.editable_mode:
             return
-        for place, text in declarations.stubs(HERE).items():
+        for place, text in stubs.stubs(HERE).items():
             target = pathlib.Path(self.build_lib, place)
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8")

@@ -12,8 +12,8 @@ A module of `ranger_sim` that says `import cython` is compiled. Its source decla
     def f(...) -> None                         a C int that is -1 after an exception; -> cython.void raises nothing
 
 From it come three texts: the `.pxd` that other modules cimport; a copy of the source with the same line numbers for
-Cython, in which what the `.pxd` declares is left out; and the `.pyi` for type checkers. What is not understood is
-refused with file and line, as is an assignment to `self.x` where no field `x` is declared.
+Cython, in which what the `.pxd` declares is left out; and the `.pyi` for type checkers (stubs.py). What is not
+understood is refused with file and line, as is an assignment to `self.x` where no field `x` is declared.
 
 A `.pxd` that lies in the tree next to a source is written by hand: C twins of the functions of that source, which
 compiled modules use in their place.
@@ -24,6 +24,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol, TypeGuard
 
 PACKAGE = "ranger_sim"
 COMPILED = re.compile(r"^import cython\b", re.MULTILINE)
@@ -42,7 +43,9 @@ C_TYPES = {
     "ushort": "unsigned short",
     "void": "void",
 }
-REALS = {"double", "float"}
+TYPE = re.compile(  # as ast writes it: cython.const[cython.uchar][::1], cython.p_double, cython.longlong[64]
+    r"cython\.(?P<const>const\[cython\.)?(?P<pointer>p_)?(?P<name>\w+)(?(const)\])(?P<array>.*)"
+)
 BUILTIN = {"bytearray", "bytes", "dict", "list", "object", "set", "str", "tuple"}
 OF_FUNCTIONS = {"ccall", "cfunc", "inline", "exceptval", "locals"}  # decorators that the .pxd carries
 KEPT_IN_COPY = {"final", "boundscheck", "wraparound", "cdivision", "initializedcheck"}
@@ -59,6 +62,13 @@ C_FUNCTION = re.compile(r"^cdef inline .*?(\w+)\(", re.MULTILINE)
 SMALLEST, LARGEST = -(2**31), 2**31 - 1  # of an enum
 
 
+class Placed(Protocol):
+    """What has a place in a source."""
+
+    lineno: int
+    end_lineno: int | None
+
+
 class DeclarationError(Exception):
     """A source that says what cannot be declared; the text has file and line."""
 
@@ -73,7 +83,7 @@ def decorators(node: ast.FunctionDef | ast.ClassDef) -> dict[str, ast.expr]:
     return {ast.unparse(each).partition("(")[0]: each for each in node.decorator_list}
 
 
-def is_c_function(node: ast.stmt) -> bool:
+def is_c_function(node: ast.stmt) -> TypeGuard[ast.FunctionDef]:
     """Whether this is a function or method of C."""
     return isinstance(node, ast.FunctionDef) and not decorators(node).keys().isdisjoint(
         {"cython.ccall", "cython.cfunc"}
@@ -85,6 +95,7 @@ class Field:
     """A field of a compiled class; `annotation`: its type alone."""
 
     node: ast.AnnAssign
+    name: str
     annotation: ast.expr
     access: str  # public, readonly; empty: of C alone
 
@@ -131,14 +142,15 @@ class Source:
         for node in owner.body:
             if isinstance(node, ast.AnnAssign) and node.value is not None and "cython." in ast.unparse(node.annotation):
                 raise self.refusal(node, "a field of a compiled class has no value in the class body")
-            if isinstance(node, ast.AnnAssign) and node.value is None:
+            if isinstance(node, ast.AnnAssign) and node.value is None and isinstance(node.target, ast.Name):
                 annotation, access = node.annotation, "public"
                 if isinstance(annotation, ast.Subscript) and ast.unparse(annotation.value) == "Annotated":
-                    annotation, word = annotation.slice.elts
-                    access = word.value
-                    if access != "readonly":
-                        raise self.refusal(node, f"a field can be annotated as readonly, not as {access!r}")
-                yield Field(node, annotation, "" if is_pointer(annotation) else access)
+                    annotation, word = getattr(annotation.slice, "elts", [annotation, annotation])
+                    access = ast.unparse(word)
+                    if access != "'readonly'":
+                        raise self.refusal(node, f"a field can be annotated as readonly, not as {access}")
+                    access = "readonly"
+                yield Field(node, node.target.id, annotation, "" if is_pointer(annotation) else access)
 
     def imports(self) -> Iterator[ast.ImportFrom]:
         """`from ... import` at the top of the module and under TYPE_CHECKING."""
@@ -152,7 +164,7 @@ class Source:
 
         return inside(self.tree.body)
 
-    def refusal(self, node: ast.AST, why: str) -> DeclarationError:
+    def refusal(self, node: Placed, why: str) -> DeclarationError:
         """The error to raise for a node of this source."""
         return DeclarationError(f"{self.path}:{node.lineno}: {why}")
 
@@ -177,6 +189,13 @@ class Sources:
                 if is_compiled(each.read_text(encoding="utf-8")):
                     found.append(".".join(each.relative_to(self.root).with_suffix("").parts))
         return sorted(found)
+
+    def __getitem__(self, name: str) -> Source:
+        """The source of a module that is there."""
+        source = self.module(name)
+        if source is None:
+            raise KeyError(name)
+        return source
 
     def module(self, name: str) -> Source | None:
         """The source of a module of the package; None for a package and for everything else."""
@@ -203,10 +222,10 @@ class Declarations:
         self._constants()
         for name, node in self.source.variables.items():
             self._variable(name, node)
-        for node in self.source.functions.values():
-            self._function(node, "")
-        for node in self.source.classes.values():
-            self._class(node)
+        for function in self.source.functions.values():
+            self._function(function, "")
+        for owner in self.source.classes.values():
+            self._class(owner)
 
     def pxd(self) -> str:
         """The declarations that other modules cimport."""
@@ -219,17 +238,18 @@ class Declarations:
             lines[first - 1 : last] = [text] + [""] * (last - first)
         return "\n".join(lines) + "\n"
 
-    def _drop(self, node: ast.AST, text: str = "") -> None:
-        self.edits.append((node.lineno, node.end_lineno, text))
+    def _drop(self, node: Placed, text: str = "") -> None:
+        self.edits.append((node.lineno, node.end_lineno or node.lineno, text))
 
     def _imports(self) -> None:
         cimports: dict[str, set[str]] = {}
         for node in self.source.imports():
-            if node.module.startswith("cython.cimports."):
-                cimports.setdefault(node.module.removeprefix("cython.cimports."), set()).update(map(spelt, node.names))
+            module = node.module or ""
+            if module.startswith("cython.cimports."):
+                cimports.setdefault(module.removeprefix("cython.cimports."), set()).update(map(spelt, node.names))
                 self._drop(node)
                 continue
-            other = self.sources.module(node.module)
+            other = self.sources.module(module)
             if other is None:
                 continue
             # `import X as X` gives the name on to Python, so it is no name of C here
@@ -237,21 +257,22 @@ class Declarations:
             self.classes |= {each.asname or each.name for each in node.names if each.name in other.classes}
             wanted = {spelt(each) for each in node.names if each.name in in_c or each.name in other.classes}
             if wanted:
-                cimports.setdefault(node.module, set()).update(wanted)
+                cimports.setdefault(module, set()).update(wanted)
             if in_c:
                 left = ", ".join(spelt(each) for each in node.names if each.name not in in_c)
                 indent = " " * node.col_offset
                 empty = "pass" if indent else ""
-                self._drop(node, indent + (f"from {node.module} import {left}" if left else empty))
-        for module in sorted(cimports):
-            self.lines.append(f"from {module} cimport {', '.join(sorted(cimports[module]))}")
+                self._drop(node, indent + (f"from {module} import {left}" if left else empty))
+        for module, names in sorted(cimports.items()):
+            self.lines.append(f"from {module} cimport {', '.join(sorted(names))}")
 
     def _constants(self) -> None:
         values: dict[str, int] = {}
-        small, large = [], []
+        small: list[str] = []
+        large: list[str] = []
         for name, node in self.source.constants.items():
             try:
-                value = eval(compile(ast.Expression(node.value), "", "eval"), {"__builtins__": {}}, dict(values))
+                value = eval(compile(ast.unparse(node.value or node), "", "eval"), {"__builtins__": {}}, dict(values))
             except Exception as error:  # noqa: BLE001  (whatever an expression can raise)
                 raise self.source.refusal(
                     node, f"{name}: a constant is made of numbers and earlier constants ({error})"
@@ -312,9 +333,9 @@ class Declarations:
     @staticmethod
     def _clause(decorator: ast.expr | None, returns: str) -> str:
         """The exception clause that a decorator asks for; empty without one."""
-        if decorator is None:
+        if not isinstance(decorator, ast.Call):
             return ""
-        check = next((each.value.value for each in decorator.keywords if each.arg == "check"), True)
+        check = not any(each.arg == "check" and ast.unparse(each.value) == "False" for each in decorator.keywords)
         if not decorator.args:
             return " except *" if check else " noexcept"
         cast = "<long long>" if returns == "long long" else ""
@@ -328,21 +349,21 @@ class Declarations:
             self.lines.append("@cython.final")
         self.lines.append(f"cdef class {node.name}" + (f"({bases[0]})" if bases else "") + ":")
         before = len(self.lines)
-        for each in self.source.fields(node):
-            access = each.access and f"{each.access} "
-            self.lines.append(f"    cdef {access}{self.c_type(each.annotation, each.node)} {each.node.target.id}")
-            self._drop(each.node)
-        for each in node.body:
-            if is_c_function(each):
-                self._function(each, "    ")
+        for field_ in self.source.fields(node):
+            access = field_.access and f"{field_.access} "
+            self.lines.append(f"    cdef {access}{self.c_type(field_.annotation, field_.node)} {field_.name}")
+            self._drop(field_.node)
+        for statement in node.body:
+            if is_c_function(statement):
+                self._function(statement, "    ")
         if len(self.lines) == before:
             self.lines.append("    pass")
-        for name, each in decorators(node).items():
+        for name, decorator in decorators(node).items():
             if name in ("cython.cclass", "cython.final"):
-                self._drop(each)
+                self._drop(decorator)
         self._check_assignments(node)
 
-    def c_type(self, annotation: ast.expr | None, place: ast.AST) -> str:
+    def c_type(self, annotation: ast.expr | None, place: Placed) -> str:
         """The C type of an annotation; "None" for a function without a result."""
         if annotation is None:
             return "object"
@@ -355,14 +376,11 @@ class Declarations:
             parts = [each for each in text.split(" | ") if each != "None"]
             return parts[0] if len(parts) == 1 and parts[0] in self.classes | BUILTIN else "object"
         if text.startswith("cython."):
-            constant = re.fullmatch(r"cython\.const\[cython\.(\w+)\](.*)", text)
-            plain = re.fullmatch(r"cython\.(p_)?(\w+)(.*)", text)
-            name = constant[1] if constant else plain[2]
-            if name not in C_TYPES:
+            found = TYPE.fullmatch(text)
+            if found is None or found["name"] not in C_TYPES:
                 raise self.source.refusal(place, f"unknown type {text}")
-            if constant:
-                return f"const {C_TYPES[name]}{constant[2]}"
-            return C_TYPES[name] + ("*" if plain[1] else "") + plain[3]
+            constant = "const " if found["const"] else ""
+            return constant + C_TYPES[found["name"]] + ("*" if found["pointer"] else "") + found["array"]
         name = ast.unparse(annotation.value) if isinstance(annotation, ast.Subscript) else text
         return name if name in self.classes | BUILTIN else "object"
 
@@ -383,14 +401,14 @@ class Declarations:
 
 def assignable(sources: Sources, source: Source, owner: ast.ClassDef) -> set[str] | None:
     """Names of fields and properties of a class and its bases; None when a base is not a class of ours."""
-    known = {each.node.target.id for each in source.fields(owner)}
+    known = {each.name for each in source.fields(owner)}
     known |= {each.name for each in owner.body if isinstance(each, ast.FunctionDef) and each.decorator_list}
     for base in map(ast.unparse, owner.bases):
         if base in source.classes:
             more = assignable(sources, source, source.classes[base])
         else:
             origin = next((n for n in source.imports() for a in n.names if (a.asname or a.name) == base), None)
-            other = sources.module(origin.module) if origin is not None else None
+            other = sources.module(origin.module or "") if origin is not None else None
             if other is None or base not in other.classes:
                 return None
             more = assignable(sources, other, other.classes[base])
@@ -415,7 +433,7 @@ def write_declarations(root: Path, folder: Path) -> list[str]:
     names = sources.compiled_modules()
     texts: dict[Path, str] = {}
     for name in names:
-        made = Declarations(sources, sources.module(name))
+        made = Declarations(sources, sources[name])
         path = folder.joinpath(*name.split("."))
         texts[path.with_suffix(".pxd")] = made.pxd()
         texts[path.with_suffix(".py")] = made.copy()
@@ -433,168 +451,3 @@ def write_declarations(root: Path, folder: Path) -> list[str]:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
     return names
-
-
-# --- type stubs -------------------------------------------------------------------------------------------
-
-HELPERS = {"Any": "typing", "MutableSequence": "collections.abc", "final": "typing"}
-LITERALS: dict[type, str] = {bool: "bool", int: "int", float: "float", str: "str", bytes: "bytes"}
-
-
-class Stub:
-    """The `.pyi` of one source: what holds when it is compiled, so neither C functions nor C variables."""
-
-    def __init__(self, sources: Sources, source: Source) -> None:
-        self.sources, self.source = sources, source
-        self.helpers: set[str] = set()
-        self.lines: list[str] = []
-        for node in source.tree.body:
-            self._statement(node)
-
-    def text(self) -> str:
-        """The stub."""
-        head = [f"from {HELPERS[name]} import {name}" for name in sorted(self.helpers)]
-        return "\n".join([f"# Generated from {self.source.path.name}.", *head, *self.lines]) + "\n"
-
-    def _any(self) -> str:
-        self.helpers.add("Any")
-        return "Any"
-
-    def _statement(self, node: ast.stmt) -> None:
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            module = getattr(node, "module", None) or node.names[0].name
-            other = self.sources.module(module)
-            names = [each for each in node.names if other is None or each.name not in other.only_in_c]
-            if names and module.partition(".")[0] != "cython":
-                self.lines.append(ast.unparse(type(node)(**{**vars(node), "names": names})))
-        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            for each in node.body:
-                self._statement(each)
-        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
-            if node.target.id in self.source.constants:
-                self.lines.append(f"{node.target.id}: int")
-            elif node.target.id not in self.source.variables:
-                self.lines.append(f"{node.target.id}: {self.python_type(node.annotation)}")
-        elif isinstance(node, ast.Assign):
-            for target in node.targets:
-                for name in [target] if isinstance(target, ast.Name) else getattr(target, "elts", []):
-                    if isinstance(name, ast.Name):
-                        self.lines.append(f"{name.id}: {self._kind_of(node.value if name is target else None)}")
-        elif isinstance(node, ast.FunctionDef):
-            self._function(node, "")
-        elif isinstance(node, ast.ClassDef):
-            self._class(node)
-
-    def _kind_of(self, value: ast.expr | None) -> str:
-        """The type of a literal; Any for everything else."""
-        if isinstance(value, ast.UnaryOp):
-            value = value.operand
-        return LITERALS.get(type(value.value), self._any()) if isinstance(value, ast.Constant) else self._any()
-
-    def _function(self, node: ast.FunctionDef, indent: str) -> None:
-        have = decorators(node)
-        if "cython.cfunc" in have:
-            return
-        for name, each in have.items():
-            if not name.startswith("cython."):
-                self.lines.append(f"{indent}@{ast.unparse(each)}")
-        copied = ast.parse(f"def f({ast.unparse(node.args)}): ...").body[0].args
-        everything = [*copied.posonlyargs, *copied.args, *copied.kwonlyargs, copied.vararg, copied.kwarg]
-        for number, each in enumerate(filter(None, everything)):
-            if indent and number == 0 and each.arg in ("self", "cls"):
-                continue
-            each.annotation = ast.Name(self.python_type(each.annotation))
-        copied.defaults = [short(each) for each in copied.defaults]
-        copied.kw_defaults = [each and short(each) for each in copied.kw_defaults]
-        returns = "None" if node.name == "__init__" else self.python_type(node.returns)
-        self.lines.append(f"{indent}def {node.name}({ast.unparse(copied)}) -> {returns}: ...")
-
-    def _class(self, node: ast.ClassDef) -> None:
-        compiled = node.name in self.source.classes
-        have = decorators(node)
-        if "cython.final" in have:
-            self.helpers.add("final")
-            self.lines.append("@final")
-        self.lines += [f"@{ast.unparse(each)}" for name, each in have.items() if not name.startswith("cython.")]
-        bases = ", ".join(map(ast.unparse, [*node.bases]))
-        self.lines.append(f"class {node.name}" + (f"({bases})" if bases else "") + ":")
-        before = len(self.lines)
-        if compiled:
-            for each in self.source.fields(node):
-                if each.access == "public":
-                    self.lines.append(f"    {each.node.target.id}: {self.python_type(each.annotation)}")
-                elif each.access == "readonly":
-                    kind = self.python_type(each.annotation)
-                    self.lines += ["    @property", f"    def {each.node.target.id}(self) -> {kind}: ..."]
-        self._attributes(node, compiled)
-        for each in node.body:
-            if isinstance(each, ast.FunctionDef):
-                self._function(each, "    ")
-        if len(self.lines) == before:
-            self.lines.append("    pass")
-
-    def _attributes(self, node: ast.ClassDef, compiled: bool) -> None:
-        """Attributes of the class; of an ordinary class the fields too, declared in its body or set in its methods."""
-        names = set()
-        for each in node.body:
-            if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name):
-                if compiled and each.value is None:
-                    continue
-                names.add(each.target.id)
-                value = "" if each.value is None else " = ..."
-                self.lines.append(f"    {each.target.id}: {self.python_type(each.annotation)}{value}")
-            elif isinstance(each, ast.Assign):
-                for target in each.targets:
-                    if isinstance(target, ast.Name):
-                        names.add(target.id)
-                        self.lines.append(f"    {target.id}: {self._kind_of(each.value)}")
-        if compiled:
-            return
-        names |= {each.name for each in node.body if isinstance(each, ast.FunctionDef)}
-        for each in ast.walk(node):
-            if (
-                isinstance(each, ast.Attribute)
-                and isinstance(each.ctx, ast.Store)
-                and ast.unparse(each.value) == "self"
-            ):
-                if each.attr not in names:
-                    names.add(each.attr)
-                    self.lines.append(f"    {each.attr}: {self._any()}")
-
-    def python_type(self, annotation: ast.expr | None) -> str:
-        """The type that Python sees."""
-        if annotation is None:
-            return self._any()
-        text = ast.unparse(annotation)
-        if isinstance(annotation, ast.Constant) and isinstance(annotation.value, str):
-            text = annotation.value
-        if text == "object":
-            return self._any()
-        if not text.startswith("cython."):
-            return text
-        found = re.fullmatch(r"cython\.(?:const\[cython\.(\w+)\]|(p_)?(\w+))(.*)", text)
-        name = found[1] or found[3]
-        kind = "float" if name in REALS else {"bint": "bool", "void": "None"}.get(name, "int")
-        if found[2] or found[4]:
-            self.helpers.add("MutableSequence")
-            return f"MutableSequence[{kind}]"
-        return kind
-
-
-def short(default: ast.expr) -> ast.expr:
-    """A default as a stub shows it: literals, and dots for everything else."""
-    plain = (
-        isinstance(default, ast.Constant)
-        or isinstance(default, ast.UnaryOp)
-        and isinstance(default.operand, ast.Constant)
-    )
-    return default if plain else ast.Constant(...)
-
-
-def stubs(root: Path) -> dict[str, str]:
-    """{place of the `.pyi` below the root: its text} of every compiled module."""
-    sources = Sources(root)
-    return {
-        name.replace(".", "/") + ".pyi": Stub(sources, sources.module(name)).text()
-        for name in sources.compiled_modules()
-    }

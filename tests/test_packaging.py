@@ -168,7 +168,8 @@ def checkout(tmp_path):
     for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
     (tmp_path / "dev").mkdir()
-    shutil.copy(ROOT / "dev" / "declarations.py", tmp_path / "dev")
+    for name in ("__init__.py", "declarations.py", "stubs.py"):
+        shutil.copy(ROOT / "dev" / name, tmp_path / "dev")
     (tmp_path / "ranger_sim").mkdir()
     for name in ("__init__.py", "__main__.py", "loading.py", "py.typed"):
         shutil.copy(ROOT / "ranger_sim" / name, tmp_path / "ranger_sim")

@@ -58,7 +58,6 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.figures import command as figures
     from ranger_sim.tools.firmware import command as firmware
     from ranger_sim.tools.fmu import command as fmu
-    from ranger_sim.tools.fuzz import command as fuzz
     from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.new import command as new
     from ranger_sim.tools.panel import command as panel
@@ -79,7 +78,6 @@ def parser() -> argparse.ArgumentParser:
     info.register(commands)
     table_command.register(commands)
     bench.register(commands)
-    fuzz.register(commands)
     trace.register(commands)
     tune.register(commands)
     up.register(commands)

@@ -4,7 +4,8 @@ import textwrap
 
 import pytest
 
-from dev.declarations import DeclarationError, Declarations, Sources, Stub, write_declarations
+from dev.declarations import DeclarationError, Declarations, Sources, write_declarations
+from dev.stubs import Stub
 
 EVENTS = """\
 import cython
@@ -96,7 +97,7 @@ def root(tmp_path):
 
 def made(root, name="queue"):
     sources = Sources(root)
-    return Declarations(sources, sources.module(f"ranger_sim.ground.{name}"))
+    return Declarations(sources, sources[f"ranger_sim.ground.{name}"])
 
 
 def test_a_module_that_imports_cython_is_compiled_and_no_other(root):
@@ -156,7 +157,7 @@ def test_the_copy_has_the_same_lines_without_what_is_declared(root):
 
 def test_the_stub_has_what_python_sees_of_the_compiled_module(root):
     sources = Sources(root)
-    stub = Stub(sources, sources.module("ranger_sim.ground.queue")).text()
+    stub = Stub(sources, sources["ranger_sim.ground.queue"]).text()
     for line in (
         "from ranger_sim.ground.other import Other",
         "WORDS: int",

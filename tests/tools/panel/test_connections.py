@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from ranger_sim.tools.fuzz.panel import TOKEN, Fuzz, Program, frame, handshake
+from dev.fuzz.panel import TOKEN, Fuzz, Program, frame, handshake
 from ranger_sim.tools.panel import connections, server
 from tests.tools.panel.test_server import Ramp
 

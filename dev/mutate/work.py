@@ -13,6 +13,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TextIO
 
+from dev.mutate.mutants import Mutant, mutants
+from dev.mutate.serve import ASKED_BY
 from ranger_sim.foundation import toml_file, wallclock
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
@@ -25,8 +27,6 @@ from ranger_sim.loading import (
     RUNS_COMPILED,
     RUNS_INTERPRETED_BECAUSE,
 )
-from ranger_sim.tools.mutate.mutants import Mutant, mutants
-from ranger_sim.tools.mutate.serve import ASKED_BY
 
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent.toml")
 # Beside the room's own tests, and what is not a program of ours: written by other modules, or only for users' editors.
@@ -180,7 +180,7 @@ class Copy:
         log = self.folder.parent / "server.log"
         with log.open("w", encoding="utf-8") as said:
             process = self._started(
-                ["-p", "ranger_sim.tools.mutate.serve", *tests],
+                ["-p", "dev.mutate.serve", *tests],
                 compiled,
                 pass_fds=(asking, answering),
                 stdin=subprocess.DEVNULL,

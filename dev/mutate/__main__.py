@@ -1,4 +1,4 @@
-"""`python -m ranger_sim.tools.mutate ROOM ...`: what share of small faults in a room its tests notice.
+"""`python -m dev.mutate ROOM ...`: what share of small faults in a room its tests notice.
 
 Of all faults that `mutants.py` knows to put into the room's files, so many are drawn with a seed, put one at a time
 into a copy of the repository, and the tests of the room that reach the place are run there, interpreted and cheapest
@@ -17,12 +17,8 @@ import sys
 from collections import Counter
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import CHECKOUT, PACKAGE, packages
-from ranger_sim.tools.command_line.files import json_target, replace_file
-from ranger_sim.tools.command_line.units import whole_number
-from ranger_sim.tools.mutate.mutants import Mutant
-from ranger_sim.tools.mutate.work import (
+from dev.mutate.mutants import Mutant
+from dev.mutate.work import (
     KILLED,
     TIMEOUT,
     Built,
@@ -38,8 +34,12 @@ from ranger_sim.tools.mutate.work import (
     reach_of,
     sample,
 )
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.loading import CHECKOUT, PACKAGE, packages
+from ranger_sim.tools.command_line.files import json_target, replace_file
+from ranger_sim.tools.command_line.units import whole_number
 
-COMMAND = "python -m ranger_sim.tools.mutate"
+COMMAND = "python -m dev.mutate"
 COUNT = 30
 LIMIT_S = 60.0
 MAP_LIMIT_S = 900
@@ -47,7 +47,7 @@ NOTICED = (KILLED, TIMEOUT)
 # Tests of a room that stand elsewhere, since what they go through is another room's door.
 ALSO = {
     "datatable": ("tests/harness/test_requests.py", "tests/tools/robodaq/test_robodaq.py"),
-    "can_bus": ("tests/tools/fuzz/test_can.py", "tests/tools/buses/test_bus.py"),
+    "can_bus": ("tests/dev/fuzz/test_can.py", "tests/tools/buses/test_bus.py"),
     "plant": ("tests/oracle/test_known_answers.py",),
     "sysid": ("tests/blind/test_generator.py", "tests/tools/diagnose/test_bad_data.py", "tests/tools/test_identify.py"),
 }

@@ -2,9 +2,9 @@
 
 import pytest
 
+from dev.fuzz import Finding, xcp
 from ranger_sim.harness.xcp import slave, udp
 from ranger_sim.harness.xcp.table_memory import TableMemory
-from ranger_sim.tools.fuzz import Finding, xcp
 
 
 def test_hostile_masters_are_stood():

@@ -2,10 +2,10 @@
 
 import pytest
 
+from dev.fuzz import Finding, requests
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.feed.server import FeedServer
-from ranger_sim.tools.fuzz import Finding, requests
 
 
 def test_hostile_requests_and_viewers_are_stood():
@@ -29,7 +29,7 @@ def test_a_fault_that_ends_the_run_of_others_is_found(monkeypatch):
     monkeypatch.setattr(Fault, "arm", proud)
     with pytest.raises(UserError, match="one fault at a time") as found:
         requests.run(3000, seed=1)
-    assert "ranger-sim fuzz requests: seed 1, case" in found.value.__notes__[0]
+    assert "python -m dev.fuzz requests: seed 1, case" in found.value.__notes__[0]
 
 
 def test_a_feed_that_shows_what_is_no_number_is_found(monkeypatch):

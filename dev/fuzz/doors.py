@@ -16,6 +16,7 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from typing import Any
 
+from dev.fuzz import Finding
 from ranger_sim import datatable
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
@@ -28,7 +29,6 @@ from ranger_sim.foundation.peers import Door
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.processes.control import ControlServer, address
 from ranger_sim.harness.processes.requests import Request
-from ranger_sim.tools.fuzz import Finding
 
 RATE = 1_000_000
 POLL_NS = 500_000
@@ -428,6 +428,6 @@ def run(cases: int, seed: int = 1) -> dict[str, int]:
                 fuzz.poll()
         except Exception as error:
             if not isinstance(error, Finding):
-                error.add_note(f"ranger-sim fuzz doors: seed {seed}, case {fuzz.cases}")
+                error.add_note(f"python -m dev.fuzz doors: seed {seed}, case {fuzz.cases}")
             raise
         return fuzz.counted()

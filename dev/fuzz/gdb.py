@@ -10,11 +10,11 @@ import contextlib
 import socket
 from typing import Any
 
+from dev.fuzz import Finding
 from ranger_sim.firmware_sim.arm7.core import Core
 from ranger_sim.firmware_sim.gdb.packets import framed
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.tools.fuzz import Finding
 
 # add r0, r0, #1; str r0, [r1]; b to the first: it counts in RAM
 PROGRAM = (0xE3A01101, 0xE2800001, 0xE5810000, 0xEAFFFFFC)

@@ -12,6 +12,7 @@ import socket
 import struct
 from typing import Any
 
+from dev.fuzz import Finding
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import BASE, address_of
 from ranger_sim.datatable.packing import value_of_word
@@ -20,7 +21,6 @@ from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.xcp.udp import LOOK_NS, MAX_CTO, MAX_DTO, WAITING, XcpUdpServer
-from ranger_sim.tools.fuzz import Finding
 
 HEADER = struct.Struct("<HH")
 FIRST_COMMAND = 0xC0  # of ASAM MCD-1 XCP part 2; below stand packets that are no commands

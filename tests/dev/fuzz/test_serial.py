@@ -1,9 +1,9 @@
-"""A short run of `ranger-sim fuzz serial`, and that its checks can fail."""
+"""A short run of `python -m dev.fuzz serial`, and that its checks can fail."""
 
 import pytest
 
-from ranger_sim.tools.fuzz import Finding
-from ranger_sim.tools.fuzz import serial as fuzz_serial
+from dev.fuzz import Finding
+from dev.fuzz import serial as fuzz_serial
 
 
 def test_three_hundred_cases_of_wrong_bytes_move_the_counters_and_stop_nothing():

@@ -1,9 +1,9 @@
-"""A short run of `ranger-sim fuzz profiles`, and that its checks can fail."""
+"""A short run of `python -m dev.fuzz profiles`, and that its checks can fail."""
 
 import pytest
 
+from dev.fuzz import profiles as fuzz_profiles
 from ranger_sim.harness.outside import profile
-from ranger_sim.tools.fuzz import profiles as fuzz_profiles
 
 
 def test_broken_profiles_pass_or_are_refused_with_a_line_per_fault():

@@ -1,4 +1,4 @@
-"""A short run of `ranger-sim fuzz channel`, and that it ends when the board has ended."""
+"""A short run of `python -m dev.fuzz channel`, and that it ends when the board has ended."""
 
 import contextlib
 import os
@@ -6,9 +6,9 @@ import signal
 
 import pytest
 
+from dev.fuzz import Finding
+from dev.fuzz import channel as fuzz_channel
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.tools.fuzz import Finding
-from ranger_sim.tools.fuzz import channel as fuzz_channel
 
 
 def test_three_hundred_damaged_turns_are_answered():

@@ -7,10 +7,10 @@ import subprocess
 
 import pytest
 
+from dev.mutate import work
+from dev.mutate.mutants import mutants
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.loading import CHECKOUT, PACKAGE
-from ranger_sim.tools.mutate import work
-from ranger_sim.tools.mutate.mutants import mutants
 
 SOURCE = '''"""A module."""
 
@@ -213,14 +213,13 @@ def house(tmp_path_factory):
     """A checkout small enough to be mutated in a test."""
     root = tmp_path_factory.mktemp("mutate") / "house"
     needed = ("ranger_sim/__init__.py", "ranger_sim/loading.py")
-    for name in (*needed, "tools/__init__.py", "tools/mutate/__init__.py", "tools/mutate/serve.py"):
+    for name in (*needed, "dev/__init__.py", "dev/mutate/__init__.py", "dev/mutate/serve.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(CHECKOUT / name, root / name)
     (root / "pyproject.toml").write_text('[tool.pytest.ini_options]\naddopts = "-p no:ranger_sim"\n', encoding="utf-8")
     (root / "plant").mkdir()
-    for folder in ("plant", "tools"):
-        (root / folder / "__init__.py").touch()
-        (root / "ranger_sim" / folder).symlink_to(f"../{folder}")
+    (root / "plant" / "__init__.py").touch()
+    (root / "ranger_sim" / "plant").symlink_to("../plant")
     (root / "plant" / "valve.py").write_text(VALVE, encoding="utf-8")
     (root / "tests").mkdir()
     (root / "tests" / "test_valve.py").write_text(TESTS, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""`ranger-sim fuzz`: hostile input by the thousand; ends with the first case that the program does not stand."""
+"""`python -m dev.fuzz`: hostile input by the thousand; ends with the first case that the program does not stand."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import argparse
 import importlib
 import json
 import sys
-from typing import Any
 
-from ranger_sim.tools.command_line import streams
+from dev.fuzz import Finding
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.help_text import named_lines
 from ranger_sim.tools.command_line.units import whole_number
-from ranger_sim.tools.fuzz import Finding
 
+COMMAND = "python -m dev.fuzz"
 EXIT_FOUND = 1
 CASES = 10_000
 TARGETS = {
@@ -29,11 +29,10 @@ TARGETS = {
 }
 
 
-def register(commands: Any) -> None:
-    """Add the subcommand to the command line."""
-    command = commands.add_parser(
-        "fuzz",
-        help="hostile input by the thousand: wrong frames, bytes, messages, files",
+def parser() -> argparse.ArgumentParser:
+    """The options."""
+    command = argparse.ArgumentParser(
+        prog=COMMAND,
         description="Hostile input by the thousand. After every case everything is checked.\n"
         "The first case that the program does not stand is named with its seed;\nthe exit code is then 1.",
         epilog="targets:\n" + named_lines(TARGETS, 10),
@@ -49,22 +48,33 @@ def register(commands: Any) -> None:
         "--seed", type=whole_number(0), default=1, metavar="S", help="the same seed gives the same cases (default 1)"
     )
     command.add_argument("--json", metavar="FILE|-", help="what was counted, as JSON; - prints it and nothing else")
-    command.set_defaults(run=run, refuse=command.error)
+    return command
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """One target after the other; 0 when all held, 1 with the first finding, 2 for a user's mistake."""
+    command = parser()
+    options = command.parse_args(arguments)
+    for name in options.target:
+        if name not in TARGETS:
+            command.error(f"unknown target {name!r} (available: {', '.join(TARGETS)})")
+    try:
+        return run(options)
+    except UserError as mistake:
+        print(f"{COMMAND}: {mistake}", file=sys.stderr)
+        return 2
 
 
 def run(options: argparse.Namespace) -> int:
-    """One target after the other; 0 when all stood, 1 with the first finding."""
-    for name in options.target:
-        if name not in TARGETS:
-            options.refuse(f"{name!r} is no target; there are {', '.join(TARGETS)}")
+    """The same with options that are right."""
     json_file = json_target(options.json)
     found: dict[str, dict] = {}
     for name in dict.fromkeys(options.target or TARGETS):
-        fuzzer = importlib.import_module(f"ranger_sim.tools.fuzz.{name}")
+        fuzzer = importlib.import_module(f"dev.fuzz.{name}")
         try:
             counted = found[name] = fuzzer.run(options.cases, options.seed)
         except Finding as finding:
-            print(f"ranger-sim fuzz: {name}, seed {options.seed}: {finding}", file=sys.stderr)
+            print(f"{COMMAND}: {name}, seed {options.seed}: {finding}", file=sys.stderr)
             return EXIT_FOUND
         if options.json != "-":
             counts = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in counted.items())
@@ -73,5 +83,9 @@ def run(options: argparse.Namespace) -> int:
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
     if options.json == "-":
-        streams.print_result(text)
+        print(text)
     return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

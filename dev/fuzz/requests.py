@@ -14,6 +14,7 @@ import socket
 from contextlib import closing, suppress
 from typing import Any
 
+from dev.fuzz import Connection, Finding
 from ranger_sim.datatable import parameters
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
@@ -26,7 +27,6 @@ from ranger_sim.harness.processes import requests
 from ranger_sim.harness.processes.plant_process import PlantRun
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.tools.fuzz import Connection, Finding
 
 SLICE_S = 0.002
 CASES_PER_SLICE = 8
@@ -246,7 +246,7 @@ def run(cases: int, seed: int = 1) -> dict[str, int]:
                 fuzz.walk()
         except Exception as error:
             if not isinstance(error, Finding):
-                error.add_note(f"ranger-sim fuzz requests: seed {seed}, case {fuzz.cases}")
+                error.add_note(f"python -m dev.fuzz requests: seed {seed}, case {fuzz.cases}")
             raise
     return {
         "cases": fuzz.cases,

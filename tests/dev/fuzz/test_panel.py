@@ -2,7 +2,7 @@
 
 import pytest
 
-from ranger_sim.tools.fuzz import Finding, panel
+from dev.fuzz import Finding, panel
 from ranger_sim.tools.panel import connections, messages, server
 
 # Starlette leaves a file that it was sending to the collector when its server is broken off, as these tests do.

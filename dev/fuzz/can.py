@@ -12,6 +12,7 @@ import socket
 from contextlib import suppress
 from typing import Any
 
+from dev.fuzz import Finding
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.slcan import SlcanServer
@@ -21,7 +22,6 @@ from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
-from ranger_sim.tools.fuzz import Finding
 
 SLICE_NS = 1_000_000
 CASES_PER_SLICE = 8

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pathlib
 import tempfile
 
+from dev.fuzz import Finding
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.outside import profile
-from ranger_sim.tools.fuzz import Finding
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")
 WORDS = (
@@ -61,6 +61,6 @@ def run(cases: int, seed: int = 1) -> dict[str, int]:
                 if not error.faults or len(str(error).splitlines()) != len(error.faults):
                     raise Finding(f"not a line per fault: {error} (case {case})") from None
             except Exception as error:
-                error.add_note(f"ranger-sim fuzz profiles: seed {seed}, case {case}")
+                error.add_note(f"python -m dev.fuzz profiles: seed {seed}, case {case}")
                 raise
     return {"cases": cases, "passed": passed, "refused": refused, "faults": faults}

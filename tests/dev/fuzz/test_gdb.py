@@ -2,8 +2,8 @@
 
 import pytest
 
+from dev.fuzz import Finding, gdb
 from ranger_sim.firmware_sim.gdb import server, stub
-from ranger_sim.tools.fuzz import Finding, gdb
 
 
 def test_hostile_debuggers_are_stood():

@@ -9,13 +9,13 @@ from __future__ import annotations
 import contextlib
 from typing import Any
 
+from dev.fuzz import Finding
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import places
 from ranger_sim.harness.processes.channel import SLOT_WORDS
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.tools.fuzz import Finding
 
 BOARD = "MCSI"
 TURN_NS = 500_000  # one slot of that board

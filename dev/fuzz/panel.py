@@ -24,13 +24,13 @@ import h11
 import uvicorn
 from uvicorn.server import ServerState
 
+from dev.fuzz import Connection, Finding
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.harness.processes.requests import admitted
 from ranger_sim.harness.ranger import Ranger
-from ranger_sim.tools.fuzz import Connection, Finding
 from ranger_sim.tools.panel.command import http_server
 from ranger_sim.tools.panel.connections import MOST
 from ranger_sim.tools.panel.robot import RobotSource

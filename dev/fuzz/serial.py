@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from dev.fuzz import Finding
 from ranger_sim.boards.main_brain.board import MainBrainBoard
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import all_variables
@@ -16,7 +17,6 @@ from ranger_sim.datatable.generated import mb as table
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.foundation.events import UART_BYTE, UART_OUTPUT
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.tools.fuzz import Finding
 from ranger_sim.tools.robodaq.codec import SEGMENT_BYTES, write_packet
 from ranger_sim.tools.robodaq.session import Session
 

@@ -1,10 +1,10 @@
-"""A short run of `ranger-sim fuzz doors`, and that its checks can fail."""
+"""A short run of `python -m dev.fuzz doors`, and that its checks can fail."""
 
 import pytest
 
+from dev.fuzz import Finding, doors
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.processes.requests import Request
-from ranger_sim.tools.fuzz import Finding, doors
 
 
 @pytest.fixture
@@ -51,4 +51,4 @@ def test_an_exception_at_a_door_leaves_with_its_case(monkeypatch):
     monkeypatch.setattr(control, "admitted", lambda line: 1 // 0)
     with pytest.raises(ZeroDivisionError) as fault:
         doors.run(100)
-    assert "ranger-sim fuzz doors: seed 1, case" in fault.value.__notes__[0]
+    assert "python -m dev.fuzz doors: seed 1, case" in fault.value.__notes__[0]

@@ -1,12 +1,12 @@
-"""A short run of `ranger-sim fuzz can`, and that its checks can fail."""
+"""A short run of `python -m dev.fuzz can`, and that its checks can fail."""
 
 import pytest
 
+from dev.fuzz import Finding
+from dev.fuzz import can as fuzz_can
 from ranger_sim.can_bus.node import RESET
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import NEVER
-from ranger_sim.tools.fuzz import Finding
-from ranger_sim.tools.fuzz import can as fuzz_can
 
 
 class DeadBoard(Board):
