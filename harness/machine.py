@@ -356,5 +356,6 @@ class Machine:
 def accept_lists(plant: Any) -> None:
     """A body's `fill_sample` in Python gets an array of numpy: `row[:2] = [angle, rate]` is refused by a buffer."""
     fill = plant.fill_sample
-    if inspect.isfunction(getattr(type(plant), "fill_sample", None)):
+    # a body of the package has no __dict__: compiled, and interpreted too
+    if inspect.isfunction(getattr(type(plant), "fill_sample", None)) and hasattr(plant, "__dict__"):
         plant.fill_sample = lambda row: fill(np.asarray(row))

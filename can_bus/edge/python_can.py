@@ -171,7 +171,10 @@ class RangerSimBus(can.BusABC):
                 ("bit_error_rate", errors, bus.paced.bit_error_rate),
             ):
                 if want is not None and want != have:
-                    raise UserError(f"ranger_sim: the private bus {channel} is open with {what} {have:g}, not {want:g}")
+                    raise UserError(
+                        f"ranger_sim: the private bus {channel} is open with {what} {have:.12g}, not {want:.12g}: who "
+                        "opens it first sets it"
+                    )
             if wanted["acknowledge"]:
                 with bus.lock:
                     bus.paced.add_acknowledger()
@@ -234,10 +237,10 @@ class RangerSimBus(can.BusABC):
 
     def shutdown(self) -> None:
         """Leave the bus. What has been queued is still sent while somebody is there to receive it."""
-        if self._is_shutdown:
-            return
-        super().shutdown()
-        self._link.close()
+        was_open = not self._is_shutdown
+        super().shutdown()  # in any case, as python-can asks of its interfaces
+        if was_open:
+            self._link.close()
 
     @property
     def state(self) -> can.BusState:

@@ -282,7 +282,9 @@ def test_a_mistake_in_an_option_is_told_in_one_line(bus, options, words):
 def test_who_joins_a_private_bus_cannot_change_it(bus):
     bus(bitrate=250_000, speed="max")
     bus(bitrate="250000", speed="max")
-    with pytest.raises(can.CanInitializationError, match="open with bitrate 250000, not 500000"):
+    with pytest.raises(
+        can.CanInitializationError, match="open with bitrate 250000, not 500000: who opens it first sets it"
+    ):
         bus(bitrate=500_000)
     with pytest.raises(can.CanInitializationError, match="open with speed 0, not 1"):
         bus(speed=1)
@@ -299,6 +301,15 @@ def test_after_shutdown_everything_is_refused_and_nothing_is_said(bus, caplog):
         c.send(message(2))
     assert b.recv(60).arbitration_id == 2  # what was queued is still sent
     assert not [entry for entry in caplog.records if entry.levelno >= logging.WARNING]
+
+
+def test_the_shutdown_of_python_can_itself_is_always_called(bus, monkeypatch):
+    """python-can's own tests call it on an interface that was never opened."""
+    calls = []
+    monkeypatch.setattr(can.BusABC, "shutdown", lambda each: calls.append(each))
+    never_opened = python_can.RangerSimBus.__new__(python_can.RangerSimBus)
+    never_opened.shutdown()
+    assert calls == [never_opened]
 
 
 def test_flushing_drops_what_waits(bus, clock):
