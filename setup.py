@@ -150,6 +150,7 @@ class OptionalBuild(build_ext):
     def translate(self):
         """Python to C, in build/cython, only what changed. Returns the sources as they were (loading.py)."""
         try:
+            import Cython
             from Cython.Build import cythonize
         except ImportError as error:
             raise NotCompiledError(f"no Cython ({one_line(error)})") from error
@@ -159,18 +160,19 @@ class OptionalBuild(build_ext):
             names = declarations.write_declarations(HERE, TRANSLATED)
         except declarations.DeclarationError as error:
             raise NotCompiledError(str(error)) from error
+        helpers = pathlib.Path(SHARED.replace(".", "/") + ".c")
         try:
             os.chdir(TRANSLATED)
+            directives = json.dumps([SHARED, DIRECTIVES, Cython.__version__])
+            all_anew = not same_as_kept(TRANSLATED / "directives.json", directives)
+            shared = [] if helpers.exists() and not all_anew else [Extension(SHARED, [helpers.as_posix()])]
             cythonize(
-                [
-                    *(Extension(name, [name.replace(".", "/") + ".py"]) for name in names),
-                    Extension(SHARED, [SHARED.replace(".", "/") + ".c"]),
-                ],
+                [*(Extension(name, [name.replace(".", "/") + ".py"]) for name in names), *shared],
                 language_level=3,
                 nthreads=jobs if jobs > 1 else 0,
                 compiler_directives=DIRECTIVES,
                 shared_utility_qualified_name=SHARED,
-                force=not same_as_kept(TRANSLATED / "directives.json", json.dumps([SHARED, DIRECTIVES])),
+                force=all_anew,
             )
         except Exception as error:  # noqa: BLE001  (Cython has printed the place)
             raise NotCompiledError(f"Cython could not translate the sources ({one_line(error)})") from error

@@ -444,7 +444,11 @@ def write_declarations(root: Path, folder: Path) -> list[str]:
             if above.parts:
                 texts[folder / above / "__init__.pxd"] = ""
     for old in folder.rglob("*"):
-        if old.suffix in (".pxd", ".py", ".c") and old not in texts and old.with_suffix(".py") not in texts:
+        if (
+            old.suffix in (".pxd", ".py", ".c")
+            and not {old, old.with_suffix(".py")} & texts.keys()
+            and old.stem != "_shared"
+        ):
             old.unlink()
     for path, text in texts.items():
         if not path.exists() or path.read_text(encoding="utf-8") != text:

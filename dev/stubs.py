@@ -70,12 +70,11 @@ class Stub:
                 self.lines.append(f"{indent}@{ast.unparse(each)}")
         copied = copy.deepcopy(node.args)
         everything = [*copied.posonlyargs, *copied.args, *copied.kwonlyargs, copied.vararg, copied.kwarg]
-        for number, each in enumerate(filter(None, everything)):
-            if indent and number == 0 and each.arg in ("self", "cls"):
-                continue
-            each.annotation = ast.Name(self.python_type(each.annotation))
-        copied.defaults = [short(each) for each in copied.defaults]
-        copied.kw_defaults = [each and short(each) for each in copied.kw_defaults]
+        for number, argument in enumerate(each for each in everything if each is not None):
+            if not (indent and number == 0 and argument.arg in ("self", "cls")):
+                argument.annotation = ast.Name(self.python_type(argument.annotation))
+        copied.defaults = [short(value) for value in copied.defaults]
+        copied.kw_defaults = [value and short(value) for value in copied.kw_defaults]
         returns = "None" if node.name == "__init__" else self.python_type(node.returns)
         self.lines.append(f"{indent}def {node.name}({ast.unparse(copied)}) -> {returns}: ...")
 

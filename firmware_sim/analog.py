@@ -39,7 +39,9 @@ class AnalogPins:
         self.places = [-1] * 32  # in the table outside; -1: the pin has a line of its own
         self.feed = None
 
-    def follow(self, index, times: cython.longlong[::1], starts: cython.double[::1], ends: cython.double[::1], place):
+    def follow(
+        self, index, times: cython.longlong[::1], starts: cython.double[::1], ends: cython.double[::1], place
+    ) -> None:
         """From now on pin `index` runs from `starts[place]` at `times[0]` to `ends[place]` at `times[1]`, whatever
         stands there when it is read. All pins of a chip follow the same three arrays (int64 ns, V, V)."""
         self._check(index)

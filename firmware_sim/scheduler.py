@@ -122,7 +122,7 @@ class Task:
             self.scheduler.lay(self)
 
     @property
-    def cost(self):
+    def cost(self) -> int:
         """Modelled cycles of a call without items."""
         return self.base_cycles
 
@@ -134,7 +134,7 @@ class Task:
             self.scheduler.lay(self)
 
     @property
-    def limit(self):
+    def limit(self) -> int:
         """Cycles against which a call is held; 0: none."""
         return self.most_cycles
 
@@ -145,22 +145,22 @@ class Task:
             self.scheduler.lay(self)
 
     @property
-    def calls(self):
+    def calls(self) -> int:
         """Calls since power-up."""
         return self.noted_calls + self.usual_calls()
 
     @property
-    def total_cycles(self):
+    def total_cycles(self) -> int:
         """Cycles of all calls, interrupts not included."""
         return self.noted_cycles + self.usual_calls() * self.base_cycles
 
     @property
-    def max_cycles(self):
+    def max_cycles(self) -> int:
         """Cycles of the longest call."""
         return max(self.noted_most, self.base_cycles if self.usual_calls() else 0)
 
     @property
-    def last_cycles(self):
+    def last_cycles(self) -> int:
         """Cycles of the latest call."""
         return self.noted_last if self.noted_when == self.usual_calls() else self.base_cycles
 
@@ -502,7 +502,7 @@ class SlotScheduler:
         )
 
     @property
-    def run_tasks(self):
+    def run_tasks(self) -> int:
         """Tasks that were begun since power-up."""
         return self.run_before + self.position - self.row_start
 

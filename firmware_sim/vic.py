@@ -137,7 +137,7 @@ class InterruptSource:
         self.ref = None
 
     @property
-    def attached(self):
+    def attached(self) -> bool:
         """True while a handler listens."""
         return self.bit != 0
 
@@ -147,17 +147,17 @@ class InterruptSource:
         return self.controller is not None and self.controller.pending & self.bit != 0
 
     @property
-    def requests(self):
+    def requests(self) -> int:
         """Requests while somebody listened."""
         return self.served + self.merged + self.forgotten + int(self.pending)
 
     @property
-    def total_cycles(self):
+    def total_cycles(self) -> int:
         """Cycles of all services."""
         return self.noted_cycles + (self.served - self.noted) * self.base_cycles
 
     @property
-    def max_cycles(self):
+    def max_cycles(self) -> int:
         """Cycles of the longest service."""
         return max(self.noted_most, self.base_cycles if self.served > self.noted else 0)
 

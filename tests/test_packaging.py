@@ -252,7 +252,8 @@ def test_a_build_compiles_and_rebuilds_a_changed_module_and_those_whose_view_of_
 def test_a_declaration_that_is_not_understood_is_reported_and_nothing_compiled_runs(checkout):
     build_in(checkout)
     numbers = checkout / "foundation" / "numbers.py"
-    numbers.write_text(numbers.read_text(encoding="utf-8") + '\nWIDE: Final = "x"\n', encoding="utf-8")
+    more = '\nfrom typing import Final\n\nWIDE: Final = "x"\n'
+    numbers.write_text(numbers.read_text(encoding="utf-8") + more, encoding="utf-8")
     line = len(numbers.read_text(encoding="utf-8").splitlines())
     report = build_in(checkout).stderr
     assert "NOT COMPILED" in report and f"numbers.py:{line}: WIDE: a C constant is a whole number, not 'x'" in report
@@ -263,7 +264,7 @@ def test_a_declaration_that_is_not_understood_is_reported_and_nothing_compiled_r
 @needs_compiler
 def test_a_source_that_cython_refuses_is_reported_and_nothing_compiled_runs(checkout):
     numbers = checkout / "foundation" / "numbers.py"
-    wrong = "\n\n@cython.ccall\ndef wrong(value: cython.longlong) -> cython.longlong:\n    return value.nothing[:]\n"
+    wrong = "\n\n@cython.cfunc\ndef wrong(value: cython.p_double) -> object:\n    return value  # no Python object\n"
     numbers.write_text(numbers.read_text(encoding="utf-8") + wrong, encoding="utf-8")
     report = build_in(checkout).stderr
     assert "NOT COMPILED" in report and "numbers" in report and "setup.log" in report

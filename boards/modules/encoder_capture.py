@@ -56,7 +56,7 @@ class WrapCounter:
             name="encoder_timer_wrap",
         )
 
-    def on_wrap(self, queue: EventQueue):
+    def on_wrap(self, queue: EventQueue) -> None:
         """Fast interrupt: the timer restarted at 0."""
         self.timer.IR &= ~IR_MR0
         self.cycles += WRAP
@@ -104,7 +104,7 @@ class EncoderCapture:
             name=f"encoder_edge_{channel}",
         )
 
-    def on_capture(self, queue: object):
+    def on_capture(self, queue: object) -> None:
         """Fast interrupt: count the edge and keep the time since the one before. Rising with B low counts up."""
         timer: TimerCapture = self.timer
         level: cython.longlong = self.chip.pins[self.pin]

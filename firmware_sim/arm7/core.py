@@ -86,7 +86,7 @@ def memory(what, size):
     return array.array("q", [0]) * (size // 4)
 
 
-def put(words, place, content):
+def put(words, place, content) -> None:
     """Bytes into an array of words, from byte `place` on."""
     for i, byte in enumerate(content, place):
         turn = 8 * (i & 3)

@@ -468,22 +468,22 @@ class MotorUnit:
         self.square_A2s += square_A2s
 
     @property
-    def mean_current_A(self):
+    def mean_current_A(self) -> float:
         """Mean of the last step, in the joint's sense."""
         return self.drive_Nm / (self.gear * self.K * self.angle_factor)
 
     @property
-    def contact_J(self):
+    def contact_J(self) -> float:
         """Heat at the brushes."""
         return self.contact_drop_V * (self.warmed_As + self.size_As)
 
     @property
-    def series_J(self):
+    def series_J(self) -> float:
         """Heat in the inductor, the bridge and other series resistance."""
         return self.series_ohm * (self.warmed_A2s + self.square_A2s)
 
     @property
-    def winding_J(self):
+    def winding_J(self) -> float:
         """Heat in the winding without its share of the ripple's."""
         return self.warmed_J + self.winding_ohm * self.square_A2s
 
