@@ -66,9 +66,10 @@ def nothing_stays_open():
 
 
 def pytest_configure(config):
-    """Programs that a test interrupts inherit how this process takes SIGINT; a background job of a shell ignores it."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Programs inherit which signals this process ignores: SIGINT in a background job, SIGHUP under nohup."""
+    for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 def missing_for_ci():

@@ -23,7 +23,7 @@ LONG = {
     "tune": (["tune", "--steps", "6", "--jobs", "2", "--out", "tuned.toml"], "falls"),
     "bench": (["bench", "robot", "--seconds", "5", "--runs", "100"], "run 1 of"),
     "panel": (["panel", "--walk", "--http-port", "0"], "token="),
-    "bus": (["bus", "on-a-terminal"], "Ctrl-C ends"),
+    "bus": (["bus", "--name", "on-a-terminal"], "Ctrl-C ends"),
 }
 COMPLETE = ("walk", "up")  # finish their files when they are interrupted once
 ENDS_WELL = {"panel": 0, "bus": 0}  # until Ctrl-C is how they are meant
