@@ -9,6 +9,7 @@ import pathlib
 import numpy as np
 import pytest
 
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.tools import cli
 
 DATA = pathlib.Path(__file__).resolve().parents[2].parent / "shared" / "data"
@@ -21,7 +22,7 @@ NOISE = (0.01, 0.03, 0.05, 0.005)  # V, A, rad/s, N m
 
 def bench(seed, rate_hz, mean, seconds=12.0):
     """Rows of NAMES. Base values are 5 to 15 % from those of the simulator, as two motors of one kind differ."""
-    draw = np.random.default_rng(seed)
+    draw = generator(seed, "sound motor bench")
     resistance, drop, constant, friction, load_friction, inertia = (
         value * (1.0 + draw.choice([-1.0, 1.0]) * draw.uniform(0.05, 0.15))
         for value in (1.3, 0.7, 0.018 * GEAR, 0.01, 0.0018 * GEAR, 1.6e-6 * GEAR**2)
