@@ -8,11 +8,11 @@ import runpy
 
 import pytest
 
-from ranger_sim.rooms import ROOMS
+from ranger_sim.loading import packages
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROBOT = ROOT / "docs" / "robot.md"
-FOLDERS = (*ROOMS, "ranger_sim", "profiles", "benchmarks", "tests", "docs")
+FOLDERS = (*packages(), "dev", "ranger_sim", "profiles", "benchmarks", "tests", "docs")
 READ = {".py", ".pxd", ".md", ".toml", ".csv", ".h", ".dbc", ".js", ".css", ".html", ".sh"}
 
 PARAGRAPH = r"[BNCPWT]\d+(?:\.\d+)?"

@@ -17,7 +17,7 @@ from ranger_sim.boards.modules.sender import Sender
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task
 from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.loading import ROOMS
+from ranger_sim.loading import packages
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -123,7 +123,7 @@ def test_a_line_that_is_not_the_tables_is_refused_by_its_place_and_name(given, m
 def copy_of_the_house(folder):
     """The package and its rooms, without what was built."""
     unwanted = shutil.ignore_patterns("__pycache__", "*.so", "build_record.json", "*.c")
-    for name in ("ranger_sim", *ROOMS, "profiles"):
+    for name in ("ranger_sim", *packages(), "profiles"):
         shutil.copytree(ROOT / name, folder / name, ignore=unwanted)
     return folder
 

@@ -170,8 +170,9 @@ class MotorBench:
             # the slope over two samples is the speed's mean over them: Simpson's rule for samples of a point or a mean
             turning = np.gradient(s["angle"], table.step_s) / self.gear
             mean_w = np.convolve(w, (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0), mode="same")
+            no_kink = no_jump(V, JUMP_IN_STEPS, 1) & inner(table, REACH)  # Simpson's rule takes the speed for smooth
             equations["transmission"] = Equation(
-                "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, steady, lines=False
+                "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, no_kink, lines=False
             )
         regimes = _regimes(s, firm_w)
         lags = (0, 10, 30, 100) if measured else (0, 100, 250)
