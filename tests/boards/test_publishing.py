@@ -124,7 +124,7 @@ def copy_of_the_house(folder):
     """The package and its rooms, without what was built."""
     unwanted = shutil.ignore_patterns("__pycache__", "*.so", "build_record.json", "*.c")
     for name in ("ranger_sim", *packages(), "profiles"):
-        shutil.copytree(ROOT / name, folder / name, ignore=unwanted)
+        shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=unwanted)
     return folder
 
 

@@ -11,7 +11,7 @@ from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation import events
 from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import kinds, places, plain
+from ranger_sim.harness.processes import kinds, places, shared_words
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import SLOT_WORDS, Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
@@ -231,7 +231,7 @@ def test_one_step_of_the_check_never_loses_a_difference(so_far, word):
     for bit in range(64):
         other = word ^ (1 << bit)
         other = other - 2**64 if other >= 2**63 else other
-        assert plain.mix(so_far, word) != plain.mix(so_far, other)
+        assert shared_words.mix(so_far, word) != shared_words.mix(so_far, other)
 
 
 def test_a_header_of_another_version_is_refused():
