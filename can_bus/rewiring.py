@@ -70,9 +70,9 @@ def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
 
 
 class Cut:
-    """The cable between `node` and the other nodes of `bus` is cut: it is alone on a piece of its own, `far`.
+    """The cable between `node` and the other nodes of `bus` is cut: it is alone on a separate piece, `far`.
 
-    Who passes time for `bus` has to pass it for `far` too. The node has number 0 there.
+    The owner of `bus` must advance `far` too. The node has number 0 there.
     """
 
     def __init__(self, bus: Any, node: int) -> None:

@@ -27,11 +27,10 @@ SECOND_NS = 1_000_000_000
 
 
 class RecordedFrames:
-    """The frames of a recording, error frames left out. Iterating raises UserError for what cannot be read.
+    """The frames of a recording, error frames left out. Iterating raises UserError for an unreadable file.
 
-    After that `read` is the number of frames that the file has or says that it has, error frames among them, and
-    `losses` are those of them that did not come out: (reason, count, where the first is); reason "cut_off" or
-    "not_frames".
+    Afterwards `read` is the number of frames in the file, or as stated by it, including error frames, and `losses` are
+    the frames that were not returned: (reason, count, position of the first); reason "cut_off" or "not_frames".
     """
 
     def __init__(self, source: pathlib.Path) -> None:

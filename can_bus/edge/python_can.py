@@ -59,8 +59,8 @@ class RangerSimBus(can.BusABC):
     Mbit/s); attached, it must be the bus's own. speed: 1.0 by the wall clock, "max" as fast as frames are sent; private
     only, as are bit_error_rate (0 ... 0.1 per bit), seed of the disturbances, and acknowledge: True adds a silent node
     that acknowledges every frame, for a bus with one user. receive_own_messages: also receive sent messages, once they
-    are on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames kept for the reader; what
-    comes after is dropped, counted (`statistics`) and reported by an error frame.
+    are on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames kept for the reader; later
+    ones are dropped, counted (`statistics`) and reported by an error frame.
 
     Stamps of a robot are its own time since power-up, those of other buses seconds since 1970.
     """
