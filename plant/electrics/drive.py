@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False
 # (indices in the queue are below `count`, and `count` is at most `capacity`)
-"""The H-bridge of a motor board: two PWM leads, low-side enables, and the watchdog that takes its power away.
+"""The H-bridge of a motor board: two PWM leads, low-side enables, and the watchdog that removes its power.
 
-What a board does arrives stamped (ns) and takes effect at its stamp, also inside a step of the plant; a stamp
+A board's writes arrive stamped (ns) and take effect at their stamps, also inside a step of the plant; a stamp
 that has passed takes effect at the start of the next step. The watchdog is judged here, in plant time: the
 bridge has power until `watchdog_ns` after the last edge on the watchdog line, and again from the next edge on
 (appendix 3.9; robot.md N4.3).

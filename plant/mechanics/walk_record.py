@@ -9,9 +9,9 @@ RING = 4096  # strikes kept for later drawing; chosen by us: 41 minutes of walki
 class WalkRecord:
     """Strikes, lift-offs, distances and oddities of one walk. Times are ns since power-up, lengths m.
 
-    A step is counted when a foot meets the floor ahead of the other one, in turn. `step_length_m` is the distance
-    gained by it: the distance of this foot's contact point from the previous strike's. The first step counts from the
-    place where the robot was put down. `touches` and `lift_offs` count all of them.
+    A step is counted when a foot meets the floor ahead of the other one, in turn. `step_length_m` is its gain: the
+    distance of this foot's contact point from the previous strike's. The first step counts from the place where the
+    robot was put down. `touches` and `lift_offs` count all of them.
 
     Oddities: `bounces` (the leading foot left the floor and returned), `recontacts` (a foot touched out of turn),
     `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it passed the stance foot), `flights`
