@@ -180,7 +180,7 @@ class Bus:
         self.disturbance = Disturbance(RandomStream(seed, f"can_bus/{name}/bit errors"))
         self.bit_level = BitLevel(self.buffers, self.disturbance, bitrate)
         self.tampering = None
-        self.rivals = 0  # frames that lost the last arbitration
+        self.rivals = 0  # frames that were ready together with the winner of the last arbitration
         self.counters = BusCounters()
         self.load = LoadMeter(bitrate)
         self.log = FrameLog(log_capacity)

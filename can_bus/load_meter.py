@@ -57,7 +57,7 @@ class LoadMeter:
 
     @cython.cfunc
     def _split(self, first: cython.longlong, last: cython.longlong) -> cython.void:
-        """Count bits `first` ... `last` - 1 as busy where they reach beyond the open window."""
+        """Count bits `first` ... `last` - 1, which reach beyond the open window, as busy."""
         if first >= self.window_end:
             self._roll(first)
         while last > self.window_end:
