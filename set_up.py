@@ -1,12 +1,12 @@
 """Sets up everything that `make walk` or `make test` needs: environment, packages, compiled library, command.
 
     python3 set_up.py walk      # what the package needs: every command of the README runs
-    python3 set_up.py all       # all of pyproject.toml: its extras, and what tests, lints and documents besides
+    python3 set_up.py all       # all of pyproject.toml: its extras, and packages for tests, lint and documents
     python3 set_up.py lint      # all packages, and nothing compiled: enough for `make lint`
 
 Packages come from requirements.lock, by hash. The sources are compiled (setup.py) while packages are still being
-installed, which takes less time: Cython and setuptools come first. What was done before is not done again. One
-line tells how far it is; what the tools say is in build/setup.log.
+installed, which takes less time: Cython and setuptools come first. Completed work is not repeated. One line shows the
+progress; the output of the tools is in build/setup.log.
 
 Runs before anything is installed: only Python's own library here.
 """
@@ -25,7 +25,7 @@ LOG = HERE / "build" / "setup.log"
 
 
 class SetUpError(Exception):
-    """Why it cannot be set up, in a line or two."""
+    """Set-up is impossible; the message gives the reason in a line or two."""
 
 
 def name_of(requirement):
@@ -42,9 +42,9 @@ def for_a_walk(project):
 
 
 def part_of_lock(lock, wanted):
-    """The entries of a lock file's text that `wanted` (names) need, directly or by way of others; all when it is None.
+    """The entries of a lock file's text that `wanted` (names) need, directly or indirectly; all when it is None.
 
-    The lock says under each entry what it is there for ("# via ...").
+    The lock lists under each entry the packages that need it ("# via ...").
     """
     entries = re.split(r"^(?=[A-Za-z])", lock, flags=re.MULTILINE)[1:]
     if wanted is None:
@@ -63,7 +63,7 @@ def part_of_lock(lock, wanted):
 
 
 class Line:
-    """How far it is: one line that is rewritten on a terminal; elsewhere a line at the end of each part."""
+    """Progress: one line that is rewritten on a terminal; elsewhere a line at the end of each part."""
 
     def __init__(self):
         self.terminal = sys.stdout.isatty()
@@ -71,7 +71,7 @@ class Line:
         self.lock = threading.Lock()
 
     def show(self, part, text, end=False):
-        """What to tell of one part; `end`: it has come to its end."""
+        """Show one part's progress; `end`: it has finished."""
         with self.lock:
             self.parts[part] = text
             if self.terminal:
@@ -86,7 +86,7 @@ class Line:
 
 
 class Steps:
-    """Runs the tools in the environment, with what they say in the log."""
+    """Runs the tools in the environment, with their output in the log."""
 
     def __init__(self, venv, line):
         self.venv, self.line = venv, line
@@ -124,7 +124,7 @@ class Steps:
             self.run([sys.executable, "-m", "venv", self.venv])
 
     def packages(self, what, entries):
-        """Install the entries of the lock; nothing when these very ones, or all of this lock, were installed before."""
+        """Install the entries of the lock; nothing when exactly these, or all of this lock, were installed before."""
         kept = self.venv / f"installed-{what}.txt"
         whole = self.venv / "installed-all.txt"
         if kept.exists() and kept.read_text(encoding="utf-8") == entries:
@@ -143,7 +143,7 @@ class Steps:
             elif text.startswith("Installing"):
                 self.line.show("packages", f"installing {of} packages")
 
-        # the lock has everything that is wanted: pyproject.toml leaves out what a package has no need of here
+        # the lock has everything needed: pyproject.toml leaves out unused dependencies of packages
         # bytecode is written when a module is first imported: most of them never are
         options = ["--disable-pip-version-check", "--progress-bar", "off", "--no-compile", "--require-hashes"]
         options += ["--no-deps"]
@@ -158,7 +158,7 @@ class Steps:
             self.run([self.python, "-m", "compileall", "-q", "-j", "0", packages])
 
     def library(self):
-        """Compile what changed. Without a compiler the sources run interpreted, and that is told."""
+        """Compile what changed. Without a compiler the sources run interpreted, and this is reported."""
         notes = []
 
         def seen(text):
@@ -172,7 +172,7 @@ class Steps:
         return notes
 
     def command(self):
-        """Link the tree into the environment: the command and python-can's entry point are found through that."""
+        """Link the tree into the environment: this makes the command and python-can's entry point available."""
         linked = self.venv / ".linked"
         project = HERE / "pyproject.toml"
         if linked.exists() and linked.stat().st_mtime_ns >= project.stat().st_mtime_ns:

@@ -1,11 +1,11 @@
-"""Compiles every module that says `import cython`; without a C compiler the sources run as they are.
+"""Compiles every module that contains `import cython`; without a C compiler the sources run uncompiled.
 
 All or nothing: a compiled module reads the fields of another's classes at fixed places, so compiled and interpreted
-modules must not be mixed. When anything fails, a message says so, the reason is written to the record next to the
+modules must not be mixed. When anything fails, a message reports it, the reason is written to the record next to the
 libraries, and the whole robot runs interpreted (ranger_sim/loading.py reads the record).
 
-Each module is an extension module of its own. What Cython and the compiler print goes to build/setup.log; the terminal
-shows how far the build is. In a checkout the libraries go to build/compiled, one folder per kind of Python.
+Each module is a separate extension module. The output of Cython and the compiler goes to build/setup.log; the terminal
+shows the progress of the build. In a checkout the libraries go to build/compiled, one folder per kind of Python.
 
 RANGER_SIM_BUILD_JOBS: how many modules are translated and compiled at once (default: one per processor).
 RANGER_SIM_BUILT=1: an editable install does not build again what `make` has just built.
@@ -30,7 +30,7 @@ from setuptools.modified import newer_group
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 try:
-    from dev import declarations, stubs  # not in the package: what is installed has no use for them
+    from dev import declarations, stubs  # not in the package: an installation does not need them
     from ranger_sim import loading
 except ImportError as error:
     sys.exit(f"ranger-sim cannot be built: {error}")
@@ -44,10 +44,10 @@ COMPILE_ARGUMENTS = ["-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
 TOGETHER = [
     "-fno-plt",
     "-fvisibility=hidden",
-]  # calls of Python's functions without a detour, for compilers that know it
+]  # direct calls of Python's functions, for compilers that support it
 # The compiler needs a third of the time for -Og. Each of these modules runs at least half a per cent of a walk's
-# instructions (callgrind), together 87 %, or carries the messages of boards in processes of their own, at every turn of
-# `up`. What runs less is not worth the waiting.
+# instructions (callgrind), together 87 %, or carries the messages of boards in separate processes, at every turn of
+# `up`. For the others the time is not worth it.
 OPTIMISE, OPTIMISE_LITTLE = "-O2", "-Og"
 OFTEN_RUN = (
     "ranger_sim.boards.can_router",
@@ -114,7 +114,7 @@ DIRECTIVES = {
 
 
 class NotCompiledError(Exception):
-    """Why there will be no compiled modules, in one line."""
+    """Reason for building no compiled modules, in one line."""
 
 
 class OptionalBuild(build_ext):
@@ -197,7 +197,7 @@ class BuildWithStubs(build_py):
     """Adds the type stub of each compiled module, and the record where nothing is compiled."""
 
     def run(self):
-        """Everything of a wheel but the libraries."""
+        """Everything in a wheel except the libraries."""
         super().run()
         if self.editable_mode:
             return
@@ -232,7 +232,7 @@ def extensions():
             name,
             [f"build/cython/{name.replace('.', '/')}.c"],
             depends=["setup.py"],
-            # named, libm gives its present functions; found through Python it gives those for programs linked long ago
+            # linked by name, libm provides its present functions; found through Python, those for old programs
             libraries=["m"] if os.name == "posix" else [],
             extra_compile_args=[OPTIMISE if name in OFTEN_RUN else OPTIMISE_LITTLE, *COMPILE_ARGUMENTS, *together],
         )
@@ -259,7 +259,7 @@ def understood(arguments):
 
 
 def report(reason):
-    """Say on the terminal that the sources will run, and why."""
+    """Print on the terminal that the sources will run, and why."""
     print(
         f"\n*** ranger-sim: NOT COMPILED: {reason}\n"
         + (f"*** The output of the tools is in {LOG}\n" if LOG.exists() else "")
@@ -269,14 +269,14 @@ def report(reason):
 
 
 def write_record(folder, reason, sources):
-    """Next to the libraries: whether they are whole, or why not; and of which sources they are."""
+    """Write the record next to the libraries: whether they are complete, or why not, and their sources."""
     folder.mkdir(parents=True, exist_ok=True)
     record = {"compiled": not reason, "reason": reason, "sources": {} if reason else sources}
     (folder / loading.RECORD).write_text(json.dumps(record, indent=0) + "\n", encoding="utf-8")
 
 
 class Progress:
-    """How far the build is: on a terminal one line that is rewritten, elsewhere a few lines."""
+    """Progress of the build: on a terminal one line that is rewritten, elsewhere a few lines."""
 
     def __init__(self, out):
         self.out = out
@@ -295,18 +295,18 @@ class Progress:
 
 
 def wanted_by_set_up():
-    """True when set_up.py has started this and makes its own line of every one of ours."""
+    """True when set_up.py has started this and rewrites each of our lines as its own."""
     return os.environ.get("RANGER_SIM_SETUP", "") not in ("", "0")
 
 
 def open_log():
-    """The log, new; set_up.py has made it already and writes there beside us."""
+    """Open a new log; set_up.py has created it already and writes to it as well."""
     return LOG.open("a" if wanted_by_set_up() else "w", encoding="utf-8")
 
 
 @contextlib.contextmanager
 def chatter_to_log():
-    """Everything that this process and its children print goes to the log; gives what shows the progress instead."""
+    """Send all output of this process and its children to the log; returns the stream for the progress instead."""
     LOG.parent.mkdir(exist_ok=True)
     sys.stdout.flush()
     sys.stderr.flush()
@@ -342,7 +342,7 @@ def chatter_to_log():
 
 @contextlib.contextmanager
 def quiet():
-    """What the trial of a compiler prints is not shown."""
+    """Hide the output of a compiler trial."""
     kept = os.dup(1), os.dup(2)
     nothing = os.open(os.devnull, os.O_WRONLY)
     sys.stdout.flush()

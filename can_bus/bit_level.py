@@ -1,14 +1,13 @@
-"""A bus bit by bit, while something on it is not plain: every controller drives, all sample what comes of it.
+"""Bit-by-bit simulation of a bus while something on it is not plain: every controller drives, all sample the result.
 
-Frames of which nothing disturbs the course are decided at their start, in one piece (`bus.py`). This is for the rest:
-nodes that send one arbitration field with different data, inverted bits (of frames, of error frames, of an idle
-bus), frames that nobody acknowledges. The bus comes here at a bit at which every node saw it idle, and leaves at the
-next such bit.
+Undisturbed frames are decided at their start, as a whole (`bus.py`). This module handles the rest: nodes that send one
+arbitration field with different data, inverted bits (of frames, of error frames, of an idle bus), frames that no node
+acknowledges. The bus enters this mode at a bit at which every node saw it idle, and leaves it at the next such bit.
 
-Lookahead. A bit is `open` when something that a program does now could change it: a node may begin a frame, or one out
-of reset may have seen its recessive sequence. Such a bit waits until all that was stamped before it is known; those
-between are decided at once. So nothing depends on how time is cut, and mostly a frame with its error frame is decided
-at its start, as a plain one is.
+Lookahead. A bit is `open` when a program's action now could change it: a node may begin a frame, or one out
+of reset may have seen its recessive sequence. Such a bit waits until everything stamped before it is known; bits
+between open bits are decided at once. So results do not depend on how time is divided, and a frame with its error frame
+is mostly decided at its start, like a plain one.
 """
 
 from typing import TYPE_CHECKING
@@ -38,12 +37,12 @@ if TYPE_CHECKING:
 class BitLevel:
     """The medium access of all nodes (`machines`, by node number) and the bus between them.
 
-    `bit`: the next one to pass; `first_bit`: where this stretch began. `quiet`: recessive bits passed last; `levels`:
-    of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been recessive as long
-    as that takes; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
-    `heard_bit`: behind it a listening node had a frame, `sent_bit`: a transmitter was done. `in_error`: an error frame
-    goes on, which began in the frame of `error_begun`; `counted`: so the bus has noted. `tampering`: what faults do to
-    frames (`tampering.py`), or None. `bitrate`: of the bus.
+    `bit`: the next one to pass; `first_bit`: the start of this stretch. `quiet`: number of recessive bits passed last;
+    `levels`: of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been
+    recessive for long enough; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
+    `heard_bit`: the bit after which a listening node had a frame, `sent_bit`: after which a transmitter was done.
+    `in_error`: an error frame is under way, which began in the frame of `error_begun`; `counted`: the bus has counted
+    it. `tampering`: what faults do to frames (`tampering.py`), or None. `bitrate`: of the bus.
     """
 
     machines: list
@@ -61,7 +60,7 @@ class BitLevel:
     open: cython.bint
     at_rest: cython.bint
     away: cython.bint
-    # the frame that began last, and the error frame that goes on
+    # the frame that began last, and the error frame under way
     identifier: cython.longlong
     flags: cython.longlong
     sender: cython.longlong
@@ -100,7 +99,7 @@ class BitLevel:
         self.sender = -1
 
     def add_node(self, node) -> None:
-        """One more node."""
+        """Add a node."""
         machine = MediumAccess(node)
         self.machines.append(machine)
         machine.place(self.bit, self.bit)
@@ -139,7 +138,7 @@ class BitLevel:
 
     @cython.cfunc
     def start_frames(self) -> None:
-        """In an open bit: who may and has a frame for it begins it."""
+        """In an open bit, every node that may start and has a frame for this bit starts it."""
         machine: MediumAccess
         best: cython.longlong = -1
         key: cython.longlong
@@ -160,7 +159,7 @@ class BitLevel:
 
     @cython.cfunc
     def start_late(self, machine: MediumAccess) -> None:
-        """The dominant last bit of intermission stands for the start of frame of what the node offers."""
+        """The dominant last bit of intermission serves as the start of frame of the frame that the node offers."""
         self._load(machine)
         self._note_start(machine.offered, machine.begun)
 
@@ -168,12 +167,12 @@ class BitLevel:
     def _load(self, machine: MediumAccess) -> None:
         bits, fields = self.buffers.wire(machine.offered)
         extended = self.buffers.rows[machine.offered + FLAGS] & FLAG_EXTENDED
-        # a stuff bit behind RTR belongs to the control field: rule (c) speaks of those before it
+        # a stuff bit after RTR belongs to the control field: rule (c) covers those before it
         machine.send(machine.offered, bits, fields.index(FIELD_RTR if extended else FIELD_SRTR) + 1)
 
     @cython.cfunc
     def _note_start(self, row: cython.longlong, bit: cython.longlong) -> None:
-        """The frame in `row` begins at `bit`, perhaps beside others."""
+        """The frame in `row` begins at `bit`, perhaps together with others."""
         slots: cython.p_longlong = self.buffers.slots
         length: cython.longlong = (
             measure(slots[row + IDENTIFIER], slots[row + FLAGS], slots[row + LOW], slots[row + HIGH]) & MEASURED_BITS
@@ -208,7 +207,7 @@ class BitLevel:
 
     @cython.cfunc
     def pass_bit(self) -> None:
-        """The next bit: what every node drives, what they sample, and what came of it (`MediumAccess.met`)."""
+        """Pass the next bit: the levels that all nodes drive and sample, and the result (`MediumAccess.met`)."""
         machine: MediumAccess
         level: cython.longlong = RECESSIVE
         driven: cython.longlong
@@ -238,7 +237,7 @@ class BitLevel:
 
     @cython.cfunc
     def _sample_at_own_rate(self, machine: MediumAccess) -> cython.longlong:
-        """A node whose bits are longer or shorter than the bus's: none, one or more of them end in this bit.
+        """Sample for a node whose bits are longer or shorter than the bus's: none, one or more of them end in this bit.
 
         It does not resynchronise to the edges of others: at such rates that would not help it (`set_rate_of`).
         """
@@ -249,7 +248,7 @@ class BitLevel:
             if other is not machine and not other.node.silent:
                 level &= other.driven
         machine.own_rest += machine.own_rate
-        while machine.own_rest >= self.bitrate and met == 0:  # the bus is told what came of one before the next
+        while machine.own_rest >= self.bitrate and met == 0:  # report the result of one to the bus before the next
             machine.own_rest -= self.bitrate
             met = machine.sample(level & machine.drive(), machine.own_bit)
             machine.own_bit += 1
@@ -257,7 +256,7 @@ class BitLevel:
 
     @cython.cfunc
     def _note_error(self) -> None:
-        """An error frame begins: of the first transmitter that saw why, else of the first node."""
+        """An error frame begins: that of the first transmitter that saw the cause, else of the first node."""
         machine: MediumAccess
         found: MediumAccess = None
         for machine in self.machines:
@@ -275,9 +274,9 @@ class BitLevel:
 
     @cython.cfunc
     def error_is_over(self) -> cython.bint:
-        """True when no node is in an error frame any more, and none still listens to what nobody sends any more.
+        """True when no node is in an error frame any more, and no node still receives a frame that is no longer sent.
 
-        The latter when the transmitter has gone bus-off: its receivers have yet to see that something is wrong.
+        The latter happens when the transmitter has gone bus-off: its receivers have yet to detect an error.
         """
         machine: MediumAccess
         carried: cython.bint = False
@@ -295,11 +294,11 @@ class BitLevel:
     # ---- nodes that leave and join
 
     def leave(self, node) -> None:
-        """A node takes no part any more."""
+        """A node no longer takes part."""
         self.machines[node.index].place(self.bit, self.bit)
 
     def join(self, node, since) -> int:
-        """A node waits for its sequences, and has from bit `since` on: what came of the last bit passed (MET_*)."""
+        """A node waits for its sequences, and has from bit `since` on: the result of the last bit passed (MET_*)."""
         machine: MediumAccess = self.machines[node.index]
         met = 0
         machine.place(self.bit, self.bit)
@@ -314,7 +313,7 @@ class BitLevel:
         return machine.row == row and machine.sending and machine.state == MAC_FRAME
 
     def forget(self, row) -> None:
-        """The frame in `row` is over, in whatever way."""
+        """The frame in `row` is over, sent or not."""
         machine = self.machines[row >> NODE_SHIFT]
         if machine.row == row:
             machine.row = -1

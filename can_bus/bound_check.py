@@ -1,8 +1,8 @@
-"""Holds the bounds of `can_bus.bounds` against the simulated bus: message sets played on a `Bus`, answers measured.
+"""Compare the bounds of `can_bus.bounds` with the simulated bus: play message sets on a `Bus`, measure responses.
 
-A message set is played twice: at its critical instant (the lowest priority but one's whole level is released at once,
-a moment after the longest frame of lower priority has started, every frame as long as stuffing makes it) and at random
-(phases, jitters and contents). Functions return figures; nothing is printed.
+A message set is played twice: at its critical instant (the whole level of the second lowest priority is released at
+once, just after the longest frame of lower priority has started, every frame as long as stuffing makes it) and at
+random (phases, jitters and contents). Functions return figures; nothing is printed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ranger_sim.foundation.events import CAN_TX_DONE, FLAG_EXTENDED, NEVER, STAG
 from ranger_sim.foundation.random_stream import RandomStream
 
 BIT_RATES = (125_000, 250_000, 500_000, 1_000_000, 3_000_000)
-LEAD_NS = 1  # the blocking frame is asked for so long before the start that the others miss
+LEAD_NS = 1  # the blocking frame is requested this long before the start that the others miss
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +60,7 @@ def longest_content(identifier: int, flags: int) -> tuple[int, int]:
 
 
 class _Lane:
-    """Transmit buffers of one controller and what waits for them, first in, first out."""
+    """Transmit buffers of one controller and the frames that wait for them, first in, first out."""
 
     def __init__(self, node: int, buffers: Sequence[int]) -> None:
         self.node = node
@@ -69,7 +69,7 @@ class _Lane:
 
 
 def lanes_of(messages: Sequence[Message]) -> tuple[list[_Lane], int]:
-    """The lane of each message and how many nodes there are: a buffer for itself, or two for all of its queue."""
+    """The lane of each message (a buffer for itself, or two for its whole queue) and the number of nodes."""
     lanes: list[_Lane] = []
     queues: dict[str, _Lane] = {}
     nodes, alone = 0, 0
@@ -96,13 +96,13 @@ def play(
 ) -> list[int]:
     """Play a set on a bus; the longest response of each message in ns, 0 where none was released.
 
-    `releases`: for each message its instants (released, queued) in ns, ascending. A message has a transmit buffer of
-    its own; what is queued while an earlier instance waits follows in order. Messages of one queue share two buffers,
-    which are filled as they fall free. `contents(message)`: words of its next frame.
+    `releases`: for each message its times (released, queued) in ns, ascending. A message has its own transmit buffer;
+    instances queued while an earlier one waits follow in order. Messages of one queue share two buffers, which are
+    filled as they become free. `contents(message)`: words of its next frame.
     """
     bus = Bus("bounds", bit_rate, log_capacity=0)
     lanes, nodes = lanes_of([sender.message for sender in senders])
-    inboxes = [EventQueue(16) for _ in range(nodes + 1)]  # the last node only listens
+    inboxes = [EventQueue(16) for _ in range(nodes + 1)]  # the last node only receives
     for n, inbox in enumerate(inboxes):
         bus.add_node(f"n{n}", inbox, 1, STAGE_BUS * 256 + n)
     # time; -1 an instance is queued, or the buffer that is free again; message
@@ -151,13 +151,13 @@ def critical_releases(
     """
     messages = [sender.message for sender in senders]
     level = level_of(messages[place], messages)
-    start = -(-100 * 10**9 // bit_rate)  # an edge: what is queued then takes part from the next one on
+    start = -(-100 * 10**9 // bit_rate)  # an edge: frames queued then take part from the next one on
     lower = [i for i, m in enumerate(messages) if m.key > level and m.offset_ns is None]
     longest = max(lower, key=lambda i: messages[i].bits, default=-1)
     releases: list[list[tuple[int, int]]] = []
     for index, one in enumerate(messages):
-        if one.key > level and one.offset_ns is None:  # a train keeps its offsets, whatever its frames' levels
-            # asked for just before the edge that the others miss
+        if one.key > level and one.offset_ns is None:  # a train keeps its offsets, independent of its frames' levels
+            # requested just before the edge that the others miss
             releases.append([(start - LEAD_NS, start - LEAD_NS)] if index == longest else [])
             continue
         released = start - one.jitter_ns
@@ -200,7 +200,7 @@ def random_set(stream: RandomStream) -> tuple[list[Sender], int]:
         queue = queues[stream.integer(len(queues))]
         offset = None
         if kind == 1 and index < count // 2:  # one frame per slot, anywhere in it; some every other cycle only
-            # as many frames as if each had the worst period of them: at most the load aimed at
+            # as many frames as if each had the worst of the periods: at most the target load
             cycle = cycle or int(160 * 1e9 / bit_rate * sum(shares) / (min(shares[: count // 2]) * load))
             slot = cycle // (count // 2)
             period = cycle * (1 + stream.integer(2))
@@ -231,7 +231,7 @@ def random_releases(senders: Sequence[Sender], stream: RandomStream, length_ns: 
 
 
 def lengths_as_sent(senders: Sequence[Sender]) -> list[Message]:
-    """The messages with the very lengths of their contents instead of the longest possible ones."""
+    """The messages with the actual lengths of their contents instead of the longest possible ones."""
     return [
         dataclasses.replace(s.message, bits=frame_bits(s.identifier, s.flags, s.lo, s.hi) + INTERMISSION_BITS)
         for s in senders
@@ -240,7 +240,7 @@ def lengths_as_sent(senders: Sequence[Sender]) -> list[Message]:
 
 @dataclasses.dataclass
 class Figures:
-    """What a check found. Shares: longest simulated response at the critical instant over its bound, per message;
+    """Results of a check. Shares: longest simulated response at the critical instant over its bound, per message;
     `shares`: bounds for the longest frames there can be, `shares_as_sent`: for the frames that were sent."""
 
     sets: int = 0
@@ -252,7 +252,7 @@ class Figures:
     shares_as_sent: list[float] = dataclasses.field(default_factory=list)
 
     def summary(self) -> dict[str, float]:
-        """As plain figures; of the shares minimum, median and the part of messages that reach 90 %."""
+        """Summarise as plain figures; of the shares: minimum, median and the part of messages that reach 90 %."""
         found: dict[str, float] = {
             "sets": self.sets,
             "messages": self.messages,
@@ -288,7 +288,7 @@ def check_set(senders: Sequence[Sender], bit_rate: int, stream: RandomStream, fi
         worst = play(senders, bit_rate, critical_releases(senders, place, bit_rate, bound.busy_ns))
         hold(worst, bounds)
         hold(worst, as_sent)
-        if not any(sender.message.queue for sender in senders):  # where queues are, the critical instant is another
+        if not any(sender.message.queue for sender in senders):  # with queues, the critical instant is a different one
             figures.shares.append(worst[place] / bound.response_ns)
             figures.shares_as_sent.append(worst[place] / (as_sent[place].response_ns or bound.response_ns))
     longest = max(sender.message.period_ns for sender in senders)
@@ -303,7 +303,7 @@ def check_set(senders: Sequence[Sender], bit_rate: int, stream: RandomStream, fi
 
 
 def random_sets(count: int, seed: int = 1) -> dict:
-    """`count` random message sets held against their bounds: figures of `Figures.summary`, mean load and seed."""
+    """Compare `count` random message sets with their bounds: figures of `Figures.summary`, mean load and seed."""
     figures = Figures()
     load = 0.0
     for number in range(count):

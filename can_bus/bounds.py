@@ -2,8 +2,8 @@
 
 The analysis is that of R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, "Controller Area Network (CAN)
 schedulability analysis: refuted, revisited and revised", Real-Time Systems 35 (2007), section 3.2, equations 7-11:
-every instance in the busy period of a priority level is looked at, because a frame that cannot be pre-empted may
-push what it delays into its own next instance. What it needs and how this file writes it:
+every instance in the busy period of a priority level is examined, because a frame that cannot be pre-empted may push
+the frames it delays into its own next instance. Its quantities and equations, as written in this file:
 
     C   longest time of a frame on the wire: all stuff bits it can have, and the intermission
     T   shortest time between two releases; D deadline after the release
@@ -13,7 +13,7 @@ push what it delays into its own next instance. What it needs and how this file 
     w   queueing of instance q = 0, 1 ..: w = B + q C_m + sum over k in hp of ceil((w + J_k + bit) / T_k) C_k
     R   response, from release to end:    R = max over q of J_m + w(q) - q T_m + C_m
 
-Two things are added, because real controllers need them; without them the above is what is computed.
+Two things are added, because real controllers need them; without them, this file computes the above.
 
 Queues. Frames that leave a controller first in, first out are not sent in the order of their priorities. After
 R. I. Davis, S. Kollmann, V. Pollex, F. Slomka, "Schedulability analysis for Controller Area Network (CAN) with FIFO
@@ -22,12 +22,13 @@ the others of its queue delay it, and where it delays frames above that level it
 Frames that are queued after it count as well if their priority is higher: the hardware has several buffers behind the
 queue and offers the best of them.
 
-Trains. Messages of one queue that one clock releases at known offsets never come all at once. Such a queue is a train:
-in place of ceil((w + J) / T) stands the largest number of its frames that any window of w + J holds, and in place of
-q T the distance between the releases of the first frame and the one looked at, over all frames it may begin with.
+Trains. Messages of one queue that one clock releases at known offsets are never all released at once. Such a queue is a
+train: ceil((w + J) / T) is replaced by the largest number of its frames in any window of w + J, and q T by the distance
+between the releases of the first frame and the examined one, over all frames it may begin with.
 
-Holds without bit errors, for controllers that offer their frame at every chance. All times are whole numbers: a tick is
-1 / bit rate of a nanosecond, so that a bit is 10^9 ticks at any bit rate. Python has no largest integer.
+The bounds hold without bit errors, for controllers that offer their frame at every opportunity. All times are whole
+numbers: a tick is 1 / bit rate of a nanosecond, so that a bit is 10^9 ticks at any bit rate. Python has no largest
+integer.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from fractions import Fraction
 from ranger_sim.can_bus.frame import INTERMISSION_BITS, arbitration_key, worst_case_bits
 
 TICKS_PER_BIT = 10**9
-# A busy period of more instances than this is given up as unbounded, so that an answer comes within seconds. Chosen by
+# A busy period of more instances than this counts as unbounded, so that an answer takes seconds at most. Chosen by
 # us: at a utilisation of 99.9 % a level of 100 frames with one period needs some 1000.
 MOST_INSTANCES = 2_000
 MOST_ROUNDS = 100_000  # of one search for a fixed point; each but the last finds at least one frame more
@@ -53,7 +54,7 @@ class Message:
 
     Times in ns. `queue`: name of the first-in-first-out queue that it shares with others of its controller;
     empty where it has a transmit buffer to itself (or the driver keeps its queue sorted by priority). `pause_ns`: how
-    long in all that queue may stand still while the frame is in it, because its driver fills free buffers late.
+    long in total that queue may stall while the frame is in it, because its driver fills free buffers late.
     `last_key`: where frames of several identifiers take turns in one stream, the key of the lowest priority among them
     (`key` is the highest then). `offset_ns`: release relative to the others of its queue, on one clock; None: any.
     """
@@ -103,10 +104,10 @@ def message(
 
 @dataclasses.dataclass(frozen=True)
 class Bound:
-    """What the analysis says of one message. `response_ns` None: no bound, the bus has more to do than it can.
+    """Result of the analysis for one message. `response_ns` None: no bound, the bus is overloaded.
 
-    `instance`: which one in the busy period answers latest (0: the first), of `instances`. `blocking_ns`: B with the
-    pause of the queue. Times in ns, rounded up.
+    `instance`: the one in the busy period with the longest response (0: the first), of `instances`. `blocking_ns`: B
+    with the pause of the queue. Times in ns, rounded up.
     """
 
     message: Message
@@ -123,12 +124,12 @@ class Bound:
 
 
 def utilisation(messages: Iterable[Message], bit_rate: int) -> Fraction:
-    """Share of the bus that the messages need at most, exact; above 1 is more than there is."""
+    """Largest share of the bus that the messages need, exact; above 1 the bus is overloaded."""
     return sum((Fraction(m.bits * 10**9, m.period_ns * bit_rate) for m in messages), Fraction(0))
 
 
 def level_of(message: Message, messages: Iterable[Message]) -> int:
-    """Key of the priority that a message counts with: its own, or the lowest priority in its queue."""
+    """Key of the priority that counts for a message: its own, or the lowest priority in its queue."""
     if not message.queue:
         return max(message.key, message.last_key)
     return max(max(other.key, other.last_key) for other in messages if other.queue == message.queue)
@@ -164,7 +165,7 @@ class _Train:
         return self.known_spans[level]
 
     def most(self, level: int | None, window: int) -> int:
-        """Most releases of this level or above that a window of so many true ticks can hold."""
+        """Largest number of releases of this level or above in a window of that many true ticks."""
         spans = self.spans(level)
         if not spans or window <= 0:
             return 0
@@ -175,11 +176,12 @@ class _Train:
         return cycles * len(spans) + bisect.bisect_left(spans, window - cycles * self.cycle)
 
     def by_its_clock(self, ticks: int) -> int:
-        """At most so many ticks pass on a fast clock in `ticks` true ones."""
+        """Largest number of ticks that pass on a fast clock in `ticks` true ones."""
         return ticks if not self.clock_ppm else ticks + -(-ticks * self.clock_ppm // 1_000_000)
 
     def distance(self, first: int, last: int) -> int:
-        """True ticks that pass at least between releases number `first` and `last`, counted from a cycle's begin on."""
+        """Smallest number of true ticks between releases number `first` and `last`, counted from the start of a
+        cycle."""
         count = len(self.entries)
         ticks = self.entries[last % count][0] - self.entries[first % count][0]
         ticks += (last // count - first // count) * self.cycle
@@ -187,7 +189,7 @@ class _Train:
 
 
 def _trains(messages: Sequence[Message], bit_rate: int, clock_ppm: int) -> list[_Train]:
-    """Each queue whose messages all have offsets is one train, any other message is a train of its own."""
+    """Each queue whose messages all have offsets is one train, any other message is a separate train."""
     trains = []
     free = [one for one in messages if not one.queue]
     for queue in dict.fromkeys(one.queue for one in messages if one.queue):
@@ -202,7 +204,8 @@ def _trains(messages: Sequence[Message], bit_rate: int, clock_ppm: int) -> list[
 
 
 class _Delays:
-    """What delays the frames of one train: (train, level that counts, jitter), and what blocks them, in ticks."""
+    """Interference with the frames of one train: delays as (train, level that counts, jitter), and blocking in
+    ticks."""
 
     def __init__(self, own: _Train, trains: Sequence[_Train]) -> None:
         self.sources: list[tuple[_Train, int | None, int]] = []
@@ -216,7 +219,7 @@ class _Delays:
                 continue
             if other.spans(own.level):
                 jitter = other.jitter
-                if other.level > own.level:  # it may have waited behind frames that the own level does not count
+                if other.level > own.level:  # it may have waited behind frames that its own level does not count
                     if other.held is None:
                         self.bounded = False
                         return
@@ -227,7 +230,7 @@ class _Delays:
         self.blocking += own.pause
 
     def work(self, time: int) -> int:
-        """Ticks of work that the others bring until `time`."""
+        """Ticks of work that the others add until `time`."""
         return sum(train.most(level, time + jitter) * train.length for train, level, jitter in self.sources)
 
     def load(self) -> Fraction:
@@ -258,7 +261,7 @@ def response_times(messages: Iterable[Message], bit_rate: int, clock_ppm: int = 
 
 
 def _busy_period(own: _Train, delays: _Delays, bit_rate: int) -> int | None:
-    """Longest busy period of the level of `own` in ticks; None when there is no end to it."""
+    """Longest busy period of the level of `own` in ticks; None when it does not end."""
     load = delays.load() + Fraction(len(own.entries) * own.length, own.cycle)
     jitter = own.jitter or own.clock_ppm or any(jitter for _, _, jitter in delays.sources)
     if not delays.bounded or load > 1 or (load == 1 and (delays.blocking or jitter)):
@@ -321,7 +324,7 @@ def _passing(own: _Train, first: int, before: int, later: Sequence[int], window:
 
 
 def most_waiting(bounds: Iterable[Bound], queue: str, bit_rate: int, clock_ppm: int = 0) -> int | None:
-    """Most frames of a queue that can be under way at once, the one being sent included; None: no bound.
+    """Largest number of frames of a queue under way at once, including the one being sent; None: no bound.
 
     At any time these are frames that were queued within the longest response.
     """

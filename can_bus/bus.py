@@ -1,27 +1,26 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
-# (every index below is made of a node and a buffer, which `request` has checked, or is a row that waits)
-"""One CAN bus to the bit: arbitration, timing, acknowledgement, and what came of every frame.
+# (every index below is made from a node and a buffer, which `request` has checked, or is a waiting row)
+"""Bit-accurate CAN bus: arbitration, timing, acknowledgement, and the result of every frame.
 
-Beside it: `node.py`, a controller with its error confinement; `transmit_buffers.py`, the frames that wait;
-`disturbance.py`, wrong bits; `tampering.py`, faults of frames; `rewiring.py`, wires that part; `bit_level.py` and
-`medium_access.py`, bit by bit what follows them; `load_meter.py`, `bus_counters.py`, `frame_log.py`.
+Related modules: `node.py`, a controller with its error confinement; `transmit_buffers.py`, the frames that wait;
+`disturbance.py`, wrong bits; `tampering.py`, faults of frames; `rewiring.py`, cut wires; `bit_level.py` and
+`medium_access.py`, their consequences bit by bit; `load_meter.py`, `bus_counters.py`, `frame_log.py`.
 
-Time. Inside, the bus counts absolute bits since power-up; an instant in ns is made from such a count only
-when a result leaves. Bit k begins at the first whole nanosecond at or after k / bitrate
-(ceil(k 10^9 / bitrate)), so 3 Mbit/s, where a bit is 333 1/3 ns, drifts by nothing in any time.
-All controllers share this bit grid: real ones synchronise to the edges of whoever sends (ISO 11898-1).
-A request takes part in every start of frame strictly after its stamp, never in one at its stamp: what a
-program writes at the instant at which the bus falls free comes too late. On an idle bus a frame therefore
-starts at the next bit edge. So `advance(t)` can decide everything up to and including t as soon as all
-requests stamped before t are known, and results do not depend on how time is cut into advances.
+Time. Internally, the bus counts absolute bits since power-up; a count is converted to a time in ns only for results.
+Bit k begins at the first whole nanosecond at or after k / bitrate (ceil(k 10^9 / bitrate)), so 3 Mbit/s, where a bit is
+333 1/3 ns, drifts by nothing in any time. All controllers share this bit grid: real ones synchronise to the edges of
+the sender (ISO 11898-1). A request takes part in every start of frame strictly after its stamp, never in one at its
+stamp: a request written at the time at which the bus becomes free is too late. On an idle bus a frame therefore starts
+at the next bit edge. So `advance(t)` can decide everything up to and including t as soon as all requests stamped before
+t are known, and results do not depend on how time is divided into advances.
 
 Order. The lowest arbitration field among the controllers ready wins; a controller offers the lowest of its
 three buffers, ties by buffer number (LPC2194 with TPM = 0). Nothing is pre-empted.
 
 A frame is decided at its start: its results are pushed, stamped in the future, into the nodes' inboxes; its end is
-written where the sender looks for it (`Node.connect`). That is so while nothing disturbs it; all else passes bit by bit
-(`bit_level.py`), with the same stamps.
-Receivers have the frame at the end of the sixth bit of EOF, its sender is done at the end of the seventh.
+written where the sender reads it (`Node.connect`). That holds while nothing disturbs the frame; otherwise the bus is
+simulated bit by bit (`bit_level.py`), with the same stamps. Receivers have the frame at the end of the sixth bit of
+EOF, its sender is done at the end of the seventh.
 """
 
 from typing import TYPE_CHECKING, Annotated, Final
@@ -108,10 +107,10 @@ SECOND_NS: Final = 1_000_000_000
 class Bus:
     """A CAN bus. `bitrate` in bit/s; `seed` feeds the noise source of `set_bit_error_rate` only.
 
-    What happened is in `counters`, `load` and `log`; what waits is in `buffers`.
+    `counters`, `load` and `log` record the past; `buffers` holds the waiting frames.
     """
 
-    # what every request and frame touches stands in front: few lines of the processor's cache
+    # fields used by every request and frame come first: few cache lines
     next_time: cython.longlong
     next_bit: cython.longlong
     advanced: cython.longlong
@@ -138,7 +137,7 @@ class Bus:
     counters: BusCounters
     load: LoadMeter
     log: FrameLog
-    # what the address `due` leads into: exchanged only by `wake`, which sets both
+    # the array that `due` points into: replaced only by `wake`, which sets both
     wakes: Annotated[cython.longlong[::1], "readonly"]
     name: str
     disturbance: Disturbance
@@ -162,26 +161,26 @@ class Bus:
         self.suspended_until = 0  # the last bit up to which a node has been suspended
         self.hindered_until = 0  # the same; NEVER while not every node takes part
         self.commands = EventQueue(16)
-        self.next_change = NEVER  # the instant of the first command; -1 while a node is joining
+        self.next_change = NEVER  # time of the first command; -1 while a node is joining
         self.advanced = -1
-        self.disturbed = False  # the bus passes bit by bit
+        self.disturbed = False  # the bus is simulated bit by bit
         self.next_bit = NEVER  # where the next frame starts, as far as known
         self.next_time = NEVER
         self.wake(integers(1), 0)
         self.strike_bit = NEVER  # the next bit that is inverted, as far as known
-        self.next_strike = -1  # the same; -1 when the next frame is no plain one wherever that lies
-        self.free_bit = 0  # after the intermission of the last frame: the first bit not yet decided; its instant:
+        self.next_strike = -1  # the same; -1 when the next frame is not plain, wherever it starts
+        self.free_bit = 0  # after the intermission of the last frame: the first bit not yet decided; its time:
         self.free_time = 0
-        # the second in which the last frame began: its first bit and its instant
+        # the second in which the last frame began: its first bit and its time
         self.second_bit = 0
         self.second_ns = 0
-        self.bit_ns, self.bit_rest = divmod(second, bitrate)  # a bit in ns, and what is left of it times bitrate
+        self.bit_ns, self.bit_rest = divmod(second, bitrate)  # a bit in ns, and the remainder times bitrate
         self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * second, bitrate)
         self.buffers = TransmitBuffers()
         self.disturbance = Disturbance(RandomStream(seed, f"can_bus/{name}/bit errors"))
         self.bit_level = BitLevel(self.buffers, self.disturbance, bitrate)
         self.tampering = None
-        self.rivals = 0  # frames that were ready beside the one that won the last arbitration
+        self.rivals = 0  # frames that were ready together with the winner of the last arbitration
         self.counters = BusCounters()
         self.load = LoadMeter(bitrate)
         self.log = FrameLog(log_capacity)
@@ -197,7 +196,7 @@ class Bus:
         return self.acknowledging
 
     def set_silent(self, node, silent) -> None:
-        """A node only listens from now on, and drives no acknowledgement and no error flag; or it does again."""
+        """From now on, let a node receive only, driving no acknowledgement and no error flag; or take part again."""
         controller: Node = self.nodes[node]
         if controller.mode == OPERATING and controller.silent != bool(silent):
             self.acknowledging += -1 if silent else 1
@@ -206,18 +205,18 @@ class Bus:
 
     @property
     def accepted(self) -> int:
-        """Requests taken; what waited when the statistics were set to zero counts."""
+        """Requests accepted, including those that waited when the statistics were set to zero."""
         return self.counters.over + self.buffers.waiting_count
 
     def load_mean(self, time) -> float:
-        """Share of the bus that was taken from the start of the statistics to `time` (ns), 0 ... 1."""
+        """Share of the time for which the bus was busy from the start of the statistics to `time` (ns), 0 ... 1."""
         return self.load.mean(self.bit_of(time))
 
     def note_outside(self, time, identifier, flags, lo, hi) -> None:
-        """A frame has passed on the real bus that stands in the place of this one, which keeps the record."""
+        """Record a frame that passed on the real bus which replaces this one."""
         self.counters.frames += 1
         self.log.add(time, identifier, flags, lo, hi, -1)
-        if self.log.times is not None:  # who asked for it, and when, nobody here knows
+        if self.log.times is not None:  # its requester and the time of the request are unknown here
             bits = frame_bits(identifier, flags & RECEIVERS_SEE, lo, hi)
             begun = time - bits * SECOND_NS // self.bitrate
             self.log.times.add(begun, begun, time, identifier, flags & RECEIVERS_SEE, lo, hi)
@@ -226,7 +225,7 @@ class Bus:
         """From now on an earlier `next_time` lowers `wakes[place]` (whole numbers, ns) to it."""
         self.wakes = wakes
         self.wake_place = place
-        # compiled an address: beside the other fields of every request, where a memoryview takes 208 bytes
+        # compiled, an address: close to the other fields of every request, where a memoryview takes 208 bytes
         self.due = cython.address(self.wakes[0]) if cython.compiled else self.wakes
 
     # ---- time
@@ -234,7 +233,7 @@ class Bus:
     @cython.ccall
     @cython.exceptval(check=False)
     def bit_of(self, time: cython.longlong) -> cython.longlong:
-        """Number of the bit that runs at `time` (ns): floor(time * bitrate / 10^9)."""
+        """Number of the bit in progress at `time` (ns): floor(time * bitrate / 10^9)."""
         seconds: cython.longlong = time // SECOND_NS
         return seconds * self.bitrate + (time - seconds * SECOND_NS) * self.bitrate // SECOND_NS
 
@@ -253,7 +252,7 @@ class Bus:
         """Put a controller on the bus; returns its node number.
 
         `inbox`: EventQueue that gets CAN_RX, CAN_TX_DONE and CAN_STATUS, with `controller` as field a and
-        `order` (stage * 256 + source) as the queue's order. `Node.connect` spares it most of CAN_TX_DONE.
+        `order` (stage * 256 + source) as the queue's order. `Node.connect` avoids most CAN_TX_DONE messages.
         """
         node: Node
         index = len(self.nodes)
@@ -265,7 +264,7 @@ class Bus:
         self.node_count += 1
         self.buffers.add_node()
         self.bit_level.add_node(node)
-        if self.disturbed:  # as if out of reset: the bus is not at rest
+        if self.disturbed:  # as after reset: the bus is not at rest
             node.leave()
             node.start_joining(self.free_bit)
             self.bit_level.join(node, self.free_bit)
@@ -276,7 +275,7 @@ class Bus:
         return index
 
     @cython.ccall
-    @cython.cdivision(True)  # instants are not negative
+    @cython.cdivision(True)  # times are not negative
     def request(
         self,
         node: cython.longlong,
@@ -289,10 +288,10 @@ class Bus:
     ) -> cython.bint:
         """Ask at `time` (ns) to send a frame from transmit buffer 1..3 of `node`; True when accepted.
 
-        Refused, counted and answered False when the buffer still holds a frame (it is free again from
-        the stamp of that frame's CAN_TX_DONE on), and, with a CAN_TX_DONE of status TX_ABORTED, when the
-        node is off the bus. FLAG_SINGLE_SHOT: one attempt; a lost arbitration or an error ends it with
-        TX_LOST. ValueError for a node, buffer, identifier or flag that does not exist.
+        The bus refuses and counts the request and returns False when the buffer still holds a frame (it is free again
+        from the stamp of that frame's CAN_TX_DONE on), and, with a CAN_TX_DONE of status TX_ABORTED, when the node is
+        off the bus. FLAG_SINGLE_SHOT: one attempt; a lost arbitration or an error ends it with TX_LOST. ValueError for
+        a node, buffer, identifier or flag that does not exist.
         """
         first: cython.longlong
         start: cython.longlong
@@ -318,7 +317,7 @@ class Bus:
             self._refuse(node, flags)
             return False
         if time < self.advanced:
-            # stamped before what has been decided: it takes part from here on
+            # stamped before bits that are already decided: it takes part from here on
             self.counters.late_requests += 1
             first = max(self.bit_of(self.advanced) + 1, self.free_bit)
             start = self.edge_ns(first)
@@ -405,10 +404,10 @@ class Bus:
     @cython.ccall
     @cython.exceptval(check=True)
     def abort(self, node: cython.longlong, buffer: cython.longlong, time: cython.longlong) -> cython.void:
-        """Take back, at `time` (ns), the frame waiting in a transmit buffer.
+        """Abort, at `time` (ns), the frame waiting in a transmit buffer.
 
-        If it has not started it is answered with TX_ABORTED. A frame under way is not stopped; should
-        it fail by an error, it is not repeated (SJA1000 data sheet, command register).
+        If it has not started it is answered with TX_ABORTED. A frame under way is not stopped; if an error ends it, it
+        is not repeated (SJA1000 data sheet, command register).
         """
         self._command(node, buffer, time, COMMAND_ABORT)
 
@@ -417,7 +416,7 @@ class Bus:
     def set_mode(self, node: cython.longlong, mode: cython.longlong, time: cython.longlong) -> cython.void:
         """Mode register of a node at `time` (ns): OPERATING (0) or RESET (1), as CAN_MODE messages carry.
 
-        RESET drops what waits (TX_ABORTED). OPERATING joins after one sequence of 11 recessive bits, or,
+        RESET drops waiting frames (TX_ABORTED). OPERATING joins after one sequence of 11 recessive bits, or,
         out of bus-off, after 128 of them with both error counters at zero. A plain frame under way is completed.
         """
         if mode != OPERATING and mode != RESET:
@@ -435,12 +434,12 @@ class Bus:
     # ---- disturbances
 
     def inject_errors(self, count, position=-1) -> None:
-        """Invert one bit of each of the next `count` frames for everybody, at `position` from the start of frame.
+        """Invert one bit of each of the next `count` frames for all nodes, at `position` from the start of frame.
 
-        Stuff bits count. It acts where it is: in the arbitration field a false dominant bit reads as a lost
-        arbitration; in the last bit of EOF it makes the sender repeat a frame that receivers have; behind the frame it
-        hits what is there. Negative: the middle of the frame, or the first bit that is behind every arbitration field
-        (17, extended 41) where that is later.
+        Stuff bits count. The effect depends on the position: in the arbitration field a false dominant bit reads as a
+        lost arbitration; in the last bit of EOF it makes the sender repeat a frame that receivers have; after the frame
+        it inverts the bit there. Negative: the middle of the frame, or the first bit that is behind every arbitration
+        field (17, extended 41) where that is later.
         """
         self.disturbance.hit_frames(count, position)
         self._aim()
@@ -448,7 +447,7 @@ class Bus:
     def inject_error_at(self, time) -> None:
         """Invert the bus level during the bit at `time` (ns); on an idle bus that is a false start of frame.
 
-        ValueError for an instant that is decided already: a frame is at its start, with its intermission.
+        ValueError for a time that is decided already: a frame and its intermission are decided at its start.
         """
         bit = self.bit_of(time)
         if bit <= self.bit_of(self.advanced) or bit < self.free_bit:
@@ -458,20 +457,20 @@ class Bus:
         self._aim()
 
     def set_bit_error_rate(self, rate) -> None:
-        """Invert each bit not yet decided with probability `rate` (0 ... 0.1), from a stream of its own."""
+        """Invert each bit not yet decided with probability `rate` (0 ... 0.1), from a separate random stream."""
         if not 0.0 <= rate <= HIGHEST_RATE:
             raise ValueError(f"bus {self.name}: bit error rate {rate} is outside 0 ... {HIGHEST_RATE}")
         self.disturbance.set_rate(rate, max(self.bit_of(self.advanced), self.free_bit - 1))
         self._aim()
 
     def tamper(self, tampering) -> None:
-        """Faults reach into frames from now on (`tampering.Tampering`); None: no longer."""
+        """Let faults affect frames from now on (`tampering.Tampering`); None: no longer."""
         self.tampering = tampering
         self.bit_level.tampering = tampering
         self._aim()
 
     def _aim(self) -> None:
-        """Set what tells a plain frame, after anything that decides on it; nobody acknowledges a lone node's."""
+        """Update the criteria for plain frames after a change to any of them; a lone node gets no acknowledgement."""
         strike: cython.longlong = self.disturbance.next_bit
         self.next_strike = strike
         if self.acknowledging < 2 or self.disturbance.frames_left > 0 or self.tampering is not None:
@@ -485,14 +484,13 @@ class Bus:
 
     @cython.ccall
     def advance(self, until: cython.longlong) -> cython.longlong:
-        """Decide every bit that begins up to and including `until` (ns); returns the next instant of interest.
+        """Decide every bit that begins up to and including `until` (ns); returns the next time of interest.
 
-        Every request, abort and mode change stamped before `until` must have been made. The answer
-        (also in the field `next_time`) is the start of the next frame as far as known, or NEVER; a
-        call before that instant returns at once.
+        Every request, abort and mode change stamped before `until` must have been made. The result (also in the field
+        `next_time`) is the start of the next frame as far as known, or NEVER; a call before that time returns at once.
         """
         if until > self.advanced:
-            self.advanced = until  # decided, also where nothing starts
+            self.advanced = until  # decided, even if nothing starts
         while self.next_time <= until:
             if self.disturbed:
                 self._pass_bits(until)
@@ -510,7 +508,7 @@ class Bus:
 
     @cython.cfunc
     def _look_ahead(self) -> cython.void:
-        """Set `next_bit` and `next_time` from what waits; bit by bit, the next bit that waits for programs."""
+        """Set `next_bit` and `next_time` from the waiting frames; bit by bit, the next bit that waits for programs."""
         first: cython.longlong = self.buffers.first_ready()
         if first <= self.free_bit or self.disturbed:
             self.next_bit = self.free_bit
@@ -532,14 +530,14 @@ class Bus:
     # ---- nodes that leave and join
 
     def _note_changes(self) -> None:
-        """Set what depends on waiting commands and on the nodes that join or take part, after any of them changed."""
+        """Update the fields that depend on waiting commands and on nodes that join or take part, after a change."""
         self.next_change = -1 if self.joining > 0 else self.commands.head_time
         self.hindered_until = self.suspended_until if self.acknowledging == self.node_count else NEVER
         self._aim()
 
     @cython.cfunc
     def _change(self, until: cython.longlong) -> cython.bint:
-        """Carry out the abort or mode change, or let the nodes join, that come before the next frame, if any do."""
+        """Carry out an abort or mode change, or let nodes join, if that is due before the next frame."""
         node: Node
         last: cython.longlong = self.bit_of(until)
         join: cython.longlong = self._next_join()
@@ -560,7 +558,7 @@ class Bus:
 
     @cython.cfunc
     def _next_join(self) -> cython.longlong:
-        """Bit at which the next joining node has seen its recessive sequences, if no frame comes before."""
+        """Bit at which the next joining node has seen its recessive sequences, if no frame starts earlier."""
         first: cython.longlong = NEVER
         node: Node
         if self.joining > 0:
@@ -584,7 +582,7 @@ class Bus:
         self._note_changes()
 
     def _abort(self, node, buffer, time) -> None:
-        """Take back the frame in a buffer, if it holds one; after a failed attempt: at its end."""
+        """Abort the frame in a buffer, if it holds one; after a failed attempt: at its end."""
         row = node.index << NODE_SHIFT | buffer << BUFFER_SHIFT
         if not 1 <= buffer <= BUFFERS or not self.buffers.is_full(row):
             return
@@ -596,7 +594,7 @@ class Bus:
         self._drop_aborted(node, row, time)
 
     def _reset(self, node, time) -> None:
-        """Take a node off the bus, with what waits there."""
+        """Take a node off the bus, with its waiting frames."""
         if node.mode == OPERATING:
             self.acknowledging -= not node.silent
             node.leave()
@@ -609,7 +607,7 @@ class Bus:
             self._drop_aborted(node, row, time)
 
     def _drop_aborted(self, node, row, time) -> None:
-        """End a request that its program took back."""
+        """End a request that its program aborted."""
         self.counters.aborted += 1
         node.aborted += 1
         self._drop(node, row, time, TX_ABORTED)
@@ -649,7 +647,7 @@ class Bus:
         return waited
 
     def look_again(self) -> None:
-        """Nodes or requests were exchanged by hand: decide anew what comes next, and when."""
+        """Recompute the next event and its time after nodes or requests were exchanged directly."""
         self._note_changes()
         self._look_ahead()
         self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
@@ -659,9 +657,9 @@ class Bus:
     @cython.cfunc
     @cython.cdivision(True)  # bits are not negative
     def _attempt(self, k: cython.longlong) -> cython.longlong:
-        """The frame that starts at bit k: arbitration; then its results to everybody, when nothing disturbs it.
+        """Decide the frame that starts at bit k: arbitration; then its results to all nodes, when nothing disturbs it.
 
-        Returns the first bit that is not decided: of a plain frame where the bus is free again, else k.
+        Returns the first undecided bit: for a plain frame the bit at which the bus is free again, else k.
         """
         row: cython.longlong = self.buffers.first
         merged: cython.bint = False
@@ -757,7 +755,7 @@ class Bus:
         row: cython.longlong,
         flags: cython.longlong,
     ) -> None:
-        """The frame in `row`, asked for at `asked`, began at bit `k` and ends at `done` (ns)."""
+        """Record that the frame in `row`, requested at `asked`, began at bit `k` and ends at `done` (ns)."""
         slots: cython.p_longlong = self.buffers.slots
         sender: cython.longlong = (row >> NODE_SHIFT) + 1 << SENDER_SHIFT
         sender |= (row >> BUFFER_SHIFT & BUFFER_MASK) << TIMES_BUFFER_SHIFT | flags
@@ -767,7 +765,7 @@ class Bus:
 
     @cython.cfunc
     def _after_success(self, node: Node, end: cython.longlong, done: cython.longlong) -> None:
-        """A sender that has had errors has sent a frame whole: to bit `end`, at `done` (ns).
+        """Update a sender with earlier errors that has sent a whole frame: to bit `end`, at `done` (ns).
 
         Whether it suspends transmission is decided at the end of the intermission, so by the counter that has moved
         (see `MediumAccess._sample_intermission`); a good frame moves no counter in between.
@@ -788,7 +786,7 @@ class Bus:
 
     @cython.cfunc
     def _arbitrate(self, k: cython.longlong) -> cython.longlong:
-        """The row that wins the frame that starts at bit k; negative when another node offers the very same field."""
+        """The row that wins the frame that starts at bit k; negative when another node offers the same field."""
         best: cython.longlong = -1
         best_key: cython.longlong = 0
         ready: cython.longlong = 0
@@ -815,7 +813,7 @@ class Bus:
 
     @cython.cfunc
     def _contend(self, k: cython.longlong, best: cython.longlong) -> None:
-        """Note who loses the arbitration against the row `best`."""
+        """Record the nodes that lose the arbitration against the row `best`."""
         slots: cython.p_longlong = self.buffers.slots
         row: cython.longlong = self.buffers.first
         key: cython.longlong
@@ -841,7 +839,7 @@ class Bus:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _is_offered(self, row: cython.longlong, key: cython.longlong, k: cython.longlong) -> cython.bint:
-        """True when this is what its node puts on the bus at bit k: of its frames that are ready, the lowest."""
+        """True when its node offers this row at bit k: the lowest of its ready frames."""
         slots: cython.p_longlong = self.buffers.slots
         other: cython.longlong = self.buffers.first
         other_key: cython.longlong
@@ -858,7 +856,7 @@ class Bus:
         return first_difference(self.buffers.wire(row)[0], self.buffers.wire(best)[0]) + 1
 
     def _skip(self, row, time) -> None:
-        """End a single shot that did not get through."""
+        """End a single shot that failed."""
         node: Node = self.nodes[row >> NODE_SHIFT]
         node.single_shot_skipped += 1
         self.counters.single_shot_skipped += 1
@@ -880,9 +878,9 @@ class Bus:
     def _is_disturbed(
         self, k: cython.longlong, best: cython.longlong, end: cython.longlong, merged: cython.bint
     ) -> cython.bint:
-        """True when the frame on bits k ... end - 1, or its intermission, does not take its plain course.
+        """True when the frame on bits k ... end - 1, or its intermission, is not plain.
 
-        When it does, the other senders of a frame that is `merged` are done here.
+        When it is, the other senders of a `merged` frame are completed here.
         """
         if self.strike_bit < end + INTERMISSION_BITS or self.disturbance.frames_left > 0:
             return True
@@ -890,7 +888,7 @@ class Bus:
             return True
         senders = self._senders(k, best) if merged else [best]
         if sum(not self.nodes[row >> NODE_SHIFT].silent for row in senders) >= self.acknowledging:
-            return True  # nobody is left to acknowledge
+            return True  # no node is left to acknowledge
         wire = self.buffers.wire(best)[0]
         if any(self.buffers.wire(row)[0] != wire for row in senders):
             return True
@@ -901,7 +899,7 @@ class Bus:
         return False
 
     def _senders(self, k, best) -> list:
-        """Rows whose frames go out together: of each node its first one with the winning field."""
+        """Rows whose frames are sent together: the first one with the winning field of each node."""
         found: dict = {}
         for row in self.buffers.waiting():
             if self.buffers.rows[row + READY] <= k and self._key(row) == self._key(best):
@@ -910,7 +908,8 @@ class Bus:
         return sorted(found.values())
 
     def _finish_merged(self, node, row, end) -> None:
-        """A node sent the same frame as the winner, up to bit `end`: it is a sender too, no receiver."""
+        """Complete a node that sent the same frame as the winner, up to bit `end`: it is a sender too, not a
+        receiver."""
         done = self.edge_ns(end)
         buffer = row >> BUFFER_SHIFT & BUFFER_MASK
         self.buffers.remove(row)
@@ -924,7 +923,7 @@ class Bus:
     # ---- bit by bit
 
     def _begin_bits(self, bit) -> None:
-        """From `bit` on, up to which the bus is idle, it passes bit by bit."""
+        """Switch to bit-by-bit simulation from `bit` on, up to which the bus is idle."""
         self.disturbed = True
         self.rivals = 0
         self.bit_level.begin(bit, self.free_bit)
@@ -968,13 +967,13 @@ class Bus:
 
     @cython.cfunc
     def _decided(self, bit: cython.longlong) -> None:
-        """All bits before `bit` are."""
+        """Mark all bits before `bit` as decided."""
         self.load.take(self.free_bit, bit)
         self.free_bit = bit
         self.free_time = self.edge_ns(bit)
 
     def _follow(self, machine: MediumAccess, bit: cython.longlong) -> None:
-        """What came of the bit before `bit` for a node."""
+        """Handle the result of the bit before `bit` for a node."""
         node: Node = machine.node
         met: cython.longlong = machine.met
         row: cython.longlong = machine.row
@@ -1022,7 +1021,7 @@ class Bus:
 
     @cython.cfunc
     def _sent(self, node: Node, row: cython.longlong, bit: cython.longlong) -> None:
-        """A node's frame is through: its last bit was the one before `bit`."""
+        """Complete a node's frame, whose last bit was the one before `bit`."""
         slots: cython.p_longlong = self.buffers.slots
         time: cython.longlong = self.edge_ns(bit)
         identifier: cython.longlong = slots[row + IDENTIFIER]
@@ -1065,7 +1064,7 @@ class Bus:
                 self.log.times.add(begun, begun, end, level.identifier, sender, level.error_field, level.error_position)
 
     def _flush(self, node, time) -> None:
-        """A node is bus-off: what waited there is lost."""
+        """Handle a node that is bus-off: its waiting frames are lost."""
         self.bit_level.leave(node)
         for waiting in self.buffers.waiting_of(node.index):
             self.counters.flushed += 1
@@ -1085,7 +1084,7 @@ class Bus:
 
     @cython.cfunc
     def _confine(self, node: Node, time: cython.longlong, interrupts: cython.longlong) -> None:
-        """Error confinement of a node of which a counter has moved."""
+        """Update the error confinement of a node whose counter has changed."""
         if node.confine(time, interrupts):
             self.acknowledging -= not node.silent
             node.off_ns = time
@@ -1094,6 +1093,6 @@ class Bus:
 
     @cython.cfunc
     def _note_result(self, time: cython.longlong) -> None:
-        """Something was told with the stamp `time`."""
+        """Count a result that was pushed with the stamp `time`."""
         if time <= self.advanced:
             self.counters.late_results += 1

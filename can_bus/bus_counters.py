@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below is made of a standard identifier, which `Bus.request` has checked)
-"""What a bus counts of its frames."""
+"""Frame counters of a bus."""
 
 from typing import Annotated
 
@@ -16,12 +16,13 @@ class BusCounters:
     """Counted since the last `reset`.
 
     `frames` sent whole; `merged` frames that two nodes sent at once with equal content; `lost` accepted but received
-    by no listening node (nobody listened, or the sender fell off the bus with the frame still waiting); `errors`
+    by no listening node (no node listened, or the sender went off the bus with the frame still waiting); `errors`
     error frames; `retries` after an error; `refused` requests; `aborted`; `flushed` waited when their sender went
-    bus-off; `arbitrations_lost`; `single_shot_skipped` single shots that did not go out, of which
+    bus-off; `arbitrations_lost`; `single_shot_skipped` single shots that were not sent, of which
     `single_shot_dropped` had been accepted.
-    `late_requests` came with stamps before what had been decided. `late_results` were stamped at or before the `until`
-    that found them: with steps of `Bus.advance` shorter than the shortest frame and no errors there are none.
+    `late_requests` arrived with stamps before bits that were already decided. `late_results` were stamped at or before
+    the `until` that found them: with steps of `Bus.advance` shorter than the shortest frame and no errors there are
+    none.
     """
 
     frames: cython.longlong
@@ -38,14 +39,14 @@ class BusCounters:
     flushed: cython.longlong
     late_results: cython.longlong
     late_requests: cython.longlong
-    # what the address `counts` leads into: exchanged only by `reset`, which sets both
+    # the array that `counts` points into: replaced only by `reset`, which sets both
     identifiers: Annotated[cython.longlong[::1], "readonly"]
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Everything to zero."""
+        """Set every counter to zero."""
         self.frames = 0
         self.merged = 0
         self.lost = 0
@@ -64,7 +65,7 @@ class BusCounters:
 
     @cython.cfunc
     def note_answer(self, identifier: cython.longlong, response_ns: cython.longlong) -> cython.void:
-        """A frame with a standard identifier was sent whole, so long after its request."""
+        """Count a frame with a standard identifier that was sent whole, and its response time."""
         place: cython.longlong = 2 * identifier
         self.counts[place] += 1
         if response_ns > self.counts[place + 1]:
@@ -72,7 +73,7 @@ class BusCounters:
 
     @property
     def over(self) -> int:
-        """Requests that have been answered, in whatever way."""
+        """Requests that have been answered, with any result."""
         return self.frames + self.merged + self.aborted + self.flushed + self.single_shot_dropped
 
     @property

@@ -1,4 +1,4 @@
-"""Bits of a bus whose level is inverted, for everybody: of chosen frames, chosen ones, and noise; or for one node."""
+"""Inverted bits of a bus, for all nodes: in chosen frames, at chosen bits, and from noise; or for one node."""
 
 from typing import TYPE_CHECKING
 
@@ -17,11 +17,11 @@ HIGHEST_RATE = 0.1  # bit error rate; chosen by us: beyond it no frame gets thro
 @cython.final
 @cython.cclass
 class Disturbance:
-    """What disturbs a bus. Bits are counted since power-up.
+    """Disturbances of a bus. Bits are counted since power-up.
 
-    `next_bit`: the next bit that is hit as far as known, NEVER when none is. `frames_left`: so many frames to come are
-    hit, at `position` each, negative: in their middle. `noise`: the RandomStream of the bit error rate. `misread`: bits
-    that single nodes sample wrongly, as (bit, node), of which the first is `next_misread`.
+    `next_bit`: the next bit that is hit as far as known, NEVER when none is. `frames_left`: number of coming frames
+    that are hit, at `position` each, negative: in their middle. `noise`: the RandomStream of the bit error rate.
+    `misread`: bits that single nodes sample wrongly, as (bit, node), of which the first is `next_misread`.
     """
 
     next_bit: cython.longlong
@@ -53,7 +53,7 @@ class Disturbance:
 
     @cython.cfunc
     def misreading(self, bit: cython.longlong) -> cython.longlong:
-        """Nodes that sample `bit` wrongly, as bits by node number; what was planned up to there is over."""
+        """Nodes that sample `bit` wrongly, as bits by node number; entries up to there are removed."""
         nodes: cython.longlong = 0
         one: cython.longlong = 1
         node: cython.longlong
@@ -70,7 +70,7 @@ class Disturbance:
         self.position = position
 
     def hit_bit(self, bit) -> None:
-        """Hit one bit, which nobody has decided yet."""
+        """Hit one bit, which is not decided yet."""
         self.planned_bits.append(bit)
         self.planned_bits.sort()
         self._aim()
@@ -101,17 +101,17 @@ class Disturbance:
 
     @cython.cfunc
     def meet_frame(self, start: cython.longlong, bits: cython.longlong, flags: cython.longlong) -> None:
-        """A frame of so many bits begins at bit `start`: if it is one of those to be hit, its bit is planned."""
+        """Plan the bit to hit in a frame of that many bits from bit `start` on, if the frame is one to be hit."""
         middle: cython.longlong = (bits - 1) // 2
         if self.frames_left > 0:
             self.frames_left -= 1
-            if self.position < 0:  # behind the arbitration field, so that it is an error of the sender's
+            if self.position < 0:  # after the arbitration field, so that it is an error of the sender
                 middle = max(middle, EXTENDED_ARBITRATION_END if flags & FLAG_EXTENDED else ARBITRATION_END)
             self.hit_bit(start + (middle if self.position < 0 else self.position))
 
     @cython.cfunc
     def strike(self, bit: cython.longlong) -> None:
-        """`bit`, which is hit, passes."""
+        """Advance past `bit`, which is hit."""
         while self.planned_bits and self.planned_bits[0] <= bit:
             self.planned_bits.pop(0)
         if self.next_noise_bit <= bit:

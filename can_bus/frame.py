@@ -7,7 +7,7 @@ transmit registers CxTDA/TDB of the LPC2194 hold them (robot.md N1.3).
 Layout (ISO 11898-1): start of frame, arbitration and control field, data, CRC-15: all of these are
 stuffed; then CRC delimiter, acknowledge slot and delimiter, seven bits end of frame: 10 bits unstuffed.
 The three bits of intermission belong to the bus, not to the frame: `INTERMISSION_BITS`.
-The rules of both chains, CRC and stuffing, stand in `_feed`, bit by bit; tables made from them do it piece by piece.
+`_feed` holds the rules of both chains, CRC and stuffing, bit by bit; tables made from them work piece by piece.
 """
 
 from typing import Final
@@ -16,11 +16,11 @@ import cython
 
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT
 
-# The flags of a frame beside the FLAG_* of foundation.events.
+# The flags of a frame in addition to the FLAG_* of foundation.events.
 LENGTH_CODE: Final = 15  # bits 0-3
 EIGHT_BYTES: Final = 8  # the flags of a standard data frame of eight bytes, as the robot sends them
-SENDABLE: Final = 0x7F  # all that a request may have: length code, remote, single shot, extended
-RECEIVERS_SEE: Final = 0x5F  # of these, what is on the wire: no single shot
+SENDABLE: Final = 0x7F  # all flags that a request may have: length code, remote, single shot, extended
+RECEIVERS_SEE: Final = 0x5F  # the part of these on the wire: no single shot
 
 HIGHEST_STANDARD: Final = 0x7FF  # identifiers of 11 bits
 HIGHEST_EXTENDED: Final = 0x1FFFFFFF  # identifiers of 29 bits
@@ -37,14 +37,14 @@ CRC_POLYNOMIAL: Final = 0x4599  # x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1
 CRC_BITS: Final = 15
 CRC_MASK: Final = 0x7FFF
 
-# What `measure` gives: bits 0-15 the length, from bit 16 the CRC.
+# Result of `measure`: bits 0-15 the length, from bit 16 the CRC.
 MEASURED_BITS: Final = 0xFFFF
 MEASURED_CRC_SHIFT: Final = 16
 
 DOMINANT: Final = 0
 RECESSIVE: Final = 1
 
-# Where in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
+# Positions in a frame: codes of the error code capture register, LPC2194 CxICR bits 16-20 (as the SJA1000's).
 FIELD_ID_28_21: Final = 2
 FIELD_START: Final = 3
 FIELD_SRTR: Final = 4
@@ -105,7 +105,7 @@ STEP_PLACE_MASK: Final = 63
 def _feed(chain: cython.longlong, value: cython.longlong, count: cython.longlong) -> cython.longlong:
     """Both chains after the `count` low bits of `value`, the highest of them first: the rules, bit by bit.
 
-    The fifth equal bit is followed at once by its complement, which begins a run of its own.
+    The fifth equal bit is followed at once by its complement, which begins a new run.
     """
     register: cython.longlong = chain & CRC_MASK
     run: cython.longlong = (chain >> STATE_SHIFT & RUN_MASK) + 1
@@ -169,14 +169,14 @@ def _measure_bitwise(
 
 
 # A standard frame of eight bytes, which nearly every frame is, goes through tables, byte by byte. The CRC is linear:
-# each byte adds what stands in the table of its place. For the stuffing a byte is a map from the state before it to the
-# state behind it.
+# each byte adds the table entry of its position. For the stuffing a byte is a map from the state before it to the state
+# after it.
 #
 # Compiled: CRC_OF_BYTE by place * 256 + byte. STUFF by byte, a map that is read while the state is still being found,
 # by eight bits per state: next state << 3 | stuff bits << 6. BEGUN by identifier, of the header: CRC << 16 | stuff
 # bits << 8 | state << 3.
 #
-# Interpreted, the states are lists: by byte what comes behind it, the last item is the number of stuff bits so far.
+# Interpreted, the states are lists: by byte the state after it; the last item is the number of stuff bits so far.
 # CRC_LISTS: by place, by byte. WALK: by stuff bits, by state. WALKS: by identifier, as `_begin`.
 CRC_OF_BYTE: cython.short[TABLE_BYTES] = [0] * TABLE_BYTES
 STUFF: cython.ulonglong[BYTES] = [0] * BYTES
@@ -228,7 +228,7 @@ def _fill_lists() -> None:
 
 
 def _begin(identifier):
-    """CRC of the header of a standard frame of eight bytes with 64 bits 0 behind it, and where on the walk it ends."""
+    """CRC of the header of a standard frame of eight bytes followed by 64 bits 0, and its end on the walk."""
     chain = _feed(IDLE, _header(identifier, EIGHT_BYTES), STANDARD_HEADER_BITS)
     WALKS[identifier] = (_feed(chain, 0, DATA_BITS) & CRC_MASK, WALK[chain >> STUFFED_SHIFT][_state(chain)])
     return WALKS[identifier]
@@ -241,7 +241,7 @@ def _begin(identifier):
 def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cython.longlong) -> cython.longlong:
     """`measure` of a standard frame of eight bytes, compiled."""
     crc: cython.longlong = BEGUN[identifier] >> BEGUN_CRC_SHIFT
-    # the six low bits of `steps`: where in the next map the next state stands
+    # the six low bits of `steps`: position of the next state in the next map
     steps: cython.ulonglong = BEGUN[identifier] & STEP_STATE_MASK
     # times 64, as in the maps
     stuffed: cython.ulonglong = (BEGUN[identifier] & BEGUN_STUFFED_MASK) >> (BEGUN_STUFFED_SHIFT - STEP_STUFFED_SHIFT)
@@ -267,11 +267,11 @@ def _measure_by_bytes(identifier: cython.longlong, lo: cython.longlong, hi: cyth
 def measure(
     identifier: cython.longlong, flags: cython.longlong, lo: cython.longlong, hi: cython.longlong
 ) -> cython.longlong:
-    """CRC-15 and length of a frame with this very content: crc << 16 | bits.
+    """CRC-15 and length of a frame with exactly this content: crc << 16 | bits.
 
     Bits: from start of frame to the end of EOF, stuff bits included, intermission not.
     """
-    if identifier >> 11 or flags & ~FLAG_SINGLE_SHOT != EIGHT_BYTES:  # single shot does not show on the wire
+    if identifier >> 11 or flags & ~FLAG_SINGLE_SHOT != EIGHT_BYTES:  # single shot is not visible on the wire
         return _measure_bitwise(identifier, flags, lo, hi)
     if cython.compiled:
         return _measure_by_bytes(identifier, lo, hi)
@@ -310,7 +310,7 @@ def frame_bits(
 @cython.wraparound(False)
 def fill_frame_bits(identifiers, flags, lows, highs, bits) -> None:
     """`frame_bits` of many frames into `bits`: five buffers of 64-bit integers, of one length."""
-    if not cython.compiled:  # numpy's own integers are no Python's
+    if not cython.compiled:  # numpy integers are not Python integers
         identifiers, flags, lows, highs = (memoryview(each).tolist() for each in (identifiers, flags, lows, highs))
     ids: cython.longlong[::1] = identifiers
     flag: cython.longlong[::1] = flags
@@ -359,8 +359,8 @@ def worst_case_bits(flags: int) -> int:
 def wire(identifier: int, flags: int, lo: int, hi: int) -> tuple[list[int], list[int]]:
     """The bits of a frame as they pass on the wire and, for each, its field (FIELD_*), stuff bits included.
 
-    The acknowledge slot is given as the sender drives it, recessive. Slow and plain: for errors and for
-    people who want to look at a frame.
+    The acknowledge slot is given as the sender drives it, recessive. Slow and simple: for errors and for displaying a
+    frame.
     """
     parts: list[tuple[int, int, int]] = [(FIELD_START, 1, 0)]  # field, number of bits, value
     remote = flags >> 4 & 1

@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
 # (every index below is a column of a row)
-"""What passed on a bus, frame by frame."""
+"""Log of the frames that passed on a bus."""
 
 from typing import Final
 
@@ -11,10 +11,10 @@ from ranger_sim.foundation.row_stream import FrameStream, RowStream
 TIMES_COLUMNS: Final = 7
 # numbers of a FrameTimes row
 TIMES_START: Final = 0  # first bit of the frame, ns
-TIMES_ASKED: Final = 1  # its program asked for it, ns; TIMES_START where nobody had
-TIMES_END: Final = 2  # its last bit is over, or its error frame is, ns
+TIMES_ASKED: Final = 1  # its program requested it, ns; TIMES_START where no program had
+TIMES_END: Final = 2  # end of its last bit, or of its error frame, ns
 TIMES_IDENTIFIER: Final = 3
-TIMES_SENDER: Final = 4  # (node + 1) << SENDER_SHIFT | transmit buffer << TIMES_BUFFER_SHIFT | flags; node -1: nobody
+TIMES_SENDER: Final = 4  # (node + 1) << SENDER_SHIFT | transmit buffer << TIMES_BUFFER_SHIFT | flags; node -1: none
 TIMES_LOW: Final = 5  # data bytes 0-3, or the field in which an error was detected (FIELD_*)
 TIMES_HIGH: Final = 6  # data bytes 4-7, or the position of that bit in the frame
 TIMES_BUFFER_SHIFT: Final = 8
@@ -24,9 +24,9 @@ SENDER_SHIFT: Final = 16
 @cython.final
 @cython.cclass
 class FrameTimes(RowStream):
-    """When each frame of a bus was asked for, began and ended: whole numbers, TIMES_COLUMNS a row.
+    """Request, start and end times of each frame of a bus: whole numbers, TIMES_COLUMNS per row.
 
-    In the order in which the bus decided them, which is that of their ends.
+    Rows are in the order in which the bus decided the frames, which is the order of their ends.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class FrameTimes(RowStream):
         lo: cython.longlong,
         hi: cython.longlong,
     ) -> None:
-        """A frame was on the bus; `sender` as TIMES_SENDER says."""
+        """Add a frame that was on the bus; `sender` as in TIMES_SENDER."""
         at: cython.longlong = self.used
         self.numbers[at + TIMES_START] = start
         self.numbers[at + TIMES_ASKED] = asked
@@ -58,14 +58,15 @@ class FrameTimes(RowStream):
 @cython.final
 @cython.cclass
 class FrameLog:
-    """The first `capacity` frames since the last `take`; `dropped` counts those beyond. A `stream` takes them instead.
+    """The first `capacity` frames since the last `take`; `dropped` counts those beyond. A `stream`, if set, takes them
+    instead.
 
-    A frame is a tuple (time_ns, identifier, flags, lo, hi, sending node), in order of their starts. time_ns is the
-    instant at which receivers have it. An error frame stands where it ended: FLAG_ERROR, the instant of its end,
-    lo = field (FIELD_*) and hi = position of the bit in which a node detected the error, the frame's sender first;
-    identifier 0 and node -1 where nobody had sent, after a false start of frame.
+    A frame is a tuple (time_ns, identifier, flags, lo, hi, sending node), in order of their starts. time_ns is the time
+    at which receivers have it. An error frame is listed at its end: FLAG_ERROR, the time of its end, lo = field
+    (FIELD_*) and hi = position of the bit in which a node detected the error, the frame's sender first; identifier 0
+    and node -1 where no node had sent, after a false start of frame.
 
-    `times`: None, or a FrameTimes that takes requests, starts and ends beside.
+    `times`: None, or a FrameTimes that also records requests, starts and ends.
     """
 
     stream: "FrameStream"
@@ -91,7 +92,7 @@ class FrameLog:
         hi: cython.longlong,
         node: cython.longlong,
     ) -> None:
-        """A frame has passed."""
+        """Record a frame that has passed."""
         if self.stream is not None:
             self.stream.add(time, identifier, flags, lo, hi)
         elif len(self.frames) < self.capacity:
@@ -100,7 +101,7 @@ class FrameLog:
             self.dropped += 1
 
     def take(self) -> list:
-        """The frames so far, which are forgotten here."""
+        """Return the frames so far and remove them."""
         taken = self.frames
         self.frames = []
         return taken

@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below is a place of the ring)
-"""How much of a bus is taken: over all, and in windows of 10 ms. Everything here counts bits since power-up."""
+"""Load of a bus: overall, and in windows of 10 ms. All counts are bits since power-up."""
 
 import array
 from typing import Final
@@ -15,9 +15,9 @@ WINDOWS_PER_SECOND = 100
 @cython.final
 @cython.cclass
 class LoadMeter:
-    """Counts the bits for which a bus is taken: stuff bits, intermission and error frames included.
+    """Counts the bits for which a bus is busy: stuff bits, intermission and error frames included.
 
-    `bits`: so many since `start`. `count`: windows closed since then. `window_busy`: bits of the open window.
+    `bits`: busy bits since `start`. `count`: windows closed since then. `window_busy`: bits of the open window.
     """
 
     bits: cython.longlong
@@ -36,7 +36,7 @@ class LoadMeter:
         self.start(0)
 
     def start(self, bit) -> None:
-        """Count anew, from `bit` on."""
+        """Restart the count from `bit` on."""
         self.bits = 0
         self.origin_bit = bit
         self.window_end = bit + self.window_bits
@@ -47,7 +47,7 @@ class LoadMeter:
 
     @cython.cfunc
     def take(self, first: cython.longlong, free: cython.longlong) -> cython.void:
-        """The bus is taken from bit `first` until it is free at bit `free`."""
+        """Count the bus as busy from bit `first` until it is free at bit `free`."""
         self.bits += free - first
         self.taken_until = free
         if free > self.window_end:
@@ -57,7 +57,7 @@ class LoadMeter:
 
     @cython.cfunc
     def _split(self, first: cython.longlong, last: cython.longlong) -> cython.void:
-        """Bits `first` ... `last` - 1 are taken and reach beyond the open window."""
+        """Count bits `first` ... `last` - 1, which reach beyond the open window, as busy."""
         if first >= self.window_end:
             self._roll(first)
         while last > self.window_end:
@@ -83,10 +83,10 @@ class LoadMeter:
                 self.window_end += idle * self.window_bits
 
     def mean(self, bit) -> float:
-        """Share of the bits from the start to `bit` for which the bus was taken, 0 ... 1."""
+        """Share of the bits from the start to `bit` for which the bus was busy, 0 ... 1."""
         if bit <= self.origin_bit:
             return 0.0
-        ahead = max(self.taken_until - bit, 0) if self.bits else 0  # of a frame decided but not over
+        ahead = max(self.taken_until - bit, 0) if self.bits else 0  # part of a frame decided but not over
         return max(self.bits - ahead, 0) / (bit - self.origin_bit)
 
     def largest(self) -> float:

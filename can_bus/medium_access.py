@@ -1,15 +1,15 @@
 """One controller's medium access, bit by bit: frames, error and overload frames, intermission (ISO 11898-1).
 
 The standard's medium access control sublayer and its fault confinement entity as one state machine. In every bit the
-controller drives a level, samples the one that is on the bus, and decides from that alone what it does in the next bit.
-Nothing here knows another controller: that all of them together do what the standard wants is what comes out.
+controller drives a level, samples the level on the bus, and decides from that alone its action in the next bit. No
+controller here knows another one: the behaviour that the standard requires results from all of them together.
 
 The rules of fault confinement are cited by their letters, in the order in which ISO 11898-1 and, before it, the CAN
 Specification 2.0 give them:
 (a) a receiver that detects an error: receive errors + 1, unless (e) holds.
 (b) a receiver that samples a dominant bit as the first one after its error flag: receive errors + 8.
-(c) a transmitter that sends an error flag: transmit errors + 8. Exception 1: it is error passive, nobody acknowledged,
-    and no bit was dominant while it sent its passive flag. Exception 2: a stuff error in the arbitration field, the
+(c) a transmitter that sends an error flag: transmit errors + 8. Exception 1: it is error passive, no node acknowledged,
+and no bit was dominant while it sent its passive flag. Exception 2: a stuff error in the arbitration field, the
     stuff bit having been sent recessive and sampled dominant.
 (d), (e) a bit error in an active error flag or an overload flag: + 8, of a transmitter (d) or a receiver (e).
 (f) up to seven dominant bits after any flag are tolerated: the eighth, and each eighth more, + 8.
@@ -83,41 +83,41 @@ MAC_FRAME: Final = 3
 MAC_ACTIVE_FLAG: Final = 4
 MAC_PASSIVE_FLAG: Final = 5
 MAC_OVERLOAD_FLAG: Final = 6
-MAC_TOLERATING: Final = 7  # behind a flag, until a bit is recessive: the first one of the delimiter
+MAC_TOLERATING: Final = 7  # after a flag, until a bit is recessive: the first one of the delimiter
 MAC_DELIMITER: Final = 8  # of an error frame or an overload frame
 MAC_INTERMISSION: Final = 9
 MAC_SUSPENDED: Final = 10  # suspend transmission
 
-# What came of a bit, as `sample` tells it.
+# Results of a bit, as `sample` returns them.
 MET_RECEIVED: Final = 1  # the sixth bit of EOF: a receiver has the frame
 MET_SENT: Final = 2  # the last bit of EOF: a transmitter is done
 MET_LOSS: Final = 4  # arbitration lost
 MET_ERROR: Final = 8  # an error detected: an error flag begins with the next bit
 MET_FAILURE: Final = 16  # with it: that was an attempt to send a frame
-MET_COUNTER: Final = 32  # something of error confinement to tell; `capture` is its ICR_*
+MET_COUNTER: Final = 32  # error confinement has something to report; `capture` is its ICR_*
 MET_SETTLED: Final = 64  # the error frame after a failure is over
-MET_START: Final = 128  # the dominant last bit of intermission stands for the start of frame of `offered`
+MET_START: Final = 128  # the dominant last bit of intermission serves as the start of frame of `offered`
 MET_JOIN: Final = 256  # all recessive sequences seen
 
 RECEIVER_PENALTY: Final = 1  # rule (a)
 FLAG_BITS: Final = 6  # of an error or overload flag
-DELIMITER_BITS: Final = 8  # recessive, behind the last flag
+DELIMITER_BITS: Final = 8  # recessive, after the last flag
 TOLERATED_BITS: Final = 8  # rule (f)
 
 
 @cython.final
 @cython.cclass
 class MediumAccess:
-    """What `node` does on the bus. Counts its errors in the node; the bus has the node take its error state from them.
+    """Bus access of `node`. Counts its errors in the node; the bus then has the node derive its error state from them.
 
-    `count`: bits of the present state. `sending`: it is the transmitter, which it stays until the bus is idle or
-    another frame begins. `begun`: bit at which its frame began; `position`: bits since. `field` (FIELD_*) is where it
-    stands, with `left` bits still to come. `row`: the frame that it sends; `offered`: the one that it may begin in this
-    bit, -1 for none. `failed`: since then an error frame has gone on. `after_error`: the flag before was an error
-    flag, no overload flag. `unacknowledged`: exception 1 of rule (c) may hold. `unheeded`: its frame is not for it.
-    `met`: what came of the last bit. `stuff_run`, `stuff_level`: equal bits
-    seen last. `own_rate`: its bits per second where they are not the bus's (0: they are); then `own_bit` counts its own
-    bits, and `own_rest` is what has passed of the next one.
+    `count`: bits of the present state. `sending`: it is the transmitter, and remains so until the bus is idle or
+    another frame begins. `begun`: bit at which its frame began; `position`: bits since. `field` (FIELD_*) is its
+    current field, with `left` bits still to come. `row`: the frame that it sends; `offered`: the one that it may begin
+    in this bit, -1 for none. `failed`: an error frame has been under way since then. `after_error`: the previous flag
+    was an error flag, not an overload flag. `unacknowledged`: exception 1 of rule (c) may hold. `unheeded`: the frame
+    is not for it. `met`: result of the last bit. `stuff_run`, `stuff_level`: equal bits seen last. `own_rate`: its bit
+    rate where it differs from the bus's (0: it does not); then `own_bit` counts its own bits, and `own_rest` is the
+    part of the next one that has passed.
     """
 
     node: Node
@@ -141,7 +141,7 @@ class MediumAccess:
     flags: cython.longlong
     lo: cython.longlong
     hi: cython.longlong
-    # what it sends
+    # the frame that it sends
     row: cython.longlong
     offered: cython.longlong
     arbitration_bits: cython.longlong
@@ -180,7 +180,7 @@ class MediumAccess:
 
     @cython.cfunc
     def _forget_frame(self) -> cython.void:
-        """Nothing of a frame has been seen."""
+        """Reset: nothing of a frame has been seen."""
         self.position = 0
         self.stuff_run = 0
         self.stuff_level = RECESSIVE
@@ -193,7 +193,7 @@ class MediumAccess:
 
     @cython.ccall
     def place(self, bit: cython.longlong, free_bit: cython.longlong) -> cython.void:
-        """Where the node stands at `bit`, when nothing has been on the bus since `free_bit`."""
+        """Set the node's state at `bit`, when nothing has been on the bus since `free_bit`."""
         node: Node = self.node
         self.sending = False
         self.failed = False
@@ -236,7 +236,7 @@ class MediumAccess:
 
     @cython.cfunc
     def send(self, row: cython.longlong, bits: list, arbitration_bits: cython.longlong) -> cython.void:
-        """The frame in `row` is what it sends: `bits` on the wire, of which so many to the end of arbitration."""
+        """Send the frame in `row`: `bits` on the wire, and the number of them to the end of arbitration."""
         self.row = row
         self.bits = bits
         self.arbitration_bits = arbitration_bits
@@ -244,7 +244,7 @@ class MediumAccess:
 
     @cython.cfunc
     def start(self, bit: cython.longlong) -> cython.void:
-        """A frame begins at `bit`: its start of frame is what comes next."""
+        """A frame begins at `bit`: its start of frame comes next."""
         self.state = MAC_FRAME
         self.begun = bit
         self.field = FIELD_START
@@ -270,7 +270,7 @@ class MediumAccess:
 
     @cython.ccall
     def sample(self, wire_level: cython.longlong, bit: cython.longlong) -> cython.longlong:
-        """The bus was at `wire_level` during `bit`: what came of that (MET_*).
+        """Sample `wire_level` of the bus during `bit`; returns the result (MET_*).
 
         A silent node drives nothing on the bus; what it would drive is looped back to it (bus monitoring mode).
         """
@@ -336,8 +336,9 @@ class MediumAccess:
             self._next_field()
         if not self.sending:
             if self.field == FIELD_ACK_SLOT and self.node.silent and wire_level == RECESSIVE:
-                # ROBOT PARITY: a real silent controller takes a frame that nobody acknowledged, once per repetition;
-                # ours does not, so that a bus on which nobody else listens may rest (`edge.paced.alone_and_passive`).
+                # ROBOT PARITY: a real silent controller receives a frame that no node acknowledged, once per
+                # repetition; ours does not, so that a bus without other receivers may rest
+                # (`edge.paced.alone_and_passive`).
                 self.unheeded = True
             return self._receive(level)
         if level != self.driven:
@@ -376,7 +377,7 @@ class MediumAccess:
 
     @cython.cfunc
     def _next_field(self) -> cython.void:
-        """A field is over: the one that follows it, and its length in bits."""
+        """A field is over: enter the next one, with its length in bits."""
         field: cython.longlong = self.field
         self.left = 1
         if field == FIELD_START:
@@ -455,7 +456,7 @@ class MediumAccess:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _fixed_form(self, level: cython.longlong) -> cython.longlong:
-        """A bit behind the CRC: recessive, but for the ACK slot. `register` is 0 when the CRC was right."""
+        """A bit after the CRC: recessive, except for the ACK slot. `register` is 0 when the CRC was right."""
         if self.field == FIELD_ACK_SLOT:
             if not self.sending and self.driven == DOMINANT:
                 if level == RECESSIVE:
@@ -469,7 +470,7 @@ class MediumAccess:
             if self.field == FIELD_END and self.left == 0:  # a receiver has the frame already
                 return self._overload()
             return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
-        if self.field == FIELD_ACK_DELIMITER and self.register != 0:  # a CRC error is signalled behind it
+        if self.field == FIELD_ACK_DELIMITER and self.register != 0:  # a CRC error is signalled after it
             return self._error(KIND_OTHER, SENDER_PENALTY, RECEIVER_PENALTY)
         if self.field == FIELD_END and self.left == 1 and not self.sending:
             return 0 if self.unheeded else MET_RECEIVED
@@ -520,7 +521,7 @@ class MediumAccess:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _tolerate(self, level: cython.longlong) -> cython.longlong:
-        """Dominant bits behind a flag are other nodes'; the first recessive one begins the delimiter."""
+        """Dominant bits after a flag are other nodes'; the first recessive one begins the delimiter."""
         self.unacknowledged = False
         if level == RECESSIVE:
             self.state = MAC_DELIMITER
@@ -550,7 +551,7 @@ class MediumAccess:
     def _error(
         self, kind: cython.longlong, sender_penalty: cython.longlong, receiver_penalty: cython.longlong
     ) -> cython.longlong:
-        """An error of `kind` (KIND_*) in this bit: the error flag begins with the next one, whatever was going on.
+        """An error of `kind` (KIND_*) in this bit: the error flag begins with the next one, in any state.
 
         Which flag is decided before the counters move: the error that makes a node passive is signalled actively.
         """
@@ -591,7 +592,7 @@ class MediumAccess:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _overload(self) -> cython.longlong:
-        """An overload condition, which is no error: the overload flag begins with the next bit."""
+        """An overload condition, which is not an error: the overload flag begins with the next bit."""
         settled: cython.longlong = MET_SETTLED if self.failed else 0
         self.state = MAC_OVERLOAD_FLAG
         self.field = FIELD_OVERLOAD_FLAG
@@ -619,9 +620,9 @@ class MediumAccess:
         """Three recessive bits. A dominant one is an overload condition, but the third a start of frame.
 
         Suspend transmission: a transmitter that is error passive when intermission ends waits eight bits more, and
-        begins no frame in its last bit. What counts is the state then, after the counters of its frame have moved:
-        a transmitter at 128 whose frame got through is error active again and does not wait (ISO 11898-1 speaks of an
-        error-passive node that has been the transmitter, not of one that was error passive while it sent).
+        begins no frame in its last bit. The state at that time counts, after the counters of its frame have changed: a
+        transmitter at 128 whose frame succeeded is error active again and does not wait (ISO 11898-1 refers to an
+        error-passive node that has been the transmitter, not to one that was error passive while it sent).
         """
         suspended: cython.bint = self.sending and self.node.passive
         self.count += 1

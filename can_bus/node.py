@@ -1,9 +1,9 @@
 """A controller on a bus, and its error confinement (ISO 11898-1): error counters, error states, bus-off recovery.
 
 A node is error active until one of its counters reaches PASSIVE_LIMIT; then it is error passive: its error flags are
-recessive and destroy nobody's frame, and after sending it suspends transmission. At BUS_OFF_LIMIT transmit errors it is
-bus-off and takes no part. The bus decides what happened to a frame and tells the nodes; the nodes count, change
-state and tell their programs.
+recessive and destroy no other node's frame, and after sending it suspends transmission. At BUS_OFF_LIMIT transmit
+errors it is bus-off and takes no part. The bus decides the result of a frame and reports it to the nodes; the nodes
+count, change state and notify their programs.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ from ranger_sim.foundation.events import CAN_STATUS, CAN_TX_DONE, EventQueue
 # Modes: `Bus.set_mode` takes the first two, `Node.mode` shows all.
 OPERATING: Final = 0
 RESET: Final = 1  # off the bus: neither sends, receives nor acknowledges
-BUS_OFF: Final = 2  # thrown off by its transmit error counter
+BUS_OFF: Final = 2  # removed by its transmit error counter
 JOINING: Final = 3  # waits for recessive sequences before it takes part
 UNPLUGGED: Final = 4  # no wire leads from it to this bus (`Bus.unplug`)
 
@@ -33,36 +33,36 @@ KIND_FORM: Final = 1
 KIND_STUFF: Final = 2
 KIND_OTHER: Final = 3
 
-# Error confinement: ISO 11898-1, where nothing else is said.
+# Error confinement: ISO 11898-1, unless noted otherwise.
 WARNING_LIMIT: Final = 96  # CxEWL after reset; ISO 11898-1 recommends the same
 PASSIVE_LIMIT: Final = 128  # error passive from here
 BUS_OFF_LIMIT: Final = 256  # bus-off from here (transmit errors)
 RECEIVE_ERRORS_MOST: Final = (
-    255  # RXERR of the LPC2194 has eight bits; beyond the passive limit more means nothing more
+    255  # RXERR of the LPC2194 has eight bits; beyond the passive limit the value has no further meaning
 )
 RECEIVER_CALMED: Final = 119  # an error-passive receiver after a good frame; the standard allows 119 ... 127
 SENDER_PENALTY: Final = 8  # transmit errors that an error costs the sender; the heavier ones cost a receiver as much
 SUSPEND_BITS: Final = 8  # suspend transmission: how long an error-passive sender waits after the intermission
-SEQUENCE_BITS: Final = 11  # a recessive sequence, as it stands between two frames
-RECOVERY_SEQUENCES: Final = 128  # of which a bus-off node waits for so many before it returns
-TRANSMIT_ERRORS_OFF: Final = 127  # what the transmit counter of an LPC2194 reads while it is bus-off
+SEQUENCE_BITS: Final = 11  # a recessive sequence, as between two frames
+RECOVERY_SEQUENCES: Final = 128  # number of them for which a bus-off node waits before it returns
+TRANSMIT_ERRORS_OFF: Final = 127  # reading of the transmit counter of an LPC2194 while it is bus-off
 
 
 @cython.final
 @cython.cclass
 class Node:
-    """A controller on a bus, with its error counters and what it did so far.
+    """A controller on a bus, with its error counters and statistics.
 
-    `following`: the next one of the bus; behind the last comes the first. `listening`: it wants what it receives (a
+    `following`: the next node of the bus; the last is followed by the first. `listening`: it wants received frames (a
     node that does not still acknowledges). `silent`: it drives nothing, not even an acknowledgement (`Bus.set_silent`).
     `flushed`: frames that waited when it went bus-off. `refused`: requests into an occupied buffer or while off the
-    bus. `ends`: where the ends of its transmissions are written, unless they shall be messages. `suspend_bit`: before
-    that it sends nothing. `off_ns`: when it went bus-off last; what its program asked for earlier does not bring it
-    back. `sending_end`: the last bit of a frame that it sent together with another node. While it is joining,
+    bus. `ends`: where the ends of its transmissions are written, unless they shall be messages. `suspend_bit`: it sends
+    nothing before that bit. `off_ns`: when it went bus-off last; earlier requests of its program do not bring it back.
+    `sending_end`: the last bit of a frame that it sent together with another node. While it is joining,
     `sequences_left` recessive sequences, of which the first begins at bit `join_from` or later, are missing.
     """
 
-    # what every frame touches stands in front: few lines of the processor's cache
+    # fields used by every frame come first: few cache lines
     inbox: "EventQueue"
     following: "Node"
     ends: TransmitEnds
@@ -142,22 +142,22 @@ class Node:
 
     @cython.cfunc
     def count_success(self) -> None:
-        """A frame of its own, sent when it had transmit errors, is through."""
+        """Count a frame that it has sent successfully when it had transmit errors."""
         self.transmit_errors -= 1
 
     @cython.cfunc
     def count_reception(self) -> None:
-        """A good frame came in when it had receive errors."""
+        """Count a good frame that it received when it had receive errors."""
         self.receive_errors = self.receive_errors - 1 if self.receive_errors < PASSIVE_LIMIT else RECEIVER_CALMED
 
     @cython.ccall
     def count_receive_errors(self, penalty: cython.longlong) -> None:
-        """An error that it met as a receiver."""
+        """Count an error that it detected as a receiver."""
         self.receive_errors = min(self.receive_errors + penalty, RECEIVE_ERRORS_MOST)
 
     @cython.ccall
     def confine(self, time: cython.longlong, interrupts: cython.longlong) -> cython.bint:
-        """Take the error state that belongs to the counters, and tell it at `time` (ns) with `interrupts` (ICR_*).
+        """Derive the error state from the counters, and report it at `time` (ns) with `interrupts` (ICR_*).
 
         True when the node goes bus-off by that.
         """
@@ -185,15 +185,15 @@ class Node:
     # ---- off the bus and back
 
     def leave(self) -> None:
-        """Into reset. That does not spare a node that was thrown off its recovery."""
+        """Enter reset. A node that went bus-off must still recover afterwards."""
         self.mode = BUS_OFF if self.transmit_errors >= BUS_OFF_LIMIT else RESET
 
     def unplug(self) -> None:
-        """Off the bus for good: who takes this place is a new controller."""
+        """Leave the bus permanently: the next user of this place is a new controller."""
         self.mode = RESET
 
     def take_over(self, other) -> None:
-        """It is the controller that was `other` on another bus, or on the other side of a cut: its counters."""
+        """Take the counters of `other`, the same controller on another bus or on the other side of a cut."""
         self.transmit_errors = other.transmit_errors
         self.receive_errors = other.receive_errors
         self.passive = other.passive
@@ -203,7 +203,7 @@ class Node:
         self.off_ns = other.off_ns
 
     def start_joining(self, bit) -> None:
-        """It waits from `bit` on: out of reset for one recessive sequence, out of bus-off for its recovery."""
+        """Wait from `bit` on: after reset for one recessive sequence, after bus-off for its recovery."""
         self.sequences_left = RECOVERY_SEQUENCES if self.mode == BUS_OFF else 1
         self.join_from = bit
         self.mode = JOINING
@@ -211,14 +211,14 @@ class Node:
     @cython.cfunc
     @cython.exceptval(check=False)
     def joins_at(self, free_bit: cython.longlong) -> cython.longlong:
-        """Bit at which the last recessive sequence is over, if no frame comes before.
+        """Bit at which the last recessive sequence is over, if no frame starts earlier.
 
         `free_bit`: where the bus is free. A frame and its intermission end in one recessive sequence.
         """
         return max(free_bit - SEQUENCE_BITS, self.join_from) + SEQUENCE_BITS * self.sequences_left
 
     def count_sequences(self, free_bit, start) -> None:
-        """A frame starts at bit `start`, after the bus was free from `free_bit` on: so much of the waiting is over."""
+        """Count the sequences that have passed: a frame starts at bit `start`, the bus was free from `free_bit` on."""
         run = start - max(free_bit - SEQUENCE_BITS, self.join_from)
         self.sequences_left -= max(run, 0) // SEQUENCE_BITS
 

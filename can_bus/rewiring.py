@@ -1,4 +1,4 @@
-"""Wires that part and come together again, and controllers at a wrong bit rate: what is done to a bus by hand.
+"""Wires that are cut and joined again, and controllers at a wrong bit rate: changes made directly to a bus.
 
 Everything here takes effect between two bits that are decided: a plain frame under way is completed (`bus.py`).
 """
@@ -9,15 +9,15 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.node import JOINING, OPERATING, UNPLUGGED
 from ranger_sim.foundation.user_error import UserError
 
-# A rate that synchronisation makes up for is no fault: bits of ten time quanta with a jump width of two stand 1 % at
-# either end (ISO 11898-1, oscillator tolerance), so 2 % between two controllers. The other limit is chosen by us: an
-# eighth to eight times covers every prescaler that is wrong by a few steps.
+# A rate for which synchronisation compensates is not a fault: bits of ten time quanta with a jump width of two tolerate
+# 1 % at either end (ISO 11898-1, oscillator tolerance), so 2 % between two controllers. The other limit is chosen by
+# us: an eighth to eight times covers every prescaler that is wrong by a few steps.
 LEAST_MISMATCH = 0.02
 MOST_TIMES = 8
 
 
 def unplug(bus: Any, node: int, time: int) -> list[tuple[int, int, int, int, int]]:
-    """No wire leads from a node to `bus` any more, from `time` (ns) on.
+    """Unplug a node from `bus` from `time` (ns) on.
 
     Returns the requests that waited there, as `Bus.take_out` does.
     """
@@ -34,7 +34,7 @@ def unplug(bus: Any, node: int, time: int) -> list[tuple[int, int, int, int, int
 
 
 def plug(bus: Any, node: int, time: int) -> None:
-    """A node that was unplugged hangs on `bus` again: it takes part after one recessive sequence, as out of reset."""
+    """Connect an unplugged node to `bus` again: it takes part after one recessive sequence, as after reset."""
     controller = bus.nodes[node]
     if controller.mode == UNPLUGGED:
         controller.leave()
@@ -43,7 +43,7 @@ def plug(bus: Any, node: int, time: int) -> None:
 
 
 def check_rate(bus: Any, rate: int, where: str) -> None:
-    """UserError, naming `where`, for a rate (bit/s) that is not wrong enough on `bus`, or too wrong."""
+    """Raise UserError, naming `where`, for a rate (bit/s) too close to that of `bus`, or too far from it."""
     off = abs(rate / bus.bitrate - 1.0)
     if not (off >= LEAST_MISMATCH and bus.bitrate <= MOST_TIMES * rate <= MOST_TIMES**2 * bus.bitrate):
         raise UserError(
@@ -53,10 +53,10 @@ def check_rate(bus: Any, rate: int, where: str) -> None:
 
 
 def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
-    """A controller takes its bits for those of `rate` bit/s from `time` (ns) on; 0: for the bus's.
+    """Set a controller's bit rate to `rate` bit/s from `time` (ns) on; 0: the bus's.
 
-    That takes a reset, because CxBTR can be written in reset mode only: what waits there is answered with TX_ABORTED.
-    UserError for a rate that is not wrong enough, or too wrong.
+    That takes a reset, because CxBTR can be written in reset mode only: waiting frames are answered with TX_ABORTED.
+    UserError for a rate that is too close, or too far off.
     """
     controller = bus.nodes[node]
     if rate:
@@ -70,9 +70,9 @@ def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
 
 
 class Cut:
-    """The cable between `node` and the other nodes of `bus` is cut: it is alone on a piece of its own, `far`.
+    """The cable between `node` and the other nodes of `bus` is cut: it is alone on a separate piece, `far`.
 
-    Who passes time for `bus` has to pass it for `far` too. The node has number 0 there.
+    The owner of `bus` must advance `far` too. The node has number 0 there.
     """
 
     def __init__(self, bus: Any, node: int) -> None:
@@ -89,12 +89,12 @@ class Cut:
         return far
 
     def mend(self, time: int) -> None:
-        """The wire is whole again at `time` (ns): the node takes part after a recessive sequence."""
+        """Repair the wire at `time` (ns): the node takes part after a recessive sequence."""
         _move(self.far, 0, self.bus, self.node, time)
 
 
 def _move(source: Any, place: int, target: Any, to: int, time: int) -> None:
-    """The controller at `place` of one bus hangs on another one as `to`, with its counters and what waits there."""
+    """Move the controller at `place` of one bus to another one as `to`, with its counters and waiting frames."""
     before, after = source.nodes[place], target.nodes[to]
     mode = before.mode
     waited = unplug(source, place, time)
@@ -103,7 +103,7 @@ def _move(source: Any, place: int, target: Any, to: int, time: int) -> None:
         unplug(target, to, time)
     if mode in (OPERATING, JOINING):
         plug(target, to, time)
-    else:  # off by its program or thrown off: so it stays
+    else:  # off by its program or bus-off: it remains so
         after.mode = mode
         target.look_again()
     for buffer, identifier, flags, low, high in waited:

@@ -1,11 +1,11 @@
-"""Faults that reach into the frames of a bus: what one node sees wrong, loses, or has late or changed.
+"""Faults in the frames of a bus: one node misreads, loses, or receives frames late or changed.
 
-A bus with `Tampering` passes every frame that a fault reaches bit by bit. What follows from a bit that one node samples
-wrongly (error flags, counters, repetitions, bus-off) is then the controllers' own doing (`medium_access.py`).
+A bus with `Tampering` simulates every affected frame bit by bit. The consequences of a bit that one node samples
+wrongly (error flags, counters, repetitions, bus-off) then come from the controllers (`medium_access.py`).
 
-Errors have the names of FMI-LS-BUS: BIT, BIT_STUFFING, FORM, CRC, ACK, BROKEN_ERROR_FRAME. Of all nodes the one that a
-fault makes misread a bit sees the error first and signals it: its error is primary. What others see because of its
-error flag is secondary.
+Errors have the names of FMI-LS-BUS: BIT, BIT_STUFFING, FORM, CRC, ACK, BROKEN_ERROR_FRAME. The node that a fault makes
+misread a bit sees the error first and signals it: its error is primary. Errors that others see because of its error
+flag are secondary.
 """
 
 from collections import Counter
@@ -53,19 +53,20 @@ from ranger_sim.foundation.events import CAN_RX, NEVER, STAGE_BUS, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
 ERRORS = ("BIT", "BIT_STUFFING", "FORM", "CRC", "ACK", "BROKEN_ERROR_FRAME")
-# What a node cannot see, and why: (error, whether it is the sender)
+# Errors that a node cannot see, and why: (error, whether it is the sender)
 IMPOSSIBLE = {
     ("FORM", True): "a sender that samples a dominant bit where it sent a recessive one sees a BIT error",
     ("CRC", True): "a sender does not check the CRC of its own frame",
     ("ACK", False): "only a sender looks for the acknowledgement",
 }
-INTRUDERS_ORDER = STAGE_BUS * 256 + 255  # nobody of the robot has it
+INTRUDERS_ORDER = STAGE_BUS * 256 + 255  # no node of the robot has it
 FLAG_BIT_BROKEN = 3  # bits from an error to the one of its error flag that is misread: the third of six
 BIT_BEHIND_ARBITRATION = (FIELD_R1, FIELD_R0, FIELD_DLC, FIELD_DATA, FIELD_CRC)
 
 
 def error_name(capture: int) -> str:
-    """Name of the error that an ICR_* word with a bus error tells; "" for dominant bits behind a flag, no new one."""
+    """Name of the error in an ICR_* word with a bus error; "" for dominant bits after a flag, which are not a new
+    error."""
     field = capture >> ICR_FIELD_SHIFT & ICR_FIELD_MASK
     kind = capture >> ICR_KIND_SHIFT & 3
     if field in (FIELD_ACTIVE_FLAG, FIELD_DELIMITER, FIELD_OVERLOAD_FLAG):
@@ -79,7 +80,7 @@ def error_name(capture: int) -> str:
 def places_of_error(error: str, of_sender: bool, bits: list, fields: list) -> list:
     """Positions from the start of a frame at which a node must misread the bus in order to see `error`.
 
-    `bits` and `fields` of the frame on the wire, as `frame.wire` gives them. Empty: this frame has no such place.
+    `bits` and `fields` of the frame on the wire, as `frame.wire` gives them. Empty: this frame has no such position.
     """
     if error == "ACK" or (error == "BIT" and not of_sender):  # of a receiver: the acknowledgement that it sends itself
         return [fields.index(FIELD_ACK_SLOT)]
@@ -101,7 +102,7 @@ def places_of_error(error: str, of_sender: bool, bits: list, fields: list) -> li
 
 
 def _recessive_stuff_bit(bits: list, fields: list) -> list:
-    """Recessive stuff bits of the arbitration field: one that is sampled dominant there is no lost arbitration."""
+    """Recessive stuff bits of the arbitration field: one that is sampled dominant is not a lost arbitration."""
     last = fields.index(FIELD_RTR if FIELD_RTR in fields else FIELD_SRTR)
     found, run, level = [], 0, RECESSIVE
     for place, bit in enumerate(bits[: last + 1]):
@@ -125,11 +126,11 @@ def _what_a_receiver_sees(bits: list, fields: list, misread: int) -> str:
 
 
 class Tamper:
-    """What one fault does on a bus. Subclasses act in the four ways in which a bus asks (`Tampering`).
+    """Effect of one fault on a bus. Subclasses implement the four calls that a bus makes (`Tampering`).
 
     Picks frames of `identifier` (-1: any) sent by node `sender` (-1: any; `but`: any but this one): every `every`-th
-    of them, and of those a `share` by `random`. `count`: so many at most, 0: no end. `tampered`: frames so far.
-    `noted(time_ns, difference)` is called when it acted.
+    of them, and of those a `share` by `random`. `count`: the most frames to pick, 0: no limit. `tampered`: frames so
+    far. `noted(time_ns, difference)` is called when it acted.
     """
 
     def __init__(self, identifier: int = -1, sender: int = -1, but: int = -1) -> None:
@@ -146,7 +147,7 @@ class Tamper:
         self.hit = False  # the frame that is on the bus
 
     def picks(self, identifier: int, sender: int) -> bool:
-        """Whether a frame is one of those that it may reach."""
+        """Whether it may affect a frame."""
         return (
             self.identifier in (-1, identifier)
             and self.sender in (-1, sender)
@@ -155,7 +156,7 @@ class Tamper:
         )
 
     def takes(self, identifier: int, sender: int) -> bool:
-        """Whether it reaches the frame that begins now."""
+        """Whether it affects the frame that begins now."""
         if not self.picks(identifier, sender):
             return False
         self.begun += 1
@@ -164,51 +165,52 @@ class Tamper:
         return self.share >= 1.0 or bool(self.random.uniform() < self.share)
 
     def note(self, time: int, difference: float = 1.0) -> None:
-        """It acted."""
+        """Record that it acted."""
         if self.noted is not None:
             self.noted(time, difference)
 
     def before_frame(self, bus: Any, row: int, bit: int) -> bool:
-        """A frame is about to begin on an idle bus. True: it shall pass bit by bit."""
+        """A frame is about to begin on an idle bus. True: it shall be simulated bit by bit."""
         return self.picks(bus.buffers.rows[row + IDENTIFIER], row >> NODE_SHIFT)
 
     def frame_begins(self, level: Any, row: int, bit: int) -> None:
-        """A frame that it takes begins."""
+        """A frame that it affects begins."""
 
     def receives(self, machine: Any, time: int) -> bool:
-        """A node has a frame that was taken. False: its program does not get it by this way."""
+        """A node has an affected frame. False: its program does not receive it this way."""
         return True
 
     def notices(self, machine: Any, time: int) -> None:
-        """Error confinement of a node has something to tell."""
+        """Error confinement of a node has something to report."""
 
 
 class Tampering:
-    """Everything that reaches into the frames of one bus."""
+    """All faults that affect the frames of one bus."""
 
     def __init__(self, bus: Any) -> None:
         self.bus = bus
         self.tampers: list[Tamper] = []
 
     def add(self, tamper: Tamper) -> None:
-        """One more."""
+        """Add a fault."""
         self.tampers.append(tamper)
         self.bus.tamper(self)
 
     def remove(self, tamper: Tamper) -> None:
-        """It does nothing any more. With the last one the bus passes plain frames as they are."""
+        """Remove a fault. Without any, the bus passes plain frames unchanged."""
         self.tampers.remove(tamper)
         if not self.tampers:
             self.bus.tamper(None)
 
-    # ---- what the bus asks
+    # ---- called by the bus
 
     def reaches(self, bus: Any, row: int, bit: int) -> bool:
-        """Whether the frame in `row`, which would begin at `bit` on an idle bus, has to pass bit by bit."""
+        """Whether the frame in `row`, which would begin at `bit` on an idle bus, must be simulated bit by bit."""
         return any([tamper.before_frame(bus, row, bit) for tamper in self.tampers])
 
     def frame_begins(self, level: Any, row: int, bit: int) -> None:
-        """The frame in `row` begins at `bit`, perhaps beside others; bits misread in the one before are over."""
+        """The frame in `row` begins at `bit`, perhaps together with others; misread bits of the previous one are
+        over."""
         level.disturbance.misread.clear()
         for tamper in self.tampers:
             tamper.hit = tamper.takes(level.buffers.rows[row + IDENTIFIER], row >> NODE_SHIFT)
@@ -216,26 +218,26 @@ class Tampering:
                 tamper.frame_begins(level, row, bit)
 
     def receives(self, machine: Any, time: int) -> bool:
-        """Whether the node of `machine` has a frame at `time` (ns), in whatever way it was changed."""
+        """Whether the node of `machine` receives a frame at `time` (ns), changed or not."""
         return all([tamper.receives(machine, time) for tamper in self.tampers if tamper.hit])
 
     def notices(self, machine: Any, time: int) -> None:
-        """A node has an error, or a counter that moved, at `time` (ns)."""
+        """A node has an error, or a changed counter, at `time` (ns)."""
         for tamper in self.tampers:
             tamper.notices(machine, time)
 
 
 def tampering_of(bus: Any) -> Tampering:
-    """What reaches into the frames of `bus`, made where nothing does yet."""
+    """The `Tampering` of `bus`, created if it has none."""
     return bus.tampering if bus.tampering is not None else Tampering(bus)
 
 
 class Misreading(Tamper):
     """`node` sees `error` in the frames that are picked, as their sender or as a receiver.
 
-    UserError for what such a node cannot see. `notes_errors`: it acted when the node saw the error. `seen`: how often
-    which node saw which error, primary or secondary, since the first frame hit: {(node, error, "primary" |
-    "secondary"): count}. `unfit`: frames without a place for it.
+    UserError for an error that such a node cannot see. `notes_errors`: it acted when the node saw the error. `seen`:
+    counts of errors by node, error and order, since the first frame hit: {(node, error, "primary" | "secondary"):
+    count}. `unfit`: frames without a position for it.
     """
 
     notes_errors = True
@@ -273,7 +275,7 @@ class Misreading(Tamper):
 
 
 class Loss(Tamper):
-    """`node` acknowledges the frames that are picked, and its program never has them: lost behind the receive path."""
+    """`node` acknowledges the picked frames, but its program never receives them: lost after the receive path."""
 
     def __init__(self, node: int, identifier: int = -1) -> None:
         Tamper.__init__(self, identifier, but=node)
@@ -288,7 +290,7 @@ class Loss(Tamper):
 
 
 class Corruption(Tamper):
-    """`node` has other data than was sent: word 0 with the bits of `mask` inverted, behind the check of the CRC."""
+    """`node` receives other data than were sent: word 0 with the bits of `mask` inverted, after the CRC check."""
 
     def __init__(self, node: int, mask: int, identifier: int = -1) -> None:
         Tamper.__init__(self, identifier, but=node)
@@ -304,7 +306,7 @@ class Corruption(Tamper):
 
 
 class Delay(Tamper):
-    """`node` has the frames that are picked `delay_ns` later; those that come behind may overtake them."""
+    """`node` receives the picked frames `delay_ns` later; later frames may overtake them."""
 
     def __init__(self, node: int, delay_ns: int, identifier: int = -1) -> None:
         Tamper.__init__(self, identifier, but=node)
@@ -326,7 +328,8 @@ class Delay(Tamper):
 
 
 class Silence(Misreading):
-    """BIT errors in every frame that `node` sends until its controller is bus-off; then it is left to its recovery."""
+    """BIT errors in every frame that `node` sends until its controller is bus-off; then its recovery proceeds
+    undisturbed."""
 
     notes_errors = False
 
@@ -344,7 +347,7 @@ class Silence(Misreading):
 
 
 class WrongRate(Tamper):
-    """A node takes its bits for longer or shorter than they are: every frame passes bit by bit while it takes part."""
+    """A node runs at a wrong bit rate: every frame is simulated bit by bit while it takes part."""
 
     def __init__(self, node: Node) -> None:
         Tamper.__init__(self)
@@ -360,7 +363,7 @@ class WrongRate(Tamper):
 
 
 class Intruder:
-    """A controller clipped on a bus beside those of the robot: it acknowledges, and its program hears nothing."""
+    """An extra controller on a bus of the robot: it acknowledges, and its program receives nothing."""
 
     def __init__(self, bus: Any, name: str) -> None:
         self.bus = bus
@@ -372,7 +375,7 @@ class Intruder:
         self.node.connect(self.ends)
 
     def offer(self, buffer: int, ready: int, identifier: int, flags: int, low: int, high: int) -> bool:
-        """Put a frame in a transmit buffer that may start at bit `ready`, however far the bus has been advanced.
+        """Put a frame that may start at bit `ready` in a transmit buffer, even if the bus has advanced further.
 
         False while the buffer holds one, or while it is off the bus.
         """
@@ -394,7 +397,8 @@ class Intruder:
 
 
 class Duplicate(Tamper):
-    """Whenever a frame of `identifier` begins, `intruder` begins one like it beside it, with other data."""
+    """Whenever a frame of `identifier` begins, `intruder` begins one with the same identifier at the same time, with
+    other data."""
 
     def __init__(self, intruder: Intruder, identifier: int, mask: int) -> None:
         Tamper.__init__(self, identifier, but=intruder.number)
@@ -414,7 +418,8 @@ class Duplicate(Tamper):
 
 
 class Babbling(Tamper):
-    """`intruder` sends frames of `identifier` whenever it can, or one every `period_ns`; between two buffers."""
+    """`intruder` sends frames of `identifier` whenever it can, or one every `period_ns`; alternating between two
+    buffers."""
 
     def __init__(self, intruder: Intruder, identifier: int, period_ns: int) -> None:
         Tamper.__init__(self, identifier, sender=intruder.number)
@@ -424,13 +429,13 @@ class Babbling(Tamper):
         self.buffer = 1
 
     def speak(self, time: int) -> None:
-        """The first frame may start behind `time` (ns)."""
+        """Allow the first frame to start after `time` (ns)."""
         self.due_ns = time
         self._offer(self.intruder.bus.bit_of(time) + 1)
         self.intruder.bus.look_again()
 
     def _offer(self, bit: int) -> None:
-        """The next frame, from `bit` on."""
+        """Offer the next frame, from `bit` on."""
         bus = self.intruder.bus
         ready = max(bit, bus.bit_of(self.due_ns))
         if self.intruder.offer(3 - self.buffer, ready, self.identifier, EIGHT_BYTES, 0, 0):

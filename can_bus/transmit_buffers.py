@@ -1,9 +1,9 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
-# (every index below is made of a node and a buffer, which `Bus.request` has checked, or is a row of the list)
-"""The transmit buffers of all controllers on a bus, and a list of those that wait for it.
+# (every index below is made from a node and a buffer, which `Bus.request` has checked, or is a row of the list)
+"""The transmit buffers of all controllers on a bus, and a list of the waiting ones.
 
 A buffer is a row of eight numbers; buffer 1 ... 3 of node n begins at n << NODE_SHIFT | buffer << BUFFER_SHIFT. The
-number of that place is the name of the buffer, `row`. Of equal arbitration fields the lower row goes first: the lower
+number of that place identifies the buffer: `row`. Of equal arbitration fields the lower row is sent first: the lower
 node, then the lower buffer.
 """
 
@@ -16,11 +16,11 @@ from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
 
 BUFFERS: Final = 3  # transmit buffers of an LPC2194 CAN controller
-# what stands in a row
-FREE_AT: Final = 0  # instant from which the buffer takes a frame, ns; NEVER while it holds one
+# columns of a row
+FREE_AT: Final = 0  # time from which the buffer takes a frame, ns; NEVER while it holds one
 READY: Final = 1  # bit at which its frame may start; NEVER + that bit while its node is joining
-ASKED: Final = 2  # instant of the request, ns
-NEXT: Final = 3  # the row that waits behind this one, -1 for none
+ASKED: Final = 2  # time of the request, ns
+NEXT: Final = 3  # the next waiting row, -1 for none
 IDENTIFIER: Final = 4
 FLAGS: Final = 5
 LOW: Final = 6  # data bytes 0-3
@@ -35,16 +35,17 @@ NODE_SHIFT: Final = 5
 @cython.final
 @cython.cclass
 class TransmitBuffers:
-    """`rows`: the numbers. `first`: of the rows that wait, in no order, -1 for none; `waiting_count`: how many.
+    """`rows`: the numbers. `first`: the first of the waiting rows, in no order, -1 for none; `waiting_count`: their
+    number.
 
-    `slots` is how `rows` is read and written: compiled an address, in a line of the processor's cache with the other
-    fields, where a memoryview takes 208 bytes.
+    `rows` is accessed through `slots`: compiled, an address, in one cache line with the other fields, where a
+    memoryview takes 208 bytes.
     """
 
     slots: cython.p_longlong
     first: cython.longlong
     waiting_count: cython.longlong
-    # what the address `slots` leads into: exchanged only by `add_node`, which sets both
+    # the array that `slots` points into: replaced only by `add_node`, which sets both
     rows: Annotated[cython.longlong[::1], "readonly"]
 
     def __init__(self) -> None:
@@ -53,7 +54,7 @@ class TransmitBuffers:
         self.waiting_count = 0
 
     def add_node(self) -> None:
-        """Room for the buffers of one more node."""
+        """Add the buffers of one more node."""
         before = self.rows
         kept = len(before) >> NODE_SHIFT << NODE_SHIFT
         self.rows = integers(kept + (1 << NODE_SHIFT))
@@ -61,7 +62,7 @@ class TransmitBuffers:
             self.rows[place] = before[place]
         self.slots = cython.address(self.rows[0]) if cython.compiled else self.rows
 
-    # ---- the list of those that wait
+    # ---- the list of waiting rows
 
     @cython.cfunc
     def remove(self, row: cython.longlong) -> cython.void:
@@ -95,7 +96,7 @@ class TransmitBuffers:
         return self.rows[row + FREE_AT] == NEVER
 
     def hold(self, row, bit) -> None:
-        """The frame in a row does not start before `bit`."""
+        """Let the frame in a row start no earlier than `bit`."""
         self.rows[row + READY] = max(self.rows[row + READY], bit)
 
     def wire(self, row) -> tuple:

@@ -1,10 +1,9 @@
 # cython: boundscheck=False, wraparound=False
 # (every index below is a transmit buffer, 1 ... 3, as bus and controller have checked)
-"""The ends of transmissions: a bus knows them from the start of the frame on, and hardly anybody waits for them.
+"""The ends of transmissions: a bus knows them from the start of the frame on, and programs rarely wait for them.
 
-Bus and controller hold the same object: the bus writes the end down, and the controller takes it in when a register
-is read that depends on it. An end travels as a message (CAN_TX_DONE) where somebody waits for it, and between
-processes.
+Bus and controller hold the same object: the bus writes the end, and the controller processes it when a register that
+depends on it is read. An end is sent as a message (CAN_TX_DONE) where a program waits for it, and between processes.
 """
 
 import cython
@@ -17,9 +16,9 @@ BY_MESSAGE = NEVER + 1
 @cython.final
 @cython.cclass
 class TransmitEnds:
-    """By transmit buffer 1 ... 3: `times`, the instant (ns) from which it is free again, and `statuses`, TX_*.
+    """By transmit buffer 1 ... 3: `times`, the time (ns) from which it is free again, and `statuses`, TX_*.
 
-    A time is NEVER while the frame has not started, and when the controller has taken the end in; BY_MESSAGE where the
+    A time is NEVER while the frame has not started, and when the controller has processed the end; BY_MESSAGE where the
     bus shall send a message. `order`: of such messages.
     """
 
@@ -36,7 +35,8 @@ class TransmitEnds:
     @cython.ccall
     @cython.exceptval(check=False)
     def write(self, buffer: cython.longlong, time: cython.longlong, status: cython.longlong) -> cython.bint:
-        """The bus: the transmission from `buffer` ends at `time`. False when it shall send a message instead."""
+        """Called by the bus: the transmission from `buffer` ends at `time`. False when it shall send a message
+        instead."""
         if self.times[buffer] != NEVER:
             return False
         self.times[buffer] = time

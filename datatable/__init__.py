@@ -48,7 +48,7 @@ def place_of_generated(ours: list[str]) -> list[str]:
 
 
 def check_own_table() -> None:
-    """UserError when code was generated from another state of the user's own table (RANGER_SIM_TABLE) than it is in."""
+    """Raise UserError when code was generated from a different state of the user's own table (RANGER_SIM_TABLE)."""
     from ranger_sim.foundation.user_error import UserError
     from ranger_sim.loading import OWN_TABLE
 
@@ -61,16 +61,16 @@ def check_own_table() -> None:
 
 
 def published_schedule(board: str) -> "PublishedSchedule":
-    """What the schedule of `board` sends, row by row, as boards.toml says it."""
+    """Variables that the schedule of `board` sends, row by row, from boards.toml."""
     from ranger_sim.datatable.schedule import published_schedule as lookup
 
     return lookup(board)
 
 
 def main_brain_store() -> "DataStore":
-    """The main brain's data store at power-up: every variable at its initial value, unread by everyone.
+    """The main brain's data store at power-up: every variable at its initial value, unread by every subscriber.
 
-    ROBOT PARITY: the robot's store ends at id 313; ours goes on with the ids of the 2011 controller.
+    ROBOT PARITY: the robot's store ends at id 313; ours continues with the ids of the 2011 controller.
     """
     from ranger_sim.datatable.generated import all_variables
     from ranger_sim.datatable.packing import word_of_value

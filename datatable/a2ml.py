@@ -1,13 +1,13 @@
 """The grammar of `IF_DATA XCP` in the description for calibration programs, in A2ML.
 
 It has the tags, types and values that ASAM MCD-1 XCP (part 2 for the common parameters, part 3 for CAN and for UDP)
-gives them, as far as our IF_DATA uses them: a program that knows the standard finds its own names, and one that does
-not can read the blocks by this text.
+gives them, as far as our IF_DATA uses them: a program that knows the standard finds its names, and one that does not
+can read the blocks with this text.
 """
 
 from __future__ import annotations
 
-# Optional commands with their codes (part 2, table of commands). What the slave obeys: harness/xcp/slave.py
+# Optional commands with their codes (part 2, table of commands). The slave implements them in harness/xcp/slave.py
 COMMANDS = {
     "GET_COMM_MODE_INFO": 0xFB,
     "GET_ID": 0xFA,

@@ -1,4 +1,4 @@
-"""`ranger-sim table`: generate the code, check that it is fresh, look things up in the master table."""
+"""`ranger-sim table`: generate the code, check that it is up to date, query the master table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ranger_sim.foundation.user_error import UserError
 
 EXIT_DONE, EXIT_STALE = 0, 1
 FILE_COLUMNS = 160  # of lines in a file or a pipe
-WIDE = 120  # columns of a window with room for descriptions
+WIDE = 120  # columns of a window wide enough for descriptions
 
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -91,7 +91,7 @@ def run_copy(arguments: argparse.Namespace) -> int:
 
 
 def facts_of(variable: Variable) -> dict[str, object]:
-    """A variable as plain values, in the order in which people read them."""
+    """A variable as plain values, in reading order."""
     return {
         "id": variable.id,
         "name": variable.name,
@@ -127,7 +127,7 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 
 def run_list(arguments: argparse.Namespace) -> int:
-    """A line per variable: all, or what one board publishes and hears."""
+    """A line per variable: all, or those that one board publishes and receives."""
     table = load(arguments)
     variables = list(table.variables)
     if arguments.board:

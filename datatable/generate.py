@@ -1,4 +1,4 @@
-"""Everything that is generated from a master table, as {path below its folder `generated`: text}.
+"""All files generated from a master table, as {path below its folder `generated`: text}.
 
 The files carry no date, so the same table gives the same bytes on every machine.
 """
@@ -47,7 +47,7 @@ def on_disk(folder: pathlib.Path) -> set[str]:
 
 
 def write(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
-    """Write what is missing or stale, delete what the table no longer gives; the paths changed, sorted.
+    """Write missing or stale files, delete those that the table no longer produces; returns the changed paths, sorted.
 
     UserError when the folder cannot be written.
     """
@@ -67,7 +67,7 @@ def write(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
 
 
 def stale(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
-    """Paths that differ from what the table gives, that are missing, or that no longer belong there; sorted."""
+    """Paths that differ from the table's output, are missing, or no longer belong there; sorted."""
     files = generated_files(table)
     try:
         found = on_disk(folder) if folder.is_dir() else set()

@@ -1,4 +1,4 @@
-"""The description for calibration programs (ASAP2 1.71): every variable with its address, and the way to it."""
+"""The description for calibration programs (ASAP2 1.71): every variable with its address and transports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ranger_sim.datatable.generate_dbc import bound
 from ranger_sim.datatable.model import COMPUTER, LIMITS, Table, Variable
 
 TYPES = {"f32": "FLOAT32_IEEE", "i32": "SLONG", "u32": "ULONG"}
-CHANNEL_PREFIX = "LV_"  # as in parameters.py: the computer's variables that are no parameters
+CHANNEL_PREFIX = "LV_"  # as in parameters.py: the computer's variables that are not parameters
 UDP_PORT = 5555  # the port that XCP programs propose
 EVENT_OF_US = {500: 0, 1000: 1, 2000: 2}  # event of a board's slots, by their length
 EVENTS = (("slot_0_5ms", 5), ("slot_1ms", 10), ("slot_2ms", 20))  # cycles of 100 us; harness/xcp/slave.py serves them
@@ -31,13 +31,13 @@ def limits_of(variable: Variable) -> str:
 
 
 def method_of(variable: Variable) -> str:
-    """The name of the conversion of this unit: a variable's numbers are physical as they stand."""
+    """The name of the conversion of this unit: a variable's numbers are physical without conversion."""
     letters = "".join(each if each.isalnum() and each.isascii() else f"_{ord(each):x}_" for each in variable.unit)
     return f"UNIT_{letters}" if variable.unit else "NO_COMPU_METHOD"
 
 
 def is_characteristic(variable: Variable) -> bool:
-    """True for what the slave lets a master write."""
+    """True for variables that the slave lets a master write."""
     return variable.publisher == COMPUTER and not variable.name.startswith(CHANNEL_PREFIX)
 
 
@@ -67,7 +67,7 @@ def object_lines(table: Table, variable: Variable) -> list[str]:
 
 @dataclasses.dataclass(frozen=True)
 class Transport:
-    """What differs between the two: its tag, bytes of packets, packets of a block, the clock, its own lines."""
+    """Differences between the two transports: tag, packet size, packets per block, clock, additional lines."""
 
     tag: str
     max_cto: int
@@ -78,7 +78,7 @@ class Transport:
     lines: tuple[str, ...]
 
 
-# harness/xcp/udp.py and can.py serve them; tests hold both together
+# harness/xcp/udp.py and can.py serve them; tests compare both
 UDP = Transport(
     "XCP_ON_UDP_IP",
     248,
@@ -134,7 +134,7 @@ def common_lines(transport: Transport) -> list[str]:
 
 
 def transport_lines() -> list[str]:
-    """IF_DATA XCP: the protocol as it is on CAN, the ways to the slave, and what UDP has other than CAN."""
+    """IF_DATA XCP: the protocol on CAN, the transports to the slave, and the differences of UDP from CAN."""
     lines = ["/begin IF_DATA XCP", *(f"  {each}" for each in common_lines(CAN))]
     for transport, more in ((CAN, []), (UDP, common_lines(UDP))):
         inner = [*transport.lines, *more]

@@ -40,7 +40,7 @@ def c_number(variable: Variable) -> str:
     """The initial value as a C constant of the variable's type."""
     value = variable.initial_as_stored
     if variable.type == "f32":
-        text = f"{value:.9g}"  # nine digits bring a single back unchanged
+        text = f"{value:.9g}"  # nine digits reproduce a single exactly
         return (text if "." in text or "e" in text else text + ".0") + "f"
     if variable.type == "u32":
         return f"UINT32_C({value})"
@@ -56,7 +56,7 @@ def list_lines(board: str, which: str, variables: list[Variable]) -> list[str]:
     entries = [
         f"    {{ {v.name}, {KINDS[v.type]}, offsetof(struct {board}_data, {v.name.lower()}) }}," for v in variables
     ]
-    nothing = ["    { 0, 0, 0 },"]  # C has no empty arrays; the count says 0
+    nothing = ["    { 0, 0, 0 },"]  # C has no empty arrays; the count is 0
     return [f"const struct ranger_entry {board}_{which}[] = {{", *(entries or nothing), "};"]
 
 

@@ -8,12 +8,12 @@ from ranger_sim.datatable.model import Table
 
 
 def number(value: object) -> object:
-    """A Fraction as a JSON number, anything else as it is."""
+    """A Fraction as a JSON number, anything else unchanged."""
     return None if value is None else float(value)  # type: ignore[arg-type]
 
 
 def catalogue(table: Table) -> dict[str, object]:
-    """The table as plain dictionaries and lists. Periods in ms; None where there is none."""
+    """The table as plain dictionaries and lists. Periods in ms; None for no period."""
     return {
         "format": 1,
         "table_hash": table.hash,

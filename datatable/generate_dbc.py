@@ -15,7 +15,7 @@ def bound(value: float | int) -> str:
 def range_of(variable: Variable) -> str:
     low, high = LIMITS[variable.type]
     if variable.type == "f32" and variable.minimum is None and variable.maximum is None:
-        return "[0|0]"  # a DBC file's way to say that no range is stated
+        return "[0|0]"  # in a DBC file: no range given
     minimum = low if variable.minimum is None else variable.minimum
     maximum = high if variable.maximum is None else variable.maximum
     return f"[{bound(minimum)}|{bound(maximum)}]"

@@ -53,10 +53,10 @@ def names_literal(names: Iterable[str]) -> str:
 
 
 def sent_by(table: Table, board: Board) -> list[Variable]:
-    """What a board puts on a bus or link: its variables that some bus carries.
+    """Variables that a board sends on a bus or link: its own that some bus carries.
 
-    The main brain also sends what the computer sets for a satellite; what stays between main brain and
-    computer, and what it has for the router itself, is not on its list (robot.md N2.2).
+    The main brain also sends variables that the computer sets for a satellite; its list leaves out those between main
+    brain and computer, and those for the router itself (robot.md N2.2).
     """
     if board.role != "main brain":
         return [variable for variable in table.published_by(board.name) if variable.buses]
@@ -69,17 +69,17 @@ def sent_by(table: Table, board: Board) -> list[Variable]:
 
 
 def heard_by(table: Table, board: Board) -> list[Variable]:
-    """What a board takes from a bus or link: subscribed variables that some bus carries.
+    """Variables that a board receives from a bus or link: subscribed ones that some bus carries.
 
-    ROBOT PARITY: the robot's satellites keep hand-written receive lists, which leave out their spares, the main
-    brain's status and reserved commands; here the list is made from the table, and a frame that no firmware
-    function takes is dropped as an unlisted one would be.
+    ROBOT PARITY: the robot's satellites keep hand-written receive lists, which omit their spares, the main
+    brain's status and reserved commands; here the list is made from the table, and a frame that no firmware function
+    reads is dropped like an unlisted one.
     """
     return [variable for variable in table.subscribed_by(board.name) if variable.buses]
 
 
 def known_to(table: Table, board: Board) -> list[Variable]:
-    """Variables that a board's code names: all on the main brain, its own and the heard ones elsewhere."""
+    """Variables that a board's code names: all on the main brain, its own and the received ones elsewhere."""
     if board.role == "main brain":
         return list(table.variables)
     own = {variable.id for variable in (*table.published_by(board.name), *table.subscribed_by(board.name))}
@@ -169,12 +169,13 @@ def all_variables_module(table: Table) -> str:
 
 
 def writable(variables: Sequence[Variable]) -> Iterator[tuple[str, str]]:
-    """(id, limits) as text of what the computer publishes. Where the table has no limit, that of the type."""
+    """(id, limits) as text of the variables that the computer publishes. Without a limit in the table, that of the
+    type."""
     for each in variables:
         if each.publisher == COMPUTER:
             given = zip((each.minimum, each.maximum), LIMITS[each.type], strict=True)
             least, most = (of_type if limit is None else limit for limit, of_type in given)
-            if each.type == "f32":  # what is compared with it has gone through single precision as well
+            if each.type == "f32":  # the compared values have been rounded to single precision as well
                 least, most = float32(least), float32(most)
             yield str(each.id), f"({literal(float(least))}, {literal(float(most))})"
 

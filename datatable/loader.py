@@ -1,7 +1,7 @@
-"""Reads the master files and holds them against the rules; all faults are reported together.
+"""Reads the master files and checks them against the rules; all faults are reported together.
 
-A main brain, a router and the serial link SSP between them belong together: a table has all three or none of them. A
-table passes whole or not at all. Nothing a file can contain raises anything but TableError.
+A main brain, a router and the serial link SSP between them belong together: a table has all three or none. A table is
+accepted whole or refused. No content of a file raises anything but TableError.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ TEXT = re.compile(r"[ -~]*")  # printable ASCII: the texts go into C and DBC fil
 MOST_ROWS = 65536
 MOST_NORMAL = 1e6  # of errors; no board of the robot counts more than one per slot and cause
 
-# Names that would collide in what is generated: Python module constants, C keywords (structure members are the
-# names in lower case), C macros, sections of a DBC file, and modules beside the boards' own.
+# Names that would collide in generated files: Python module constants, C keywords (structure members are the
+# names in lower case), C macros, sections of a DBC file, and modules other than the boards'.
 RESERVED_NAMES = frozenset(
     "BOARD BOARD_NUMBER BUS CONTROLLER CLOCK_HZ SLOT_US ROWS ROW_NAMES OCCASIONAL_NAMES OCCASIONAL_ROW "
     "ERROR_VARIABLE SEND SEND_TYPES RECEIVE RECEIVE_TYPES TYPES INITIAL NAMES ERRORS LAST DESCRIPTIONS "
@@ -98,18 +98,18 @@ def one_line(text: str, longest: int) -> str:
 
 
 def shown(text: object) -> str:
-    """A value as a fault names it: quoted, on one line, not too long."""
+    """A value for a fault message: quoted, on one line, shortened."""
     quoted = repr(text)
     return quoted if len(quoted) <= 60 else quoted[:57] + "..."
 
 
 def folder_of(folder: str | pathlib.Path | None) -> pathlib.Path:
-    """Where the master files are: as said, or the user's own that RANGER_SIM_TABLE names, or ours."""
+    """Folder of the master files: as given, or the user's own (RANGER_SIM_TABLE), or ours."""
     return (OWN_TABLE or MASTER_FOLDER) if folder is None else pathlib.Path(folder)
 
 
 def read_text(path: pathlib.Path, faults: Faults) -> str | None:
-    """The text of a master file; a fault and None when it cannot be read as UTF-8."""
+    """The text of a master file; reports a fault and returns None when it cannot be read as UTF-8."""
     report = faults.at(path.name, 1, "")
     try:
         data = path.read_bytes()
@@ -168,7 +168,7 @@ def read_rows(path: pathlib.Path, columns: tuple[str, ...], faults: Faults) -> l
 
 
 class BoardReader:
-    """Takes one `[boards.NAME]` table apart; each wrong or unknown key is a fault."""
+    """Parses one `[boards.NAME]` table; each wrong or unknown key is a fault."""
 
     def __init__(self, name: str, content: object, report: Callable[[str, str], None]) -> None:
         self.report = report
@@ -220,7 +220,7 @@ class BoardReader:
 def board_of(
     name: str, content: object, channels: dict[str, int], routed: bool, report: Callable[[str, str], None]
 ) -> Board:
-    """A board from its TOML table. `routed`: of a machine with a router, the bus of which its ribbon tells."""
+    """A board from its TOML table. `routed`: for a machine with a router, the bus given by its ribbon."""
     reader = BoardReader(name, content, report)
     role = reader.take("role", str, "satellite")
     if role not in ROLES:
@@ -271,7 +271,7 @@ def board_of(
 
 
 def line_of_table(text: str, name: str) -> int:
-    """The line of `[boards.NAME]` (1 when it is written in another way)."""
+    """The line of `[boards.NAME]` (1 when it is written differently)."""
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip().replace(" ", "").startswith(f"[boards.{name}]"):
             return number
@@ -395,7 +395,7 @@ def repeated(names: Iterable[str]) -> list[str]:
 
 
 class VariableChecker:
-    """Turns rows of variables.csv into variables, with everything that the boards say at hand."""
+    """Turns rows of variables.csv into variables, using the data of the boards."""
 
     def __init__(self, boards: dict[str, Board], channels: dict[str, int], faults: Faults) -> None:
         self.boards = boards
@@ -568,7 +568,7 @@ def check_schedules(
 def normal_of(
     row: dict[str, str], field: str, users: list[str], report: Callable[[str, str], None]
 ) -> dict[str, float]:
-    """{board: how often} of a cell such as MCH:350;MCFO:280; only boards that raise the error, numbers above 0."""
+    """{board: count} of a cell such as MCH:350;MCFO:280; only boards that raise the error, numbers above 0."""
     normal: dict[str, float] = {}
     for part in names_of(row[field]):
         board, colon, text = part.partition(":")
@@ -627,7 +627,7 @@ def load_table(folder: str | pathlib.Path | None = None) -> Table:
     if boards:
         checker = VariableChecker(boards, channels, faults)
         variables = [variable for line, row in rows if (variable := checker.check(line, row)) is not None]
-        if rows:  # a file that cannot be read is one fault, not one for each name that it does not have
+        if rows:  # an unreadable file is one fault, not one for each name missing from it
             check_schedules(boards, lines, rows, faults)
         errors = read_errors(master / ERRORS_FILE, boards, faults)
         if not faults.found and not variables:

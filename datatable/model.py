@@ -25,7 +25,7 @@ ROLES = ("satellite", ROUTER, MAIN_BRAIN, "computer")
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
-    """One thing wrong with a table: file, line (1 is the header), the row's name, field, rule broken."""
+    """One fault of a table: file, line (1 is the header), the row's name, field, rule broken."""
 
     file: str
     line: int
@@ -48,7 +48,7 @@ class TableError(UserError):
 
 @dataclasses.dataclass(frozen=True)
 class Board:
-    """A board (or the computer) as boards.toml gives it. Times in us; lists name variables or "(work)"."""
+    """A board (or the computer) from boards.toml. Times in us; lists name variables or "(work)"."""
 
     name: str
     number: int
@@ -130,7 +130,7 @@ class Variable:
 
 @dataclasses.dataclass(frozen=True)
 class ErrorCode:
-    """One row of errors.csv. `normal_per_s`, `normal_at_start`: what a healthy walk raises at most, by board."""
+    """One row of errors.csv. `normal_per_s`, `normal_at_start`: the most that a healthy walk raises, by board."""
 
     id: int
     name: str
@@ -152,7 +152,7 @@ class Table:
     hash: str
 
     def board(self, name: str) -> Board:
-        """The board of that name. UserError when there is none."""
+        """The board of that name. UserError for an unknown name."""
         for board in self.boards:
             if board.name == name:
                 return board
@@ -164,7 +164,7 @@ class Table:
         return tuple(board for board in self.boards if board.role == role)
 
     def variable(self, name_or_id: str | int) -> Variable:
-        """A variable by name (any case) or id. UserError when there is none."""
+        """A variable by name (any case) or id. UserError for an unknown one."""
         wanted = str(name_or_id).strip()
         for variable in self.variables:
             if variable.name == wanted.upper() or str(variable.id) == wanted:

@@ -1,7 +1,7 @@
-"""What may be written into a running robot: the parameters of the master table, each within its limits.
+"""Writable values of a running robot: the parameters of the master table, each within its limits.
 
-The one check for everybody who writes: `ctl set`, `Ranger.set_parameter`, `daq`, parameter sets. The robot itself keeps
-the same limits for what comes over its serial link (`all_variables.WRITABLE`, generated from the same rows).
+The only check for all writers: `ctl set`, `Ranger.set_parameter`, `daq`, parameter sets. The robot itself applies the
+same limits to data from its serial link (`all_variables.WRITABLE`, generated from the same rows).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def rows() -> dict[str, Variable]:
 
 
 def find(name: str) -> Variable:
-    """The variable of this name; UserError with the nearest names when there is none."""
+    """The variable of this name; UserError with the nearest names for an unknown name."""
     row = rows().get(name)
     if row is None:
         near = difflib.get_close_matches(name[:LONGEST_SHOWN], rows(), 3)
@@ -37,7 +37,7 @@ def find(name: str) -> Variable:
 
 
 def is_parameter(row: Variable) -> bool:
-    """True for what the computer publishes, so that it may be written."""
+    """True for variables that the computer publishes, which may be written."""
     return row.publisher == COMPUTER and not row.name.startswith(CHANNEL_PREFIX)
 
 
@@ -48,7 +48,7 @@ def parameters() -> tuple[Variable, ...]:
 
 
 def parameter(name: str) -> Variable:
-    """The parameter of this name; UserError for everything else."""
+    """The parameter of this name; UserError for any other name."""
     row = find(name)
     if row.name.startswith(CHANNEL_PREFIX):
         raise UserError(f"{name}: not a parameter; --fast and --medium set the channels of the link")
@@ -58,7 +58,7 @@ def parameter(name: str) -> Variable:
 
 
 def checked_word(row: Variable, value: Any, place: str = "") -> int:
-    """The 32-bit word of a parameter's value; UserError when it is no number, or outside its limits or its type."""
+    """The 32-bit word of a parameter's value; UserError when it is not a number, or outside its limits or its type."""
     what = f"{place}: {row.name}" if place else row.name
     number = number_of(value)
     if number is None:
@@ -74,7 +74,7 @@ def checked_word(row: Variable, value: Any, place: str = "") -> int:
 
 
 def number_of(value: Any) -> float | None:
-    """`value` as a finite number; None when it is none (a truth value is none either)."""
+    """`value` as a finite number; None when it is not one (nor is a truth value)."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         return None
     try:
@@ -85,6 +85,6 @@ def number_of(value: Any) -> float | None:
 
 
 def shown(value: Any) -> str:
-    """A value that is none, for a message: of ordinary length, nothing in it that a terminal obeys."""
+    """An invalid value for a message: shortened, without terminal control characters."""
     text = ascii(value)
     return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."

@@ -1,4 +1,4 @@
-"""Who can hear whom, and the router's table: one destination mask per identifier (robot.md N1.5)."""
+"""Reachability between boards, and the router's table: one destination mask per identifier (robot.md N1.5)."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ ENTRIES = LARGEST_CAN_ID + 1
 
 
 def unreachable(publisher: Board, subscriber: Board, buses: tuple[str, ...], routed: bool) -> str | None:
-    """Why a variable carried on `buses` does not get from `publisher` to `subscriber`; None when it does.
+    """Why a variable carried on `buses` does not reach `subscriber` from `publisher`; None when it does.
 
-    With a router (`routed`) the computer hangs on the main brain's serial line, so both share everything. All else
-    goes by the named buses: the router passes a frame on to every bus the variable is carried on. Without one every
-    board hears what is sent on a bus that it hangs on itself.
+    With a router (`routed`) the computer is connected to the main brain's serial line, so both share everything. All
+    other traffic uses the named buses: the router forwards a frame to every bus the variable is carried on. Without one
+    every board receives the frames of the buses that it is connected to.
     """
     if not routed:
         common = set(publisher.buses) & set(subscriber.buses)
@@ -38,13 +38,13 @@ def unreachable(publisher: Board, subscriber: Board, buses: tuple[str, ...], rou
 def destination_masks(table: Table) -> bytes:
     """Destination bits per identifier 0 ... 2031: bit 0 SSP, bits 1-4 CAN1-4.
 
-    Every identifier goes to the main brain unless the table says otherwise. What the main brain or the computer
-    publishes for a satellite goes to the buses named, and not back. What the router sends by itself
-    (`sends_itself`) is on the buses already, so only the SSP copy is routed. Frames of XCP end where they are sent.
+    Every identifier goes to the main brain unless the table specifies otherwise. Variables that the main brain or the
+    computer publishes for a satellite go to the named buses, and not back. Frames that the router itself sends
+    (`sends_itself`) are on the buses already, so only the SSP copy is routed. Frames of XCP end where they are sent.
     """
     ssp = 1 << table.channels["SSP"]
     masks = bytearray([ssp]) * ENTRIES
-    for identifier in XCP_IDS:  # ROBOT PARITY: its table knows no XCP and would send these to the main brain
+    for identifier in XCP_IDS:  # ROBOT PARITY: its table does not contain XCP and would send these to the main brain
         masks[identifier] = 0
     for variable in table.variables:
         if variable.id >= ENTRIES:

@@ -1,4 +1,5 @@
-"""What each board's schedule sends, as boards.toml says it: for tests that lay it beside the firmware's tables."""
+"""Variables that each board's schedule sends, from boards.toml: for tests that compare it with the firmware's
+tables."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ class PublishedSchedule:
     """Names of the variables sent, in order: in each slot, in each row, in the occasional list.
 
     A name in parentheses is work that sends nothing. `occasional_row` is the row whose last task is the
-    occasional list, None when there is no such list. Slot length in us.
+    occasional list, None without such a list. Slot length in us.
     """
 
     board: str
@@ -29,7 +30,7 @@ def schedule_of(board: Board) -> PublishedSchedule:
 
 
 def published_schedule(name: str, table: Table | None = None) -> PublishedSchedule:
-    """The published schedule of the board called `name`; UserError when there is no such board."""
+    """The published schedule of the board called `name`; UserError for an unknown board."""
     from ranger_sim.datatable.loader import load_table
 
     return schedule_of((table or load_table()).board(name))

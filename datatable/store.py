@@ -1,11 +1,10 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is an id held against the table's size, or a place in the caller's list of ids)
+# (every index below is an id checked against the table's size, or a position in the caller's list of ids)
 """The main brain's data at run time: one 32-bit word and one ms stamp per id, with a read flag per subscriber.
 
-What the robot's io data module keeps (robot.md N4.13). A write makes a value new for every subscriber.
-An id beyond the table is no exception here, as in the firmware it is not: it reads 0, changes nothing, and is
-told through `out_of_range_count`, `out_of_range_id` and the attribute `on_out_of_range`, which the board sets
-to raise MB_IO_ID_OOR.
+It corresponds to the robot's io data module (robot.md N4.13). A write makes a value new for every subscriber. An id
+beyond the table raises no exception, as in the firmware: it reads 0, changes nothing, and is reported through
+`out_of_range_count`, `out_of_range_id` and the attribute `on_out_of_range`, which the board sets to raise MB_IO_ID_OOR.
 """
 
 import array
@@ -32,7 +31,7 @@ _MASK: cython.longlong = 4294967295
 @cython.final
 @cython.cclass
 class DataStore:
-    """Records 0 ... size-1. At the start all words and stamps are 0 and every record is unread by everyone."""
+    """Records 0 ... size-1. At the start all words and stamps are 0 and every record is unread by every subscriber."""
 
     size: cython.longlong
     words: cython.longlong[::1]
@@ -53,13 +52,13 @@ class DataStore:
 
     @cython.ccall
     def move(self, words) -> None:
-        """The words of the records stand in `words` from now on, as they are: memory that processes share."""
+        """Keep the words of the records in `words` from now on, unchanged: memory that processes share."""
         words[:] = memoryview(self.words)
         self.words = words
 
     @cython.ccall
     def has(self, number: cython.longlong) -> cython.bint:
-        """True when `number` is an id of the table; otherwise the miss is told and False returned."""
+        """True when `number` is an id of the table; otherwise reports the miss and returns False."""
         if 0 <= number < self.size:
             return True
         self.out_of_range_count += 1
@@ -72,7 +71,7 @@ class DataStore:
 
     @cython.ccall
     def set_word(self, number: cython.longlong, word: cython.longlong, stamp: cython.longlong) -> cython.bint:
-        """Store the two words of a frame as they are; new for every subscriber. True when the table has the id."""
+        """Store the two words of a frame unchanged; new for every subscriber. True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.words[number] = word & _MASK
             self.stamps[number] = stamp & _MASK
@@ -87,7 +86,7 @@ class DataStore:
             return self.words[number]
         return 0
 
-    # ---- typed access: the stamp is the network time the main brain heard last
+    # ---- typed access: the stamp is the network time that the main brain received last
 
     @cython.ccall
     def set_float(self, number: cython.longlong, value: cython.double) -> cython.bint:
@@ -145,12 +144,12 @@ class DataStore:
     @cython.ccall
     @cython.exceptval(check=False)
     def network_time_ms(self) -> cython.longlong:
-        """The network time heard last, 0 ... 2^32-1 ms."""
+        """The network time received last, 0 ... 2^32-1 ms."""
         return self.stamps[0]
 
     @cython.ccall
     def age_ms(self, number: cython.longlong, now: cython.longlong) -> cython.longlong:
-        """How long before `now` (ms) the value was written; right across one wrap of the 32-bit count."""
+        """Age of the value at `now`, ms; correct across one wrap of the 32-bit count."""
         if 0 <= number < self.size or self.has(number):
             return (now - self.stamps[number]) & _MASK
         return 0
@@ -166,7 +165,7 @@ class DataStore:
 
     @cython.ccall
     def mark_read(self, number: cython.longlong, subscriber: cython.longlong) -> cython.bint:
-        """`subscriber` has read the value, the others are not concerned; True when the table has the id."""
+        """Mark the value as read by `subscriber` only; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.unread[number] &= ~(1 << subscriber)
             return True
@@ -174,7 +173,7 @@ class DataStore:
 
     @cython.ccall
     def mark_unread(self, number: cython.longlong) -> cython.bint:
-        """The value counts as new for every subscriber though it was not written; True when the table has the id."""
+        """Mark the value as new for every subscriber though it was not written; True when the table has the id."""
         if 0 <= number < self.size or self.has(number):
             self.unread[number] = 0x7F
             return True

@@ -1,1 +1,1 @@
-"""What the developers use and a user has no use for: not in the wheel. Run from the top of a checkout."""
+"""Tools for developers, not for users: not in the wheel. Run from the top of a checkout."""

@@ -1,6 +1,6 @@
-"""What Cython and type checkers need of a compiled module, made from its one annotated source.
+"""Files for Cython and type checkers, generated from the one annotated source of a compiled module.
 
-A module of `ranger_sim` that says `import cython` is compiled. Its source declares everything itself:
+A module of `ranger_sim` that contains `import cython` is compiled. Its source declares everything itself:
 
     WORDS: Final = 3                       a C constant (a whole number, or an expression of earlier ones)
     MASK: cython.longlong = 0xFFFFFFFF     a C variable of the module, not visible from Python
@@ -11,11 +11,11 @@ A module of `ranger_sim` that says `import cython` is compiled. Its source decla
     @cython.exceptval(-1, check=False)         where its clause is not the usual one of its return type
     def f(...) -> None                         a C int that is -1 after an exception; -> cython.void raises nothing
 
-From it come three texts: the `.pxd` that other modules cimport; a copy of the source with the same line numbers for
-Cython, in which what the `.pxd` declares is left out; and the `.pyi` for type checkers (stubs.py). What is not
-understood is refused with file and line, as is an assignment to `self.x` where no field `x` is declared.
+Three texts are generated from it: the `.pxd` that other modules cimport; a copy of the source with the same line
+numbers for Cython, without the declarations of the `.pxd`; and the `.pyi` for type checkers (stubs.py). Unknown
+constructs are refused with file and line, as is an assignment to `self.x` where no field `x` is declared.
 
-A `.pxd` that lies in the tree next to a source is written by hand: C twins of the functions of that source, which
+A `.pxd` in the tree next to a source is written by hand: C twins of the functions of that source, which
 compiled modules use in their place.
 """
 
@@ -49,9 +49,9 @@ TYPE = re.compile(  # as ast writes it: cython.const[cython.uchar][::1], cython.
 BUILTIN = {"bytearray", "bytes", "dict", "list", "object", "set", "str", "tuple"}
 OF_FUNCTIONS = {"ccall", "cfunc", "inline", "exceptval", "locals"}  # decorators that the .pxd carries
 KEPT_IN_COPY = {"final", "boundscheck", "wraparound", "cdivision", "initializedcheck"}
-# of a result by its type; `int` is that of a function without a result. Said outright, because Cython's own for a
-# function whose body is in a .py is `except *`, which asks for an exception after every call. Without the cast Cython
-# 3.3 writes -1LLLL into the C file of another module.
+# of a result by its type; `int` is that of a function without a result. Stated explicitly, because Cython's default for
+# a function whose body is in a .py is `except *`, which checks for an exception after every call. Without the cast
+# Cython 3.3 writes -1LLLL into the C file of another module.
 USUAL_CLAUSE = {
     "int": " except -1",
     "void": " noexcept",
@@ -63,14 +63,14 @@ SMALLEST, LARGEST = -(2**31), 2**31 - 1  # of an enum
 
 
 class Placed(Protocol):
-    """What has a place in a source."""
+    """A node with a position in a source."""
 
     lineno: int
     end_lineno: int | None
 
 
 class DeclarationError(Exception):
-    """A source that says what cannot be declared; the text has file and line."""
+    """A source contains something that cannot be declared; the text has file and line."""
 
 
 def is_compiled(text: str) -> bool:
@@ -101,7 +101,7 @@ class Field:
 
 
 class Source:
-    """One annotated source: what it declares, by kind and name."""
+    """One annotated source: its declarations, by kind and name."""
 
     def __init__(self, path: Path, name: str) -> None:
         self.path, self.name = path, name
@@ -175,7 +175,7 @@ def is_pointer(annotation: ast.expr) -> bool:
 
 
 class Sources:
-    """All modules below a folder that holds the package, read when they are first asked for."""
+    """All modules below a folder that holds the package, read on first use."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -191,14 +191,14 @@ class Sources:
         return sorted(found)
 
     def __getitem__(self, name: str) -> Source:
-        """The source of a module that is there."""
+        """The source of an existing module."""
         source = self.module(name)
         if source is None:
             raise KeyError(name)
         return source
 
     def module(self, name: str) -> Source | None:
-        """The source of a module of the package; None for a package and for everything else."""
+        """The source of a module of the package; None for a package and any other name."""
         if name not in self.read:
             path = self.root.joinpath(*name.split(".")).with_suffix(".py")
             known = name.startswith(f"{PACKAGE}.") and path.is_file()
@@ -208,7 +208,7 @@ class Sources:
 
 @dataclass
 class Declarations:
-    """What is made of one source."""
+    """The texts generated from one source."""
 
     sources: Sources
     source: Source
@@ -252,7 +252,7 @@ class Declarations:
             other = self.sources.module(module)
             if other is None:
                 continue
-            # `import X as X` gives the name on to Python, so it is no name of C here
+            # `import X as X` exports the name to Python, so it is not a C name here
             in_c = {each.name for each in node.names if each.name in other.c_names and each.asname != each.name}
             self.classes |= {each.asname or each.name for each in node.names if each.name in other.classes}
             wanted = {spelt(each) for each in node.names if each.name in in_c or each.name in other.classes}
@@ -332,7 +332,7 @@ class Declarations:
 
     @staticmethod
     def _clause(decorator: ast.expr | None, returns: str) -> str:
-        """The exception clause that a decorator asks for; empty without one."""
+        """The exception clause of a decorator; empty without one."""
         if not isinstance(decorator, ast.Call):
             return ""
         check = not any(each.arg == "check" and ast.unparse(each.value) == "False" for each in decorator.keywords)
@@ -419,15 +419,15 @@ def assignable(sources: Sources, source: Source, owner: ast.ClassDef) -> set[str
 
 
 def spelt(each: ast.alias) -> str:
-    """A name of an import as it is written."""
+    """A name of an import as written."""
     return each.name + (f" as {each.asname}" if each.asname else "")
 
 
 def write_declarations(root: Path, folder: Path) -> list[str]:
     """Write the `.pxd` and the copy of every compiled module below `folder`; returns the modules' names.
 
-    A file that has its text already is left alone, so that what depends on it is not built again; files of modules
-    that are gone go too. DeclarationError for a source that is not understood.
+    Up-to-date files are not written, so that their dependants are not rebuilt; files of removed modules are deleted.
+    DeclarationError for a source that cannot be processed.
     """
     sources = Sources(root)
     names = sources.compiled_modules()

@@ -12,7 +12,7 @@ LITERALS: dict[type, str] = {bool: "bool", int: "int", float: "float", str: "str
 
 
 class Stub:
-    """The `.pyi` of one source: what holds when it is compiled, so neither C functions nor C variables."""
+    """The `.pyi` of one source as compiled, so without C functions and C variables."""
 
     def __init__(self, sources: Sources, source: Source) -> None:
         self.sources, self.source = sources, source
@@ -148,7 +148,7 @@ class Stub:
 
 
 def short(default: ast.expr) -> ast.expr:
-    """A default as a stub shows it: literals, and dots for everything else."""
+    """A default in a stub: literals, and dots for everything else."""
     plain = (
         isinstance(default, ast.Constant)
         or isinstance(default, ast.UnaryOp)

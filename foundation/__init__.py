@@ -1,1 +1,1 @@
-"""The ground every room stands on: numbers, stamped events, seeded randomness, and the one wall clock."""
+"""The base of every package: numbers, stamped events, seeded randomness, and the only wall clock."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 
 def wait(readable: Sequence[int], writable: Sequence[int], seconds: float) -> tuple[list[int], list[int]]:
-    """The descriptors that can be read, and those that can be written, as soon as there is one or `seconds` are over.
+    """Wait until a descriptor is ready or `seconds` are over; return the readable and the writable ones.
 
-    `select.select` waits to the microsecond but knows no descriptor from 1024 on (FD_SETSIZE); `poll` knows all of
-    them and waits in whole milliseconds, here rounded up. So the one where it can, else the other.
+    `select.select` waits to the microsecond but takes no descriptor from 1024 on (FD_SETSIZE); `poll` takes all of them
+    and waits in whole milliseconds, here rounded up. So `select` is used where it can be, else `poll`.
     """
     try:
         can_read, can_write, _ = select.select(readable, writable, (), max(0.0, seconds))
@@ -21,7 +21,7 @@ def wait(readable: Sequence[int], writable: Sequence[int], seconds: float) -> tu
         for number, events in wanted.items():
             poll.register(number, events)
         ready = dict(poll.poll(max(0, math.ceil(1000.0 * seconds))))
-        # an end that has gone away is ready for both, as with select
+        # a closed peer is ready for both, as with select
         gone = select.POLLHUP | select.POLLERR | select.POLLNVAL
         can_read = [number for number in readable if ready.get(number, 0) & (select.POLLIN | gone)]
         can_write = [number for number in writable if ready.get(number, 0) & (select.POLLOUT | gone)]

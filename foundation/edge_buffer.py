@@ -2,8 +2,8 @@
 # (`count` stays below `capacity`: a full buffer grows first)
 """Stamped edges and stamped bytes that leave a sensor during one step of the plant.
 
-The plant writes a step's edges, the chip on whose pins they arrive reads them one by one at their stamps, and both
-hold the same buffer: an edge is the most frequent thing on the robot, and never becomes a message.
+The plant writes a step's edges, the chip on whose pins they arrive reads them one by one at their stamps, and both hold
+the same buffer: edges are the most frequent events on the robot, and never become messages.
 """
 
 from typing import Annotated
@@ -36,7 +36,7 @@ class EdgeBuffer:
 
     @cython.ccall
     def _keep(self, storage) -> None:
-        """Hold the array `storage` under `kept`, and its address, in the line of the other fields, as `packed`."""
+        """Hold the array `storage` as `kept`, and its address as `packed`, in the cache line of the other fields."""
         self.kept = storage
         if cython.compiled:
             self.packed = cython.address(self.kept[0])
@@ -51,7 +51,7 @@ class EdgeBuffer:
 
     @cython.ccall
     def grow(self) -> None:
-        """Double the storage, keeping what is there."""
+        """Double the storage, keeping its content."""
         old = self.kept
         grown = integers(2 * self.capacity)
         for place in range(self.capacity):
@@ -96,7 +96,7 @@ class ByteBuffer:
 
     @cython.ccall
     def grow(self) -> None:
-        """Double the storage, keeping what is there."""
+        """Double the storage, keeping its content."""
         self.capacity = 2 * self.capacity
         for name in ("times", "values"):
             old = getattr(self, name)

@@ -1,11 +1,11 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below lies between the head and the tail of the rows, or is the place of an object that is kept)
-"""Stamped messages: everything that passes between a board and the rest of the world.
+"""Stamped messages: all that passes between a board and the rest of the world.
 
 A message is (time, order, kind, six integers, one object). Time is virtual, in ns since the robot's
-power-up. Messages leave a queue sorted by (time, order, arrival); `order` is stage * 256 + source, so
-what happens at one instant has a written order: plant, pins, bus, interrupts, slots (`STAGE_*`).
-The same messages travel in one process or between several.
+power-up. Messages leave a queue sorted by (time, order, arrival); `order` is stage * 256 + source, so simultaneous
+events have a written order: plant, pins, bus, interrupts, slots (`STAGE_*`). The same messages are used within one
+process and between several.
 """
 
 from typing import Annotated, Final
@@ -14,7 +14,7 @@ import cython
 
 from ranger_sim.foundation.numbers import integers
 
-NEVER: Final = 1 << 62  # ns; later than any instant of a run (146 years)
+NEVER: Final = 1 << 62  # ns; later than any time in a run (146 years)
 
 STAGE_PLANT: Final = 0
 STAGE_PINS: Final = 1
@@ -56,12 +56,12 @@ TX_ABORTED: Final = 1  # aborted on request before it started
 TX_LOST: Final = 2  # single shot that lost arbitration or met an error
 
 ROW: Final = 10  # numbers in a row of a queue
-ROW_KIND: Final = 2  # where the kind stands in it
+ROW_KIND: Final = 2  # index of the kind in it
 
 
 @cython.cclass
 class Outbox:
-    """What takes the stamped messages of a board: a queue, or the wires of the robot, which carry them on at once."""
+    """Receiver of a board's stamped messages: a queue, or the wires of the robot, which forward them at once."""
 
     @cython.ccall
     def push(
@@ -99,11 +99,11 @@ class Outbox:
 class EventQueue(Outbox):
     """Messages sorted by (time, order, arrival), as rows that follow each other in one array.
 
-    A new message mostly belongs at the end; else those after it move up by one row. `take` moves the first message
+    A new message mostly belongs at the end; otherwise those after it move up by one row. `take` moves the first message
     into the fields `time, order, kind, a ... f, ref` of the queue itself.
     """
 
-    # what a message touches
+    # fields used by every message
     head: cython.longlong
     tail: cython.longlong
     head_time: cython.longlong
@@ -125,7 +125,7 @@ class EventQueue(Outbox):
     due: cython.p_longlong
     urgent_until: cython.longlong
     refs: list
-    # what the three addresses lead into: kept here, exchanged only by methods that set them too
+    # the targets of the three addresses: kept here, replaced only by methods that also set the addresses
     rows_kept: Annotated[cython.longlong[::1], "readonly"]
     came_kept: Annotated[cython.longlong[::1], "readonly"]
     due_kept: Annotated[cython.longlong[::1], "readonly"]
@@ -134,8 +134,8 @@ class EventQueue(Outbox):
         # a row is ROW numbers: time, order, kind, a ... f, and the place in `refs` of its object (0: it has none)
         self.rows_kept = integers(ROW * capacity)
         self.size = ROW * capacity
-        self.head = 0  # where the first row begins
-        self.tail = 0  # where the last row ends
+        self.head = 0  # index at which the first row begins
+        self.tail = 0  # index at which the last row ends
         self.head_time = NEVER
         self.pushed = 0
         self.refs = [None, None]
@@ -157,9 +157,9 @@ class EventQueue(Outbox):
 
     @cython.cfunc
     def _find_numbers(self) -> None:
-        """Set `rows`, `came` and `due`, by which the arrays kept under their names are read and written.
+        """Set `rows`, `came` and `due`, through which the arrays of the same names are read and written.
 
-        Compiled they are addresses: three in a line of the processor's cache, where a memoryview takes 208 bytes.
+        Compiled, they are addresses: three fit in one cache line, where a memoryview takes 208 bytes.
         """
         if cython.compiled:
             self.rows = cython.address(self.rows_kept[0])
@@ -172,7 +172,7 @@ class EventQueue(Outbox):
 
     @property
     def count(self) -> int:
-        """How many messages wait."""
+        """Number of messages that wait."""
         return (self.tail - self.head) // ROW
 
     def wake(self, came, due, place) -> None:
@@ -183,7 +183,7 @@ class EventQueue(Outbox):
         self._find_numbers()
 
     def _make_room(self) -> None:
-        """The rows have reached the end of the array: move them to its begin, or into one of twice the size."""
+        """Move the rows, which have reached the end of the array, to its beginning, or into one of twice the size."""
         i: cython.longlong
         used: cython.longlong = self.tail - self.head
         rows = self.rows_kept
@@ -217,7 +217,7 @@ class EventQueue(Outbox):
         if time < self.due[self.place]:
             self.due[self.place] = time
         if ref is not None:
-            while self.refs[place] is not None:  # few messages wait that have one
+            while self.refs[place] is not None:  # few waiting messages have an object
                 place += 1
                 if place == len(self.refs):
                     self.refs.append(None)
@@ -238,10 +238,10 @@ class EventQueue(Outbox):
         e: cython.longlong,
         f: cython.longlong,
     ) -> cython.longlong:
-        """`push` without an object, all the numbers given, and not urgent: a few instructions.
+        """Like `push`, without an object, with all numbers given, and not urgent: a few instructions.
 
-        Not urgent is what waits for a task on most boards: a frame, the end of a transmission, an edge, a byte.
-        Returns where the row begins.
+        Messages that wait for a task on most boards are not urgent: a frame, the end of a transmission, an edge, a
+        byte. Returns the index at which the row begins.
         """
         at: cython.longlong
         if self.tail == self.size:
@@ -275,7 +275,7 @@ class EventQueue(Outbox):
 
     @cython.cfunc
     def _move_up(self, at: cython.longlong) -> cython.void:
-        """The row that ends at `at` makes room for one before it."""
+        """Move the row that ends at `at` up by one row."""
         i: cython.longlong
         for i in range(at, at + 10):
             self.rows[i] = self.rows[i - 10]

@@ -1,4 +1,4 @@
-"""The one reader of JSON that comes from outside: finite numbers, bounded nesting, and a place in every complaint."""
+"""The only reader of external JSON: finite numbers, bounded nesting, and a position in every error message."""
 
 import json
 import math
@@ -7,12 +7,12 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 
-MOST_LEVELS = 32  # chosen by us: what we write has 8 at most
+MOST_LEVELS = 32  # chosen by us: our own output has 8 at most
 TOKEN = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[\]{}]', re.DOTALL)
 
 
 class JsonError(UserError):
-    """What is not JSON, or beyond a limit. `reason`: the message without the name of what was read."""
+    """Input is not JSON, or exceeds a limit. `reason`: the message without the name of the source."""
 
     def __init__(self, name: str, reason: str) -> None:
         super().__init__(f"{name}: {reason}")
@@ -20,9 +20,9 @@ class JsonError(UserError):
 
 
 def loads(text: str | bytes, name: str) -> Any:
-    """The value in `text`, as the standard has it: UTF-8, numbers are finite, a name comes once in an object.
+    """Parse `text` as the standard defines JSON: UTF-8, finite numbers, each name at most once in an object.
 
-    JsonError, which begins with `name`, for anything else, and for more than `MOST_LEVELS` levels.
+    Raises JsonError, which begins with `name`, for anything else and for more than `MOST_LEVELS` levels.
     """
     try:
         if isinstance(text, bytes):

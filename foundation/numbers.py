@@ -1,4 +1,4 @@
-"""Numbers as the robot's processors see them: float32, 32-bit words and 16.16 fixed point.
+"""Numbers as on the robot's processors: float32, 32-bit words and 16.16 fixed point.
 
 Interpreted Python has neither 32-bit floats nor wrapping integers, compiled code has both; every
 rounding and every wrap therefore goes through this file, which gives the same bits either way.
@@ -20,15 +20,16 @@ _SIGN: cython.longlong = 2147483648
 
 
 def integers(count, value=0):
-    """`count` whole numbers of 64 bits, all `value`, for a field that is looked at by index only.
+    """`count` whole numbers of 64 bits, all `value`, for a field that is accessed by index only.
 
-    Compiled, an array, whose items are C numbers; interpreted, where an array makes a new object at every look, a list.
+    Compiled, an array, whose items are C numbers; interpreted, a list, because an array makes a new object at every
+    access.
     """
     return array.array("q", [value]) * count if cython.compiled else [value] * count
 
 
 def reals(values):
-    """The numbers of `values` as doubles, for a field that is looked at by index only; what for is told above."""
+    """The numbers of `values` as doubles, for a field that is accessed by index only; see `integers`."""
     return array.array("d", values) if cython.compiled else [float(value) for value in values]
 
 

@@ -1,22 +1,22 @@
-"""Peers: programs that connect from outside. One rule says what they may ask of us, and LIMITS is that rule as a table.
+"""Peers: external programs that connect. One rule limits what they may request; LIMITS is that rule as a table.
 
-Whatever listens keeps it: attach, slcan, socketcand, the supervisor's requests, the serial lines, gdb, the feed, `trace
-open`. Nothing here blocks, has a thread, or raises because of a peer.
+Every server follows it: attach, slcan, socketcand, the supervisor's requests, the serial lines, gdb, the feed, `trace
+open`. Nothing here blocks, uses a thread, or raises because of a peer.
 
-1. A look (`Door.look`) reads at most `read_bytes` of each peer and carries out at most `burst` requests of all, one of
-   each in turn; over time at most `requests` in a millisecond of the robot's. At most ARRIVALS_PER_S connections in a
-   second of the wall clock are taken in, beyond those that would take every place twice.
-2. What does not read is not read: with `unread` bytes of answers waiting for it, nothing more is taken from a peer.
-   What it did not ask for (frames of a bus) is left out, and counted, from `backlog` bytes on.
-3. A look writes at most `write_bytes` to each peer.
-4. A door has room for `peers`. When all places are taken, one makes room: a peer that takes nothing any more, though
-   something that it had said is still to be carried out; else one that has not begun to take part. Of several the one
-   that has said nothing for longest.
-5. A peer that does not keep to this is sent away, and counted by its reason (REASONS), which the user is shown. What
-   it had begun is dropped.
-6. Only this user's programs and root's are served, and we trust no other server: SO_PEERCRED on local sockets; on
-   loopback the kernel says whose the other end is. Beyond this machine nobody is known, so
-   listening there must be asked for.
+1. A poll (`Door.look`) reads at most `read_bytes` from each peer and executes at most `burst` requests of all peers,
+   one of each in turn; over time at most `requests` per millisecond of robot time. It accepts at most ARRIVALS_PER_S
+   connections per second of wall time, beyond those that would fill every place twice.
+2. A peer that does not read is not read: while `unread` bytes of answers wait for it, nothing more is read from it.
+   From `backlog` bytes on, data that it did not request (frames of a bus) is dropped and counted.
+3. A poll writes at most `write_bytes` to each peer.
+4. An endpoint accepts `peers` peers. When all places are taken, one peer is closed: one that no longer reads, although
+   a request of it is still to be executed; otherwise one that has not completed its handshake. Of several, the one that
+   has sent nothing for longest.
+5. A peer that breaks the rule is disconnected and counted by reason (REASONS), which is shown to the user. Its
+   unfinished requests are dropped.
+6. Only programs of this user and of root are served, and no other server is trusted: SO_PEERCRED on local sockets; on
+   loopback the kernel reports the owner of the other end. Owners on other machines are unknown, so listening beyond
+   this machine must be requested explicitly.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from ranger_sim.foundation.user_error import UserError
 
 @dataclass(frozen=True)
 class Limits:
-    """One door's line of the table; the rule above says what each number limits."""
+    """One endpoint's row of the table; the rule above explains what each number limits."""
 
     peers: int
     requests: int  # in a millisecond of virtual time (of the wall clock while a robot is paused), of all peers together
-    burst: int  # after a while without any, and per look where there is no robot
+    burst: int  # after a while without any, and per poll where there is no robot
     longest: int  # bytes of one request
     read_bytes: int
     write_bytes: int
@@ -54,16 +54,15 @@ class Limits:
     backlog: int  # bytes
 
 
-# Chosen by us, for these reasons. peers: who is on a bus hears every frame, and each costs 3 us, where a bus of the
-# robot carries 4 in a millisecond. requests: a frame that is sent costs some 50 us with all that follows on the bus
-# and in the boards (both measured on 23 November 2026, AMD EPYC); a real adapter of 1 Mbit/s sends 8 in a millisecond,
-# a serial one of 1 Mbaud, and a daemon before one, 4. burst: attach, a window of its protocol. longest: attach, a
-# reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100;
-# gdb, the packet size that its stub tells, with what is around it; of a board that runs a debugger asks little, and of
-# one that stands as much as it likes. trace, the head of a browser's request, cookies of other servers of this machine
-# included.
-# xcp-udp, a datagram in a frame of Ethernet, of which a look takes 16 and no more than `burst` commands.
-# backlog: 8,000 frames, 0.3 s of a full bus of 3 Mbit/s; feed, 3 s of all that a robot records (2.6 MB a second).
+# Chosen by us, for these reasons. peers: a peer on a bus receives every frame, and each costs 3 us, where a bus of the
+# robot carries 4 per millisecond. requests: sending a frame costs some 50 us with all its consequences on the bus and
+# in the boards (both measured on 23 November 2026, AMD EPYC); a real adapter of 1 Mbit/s sends 8 in a millisecond, a
+# serial one of 1 Mbaud, or a daemon in front of it, 4. burst: attach, a window of its protocol. longest: attach, a
+# reason; slcan, an extended frame has 26; socketcand, a send has 45; control, a request has below 100; gdb, the packet
+# size that its stub reports, with its framing; a debugger requests little of a running board, and any amount of a
+# halted one. trace, the head of a browser's request, including cookies of other servers of this machine. xcp-udp, a
+# datagram in an Ethernet frame, of which a poll takes 16 and no more than `burst` commands. backlog: 8,000 frames, 0.3
+# s of a full bus of 3 Mbit/s; feed, 3 s of all data that a robot records (2.6 MB a second).
 KB = 1024
 LIMITS = {
     #                    peers  requests  burst  longest  read_bytes  write_bytes  unread    backlog
@@ -78,12 +77,12 @@ LIMITS = {
     "trace":      Limits(    8,        0,     8, 16 * KB,    4 * KB,    256 * KB,  64 * KB,         0),
 }  # fmt: skip
 
-ARRIVALS_PER_S = 250  # chosen by us: each costs some 80 us to take in, look up and refuse, 2 % of the time in all
-PAUSED_S = 0.1  # virtual time has stood still for so long: the robot is paused, not waiting for its time
-PATIENCE_S = 2.0  # with answers untaken for so long and more to say, a peer is sent away; chosen by us
+ARRIVALS_PER_S = 250  # chosen by us: each costs some 80 us to accept, look up and refuse, 2 % of the time in all
+PAUSED_S = 0.1  # virtual time has not advanced for this long: the robot is paused, not waiting for its time
+PATIENCE_S = 2.0  # a peer that leaves answers unread for this long and has sent more is disconnected; chosen by us
 MS = 1_000_000
 
-# Why a peer is sent away, as it is counted.
+# Why a peer is disconnected, as counted.
 FULL, FOREIGN, UNKNOWN, MALFORMED = "full", "foreign", "unknown", "malformed"
 TOO_LONG, STALLED, IDLE = "too_long", "stalled", "idle"
 REASONS = {
@@ -98,19 +97,19 @@ REASONS = {
 
 
 class Stream(Protocol):
-    """Bytes to and from a peer, without waiting. OSError when it is gone."""
+    """Bytes to and from a peer, without waiting. Raises OSError when it is gone."""
 
     def fileno(self) -> int:
         """What to wait on."""
 
     def read(self, limit: int) -> bytes | None:
-        """Up to `limit` bytes; None when nothing has come, no bytes when nothing will come any more."""
+        """Up to `limit` bytes; None when nothing has arrived, no bytes at the end of the stream."""
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
-        """How many of the bytes were taken."""
+        """Number of bytes taken."""
 
     def close(self) -> None:
-        """Give it back."""
+        """Release it."""
 
 
 class SocketStream:
@@ -141,10 +140,10 @@ class SocketStream:
 
 
 class Terminal:
-    """A pseudo-terminal of ours, raw, for this user alone; `path` is what a program opens. UserError: there are none.
+    """Our own pseudo-terminal, raw, for this user only; programs open `path`. UserError: none is available.
 
-    Programs come and go, and are not told apart. Our own hand stays on their end as well: with the last program's
-    close the settings would be forgotten, and between two of them reading would fail.
+    Programs connect and disconnect, and are not distinguished. We keep their end open as well: otherwise the last
+    program's close would reset the settings, and reading would fail until the next program opens it.
     """
 
     def __init__(self) -> None:
@@ -178,7 +177,7 @@ class Terminal:
 
 
 def read_ready(number: int, limit: int) -> bytes:
-    """Bytes that are there, without waiting."""
+    """Available bytes, without waiting."""
     try:
         return os.read(number, limit) if limit > 0 else b""
     except (BlockingIOError, InterruptedError):
@@ -186,7 +185,7 @@ def read_ready(number: int, limit: int) -> bytes:
 
 
 def write_ready(number: int, data: bytes | bytearray | memoryview) -> int:
-    """How many bytes were taken without waiting."""
+    """Number of bytes taken without waiting."""
     try:
         return os.write(number, data)
     except (BlockingIOError, InterruptedError):
@@ -194,34 +193,34 @@ def write_ready(number: int, data: bytes | bytearray | memoryview) -> int:
 
 
 class Peer:
-    """One peer: what it sent and was not understood yet, what it has not taken, and how much of that are answers."""
+    """One peer: bytes it sent that are not parsed yet, bytes it has not taken, and how many of those are answers."""
 
     def __init__(self, stream: Stream) -> None:
         self.stream = stream
         self.incoming = bytearray()
         self.outgoing = bytearray()
-        self.answers = 0  # bytes of `outgoing` that it asked for
-        self.gone = False  # nothing more will come
-        self.lost = False  # it takes nothing any more; what it had said is still heard
-        self.ending = False  # was told why, and is closed when that is out
-        self.waits = False  # its last request is being carried out: the next one has to wait
-        self.last = 0  # the door's count of requests and arrivals at its last one
-        self.wants_since_s: float | None = None  # it has had more to say, and taken nothing
+        self.answers = 0  # bytes of `outgoing` that it requested
+        self.gone = False  # end of stream
+        self.lost = False  # it no longer reads; its earlier requests are still processed
+        self.ending = False  # has been sent the reason, and is closed once that is written
+        self.waits = False  # its last request is being executed: the next one has to wait
+        self.last = 0  # the endpoint's count of requests and arrivals at its last one
+        self.wants_since_s: float | None = None  # it has sent more, and read nothing
 
     def answer(self, data: bytes) -> None:
-        """Bytes that the peer asked for."""
+        """Queue bytes that the peer requested."""
         self.outgoing += data
         self.answers += len(data)
 
     def deaf(self, limits: Limits) -> bool:
-        """True while too many of its answers wait: nothing is read of it."""
+        """True while too many of its answers wait: nothing is read from it."""
         return self.answers >= limits.unread
 
     def write(self, limit: int) -> None:
-        """As much as the peer takes now, up to `limit` bytes. OSError when it is gone."""
+        """Write as much as the peer takes now, up to `limit` bytes. OSError when it is gone."""
         if not self.outgoing:
             return
-        # not a copy: who takes nothing is offered 64 KB at every look
+        # not a copy: a peer that reads nothing is offered 64 KB at every poll
         with memoryview(self.outgoing) as waiting, waiting[:limit] as part:
             taken = self.stream.write(part)
         if taken:
@@ -234,14 +233,14 @@ P = TypeVar("P", bound=Peer)
 
 
 def _use_of_place(peer: Peer) -> tuple[bool, int]:
-    """The least is of who makes room first: it takes nothing any more, or has said nothing for longest."""
+    """Sort key for closing peers, lowest first: it no longer reads, or has sent nothing for longest."""
     return not peer.lost, peer.last
 
 
 class Door(Generic[P]):
-    """Something that listens: takes peers in, reads, has their requests carried out, writes; a bounded part per look.
+    """A server endpoint: accepts peers, reads, has their requests executed, writes; a bounded amount per poll.
 
-    A protocol adds `_welcome`, `_take`, and if it likes `_takes_part` and `_closed`.
+    A protocol adds `_welcome`, `_take`, and optionally `_takes_part` and `_closed`.
     """
 
     tolerated_s = PATIENCE_S
@@ -252,16 +251,16 @@ class Door(Generic[P]):
         self.listener = listener
         self.peers: list[P] = []
         self.sent_away: Counter[str] = Counter()
-        self.worked = 0  # requests carried out so far
-        self.arrived = 0  # connections taken in so far
-        self.room = float(self.limits.burst)  # for requests, now
+        self.worked = 0  # requests executed so far
+        self.arrived = 0  # connections accepted so far
+        self.room = float(self.limits.burst)  # requests allowed now
         self.time_ns = 0
         self.first = 0  # whose turn it is
-        self.left_over = False  # whole requests wait for the next look
-        self.knocking = False  # connections do
-        self.clock = wallclock.monotonic_s  # patience is measured by
-        self.looked_s = self.moved_s = -math.inf  # on `clock`: the last look, the last with virtual time ahead
-        self.arrivals = 2.0 * self.limits.peers  # room for connections, now
+        self.left_over = False  # whole requests wait for the next poll
+        self.knocking = False  # connections wait for it
+        self.clock = wallclock.monotonic_s  # patience is measured on it
+        self.looked_s = self.moved_s = -math.inf  # on `clock`: the last poll, the last one with virtual time advanced
+        self.arrivals = 2.0 * self.limits.peers  # connections allowed now
         self.watch = select.poll()
         if listener is not None:
             self.watch.register(listener, select.POLLIN)
@@ -273,24 +272,24 @@ class Door(Generic[P]):
         raise NotImplementedError
 
     def _take(self, peer: P) -> bool:
-        """Carry out one whole request out of `peer.incoming`; False when there is none yet."""
+        """Execute one whole request from `peer.incoming`; False when it holds none yet."""
         raise NotImplementedError
 
     def _takes_part(self, peer: P) -> bool:
-        """True for a peer that keeps its place, also when others want one."""
+        """True for a peer that keeps its place even when others want one."""
         return False
 
     def _apology(self, reason: str) -> bytes:
-        """What a peer is told that is sent away."""
+        """Last bytes to a peer that is disconnected."""
         return b""
 
     def _closed(self, peer: P) -> None:
-        """A peer has left, or is about to be told why it has to."""
+        """A peer has left, or is about to be sent the reason why it must."""
 
     # ---- for the process that owns it
 
     def look(self, now_ns: int) -> None:
-        """New peers, what has come, and what is asked for, as far as there is room; `now_ns`: virtual time."""
+        """Accept peers, read, and execute requests, within the limits; `now_ns`: virtual time."""
         self._make_room(now_ns)
         ready = self._ready()
         knocks = self.listener is not None and self.listener.fileno() in ready
@@ -298,7 +297,7 @@ class Door(Generic[P]):
         self.left_over = False
         peers = self.peers[self.first :] + self.peers[: self.first]
         waiting = [peer for peer in peers if self._hear(peer, peer.stream.fileno() in ready)]
-        if knocks:  # who has gone has given its place back by now
+        if knocks:  # peers that have gone have released their places by now
             waiting += [peer for peer in self._accept() if self._hear(peer, True)]
         while waiting and self.room >= 1.0:  # one of each in turn
             waiting = [peer for peer in waiting if self.room >= 1.0 and self._one(peer)]
@@ -306,21 +305,21 @@ class Door(Generic[P]):
         self.first = (self.first + 1) % len(self.peers) if self.peers else 0
 
     def write(self) -> None:
-        """To every peer what it takes now."""
+        """Write to every peer what it takes now."""
         for peer in list(self.peers):
             self._write(peer)
 
     def filenos(self) -> list[int]:
-        """Descriptors that become readable when a peer wants something that it can have."""
+        """Descriptors that become readable when a peer has a request that may be executed."""
         found = [] if self.listener is None or self.knocking else [self.listener.fileno()]
         return found + [peer.stream.fileno() for peer in self.peers if self._is_heard(peer) and not peer.gone]
 
     def filenos_to_write(self) -> list[int]:
-        """Descriptors on which something waits until the peer takes more."""
+        """Descriptors with output that waits until the peer takes more."""
         return [peer.stream.fileno() for peer in self.peers if peer.outgoing]
 
     def send_away(self, peer: P, reason: str, apology: bytes = b"") -> None:
-        """Count it, tell the peer if it still takes anything, and close."""
+        """Count the reason, send it to the peer if it still reads, and close."""
         if peer.ending or peer not in self.peers:
             return
         self.sent_away[reason] += 1
@@ -328,13 +327,13 @@ class Door(Generic[P]):
         peer.incoming.clear()
         peer.ending = True
         self._closed(peer)
-        if reason in (STALLED, IDLE):  # it takes nothing, or its place is wanted now
+        if reason in (STALLED, IDLE):  # it reads nothing, or its place is needed now
             with suppress(OSError):
                 peer.write(self.limits.write_bytes)
             self.drop(peer)
 
     def let_in(self, peer: P) -> None:
-        """From now on this peer is heard."""
+        """Start serving this peer."""
         self.peers.append(peer)
         self.watch.register(peer.stream.fileno(), select.POLLIN)
 
@@ -348,23 +347,23 @@ class Door(Generic[P]):
             peer.stream.close()
 
     def close(self) -> None:
-        """End every connection, and listen no more."""
+        """End every connection, and stop listening."""
         for peer in list(self.peers):
             self._write(peer)
             self.drop(peer)
         if self.listener is not None:
             self.listener.close()
 
-    # ---- a look
+    # ---- a poll
 
     def _make_room(self, now_ns: int) -> None:
-        """For as many requests and connections as the time since the last look allows. now_ns 0: there is no robot."""
+        """Set how many requests and connections the time since the last poll allows. now_ns 0: no robot."""
         now_s = self.clock()
         passed_s = now_s - self.looked_s
         passed, self.time_ns = now_ns - self.time_ns, now_ns
         if passed > 0 or self.moved_s < 0.0:
             self.moved_s = now_s
-        if now_ns == 0:  # whoever calls waits between two looks
+        if now_ns == 0:  # the caller waits between two polls
             fresh = float(self.limits.burst)
         elif passed > 0:
             fresh = self.limits.requests * passed / MS
@@ -381,7 +380,7 @@ class Door(Generic[P]):
         return {number for number, _ in self.watch.poll(0)}
 
     def _accept(self) -> list[P]:
-        """Take in who knocks; the new peers, which may have said something already."""
+        """Accept connections; return the new peers, which may have sent something already."""
         assert self.listener is not None
         new: list[P] = []
         while self.arrivals >= 1.0:
@@ -403,7 +402,7 @@ class Door(Generic[P]):
                 self.send_away(peer, fault)
             elif full and idle is None:
                 self.send_away(peer, FULL)
-            if peer.ending:  # it does not get a place for as long as it takes to tell it
+            if peer.ending:  # it takes no place while the reason is sent to it
                 self._write(peer)
                 self.drop(peer)
             else:
@@ -411,7 +410,7 @@ class Door(Generic[P]):
         return [peer for peer in new if peer in self.peers]
 
     def _hear(self, peer: P, comes: bool) -> bool:
-        """Read what is allowed of one peer; True when it may have a request."""
+        """Read what is allowed from one peer; True when it may have a request."""
         if not self._is_heard(peer):
             if peer.ending or not peer.waits and (comes or peer.incoming):
                 self._wait_for(peer)
@@ -429,11 +428,11 @@ class Door(Generic[P]):
         return bool(peer.incoming)
 
     def _is_heard(self, peer: P) -> bool:
-        """False for who is being sent away, has a request under way, or does not take its answers."""
+        """False for a peer that is being disconnected, has a request under way, or does not read its answers."""
         return not (peer.ending or peer.waits or peer.deaf(self.limits))
 
     def _one(self, peer: P) -> bool:
-        """One request of a peer; True when it may have another."""
+        """Execute one request of a peer; True when it may have another."""
         if not self._is_heard(peer):
             return False
         if self._take(peer):
@@ -448,7 +447,7 @@ class Door(Generic[P]):
         return False
 
     def _wait_for(self, peer: P) -> None:
-        """A peer goes on without taking what waits for it: not for ever."""
+        """Limit how long a peer may go on without reading its output."""
         now_s = self.clock()
         if peer.wants_since_s is None:
             peer.wants_since_s = now_s
@@ -471,7 +470,7 @@ class Door(Generic[P]):
             self.drop(peer)
 
 
-# ---- whom we serve, and whom we trust
+# ---- trusted users
 
 
 def trusted(user: int | None) -> bool:
@@ -480,22 +479,22 @@ def trusted(user: int | None) -> bool:
 
 
 def user_behind(connection: socket.socket) -> int | None:
-    """Who owns the other end of a connection on this machine; None when that cannot be told."""
+    """User id that owns the other end of a connection on this machine; None when that is unknown."""
     if connection.family == socket.AF_UNIX:
         return int(struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1])
     with suppress(OSError, ValueError):
         here, there = connection.getsockname()[:2], connection.getpeername()[:2]
         try:
             return _owner_told(_asked_of_kernel(there, here))
-        except (OSError, struct.error):  # a kernel that does not tell of one connection shows its table of all
+        except (OSError, struct.error):  # a kernel that does not report one connection has a table of all
             return _owner_of(there, here, Path("/proc/net/tcp").read_text(encoding="ascii"))
     return None
 
 
-# sock_diag(7), linux/inet_diag.h. One connection is found in 25 us; the table of all, which the kernel writes out anew
-# for every reader, takes 11 to 19 ms (23 November 2026, AMD EPYC).
+# sock_diag(7), linux/inet_diag.h. One connection is found in 25 us; the table of all, which the kernel writes for every
+# reader, takes 11 to 19 ms (23 November 2026, AMD EPYC).
 NETLINK_SOCK_DIAG, SOCK_DIAG_BY_FAMILY, NLM_F_REQUEST, NLMSG_ERROR = 4, 20, 1, 2
-ESTABLISHED = 1  # TCP_ESTABLISHED; in any other state the end is closed, and its owner is told as root
+ESTABLISHED = 1  # TCP_ESTABLISHED; in any other state the end is closed, and its owner is reported as root
 HEADER = struct.Struct("=IHHII")  # of a netlink message: length, type, flags, number, port
 QUESTION = struct.Struct("=BBBBI")  # inet_diag_req_v2: family, protocol, extensions, padding, states; then the ends
 ANSWER = struct.Struct("=BBBB48sIIIII")  # inet_diag_msg: family, state, ..., the ends, expires, queues, user, inode
@@ -503,7 +502,7 @@ NO_COOKIE = b"\xff" * 8
 
 
 def _asked_of_kernel(end: tuple[str, int], other: tuple[str, int]) -> bytes:
-    """What the kernel answers when asked about the connection from `end` to `other`. OSError: it does not."""
+    """The kernel's answer about the connection from `end` to `other`. OSError: it gives none."""
     ends = struct.pack(">HH", end[1], other[1])
     ends += b"".join(socket.inet_aton(each[0]).ljust(16, b"\0") for each in (end, other))
     body = QUESTION.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, 0, 1 << ESTABLISHED) + ends + bytes(4) + NO_COOKIE
@@ -515,7 +514,7 @@ def _asked_of_kernel(end: tuple[str, int], other: tuple[str, int]) -> bytes:
 
 
 def _owner_told(answer: bytes) -> int | None:
-    """Who owns the end that an answer of the kernel tells of; None when it is closed. OSError: it does not know."""
+    """Owner of the end that a kernel answer describes; None when it is closed. OSError: unknown to the kernel."""
     _, kind, *_ = HEADER.unpack_from(answer)
     if kind == NLMSG_ERROR:
         error = -struct.unpack_from("=i", answer, HEADER.size)[0]
@@ -527,7 +526,7 @@ def _owner_told(answer: bytes) -> int | None:
 
 
 def _owner_of(end: tuple[str, int], other: tuple[str, int], table: str) -> int | None:
-    """Who owns the end of an established connection, by the kernel's table (proc_net_tcp of its documentation)."""
+    """Owner of the end of an established connection, from the kernel's table (proc_net_tcp of its documentation)."""
     wanted = [_as_in_table(end), _as_in_table(other), "01"]  # 01: TCP_ESTABLISHED
     for line in table.splitlines()[1:]:
         cells = line.split()
@@ -537,12 +536,12 @@ def _owner_of(end: tuple[str, int], other: tuple[str, int], table: str) -> int |
 
 
 def _as_in_table(end: tuple[str, int]) -> str:
-    """127.0.0.1 and a port as 0100007F:1F90, the bytes of the address as this machine keeps a number."""
+    """127.0.0.1 and a port as 0100007F:1F90, the address bytes in this machine's byte order."""
     return f"{int.from_bytes(socket.inet_aton(end[0]), sys.byteorder):08X}:{end[1]:04X}"
 
 
 def fault_of_owner(connection: socket.socket) -> str | None:
-    """Why a connection is not served; None for this user's, root's, and one over the network, where nobody is known."""
+    """Why a connection is refused; None for this user's, root's, and network connections, whose owner is unknown."""
     if connection.family != socket.AF_UNIX and not loopback(connection.getsockname()[0]):
         return None
     user = user_behind(connection)
@@ -552,12 +551,12 @@ def fault_of_owner(connection: socket.socket) -> str | None:
 
 
 def loopback(address: str) -> bool:
-    """True for an address that only this machine reaches."""
+    """True for an address that only this machine can reach."""
     return ipaddress.ip_address(address).is_loopback
 
 
 def listening_address(host: str, what: str, allow_network: bool) -> str:
-    """The numeric address of `host`; UserError for one that is none, or beyond this machine without permission."""
+    """The numeric address of `host`; UserError for an invalid one, or one beyond this machine without permission."""
     try:
         address = socket.gethostbyname(host)
     except OSError as error:
@@ -570,7 +569,8 @@ def listening_address(host: str, what: str, allow_network: bool) -> str:
 
 
 def connected(address: str, whose: str, patience_s: float | None) -> socket.socket:
-    """A connection to a local server of this user or root. OSError when nobody listens; UserError: it is another's."""
+    """A connection to a local server of this user or root. OSError: nothing listens there; UserError: the owner is
+    another user."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         connection.settimeout(patience_s)
@@ -585,5 +585,5 @@ def connected(address: str, whose: str, patience_s: float | None) -> socket.sock
 
 
 def told(counts: dict[str, int] | Sequence[tuple[str, int]]) -> str:
-    """`2 did not speak the protocol, 1 ...` for the user; empty when nobody was sent away."""
+    """`2 did not speak the protocol, 1 ...` for the user; empty when no peer was disconnected."""
     return ", ".join(f"{count} {REASONS[reason]}" for reason, count in dict(counts).items() if count)

@@ -1,4 +1,4 @@
-"""Quantities as people write them: 60s, 1.5 km, 1mm, 70 %, 450 us."""
+"""Parse and print quantities as people write them: 60s, 1.5 km, 1mm, 70 %, 450 us."""
 
 import math
 import numbers
@@ -26,7 +26,7 @@ def in_base_units(text: str, units: dict[str, float]) -> float | None:
 
 
 def nanoseconds(duration: str, what: str = "duration") -> int:
-    """`duration` ("450 us", "50 ms", "2 s") in whole ns; the unit must be there. UserError names `what` otherwise."""
+    """`duration` ("450 us", "50 ms", "2 s") in whole ns; the unit is required. UserError names `what` otherwise."""
     value = in_base_units(duration, TIMES) if isinstance(duration, str) else None
     if value is None or not re.search(r"[a-z]\s*$", duration) or not math.isfinite(value):
         raise UserError(f"{what} {duration!r}: a number with one of the units {', '.join(TIMES)} is needed")
@@ -52,12 +52,12 @@ def duration_ns(duration: Duration, what: str = "duration") -> int:
 
 
 def given_text(duration: Duration) -> str:
-    """A duration as it was written, or with its unit when it is a number of seconds."""
+    """A duration as written, or with its unit when it is a number of seconds."""
     return duration if isinstance(duration, str) else duration_text(duration_ns(duration))
 
 
 def duration_text(time_ns: float) -> str:
-    """A duration with the unit that reads best: 12.5 us, 3 ms, 1.25 s."""
+    """A duration in the most readable unit: 12.5 us, 3 ms, 1.25 s."""
     for unit, size in (("s", 1e9), ("ms", 1e6), ("us", 1e3)):
         if abs(time_ns) >= size:
             return f"{time_ns / size:.6g} {unit}"

@@ -44,7 +44,7 @@ class RandomStream:
         """The next 64 random bits."""
         z: cython.ulonglong
         if cython.compiled:
-            # an unsigned C word wraps by itself; literals above 63 bits would be Python objects here
+            # an unsigned C word wraps automatically; literals above 63 bits would be Python objects here
             self.state += self.increment
             z = self.state
             z = (z ^ (z >> 30)) * self.multiplier_1

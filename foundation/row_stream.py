@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below is a place of a block: a block is a whole number of rows and flushed when it is full)
-"""Rows of 64-bit numbers on their way out of a run: collected into blocks, hashed, handed over as bytes."""
+"""Rows of 64-bit numbers that a run records: collected into blocks, hashed, passed on as bytes."""
 
 import array
 import hashlib
@@ -17,7 +17,7 @@ class RowStream:
     """Rows of 64-bit values collected into blocks. `hashed`: feed the blocks to BLAKE2b as well.
 
     code: "q" for whole numbers, "d" for doubles. A row is written into `integers` or `reals` from `used` on, then
-    told by `finish_row`. `number` tells streams of one kind apart.
+    closed by `finish_row`. `number` distinguishes streams of one kind.
     """
 
     used: cython.longlong
@@ -38,7 +38,7 @@ class RowStream:
         self.capacity = columns * block_rows
         self.integers = array.array("q", [0]) * (self.capacity if code == "q" else 0)
         self.reals = array.array("d", [0.0]) * (self.capacity if code == "d" else 0)
-        # compiled, where `integers` begins: beside the other fields of every row, where a memoryview is 208 bytes away
+        # compiled, the address of `integers`: close to the other fields of every row; a memoryview is 208 bytes away
         self.numbers = cython.address(self.integers[0]) if cython.compiled else self.integers
         self.used = 0
         self.last_time_ns = 0
@@ -56,7 +56,7 @@ class RowStream:
 
     @cython.ccall
     def flush(self) -> object:
-        """Hash and hand over what the block holds."""
+        """Hash the content of the block and pass it on."""
         if self.used == 0:
             return
         block: object = memoryview(self.reals) if self.is_real else memoryview(self.integers)
@@ -73,7 +73,8 @@ class RowStream:
 class FrameStream(RowStream):
     """The frames of bus `bus` (0 ... 15), hashed: three numbers a row, in order of their start.
 
-    They are: the instant (ns) at which receivers have it; word 0 << 12 | flags << 4 | bus; word 1 << 29 | identifier.
+    They are: the time (ns) at which receivers have the frame; word 0 << 12 | flags << 4 | bus; word 1 << 29 |
+    identifier.
     """
 
     def __init__(self, bus) -> None:
@@ -88,7 +89,7 @@ class FrameStream(RowStream):
         lo: cython.longlong,
         hi: cython.longlong,
     ) -> None:
-        """A frame was on the bus."""
+        """Add a frame that was on the bus."""
         at: cython.longlong = self.used
         self.numbers[at] = time_ns
         self.numbers[at + 1] = (lo << 12) | (flags << 4) | self.number

@@ -1,4 +1,4 @@
-"""The one reader of TOML files: what it takes is bounded in bytes, nesting and length of keys, so in time as well."""
+"""The only reader of TOML files. It limits bytes, nesting and length of keys, and so its time as well."""
 
 import pathlib
 import re
@@ -7,12 +7,12 @@ from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
 
-# Chosen by us: the longest file of ours has 6 kB, 4 levels and keys of 3 parts.
+# Chosen by us: our longest file has 6 kB, 4 levels and keys of 3 parts.
 MOST_BYTES = 1 << 20
 MOST_LEVELS = 32  # of arrays and inline tables within each other
 MOST_PARTS = 16  # of a dotted key: tables within tables; the library's time grows with the square of it
 
-# Strings and comments as a whole, and what structure is made of.
+# Strings and comments as a whole, and the characters that make structure.
 TOKEN = re.compile(
     r'"""(?:[^"\\]|\\.|"{1,2}(?!"))*+"{3,5}'
     r"|'''(?:[^']|'{1,2}(?!'))*+'{3,5}"
@@ -26,7 +26,7 @@ PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
 class TomlError(UserError):
-    """A file that is not TOML, or beyond a limit. `line` and `column` count from 1; 0: it has no such place."""
+    """File is not TOML, or exceeds a limit. `line` and `column` count from 1; 0: no position."""
 
     def __init__(self, name: str, reason: str, line: int = 0, column: int = 0) -> None:
         super().__init__(f"{name}:{line}:{column}: {reason}" if line else f"{name}: {reason}")
@@ -52,7 +52,7 @@ def load(path: str | pathlib.Path, what: str = "") -> dict[str, Any]:
 
 
 def loads(data: bytes, name: str) -> dict[str, Any]:
-    """The tables in `data`, which messages call `name`."""
+    """The tables in `data`, called `name` in messages."""
     if len(data) > MOST_BYTES:
         raise TomlError(name, f"larger than {MOST_BYTES} bytes")
     try:
@@ -70,12 +70,12 @@ def loads(data: bytes, name: str) -> dict[str, Any]:
         what = PLACE.sub("", str(error))
         line, column = (int(found[1]), int(found[2])) if found and found[1] else _end_of(text)
         raise TomlError(name, f"not valid TOML: {what}", line, column) from None
-    except ValueError as error:  # a whole number of thousands of digits: the library has no place for it
+    except ValueError as error:  # a whole number of thousands of digits, for which the library gives no position
         raise TomlError(name, f"not valid TOML: {str(error).partition(';')[0]}") from None
 
 
 def _check_structure(text: str, name: str) -> None:
-    """Refuse what the library would take too long for, or nest too deeply, before it reads it."""
+    """Refuse, before the library reads it, text that would take it too long or nest too deeply."""
     levels, parts = 0, 1
     for token in TOKEN.finditer(text):
         mark = token[0]
@@ -95,7 +95,7 @@ def _check_structure(text: str, name: str) -> None:
 
 
 def _place(text: str, at: int) -> tuple[int, int]:
-    """Line and column of a place in the text."""
+    """Line and column of a position in the text."""
     return text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
 
 

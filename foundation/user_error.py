@@ -1,4 +1,4 @@
-"""The one exception for what a user did wrong."""
+"""The only exception for mistakes of a user."""
 
 import difflib
 from collections.abc import Iterable
@@ -9,18 +9,18 @@ MOST_NAMED = 2
 
 
 def printable(text: str) -> str:
-    """`text` on one line that a terminal only shows: what is no printable character is written as its escape.
+    """`text` on one line that is safe to print on a terminal: unprintable characters are written as escapes.
 
-    So neither a file's name nor a line of a foreign file can colour, hide or fake a message.
+    So neither a file's name nor a line of an external file can colour, hide or fake a message.
     """
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode("ascii") for each in text)
 
 
 class UserError(Exception):
-    """A mistake of the user: a line that names the thing, the value, the limit and the place; or several such lines.
+    """A mistake of the user: a line that names the object, the value, the limit and the place; or several such lines.
 
-    The command line prints them and leaves with exit code 2; library users may catch it. Each line is printable,
-    whatever was put into it.
+    The command line prints them and exits with code 2; library users may catch it. Each line is printable, whatever
+    text it contains.
     """
 
     def __init__(self, *lines: str) -> None:
@@ -31,7 +31,8 @@ class UserError(Exception):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """`did you mean 'walk'?`, the known names that begin so or are near a mistyped one; empty where none is."""
+    """`did you mean 'walk'?`, the known names that begin with a mistyped one or are close to it; empty if there are
+    none."""
     names = list(known)
     begun = [each for each in names if name and each.startswith(name)][:MOST_NAMED]
     near = begun or difflib.get_close_matches(name[:LONGEST_NAME], names, MOST_NAMED, LEAST_ALIKE)

@@ -5,12 +5,12 @@ import time
 
 
 def monotonic_s() -> float:
-    """Seconds of a clock that never runs backwards; only differences mean anything."""
+    """Seconds of a monotonic clock; only differences are meaningful."""
     return time.perf_counter()
 
 
 def epoch_ns() -> int:
-    """Nanoseconds since 1970 in UTC, for the stamps of frames that leave for programs of the CAN world."""
+    """Nanoseconds since 1970 in UTC, for the stamps of frames sent to other CAN programs."""
     return time.time_ns()
 
 
@@ -25,10 +25,10 @@ def today_iso() -> str:
 
 
 def sleep_s(seconds: float) -> None:
-    """Give the processor away for about this long."""
+    """Sleep for about this long."""
     time.sleep(seconds)
 
 
 def monotonic_ns() -> int:
-    """The same clock for every process of the machine, in ns; only differences mean anything."""
+    """Monotonic clock shared by all processes of the machine, in ns; only differences are meaningful."""
     return time.monotonic_ns()

@@ -1,11 +1,11 @@
-"""Bodies by name: which robot walks. A body is a TOML file of plant/bodies, or one of a user.
+"""Bodies by name: the robot that walks. A body is a TOML file of plant/bodies, or one of a user.
 
     title = "..."            description = "..."          base = "appendix"
     [parameters]             what differs from the base, by key
     [sources]                for every key of [parameters] where its value comes from, in a sentence
 
-Without a base a file stands on the defaults of the tables. Keys are the fields of `BodyParameters` (without the slope,
-which a scenario has) and those of `ELECTRIC` below. All that is wrong with a file comes as one UserError of one line:
+Without a base a file uses the defaults of the tables. Keys are the fields of `BodyParameters` (without the slope,
+which a scenario has) and those of `ELECTRIC` below. All faults of a file are reported in one UserError of one line:
 file, key, value, limit.
 """
 
@@ -36,7 +36,7 @@ class Key:
 
     @property
     def limits(self) -> str:
-        """What is allowed, in words."""
+        """The allowed values, as text."""
         if "allowed" in self.metadata:
             return ", ".join(map(str, self.metadata["allowed"]))
         low, high = self.metadata["limits"]
@@ -52,7 +52,7 @@ MOTOR_KEYS = (
     ("constant_friction_Nm", "N m", (0.0, 10.0), "C_0 at the joint (robot.md P3)"),
     ("viscous_friction_Nms", "N m s/rad", (0.0, 10.0), "C_1 at the joint (robot.md P3)"),
 )
-# Of ElectricsParameters: what of the feet's sensors belongs to the feet.
+# Of ElectricsParameters: the part of the feet's sensors that belongs to the feet.
 SENSOR_KEYS = (
     ("foot_rise_time_constant_s", "s", (1e-4, 1.0), "of the gap's closing; chosen by us: see foot_sensor.py"),
     ("foot_share", "1", (0.0, 1.0), "closed by the blow itself; chosen by us: see foot_sensor.py"),
@@ -118,7 +118,8 @@ def available() -> tuple[str, ...]:
 
 
 def load(name: str | pathlib.Path) -> BodyFile:
-    """The body `name`, or the file at that path when it ends in .toml. UserError as this module's head tells."""
+    """The body `name`, or the file at that path when it ends in .toml. UserError as described in the module
+    docstring."""
     return _load(str(name), ())
 
 
@@ -161,7 +162,7 @@ def _load(name: str, users: tuple[str, ...]) -> BodyFile:
 
 
 def _faults(data: dict[str, Any]) -> Iterator[str]:
-    """Everything wrong with the contents of a file, one text each."""
+    """All faults of a file's contents, one text each."""
     for key, value in data.items():
         if key not in (*TEXTS, "parameters", "sources"):
             yield f"unknown key {key!r}; allowed are {', '.join((*TEXTS, '[parameters]', '[sources]'))}"

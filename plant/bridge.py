@@ -1,11 +1,11 @@
-"""What a board's PWM unit and three of its pins act upon, whatever stands there in a machine."""
+"""Interface of the device that a board's PWM unit and three of its pins drive, in any machine."""
 
 import cython
 
 
 @cython.cclass
 class Bridge:
-    """Takes what a board writes, with the instant. Ranger's H-bridge is `plant.electrics.drive.Drive`."""
+    """Takes a board's writes, with their times. Ranger's H-bridge is `plant.electrics.drive.Drive`."""
 
     @cython.ccall
     def write_pwm(

@@ -1,6 +1,6 @@
-"""What the harness needs of any machine's body: steps of equal length, and sensors that show each of them.
+"""Interface of any machine's body for the harness: steps of equal length, and sensors that show each of them.
 
-Ranger's is plant/ranger.py. A machine of your own is a subclass; plain Python does, a step takes as long as it takes:
+Ranger's is plant/ranger.py. Your own machine is a subclass; plain Python is enough, at any speed:
 
     class Arm(Plant):
         def __init__(self):
@@ -26,15 +26,15 @@ class Plant:
 
     Towards the boards: `bridges` (Bridge) that their PWM and pins drive; `encoders`, each with its `edges`
     (IncrementalEncoder); `analog_start` and `analog_end`, each voltage at the ends of the step, V, a straight line
-    between; `words` of digital sensors, which stand for a step.
+    between; `words` of digital sensors, constant during a step.
 
-    Towards the harness: `sample_names`, {name: unit} of what `fill_sample` writes; `fell`: it can go no further, with
-    the reason in `fall_cause`; `steps` and `distance_m`, for machines that walk.
+    Towards the harness: `sample_names`, {name: unit} of the values that `fill_sample` writes; `fell`: it cannot
+    continue, with the reason in `fall_cause`; `steps` and `distance_m`, for machines that walk.
 
     Towards faults, for those that a machine's places take: `encoder_rad`, `analog_line`, `analog_value`.
     """
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     time_ns: cython.longlong
     step_ns: cython.longlong
     steps: cython.longlong
@@ -76,7 +76,7 @@ class Plant:
         raise NotImplementedError
 
     def analog_value(self, number) -> float:
-        """What that sensor measures now, in its unit."""
+        """Present reading of that sensor, in its unit."""
         raise NotImplementedError
 
     @cython.ccall

@@ -1,11 +1,11 @@
 """The physical robot in one object: body, motors, battery, sensors, steering, floor; 250 us a step.
 
 A step in order (EQUATIONS 15): currents of the motors at the rates of its middle, in closed form; the body under
-their mean torques, events located inside; steering; then everything the boards can see, as straight lines between
-start and end of the step, and every encoder edge with its time.
+their mean torques, events located inside; steering; then all signals to the boards, as straight lines between start and
+end of the step, and every encoder edge with its time.
 
 Seen from the boards: `motors` with their drives, `encoders` with their edges, `analog_start` and `analog_end`,
-`words`, `imu`. Seen from outside: `body`, `record`, `steering`, and the few fields a harness asks every step.
+`words`, `imu`. Seen from outside: `body`, `record`, `steering`, and the few fields a harness reads every step.
 """
 
 import cython
@@ -72,7 +72,7 @@ SAMPLES = {
 
 
 # Share of the hip joint's edges that bounce: the joint's encoder interpolates 2048 lines from a magnet, and the hip
-# board told of glitches of it in 37 to 83 % of the logs' cycles (robot.md T3). The share is chosen by us, for a few a
+# board reported glitches of it in 37 to 83 % of the logs' cycles (robot.md T3). The share is chosen by us, for a few a
 # second.
 HIP_BOUNCE = 0.01
 
@@ -86,7 +86,7 @@ class RangerPlant(Plant):
     when None). `start_ns`: virtual time at power-up.
     """
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     changes: cython.longlong
     step_s: cython.double
     zero: cython.double
@@ -167,7 +167,7 @@ class RangerPlant(Plant):
         self.analog_start = self.electrics.analog_start
         self.analog_end = self.electrics.analog_end
 
-        # the walk, as a harness asks for it every step
+        # the walk, as a harness reads it every step
         self.strike_time_ns = start_ns
         self.lift_off_time_ns = -1
         self.step_length_m = 0.0
@@ -180,7 +180,7 @@ class RangerPlant(Plant):
             terms.load(model_file).apply(self)
         self._settle()
 
-    # ---- what the operator does -------------------------------------------------------------------------------
+    # ---- actions of the operator ------------------------------------------------------------------------------
 
     @cython.ccall
     @cython.exceptval(check=True)
@@ -195,7 +195,7 @@ class RangerPlant(Plant):
     ) -> cython.void:
         """Put the robot in this pose and keep its legs there; feet and motors are free.
 
-        stance: "outer" or "inner", the legs that stand with the robot's weight, or hang when `lifted`; lean_rad:
+        stance: "outer" or "inner", the legs that carry the robot's weight, or hang when `lifted`; lean_rad:
         theirs, forward; hip_angle_rad: inner legs ahead; ankle angles as the joints measure them, motors alike.
         """
         b: Body = self.body
@@ -224,7 +224,7 @@ class RangerPlant(Plant):
     @cython.ccall
     @cython.exceptval(check=True)
     def begin(self) -> cython.void:
-        """Everything that counts from the moment the robot is let go."""
+        """Reset everything that counts from the robot's release."""
         for motor in self.motors:
             motor.drawn_before_J = motor.drawn_J
         self.steering.begin(self.body.hip_x)
@@ -233,7 +233,7 @@ class RangerPlant(Plant):
     @cython.ccall
     @cython.exceptval(check=True)
     def _settle(self) -> cython.void:
-        """Sensors as if the robot had stood like this for long, from here on."""
+        """Settle the sensors, as if the robot had been in this state for a long time."""
         b: Body = self.body
         o: Leg = b.outer
         i: Leg = b.inner
@@ -292,7 +292,7 @@ class RangerPlant(Plant):
             e.turn_motors(t0, t1, h0, p0, n0, h0_rate, p0_rate, n0_rate)
         e.step_motors(t0, t1, h0_rate, p0_rate, n0_rate, s.rate, self.jumped)
         if e.battery.cut_off and b.mode != FALLEN:
-            # neither motors nor computers have power: the walk ends here, before the robot falls of it
+            # neither motors nor computers have power: the walk ends here, before the robot falls because of it
             b.step_start_ns = t0
             b.elapsed = 0.0
             fall(b, "battery empty" if e.battery.charge <= 0.0 else "battery protection opened")
@@ -353,7 +353,7 @@ class RangerPlant(Plant):
 
     @cython.ccall
     def _note(self) -> None:
-        """Copy what a harness asks for every step out of the record; only after something happened."""
+        """Copy the fields that a harness reads every step from the record; only after an event."""
         r = self.record
         self.changes = self.body.changes
         self.jumped = True
@@ -368,7 +368,7 @@ class RangerPlant(Plant):
     # ---- looking from outside ---------------------------------------------------------------------------------
 
     def encoder_rad(self, number) -> float:
-        """Of a joint, or of what its motor's shaft shows of it."""
+        """Angle of a joint, or as seen from its motor's shaft."""
         body = self.body
         if self.encoders[number] in (self.hip_joint, self.hip_motor):
             return body.outer.angle - body.inner.angle
@@ -452,7 +452,7 @@ class RangerPlant(Plant):
         return self.electrics.battery.voltage_V
 
     def geometry(self):
-        """What a drawing needs: lengths in m, angles in rad."""
+        """Data for a drawing: lengths in m, angles in rad."""
         p = self.parameters
         return {
             "leg": p.leg_length_m,

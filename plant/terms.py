@@ -8,11 +8,11 @@ A model file is TOML, one table per term:
     amplitude_Nm = 0.05
     periods_per_turn = 12
 
-A file that a diagnosis wrote says in [diagnosis] what it was found by (sysid/model_file.py).
+A file written by a diagnosis names its method in [diagnosis] (sysid/model_file.py).
 
-`FORMS` says which forms there are, where each may stand, and its parameters with unit and limits. Everything a
-file can get wrong is a UserError that names file, term, field and limit. A plant without terms does no extra work:
-torques are asked for only when there are any, and sensors and windings keep their neutral numbers.
+`FORMS` lists the forms, their possible places, and their parameters with unit and limits. Every fault of a file is a
+UserError that names file, term, field and limit. A plant without terms does no extra work: torques are computed only
+when there are any, and sensors and windings keep their neutral numbers.
 """
 
 import dataclasses
@@ -57,7 +57,7 @@ class Parameter:
 
 @dataclasses.dataclass(frozen=True)
 class Form:
-    """A named effect: where it may stand, its parameters in order, and what it does in one sentence."""
+    """A named effect: its possible places, its parameters in order, and its effect in one sentence."""
 
     name: str
     places: tuple[str, ...]
@@ -296,7 +296,7 @@ class Term:
 
 
 def describe() -> str:
-    """All forms with places, parameters, units and limits, as text for a person."""
+    """All forms with places, parameters, units and limits, as readable text."""
     lines = []
     for form in FORMS.values():
         lines.append(f"{form.name}: {form.meaning}")
@@ -343,7 +343,7 @@ class Model:
 
     def __init__(self, tables: Any, source: str = "model") -> None:
         self.source = source
-        self.left_out: list[str] = []  # what a diagnosis found, and the user leaves out
+        self.left_out: list[str] = []  # effects found by a diagnosis that the user leaves out
         self.terms = [_check(f"{source}: term {number}", table) for number, table in enumerate(tables, 1)]
 
     def apply(self, plant: Any) -> None:
@@ -382,7 +382,7 @@ class Model:
             plant.body.terms = rows
 
     def _ripples_are_possible(self) -> None:
-        """UserError where ripples together would turn a motor's torque constant round."""
+        """Raise UserError where ripples together would reverse a motor's torque constant."""
         sums: dict[str, float] = {}
         for term in self.terms:
             if term.form.name == "commutation_ripple":
@@ -408,7 +408,7 @@ def _apply_electric(unit: Any, term: Term) -> None:
         unit.series_ohm += value
     elif name == "torque_constant_change":
         unit.K *= value
-        # heat makes K anew from the parameters
+        # heat recomputes K from the parameters
         constant = value * unit.parameters.torque_constant_Nm_per_A
         unit.parameters = dataclasses.replace(unit.parameters, torque_constant_Nm_per_A=constant)
     elif name == "contact_drop_change":
@@ -467,9 +467,9 @@ def _apply_imu(imu: Any, term: Term) -> None:
 
 
 def load(path: str | pathlib.Path) -> Model:
-    """The model of a TOML file; UserError with file, term, field and limit for everything wrong in it.
+    """The model of a TOML file; UserError with file, term, field and limit for every fault.
 
-    What a diagnosis found and no form can be is refused, unless the file says that it is left out.
+    An effect found by a diagnosis that no form describes is refused, unless the file marks it as left out.
     """
     content = content_of(path)
     model = Model(content.get("term", []), str(path))
@@ -486,7 +486,7 @@ def load(path: str | pathlib.Path) -> Model:
 
 
 def content_of(path: str | pathlib.Path) -> dict[str, Any]:
-    """The tables of a model file; of [diagnosis] kinds are checked, and that numbers are finite."""
+    """The tables of a model file; in [diagnosis] it checks types, and that numbers are finite."""
     path = pathlib.Path(path)
     content = toml_file.load(path)
     unknown = [key for key in content if key not in ("term", "title", "diagnosis")]

@@ -1,4 +1,4 @@
-"""Where the plant meets the boards: the index of every voltage, word and encoder that leaves it.
+"""Interface between plant and boards: the index of every voltage, word and encoder output.
 
 Plain numbers, no behaviour: the plant fills arrays in this order and the assembly wires them to pins.
 """

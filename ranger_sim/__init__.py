@@ -1,4 +1,4 @@
-"""The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one walking body.
+"""Emulation of the whole Cornell Ranger biped: seven boards' firmware, four CAN buses, one walking body.
 
     from ranger_sim import Ranger, Scenario
 
@@ -6,26 +6,26 @@
     robot.run_for(5.0)
     print(robot.steps, robot.variable("MCH_ANGLE"), robot.board("MCH").scheduler.max_slot_cycles)
 
-What a user needs by name:
+The public names:
 
-    Ranger      one robot in one scenario: pass time, look in, reach in
-    Scenario    what is to be run: seed, controller, slope, floor, model of motors, joints and sensors
+    Ranger      one robot in one scenario: advance time, read and change its state
+    Scenario    what to run: seed, controller, slope, floor, model of motors, joints and sensors
     StopRule    when a walk is done: steps, time or distance
-    Quirks      in what the firmware is to follow the one of 2016 instead of the appendix
-    Profile     which boards and buses are real, on what bit rates and schedules the buses run; `load_profile` reads one
-    UserError   a mistake of the user, told in one line
+    Quirks      where the firmware follows the one of 2016 instead of the appendix
+    Profile     which boards and buses are real, bit rates and schedules of the buses; `load_profile` reads one
+    UserError   a mistake of the user, reported in one line
 
 Everything else is internal and changes without notice; CAN programs find the interface `ranger_sim` by python-can.
 
-The rooms (`ranger_sim.boards`, `ranger_sim.plant`, ...) are top-level folders of the repository; importing this package
-finds them and chooses, once for all of them, whether compiled or plain modules run (`ranger_sim.loading`). It loads
-none of them: each name is imported when it is first asked for (PEP 562).
+The packages (`ranger_sim.boards`, `ranger_sim.plant`, ...) are top-level folders of the repository; importing this
+package finds them and chooses, once for all of them, whether compiled or plain modules run (`ranger_sim.loading`). It
+loads no package: each name is imported on first use (PEP 562).
 """
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from ranger_sim import loading  # noqa: F401  (first: it finds the rooms)
+from ranger_sim import loading  # noqa: F401  (first: it finds the packages)
 
 if TYPE_CHECKING:
     from ranger_sim.boards.quirks import Quirks

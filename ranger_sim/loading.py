@@ -1,8 +1,8 @@
-"""Whether the compiled modules run, decided once, when `ranger_sim` is imported.
+"""Decide once, when `ranger_sim` is imported, whether the compiled modules run.
 
-A module that says `import cython` is compiled where a C compiler is found (setup.py). In an installation its library
-lies next to its source, where Python finds it by itself. In a checkout the libraries are below `build/compiled`; they
-are used while they are those of the sources as they are, and not when the environment variable
+A module that contains `import cython` is compiled where a C compiler is found (setup.py). In an installation its
+library lies next to its source, where Python finds it without help. In a checkout the libraries are below
+`build/compiled`; they are used while they match the present sources, and not when the environment variable
 ``RANGER_SIM_INTERPRETED`` is set to anything but an empty string or ``0``. All of them or none: a compiled module reads
 the fields of another one's classes at fixed places.
 
@@ -44,7 +44,7 @@ def packages() -> tuple[str, ...]:
 
 
 def refuse_files_for_links() -> None:
-    """ImportError where a checkout or an unpacking program has made files of the links to the packages."""
+    """Raise ImportError where a checkout or an unpacking program has turned the links to the packages into files."""
     for path in PACKAGE.iterdir():
         if path.is_file() and path.suffix == "" and path.read_bytes() == f"../{path.name}".encode():
             raise ImportError(
@@ -73,7 +73,7 @@ def module_at(place: str) -> str:
 def sources(known: dict[str, list[Any]]) -> dict[str, list[Any]]:
     """{place inside the package: [time of its change in ns, size, mark of its content]} of all sources, sorted.
 
-    The mark is empty for a module that is not compiled. known: the same of an earlier time; a file whose time and size
+    The mark is empty for a module that is not compiled. known: an earlier result; a file whose time and size
     are equal is not read again.
     """
     found = {}
@@ -98,7 +98,7 @@ def sources(known: dict[str, list[Any]]) -> dict[str, list[Any]]:
 
 
 def read_record(folder: Path | None) -> dict[str, Any]:
-    """What the build wrote: {"compiled": bool, "reason": why not, "sources": as `sources` gives them}."""
+    """The record of the build: {"compiled": bool, "reason": why not, "sources": as `sources` gives them}."""
     record: dict[str, Any] = {"compiled": False, "sources": {}}
     if folder is None:
         return record | {"reason": "nothing was built here"}
@@ -172,5 +172,5 @@ COMPILED_MODULES = frozenset(
     for place, (_, _, mark) in BUILD["sources"].items()
     if RUNS_COMPILED and mark and place.endswith(".py")
 )
-if (CHECKOUT is not None) == RUNS_COMPILED:  # else Python's own way is right: libraries next to sources, or no library
+if (CHECKOUT is not None) == RUNS_COMPILED:  # otherwise Python's default fits: libraries next to sources, or none
     choose(COMPILED if RUNS_COMPILED else None)

@@ -1,1 +1,1 @@
-"""Where the emulated buses meet the CAN world: python-can messages and candump logs. The only such place."""
+"""The only package that connects the emulated buses to other CAN software: python-can messages and candump logs."""

@@ -1,7 +1,7 @@
-"""Where other processes attach to emulated buses: a server on an abstract unix socket.
+"""Server on an abstract unix socket, through which other processes attach to emulated buses.
 
-It has no thread and never blocks: the process that owns the buses polls it. Nothing a client sends can do more than
-end that client's own connection; how much it may ask for is in `foundation/peers.py`.
+It has no thread and never blocks: the process that owns the buses polls it. Bad input from a client can only end that
+client's connection; `foundation/peers.py` limits its requests.
 """
 
 import errno
@@ -39,14 +39,14 @@ class _Client(Connection):
         self.outstanding = 0  # SEND records without an answer yet
         self.missed = 0
         self.overflowing = False
-        self.state = b""  # the latest STATE record, while there is no room for it
+        self.state = b""  # the latest STATE record, while it does not fit
 
 
 class AttachServer(StreamServer[_Client]):
     """Lets other processes attach to `buses`, {channel: Bus}, under `name`.
 
-    UserError when the name is taken or impossible, or where there are no abstract sockets. `epoch_ns` is added to
-    every stamp that leaves. A process that forks must close its copy.
+    UserError when the name is taken or impossible, or where there are no abstract sockets. `epoch_ns` is added to every
+    stamp sent. A process that forks must close its copy.
     """
 
     def __init__(self, name: str, buses: Mapping[str, Bus | Taps], epoch_ns: int = 0) -> None:
@@ -128,7 +128,7 @@ class AttachServer(StreamServer[_Client]):
             raise MalformedError(f"record type {kind} is not for a client to send")
 
     def _greet(self, client: _Client, body: bytes) -> None:
-        """HELLO: the client becomes a node of its channel, or hears which channels there are."""
+        """HELLO: the client becomes a node of its channel, or receives the list of channels."""
         if client.tap is not None:
             raise MalformedError("a second HELLO")
         if len(body) < wire.HELLO_BODY.size:
@@ -167,7 +167,7 @@ class AttachServer(StreamServer[_Client]):
         )
 
     def _tell(self, client: _Client) -> None:
-        """What happened on the bus, as records. Of a client that is far behind, frames are dropped and counted."""
+        """Send bus events as records. For a client that is far behind, frames are dropped and counted."""
         tap = client.tap
         if tap is None or not tap.events and not client.state:
             return
@@ -183,7 +183,7 @@ class AttachServer(StreamServer[_Client]):
                 if len(out) < backlog:
                     client.answer(state)
                 else:
-                    client.state = state  # an older one is of no use any more
+                    client.state = state  # it replaces an older one
                 continue
             if kind == RECEIVED:
                 if len(out) >= backlog:

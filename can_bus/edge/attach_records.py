@@ -1,6 +1,6 @@
-"""The attach protocol on the wire: records over a stream. ATTACH.md is its description for other languages.
+"""The attach protocol on the wire: records over a stream. ATTACH.md describes it for other languages.
 
-A record is `length` (unsigned 32 bits, of what follows), `type` (one byte), body. All numbers are little-endian.
+A record is `length` (unsigned 32 bits, of the rest), `type` (one byte), body. All numbers are little-endian.
 """
 
 import struct
@@ -14,21 +14,21 @@ VERSION = 1
 MAGIC = b"RNGR"
 SOCKET_PREFIX = "\0ranger-sim/"
 DEFAULT_NAME = "ranger"
-NAME_LIMIT = 64  # characters; an abstract address has room for 107 bytes (unix(7))
+NAME_LIMIT = 64  # characters; an abstract address holds 107 bytes (unix(7))
 RECORD_LIMIT = 1024  # bytes of type and body; chosen by us: the longest is a list of channels or a reason
 
-HELLO = 1  # client: magic, version (u16), options (u16), name of the channel in UTF-8; none: only tell me the channels
+HELLO = 1  # client: magic, version (u16), options (u16), name of the channel in UTF-8; none: only list the channels
 WELCOME = 2  # server: version (u16), window (u16), bit rate (u32), epoch (i64 ns), channels in UTF-8, one per line
 REFUSED = 3  # server: reason in UTF-8; the connection ends
 SEND = 4  # client: identifier (u32), flags (u16), data bytes 0-3 and 4-7 (u32 each)
 FRAME = 5  # server: time (i64 ns), then as SEND
 SENT = 6  # server: your oldest frame is on the bus whole; body as FRAME
-DROPPED = 7  # server: your oldest frame never will be; body as FRAME
+DROPPED = 7  # server: your oldest frame will never be sent; body as FRAME
 STATE = 8  # server: time (i64 ns), state (u16), transmit errors (u16), receive errors (u16)
 CONTROL = 9  # client: one byte, ACTIVATE, LISTEN or FLUSH
-OVERFLOW = 10  # server: time (i64 ns), how many frames you have missed so far (u64)
+OVERFLOW = 10  # server: time (i64 ns), number of frames that you have missed so far (u64)
 
-OPTION_LISTEN = 1  # HELLO: begin listening only
+OPTION_LISTEN = 1  # HELLO: start in listen-only mode
 ACTIVATE, LISTEN, FLUSH = 1, 2, 3
 
 HEAD = struct.Struct("<IB")
@@ -44,7 +44,7 @@ LENGTH = struct.Struct("<I")
 
 
 class MalformedError(Exception):
-    """What arrived is not a record of this protocol; the text says why."""
+    """Input is not a record of this protocol; the text gives the reason."""
 
 
 def record(kind: int, body: bytes = b"") -> bytes:
@@ -63,8 +63,8 @@ def frame_record(kind: int, time_ns: int, identifier: int, flags: int, lo: int, 
 
 
 def records_of(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(type, body) of every whole record in the buffer, which they leave. MalformedError for a senseless length."""
-    at = 0  # the buffer is cut once, at the end: a client hears many at a time
+    """(type, body) of every whole record in the buffer, removing them. MalformedError for an invalid length."""
+    at = 0  # the buffer is cut once, at the end: a client receives many at a time
     try:
         while len(buffer) - at >= HEAD.size:
             length, kind = HEAD.unpack_from(buffer, at)
@@ -81,7 +81,7 @@ def records_of(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
 
 
 def next_record(buffer: bytearray) -> tuple[int, bytes] | None:
-    """(type, body) of the first record in the buffer, which it leaves; None while it is not whole. As `records_of`."""
+    """(type, body) of the first record, removing it from the buffer; None while it is not whole. As `records_of`."""
     if len(buffer) < HEAD.size:
         return None
     length, kind = HEAD.unpack_from(buffer)

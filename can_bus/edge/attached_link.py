@@ -59,12 +59,12 @@ class AttachedLink(Link):
         self.waiter.register(self.socket, select.POLLIN)
         self.epoll: select.epoll | None = None
         with self.changed:
-            self._understand()  # frames may have come directly behind the welcome
+            self._understand()  # frames may have arrived directly after the welcome
 
     def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
         """Queue a frame, waiting up to `timeout` s for a place.
 
-        None: as long as frames go out. Where nobody acknowledges, QueueFullError tells it.
+        None: as long as frames are being sent. Raises QueueFullError where no node acknowledges.
         """
         with self.changed:
             if self.outstanding >= self.window:
@@ -82,7 +82,7 @@ class AttachedLink(Link):
             self._write(wire.send_record(identifier, flags, lo, hi))
 
     def _wait_while_heard(self) -> None:
-        """Until there is a place, or the controller is error passive and has been rid of nothing for UNHEARD_S."""
+        """Wait for a place, or until the controller is error passive and has sent nothing for UNHEARD_S."""
         while self.outstanding >= self.window and not (self.gone or self.closed):
             passive = self.state == ERROR_PASSIVE
             self._wait(lambda: self.outstanding < self.window, UNHEARD_S)
@@ -104,18 +104,18 @@ class AttachedLink(Link):
         self._control(wire.LISTEN)
 
     def flush(self) -> None:
-        """Drop what waits to be sent."""
+        """Drop the frames that wait to be sent."""
         self._control(wire.FLUSH)
 
     def present_state(self) -> int:
-        """The controller's state as far as the other side has told it."""
+        """The controller's state as last reported by the other side."""
         with self.changed:
             if not self.reading and not self.gone and not self.closed:
                 self._read(0.0)
             return self.state
 
     def fileno(self) -> int:
-        """A descriptor that is readable when `receive` has something, or may have after a look."""
+        """A descriptor that is readable when `receive` has something, or may have something."""
         with self.changed:
             if self.closed:
                 self._check()
@@ -127,13 +127,13 @@ class AttachedLink(Link):
             return self.epoll.fileno()
 
     def close(self) -> None:
-        """Leave; what is queued is still sent by the other side."""
+        """Leave; the other side still sends queued frames."""
         with self.changed:
             if self.closed:
                 return
             self.closed = True
             with suppress(OSError):
-                self.socket.shutdown(socket.SHUT_RDWR)  # whoever waits in another thread wakes up
+                self.socket.shutdown(socket.SHUT_RDWR)  # wakes threads that wait
             self.changed.notify_all()
         if self.epoll is not None:
             self.epoll.close()
@@ -155,12 +155,13 @@ class AttachedLink(Link):
         try:
             self.socket.sendall(data)
         except OSError as error:
-            self._read(0.0)  # why, if the other side has said it
+            self._read(0.0)  # the reason, if the other side has sent one
             self.gone = self.gone or f"the other side has gone ({error.strerror})"
             self._check()
 
     def _wait(self, ready: Callable[[], bool], timeout: float | None) -> None:
-        """Until `ready()`, the time is over or the other side is gone. One thread reads, the others wait for it."""
+        """Wait until `ready()`, the time is over or the other side is gone. One thread reads, the others wait for
+        it."""
         end = FOR_EVER if timeout is None else wallclock.monotonic_s() + max(timeout, 0.0)
         first = True
         while not (ready() or self.gone or self.closed):
@@ -175,7 +176,7 @@ class AttachedLink(Link):
                 self._read(left)
 
     def _read(self, timeout: float) -> None:
-        """Everything that has come in, after waiting up to `timeout` s for something. Lets go of the lock meanwhile."""
+        """Everything that has arrived, after waiting up to `timeout` s. Releases the lock meanwhile."""
         if timeout > 0.0:
             self.reading = True
             self.changed.release()
@@ -202,7 +203,7 @@ class AttachedLink(Link):
         self.changed.notify_all()
 
     def _understand(self) -> None:
-        """The records that have come in, one after the other."""
+        """Process the received records in order."""
         frame_size, unpack = wire.FRAME_BODY.size, wire.FRAME_BODY.unpack
         for kind, body in wire.records_of(self.incoming):
             if kind == wire.FRAME and len(body) == frame_size:
@@ -228,10 +229,10 @@ Welcome = tuple[int, int, int, int, list[str], bytearray]
 def greeted(
     name: str, channel: str, options: int = 0, patience_s: float = HANDSHAKE_S
 ) -> tuple[socket.socket, Welcome]:
-    """A connection to the robot `name` and what it said: version, window, bit rate, epoch, channels, the rest.
+    """A connection to the robot `name` and its welcome: version, window, bit rate, epoch, channels, the rest.
 
-    FileNotFoundError when nobody of that name is running; UserError when it refuses, is not understood, or belongs to
-    another user.
+    FileNotFoundError when no process of that name is running; UserError when it refuses, sends an invalid answer, or
+    belongs to another user.
     """
     address = wire.address_of(name)
     try:

@@ -1,6 +1,6 @@
-"""The same work on our python-can interface and on python-can's own interfaces that need no adapter.
+"""Benchmark our python-can interface against python-can's own interfaces that need no adapter.
 
-`python -m ranger_sim.can_bus.edge.benchmark` is not for people: it is the sender and the host in the two-process
+`python -m ranger_sim.can_bus.edge.benchmark` is not for users: it runs the sender and the host of the two-process
 measurement.
 """
 
@@ -19,10 +19,10 @@ from ranger_sim.foundation import wallclock
 
 IDENTIFIERS = 16  # per sender
 SPACING = 64  # between the first identifiers of two senders
-SILENCE_S = 2.0  # after so long without a frame, what has not come is lost
+SILENCE_S = 2.0  # after this long without a frame, the missing frames are lost
 MULTICAST_GROUP = "239.74.163.2"  # python-can's default group for IPv4
 
-# How each interface is opened, {options} with {channel}; ours at full speed, as the others have no bit timing.
+# Options that open each interface, {options} with {channel}; ours at full speed, as the others have no bit timing.
 OPENED: dict[str, dict[str, Any]] = {
     "ranger_sim": {"interface": "ranger_sim", "speed": "max", "private": True, "rx_queue_size": 10_000_000},
     "virtual": {"interface": "virtual"},
@@ -40,9 +40,9 @@ def opened(interface: str, channel: str) -> can.BusABC:
 
 
 class Tally:
-    """Frames that one reader has heard: how many, and how many came out of the order of their identifier.
+    """Frames that one reader has received: their number, and how many arrived out of order within their identifier.
 
-    Those of the reader itself (`own`) do not count: `udp_multicast` gives them back unasked.
+    Those of the reader itself (`own`) do not count: `udp_multicast` returns them unrequested.
     """
 
     def __init__(self, own: int = -1) -> None:
@@ -73,7 +73,7 @@ def numbered(sender: int, number: int) -> can.Message:
 def interface_frames(interface: str, frames: int, nodes: int = 3) -> dict:
     """`frames` through an interface in one thread: each is received by the `nodes` - 1 others.
 
-    The nodes send in turn and everybody empties its queue after each round, so that no queue grows. Figures:
+    The nodes send in turn and each node empties its queue after each round, so that no queue grows. Figures:
     frames, delivered, lost, reordered (within an identifier, at any reader), cpu_s, wall_s, frames_per_s (of processor
     time).
     """
@@ -90,7 +90,7 @@ def interface_frames(interface: str, frames: int, nodes: int = 3) -> dict:
                     tally.take(message)
         cpu_s = max(wallclock.process_cpu_s() - start, 1e-9)
         wall_s = wallclock.monotonic_s() - wall
-        for bus, tally in zip(buses, tallies, strict=True):  # what is still on its way
+        for bus, tally in zip(buses, tallies, strict=True):  # frames still in transit
             while tally.heard < frames - frames // nodes and (message := bus.recv(0.05)) is not None:
                 tally.take(message)
     delivered = sum(tally.heard for tally in tallies)
@@ -109,7 +109,7 @@ def two_processes(interface: str, frames: int) -> dict:
     """A burst of `frames` from one process to another, as fast as the interface takes them.
 
     `ranger_sim` goes through a third process, the host of the bus. Figures: frames, delivered, lost, reordered,
-    wall_s (first to last frame heard), frames_per_s (of wall-clock time: several processes share the work).
+    wall_s (first to last frame received), frames_per_s (of wall-clock time: several processes share the work).
     """
     tally = Tally()
     first = last = 0.0
@@ -154,7 +154,7 @@ class _helper:  # noqa: N801  (used like a function)
         return self
 
     def wait_for(self, word: str) -> None:
-        """Until it says so."""
+        """Wait until it reports that."""
         assert self.process.stdout is not None
         while word not in (line := self.process.stdout.readline()):
             if not line:

@@ -3,7 +3,7 @@
 One line per frame: `(seconds.microseconds) interface identifier#data`; three hexadecimal digits are a
 standard identifier, eight an extended one; `#R` and a length is a remote frame. An error frame is
 written as identifier 20000080 (error flag of SocketCAN and its class "bus error") with the field of the
-error in byte 3 (linux/can/error.h: where the violation was seen, the same codes as in can_bus.frame).
+error in byte 3 (linux/can/error.h: the position of the violation, the same codes as in can_bus.frame).
 Nanoseconds are cut to microseconds, the resolution of the format; the time is the receivers'.
 """
 
@@ -39,7 +39,7 @@ def line_of_frame(interface: str, time_ns: int, identifier: int, flags: int, lo:
 class CandumpWriter:
     """Writes frames of one or more buses to a file. A context manager.
 
-    UserError when the file cannot be opened, OSError when it takes no more; it ends with a whole line in any case.
+    UserError when the file cannot be opened, OSError when writing fails; the file always ends with a whole line.
     `frames` counts the lines.
     """
 
@@ -47,7 +47,7 @@ class CandumpWriter:
         self.path = pathlib.Path(path)
         self.frames = 0
         try:
-            # no buffer: a program that is killed leaves what it wrote, and a full disk is noticed at once
+            # unbuffered: the output of a killed program is kept, and a full disk is detected at once
             self.file = self.path.open("wb", buffering=0)
         except OSError as error:
             raise UserError(f"{self.path}: the frame log cannot be written ({error.strerror})") from None
@@ -97,7 +97,7 @@ def read_candump(path: str | pathlib.Path) -> Iterator[tuple[str, int, int, int,
 
 
 def frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:
-    """One line of a log; ValueError says what is wrong with it."""
+    """One line of a log; ValueError describes its fault."""
     parts = line.split()
     if len(parts) == 4 and parts[3] in ("R", "T"):
         del parts[3]

@@ -1,7 +1,7 @@
-"""Is a CAN interface there, up, and set as it should be? What the kernel says of it, and what passes on it.
+"""Check that a CAN interface exists, is up and is configured correctly, from the kernel's report and its traffic.
 
-Every finding is (what, ok, text, mend): `mend` is the command that mends it, empty where there is nothing to mend.
-What is read is given by functions, so that all of it can be tested without an interface.
+Every finding is (what, ok, text, mend): `mend` is the command that corrects it, empty where nothing is wrong. Functions
+supply all input, so that everything can be tested without an interface.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NO_DEVICE = "does not exist"
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """One thing looked at. `ok` None: told, neither good nor bad."""
+    """One checked item. `ok` None: informative, neither good nor bad."""
 
     what: str
     ok: bool | None
@@ -36,7 +36,7 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Traffic:
-    """What passed while listening: frames, error frames, frames by identifier."""
+    """Traffic while listening: frames, error frames, frames by identifier."""
 
     seconds: float
     frames: int
@@ -49,9 +49,9 @@ class NotReadError(Exception):
 
 
 def read_link(device: str, sys_folder: pathlib.Path = pathlib.Path("/sys/class/net")) -> dict[str, Any]:
-    """What `ip -details -statistics -json link show` says of a network device; NotReadError when there is none.
+    """Output of `ip -details -statistics -json link show` for a network device; NotReadError when it does not exist.
 
-    Without the program `ip` the little that /sys tells: flags and link type.
+    Without the program `ip`, only the contents of /sys: flags and link type.
     """
     call = ["ip", "-details", "-statistics", "-json", "link", "show", "dev", device]
     try:
@@ -101,10 +101,10 @@ def read_sys(device: str, folder: pathlib.Path) -> dict[str, Any]:
 
 
 def listen(arguments: Mapping[str, Any], seconds: float) -> Traffic:
-    """Open a python-can bus and hear for so long; NotReadError when it cannot be opened."""
+    """Open a python-can bus and receive for that long; NotReadError when it cannot be opened."""
     try:
         bus = can.Bus(**arguments)
-    except Exception as error:  # drivers raise what they like: missing libraries, devices, permissions
+    except Exception as error:  # drivers raise many types: missing libraries, devices, permissions
         raise NotReadError(" ".join(f"{type(error).__name__}: {error}".split())) from None
     frames = errors = 0
     identifiers: dict[int, int] = {}
@@ -206,7 +206,7 @@ def _controller(
 def check_traffic(
     device: str, traffic: Traffic, known: Mapping[int, str], expected: Mapping[int, str]
 ) -> list[Finding]:
-    """Findings about what passed: `known` identifier -> name; `expected`: those of which some must be seen."""
+    """Findings about the traffic: `known` identifier -> name; `expected`: identifiers of which some must be seen."""
     rate = traffic.frames / traffic.seconds if traffic.seconds > 0 else 0.0
     watch = f"candump -e {device}"
     names = [name for identifier, name in sorted(known.items()) if identifier in traffic.identifiers]

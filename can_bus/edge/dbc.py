@@ -19,15 +19,15 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     """(messages, bit rate in bit/s, names of those without a cycle time) of a DBC file.
 
     Period: GenMsgCycleTime, in ms; deadline the same; no jitter; every node sends its frames by priority. Bit rate: as
-    given, else the file's attribute Baudrate. UserError for what cannot be read or is not classic CAN.
+    given, else the file's attribute Baudrate. UserError for a file that cannot be read or is not classic CAN.
     """
-    import cantools  # only here: half a second
+    import cantools  # imported only here: half a second
 
     try:
         database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
-    except Exception as error:  # what a broken file makes of cantools is of many kinds
+    except Exception as error:  # a broken file makes cantools raise many types
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise UserError(f"{path}: not a DBC file that cantools can read: {said}") from None
     if not isinstance(database, cantools.database.can.Database):

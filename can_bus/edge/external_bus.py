@@ -1,15 +1,15 @@
-"""One of the robot's buses outside the simulation: every controller is a peer of its own on a python-can interface.
+"""One of the robot's buses outside the simulation: every controller is a separate peer on a python-can interface.
 
-Each controller has a python-can bus to itself, so on SocketCAN the boards hear each other, candump and whatever else
-is there, exactly as programs of their own would. All peers live in the process that owns virtual time, because frames
-from outside get their stamps there; a board's process never sees a wall clock.
+Each controller has a python-can bus to itself, so on SocketCAN the boards receive each other, candump and all other
+programs, exactly as separate programs would. All peers live in the process that owns virtual time, because external
+frames get their stamps there; a board's process never sees a wall clock.
 
-Such a bus is asynchronous: what comes in depends on the wall clock, and no run on it can be repeated. Arbitration,
+Such a bus is asynchronous: received frames depend on the wall clock, and no run on it can be repeated. Arbitration,
 acknowledgement and the wire are those of the interface; here a controller is busy for the nominal length of its
-frame. What does not fit anywhere is counted: `not_taken` (the interface's queue was full, tried again), `overflow`
-(frames from outside faster than the bus could carry them), `refused` (CAN FD).
+frame. Frames that do not fit are counted: `not_taken` (the interface's queue was full, tried again), `overflow`
+(external frames faster than the bus could carry them), `refused` (CAN FD).
 
-What we ask of the robot is a small set of plain methods (`from_board`, `poll`), as for the other ends of wires.
+The robot uses a small set of plain methods (`from_board`, `poll`), as for the other ends of wires.
 """
 
 import argparse
@@ -42,10 +42,10 @@ from ranger_sim.foundation.events import (
 )
 from ranger_sim.foundation.user_error import UserError
 
-# Virtual time between two looks at the interfaces: half a step of the plant. Chosen by us: less brings nothing, as the
-# boards' outputs act at the plant's next step, and much more would be seen in the control loops (500 Hz).
+# Virtual time between two polls of the interfaces: half a step of the plant. Chosen by us: less has no benefit, as the
+# boards' outputs act at the plant's next step, and much more would affect the control loops (500 Hz).
 POLL_NS = 125_000
-# Frames read at once are handed on one after the other, as a bus would; further ahead than this they are dropped.
+# Frames read together are delivered one after the other, as on a bus; further ahead than this they are dropped.
 # Chosen by us: ten slots of the main brain, more than any queue in the robot holds.
 AHEAD_NS = 20_000_000
 RECEIVE_BYTES = 8 << 20  # of a socket: some 10,000 frames wait there while the robot computes; chosen by us
@@ -63,8 +63,8 @@ class _Options(argparse.ArgumentParser):
 def place_of(text: str) -> tuple[str, dict[str, Any]]:
     """("can1", keywords for can.Bus) of `can1=socketcan:vcan0`, the value of the option --bus.
 
-    Behind it may stand options of python-can, as its own programs take them (`can1=slcan:/dev/ttyACM0 --bitrate
-    1000000`). What is left out, the interface (`can1=vcan0`) or everything (`can1=`), comes from python-can's
+    Options of python-can may follow, as its own programs take them (`can1=slcan:/dev/ttyACM0 --bitrate
+    1000000`). Omitted parts, the interface (`can1=vcan0`) or everything (`can1=`), come from python-can's
     configuration: its environment variables and its files, there from the section named like the bus.
     """
     name, equals, where = text.partition("=")
@@ -108,7 +108,7 @@ def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
     def open_peer() -> Any:
         try:
             connection = can.Bus(config_context=name, **keywords)
-        except Exception as error:  # whatever a driver raises when it is not there
+        except Exception as error:  # a driver raises many types when its device is missing
             where = ":".join(str(keywords.get(each, "(by configuration)")) for each in ("interface", "channel"))
             text = " ".join(str(error).split()) or type(error).__name__
             raise UserError(f"bus {name} on {where}: {text}{hint_for(error, keywords)}") from None
@@ -119,7 +119,7 @@ def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
 
 
 def hint_for(error: Exception, keywords: dict[str, Any]) -> str:
-    """What would help against two failures that everybody meets."""
+    """Hints for two common failures."""
     if isinstance(error, OSError) and error.errno == errno.ENODEV:
         channel = keywords.get("channel", "vcan0")
         return f" (`ip link add {channel} type vcan && ip link set {channel} up` makes a virtual one)"
@@ -138,7 +138,7 @@ def widen(connection: Any) -> None:
 
 
 def dropped_by_kernel(connection: Any) -> int:
-    """Frames that found no room in the socket so far; 0 where the interface is no socket."""
+    """Frames that did not fit into the socket so far; 0 where the interface is not a socket."""
     end = getattr(connection, "socket", None)
     if not isinstance(end, socket.socket):
         return 0
@@ -167,8 +167,8 @@ class Peer:
         with suppress(NotImplementedError, OSError, ValueError):
             self.descriptor = connection.fileno()
         self.waiting: collections.deque[tuple[int, int, int, int, int]] = collections.deque()
-        self.free_ns = 0  # until then its latest frame is on the wire
-        self.read_ns = 0  # end of the latest frame handed to the board
+        self.free_ns = 0  # end of its latest frame on the wire
+        self.read_ns = 0  # end of the latest frame delivered to the board
         self.unreadable = ""
 
     def from_board(self, kind: int, time: int, b: int, c: int, d: int, e: int, f: int) -> None:
@@ -187,7 +187,7 @@ class Peer:
                 self._drop(time, {1, 2, 3})
 
     def flush(self, time: int) -> None:
-        """Give the interface what waits, as far as it takes it."""
+        """Pass waiting frames to the interface, as far as it takes them."""
         while self.waiting:
             buffer, identifier, flags, lo, hi = self.waiting[0]
             message = message_of_frame(0, identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi, is_rx=False)
@@ -209,7 +209,7 @@ class Peer:
             self.owner.seen(self, self.free_ns, identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi)
 
     def read(self, now_ns: int) -> None:
-        """Hand on what has come, one frame after the other."""
+        """Deliver the received frames, one after the other."""
         for _ in range(READ_LIMIT):
             try:
                 message = self.connection.recv(0)
@@ -251,7 +251,7 @@ class Peer:
 class ExternalBus:
     """Bus `name` of the robot at `bit_rate` (bit/s, for the length of frames). `open_peer` gives python-can buses.
 
-    `sinks`: functions (time_ns, identifier, flags, lo, hi) that hear every frame once, as the first peer does.
+    `sinks`: functions (time_ns, identifier, flags, lo, hi) that receive every frame once, as the first peer does.
     """
 
     asynchronous = True
@@ -287,15 +287,15 @@ class ExternalBus:
         return peer
 
     def remove_peer(self, peer: Peer) -> None:
-        """One that `add_peer` gave leaves the bus; what waits there is not sent."""
+        """Remove a peer of `add_peer` from the bus; its waiting frames are not sent."""
         self.peers.remove(peer)
         if peer.descriptor >= 0:
             self.poller.unregister(peer.descriptor)
         peer.connection.shutdown()
 
     def poll(self, now_ns: int) -> int:
-        """Frames in, and what waited out; returns when it wants to be polled next."""
-        ready = {descriptor for descriptor, _ in self.poller.poll(0)}  # one question for all: recv asks again
+        """Receive frames and send waiting ones; returns the time of the next poll."""
+        ready = {descriptor for descriptor, _ in self.poller.poll(0)}  # one query for all: recv queries again
         for peer in self.peers:
             if peer.waiting:
                 peer.flush(now_ns)
@@ -304,7 +304,7 @@ class ExternalBus:
         return now_ns + POLL_NS
 
     def drain(self, now_ns: int) -> None:
-        """At the end: what was sent before it belongs into the record."""
+        """Finish: record frames that were sent before the end."""
         while True:
             before = self.frames_in
             self.poll(now_ns)
@@ -312,12 +312,12 @@ class ExternalBus:
                 return
 
     def length_ns(self, identifier: int, flags: int, lo: int, hi: int) -> int:
-        """How long such a frame holds the wire, intermission included."""
+        """Time for which such a frame occupies the wire, intermission included."""
         bits = frame_bits(identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi) + INTERMISSION_BITS
         return bits * 1_000_000_000 // self.bit_rate
 
     def seen(self, peer: Peer, time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
-        """The first peer sent or received a frame: that is one frame of this bus."""
+        """Count a frame that the first peer sent or received as one frame of this bus."""
         if peer is not self.peers[0]:
             return
         length_ns = self.length_ns(identifier, flags, lo, hi)
@@ -330,12 +330,12 @@ class ExternalBus:
             sink(time_ns, identifier, flags, lo, hi)
 
     def count_error(self, peer: Peer) -> None:
-        """An error frame that the interface has told; every peer is told of it."""
+        """Pass an error frame reported by the interface to every peer."""
         if peer is self.peers[0]:
             self.errors += 1
 
     def filenos(self) -> list[int]:
-        """What to select on for reading, where the interface has such a thing."""
+        """Descriptors to select on for reading, where the interface has any."""
         return [peer.descriptor for peer in self.peers if peer.descriptor >= 0 and not peer.unreadable]
 
     def counters(self) -> dict[str, int]:

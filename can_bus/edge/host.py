@@ -1,4 +1,4 @@
-"""A host of private buses: passes their time and looks after who attaches, in one thread and without busy waiting."""
+"""A host of private buses: advances their time and serves attached clients, in one thread without busy waiting."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from ranger_sim.can_bus.edge.paced import PacedBus
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import NEVER
 
-LONGEST_NAP_S = 1.0  # so that an interrupt by the user is never late; chosen by us
+LONGEST_NAP_S = 1.0  # limits the delay of a user's interrupt; chosen by us
 
 
 class BusHost:
@@ -20,13 +20,13 @@ class BusHost:
             bus.started_ns, bus.epoch_ns = now, epoch
 
     def serve(self, server: Any) -> None:
-        """Look after this server from now on; it was made with the buses' `taps`."""
+        """Poll this server from now on; it was created with the buses' `taps`."""
         self.servers.append(server)
 
     def turn(self, patience_s: float = LONGEST_NAP_S) -> None:
-        """Once round: what clients want, the time that has passed, what clients get; then wait for the next thing.
+        """Run one cycle: read client requests, advance time, write to clients; then wait for the next event.
 
-        Nothing is read of clients behind the last advance: a frame of theirs would wait for the end of the nap.
+        Nothing is read from clients after the last advance: their frames would wait until the sleep ends.
         """
         due = NEVER
         for bus in self.buses:

@@ -1,11 +1,11 @@
-"""Which CAN interfaces python-can finds on this machine."""
+"""CAN interfaces that python-can finds on this machine."""
 
 import logging
 
 import can
 
-# Left out: `virtual` and `udp_multicast` are always there; looking for a socketcand server means listening to the
-# network for seconds.
+# Left out: `virtual` and `udp_multicast` always exist; finding a socketcand server means listening to the network for
+# seconds.
 NOT_LOOKED_FOR = {"virtual", "udp_multicast", "socketcand"}
 
 
@@ -13,7 +13,7 @@ def available_interfaces() -> list[str]:
     """`interface:channel` of every adapter or kernel interface found, e.g. `socketcan:vcan0`; sorted."""
     log = logging.getLogger("can")
     level = log.level
-    log.setLevel(logging.CRITICAL)  # drivers that are not installed announce themselves, which is no news here
+    log.setLevel(logging.CRITICAL)  # missing drivers print messages, which are not needed here
     try:
         found = can.detect_available_configs(sorted(can.VALID_INTERFACES - NOT_LOOKED_FOR))
     finally:

@@ -1,7 +1,7 @@
-"""A client's place on a bus, as a python-can bus of ours has one behind it; `attached_link.py` and `private_link.py`
-say where the bus is.
+"""A client's place on a bus, as used by our python-can bus; `attached_link.py` and `private_link.py` implement it for
+buses elsewhere and here.
 
-A link is used from any number of threads. None is started here, but for `PrivateLink.fileno` by the clock.
+A link is used from any number of threads. No thread is started here, except in `PrivateLink.fileno` by the clock.
 """
 
 import logging
@@ -18,12 +18,12 @@ from ranger_sim.foundation import wallclock
 log = logging.getLogger("can.ranger_sim")
 
 RECEIVE_QUEUE = 100_000  # frames kept for a reader; chosen by us: 20 MB, and 4 s of all four of Ranger's buses
-# Without a timeout a sender waits for a place as long as frames go out. Of an error-passive controller whose queue does
-# not move for this long nobody acknowledges anything (SocketCAN says at once that there is no buffer space); chosen by
-# us: hundreds of attempts of the longest frame at 125 kbit/s.
+# Without a timeout a sender waits for a place as long as frames are sent. If an error-passive controller's queue does
+# not move for this long, no node acknowledges (SocketCAN reports at once that there is no buffer space); chosen by us:
+# hundreds of attempts of the longest frame at 125 kbit/s.
 UNHEARD_S = 1.0
-# A `receive` that is under way when its link is closed runs out its time, but no longer than this: who closes a bus and
-# then stops the thread that reads it (python-can's Notifier waits 1 s at a time) is not too late.
+# A `receive` under way when its link is closed waits for the rest of its time, but no longer than this: a program may
+# close a bus and then stop the thread that reads it (python-can's Notifier waits 1 s at a time).
 RUN_OUT_S = 1.0
 STALE_S = 60.0  # a wait without a limit is cut into pieces of this length
 FOR_EVER = 1e18
@@ -32,7 +32,7 @@ LISTENING_TEXT = "listening only, nothing can be sent"
 
 
 class LinkError(Exception):
-    """Sending or receiving failed; the text says which bus and why."""
+    """Sending or receiving failed; the text gives the bus and the reason."""
 
 
 class QueueFullError(LinkError):
@@ -40,9 +40,9 @@ class QueueFullError(LinkError):
 
 
 class Link:
-    """A place on a bus: frames that came in, frames to go out, the state of the controller."""
+    """A place on a bus: received frames, frames to send, the state of the controller."""
 
-    acknowledge_hint = ""  # what a client can do that is alone
+    acknowledge_hint = ""  # actions of a client that is alone
 
     def __init__(self, label: str, receive_own: bool, queue_limit: int) -> None:
         self.label = label
@@ -52,16 +52,16 @@ class Link:
         self.changed = threading.Condition()
         self.state = ERROR_ACTIVE
         self.counters = (0, 0)
-        self.lost_frames = 0  # dropped because nobody read them here
-        self.missed_frames = 0  # dropped before they came here
-        self.dropped_frames = 0  # of ours, that never went out
+        self.lost_frames = 0  # dropped because no reader took them here
+        self.missed_frames = 0  # dropped before they arrived here
+        self.dropped_frames = 0  # our frames that were never sent
         self.sent_frames = 0
         self.closed = False
         self.overflowing = False
         self.signal = -1  # eventfd that is readable while `arrived` holds something
 
     def _arrive(self, event: Event) -> None:
-        """An event of the bus, in its turn."""
+        """Add an event of the bus, in order."""
         kind = event[0]
         if kind == STATE:
             self.state, self.counters = event[2], (event[3], event[4])
@@ -85,7 +85,7 @@ class Link:
     def receive(self, timeout: float | None) -> Event | None:
         """The oldest frame, waiting up to `timeout` s (None: without limit).
 
-        None when there is none in time, or when the link is closed meanwhile. LinkError when it was closed before, or
+        None when none arrives in time, or when the link is closed meanwhile. LinkError when it was closed before, or
         when the other side is gone.
         """
         with self.changed:
@@ -103,11 +103,11 @@ class Link:
             return event
 
     def _wait(self, ready: Callable[[], bool], timeout: float | None) -> None:
-        """Until `ready()`, or the time is over, or nothing more will happen."""
+        """Wait until `ready()`, the time is over, or nothing more will happen."""
         raise NotImplementedError
 
     def _check(self) -> None:
-        """LinkError when this link carries nothing any more."""
+        """Raise LinkError when this link no longer works."""
         raise NotImplementedError
 
     def _take(self) -> Event | None:
@@ -136,7 +136,7 @@ class Link:
             self.signal = -1
 
     def _full(self) -> QueueFullError:
-        """What is said of a frame that found no place."""
+        """Message for a frame that found no place."""
         return QueueFullError(f"{self.label}: the transmit queue stayed full{self._why()}")
 
     def _why(self) -> str:

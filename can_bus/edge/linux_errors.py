@@ -1,4 +1,4 @@
-"""Error frames as Linux shows them (linux/can/error.h): classes in the identifier, details in eight data bytes."""
+"""Error frames in the format of Linux (linux/can/error.h): classes in the identifier, details in eight data bytes."""
 
 from ranger_sim.can_bus.frame import FIELD_ACK_SLOT
 from ranger_sim.can_bus.node import (
@@ -40,8 +40,8 @@ Frame = tuple[int, int, int, int]  # identifier, flags, lo, hi
 
 
 def frame_of_status(interrupts: int, counters: tuple[int, int], was_off: bool, off: bool) -> Frame | None:
-    """The error frame that tells a CAN_STATUS: `interrupts` (ICR_*), `counters` (transmit errors, receive errors), and
-    whether the controller was and is bus-off. None when nothing but the counters is to be told."""
+    """The error frame for a CAN_STATUS: `interrupts` (ICR_*), `counters` (transmit errors, receive errors), and
+    whether the controller was and is bus-off. None when only the counters changed."""
     transmit_errors, receive_errors = counters
     classes, data = CAN_ERR_CNT, bytearray(8)
     data[TRANSMIT_ERRORS] = min(transmit_errors, COUNTER_LIMIT)
@@ -54,7 +54,7 @@ def frame_of_status(interrupts: int, counters: tuple[int, int], was_off: bool, o
         else:
             classes |= CAN_ERR_PROT
             data[PROTOCOL] = PROT_OF_KIND[kind] | (0 if interrupts & ICR_RECEIVING else PROT_TX)
-        data[LOCATION] = field  # the codes of the SJA1000, which linux/can/error.h has taken over
+        data[LOCATION] = field  # the codes of the SJA1000, which linux/can/error.h has adopted
     if off and not was_off:
         classes |= CAN_ERR_BUSOFF
     elif was_off and not off:
@@ -72,7 +72,7 @@ def frame_of_status(interrupts: int, counters: tuple[int, int], was_off: bool, o
 
 
 def overflow() -> Frame:
-    """The error frame that says: here frames are missing, the reader was too slow."""
+    """The error frame for an overrun: frames are missing here, because the reader was too slow."""
     data = bytearray(8)
     data[CONTROLLER] = CRTL_RX_OVERFLOW
     return _frame(CAN_ERR_CRTL, data)

@@ -1,8 +1,8 @@
-"""Recorded frames out of whatever file can be read, with an account of its lines.
+"""Recorded frames from any readable file, with a count of its lines.
 
-python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log, what candump shows on a screen, BUSMASTER's .log
-and SavvyCAN's .csv are read here. A library's reader passes over what it does not know, so its frames are counted
-against the lines or objects of the file.
+python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log and screen output, BUSMASTER's .log and SavvyCAN's
+.csv are read here. A library's reader skips unknown lines, so its frames are compared with the lines or objects of the
+file.
 """
 
 import calendar
@@ -27,11 +27,10 @@ SECOND_NS = 1_000_000_000
 
 
 class RecordedFrames:
-    """The frames of a recording, error frames left out. Iterating raises UserError for what cannot be read.
+    """The frames of a recording, error frames left out. Iterating raises UserError for an unreadable file.
 
-    After that `read` is the number of frames that the file has or says that it has, error frames among them, and
-    `losses` are those of them that did not come out: (reason, count, where the first is); reason "cut_off" or
-    "not_frames".
+    Afterwards `read` is the number of frames in the file, or as stated by it, including error frames, and `losses` are
+    the frames that were not returned: (reason, count, position of the first); reason "cut_off" or "not_frames".
     """
 
     def __init__(self, source: pathlib.Path) -> None:
@@ -47,13 +46,13 @@ class RecordedFrames:
                     yield frame
         except UserError:
             raise
-        except Exception as error:  # whatever a reader of some format raises
+        except Exception as error:  # readers of formats raise many types
             said = error.strerror if isinstance(error, OSError) and error.strerror else error
             text = f"{self.source}: the recording cannot be read ({said or type(error).__name__})"
             raise UserError(text) from None
 
     def lose(self, reason: str, count: int, where: str) -> None:
-        """Note frames that are in the file and did not come out."""
+        """Record frames that are in the file and were not returned."""
         if count > 0:
             self.losses.append((reason, count, where))
 
@@ -61,7 +60,7 @@ class RecordedFrames:
 def read_log(path: str | pathlib.Path) -> RecordedFrames:
     """(channel, time_ns, identifier, flags, lo, hi) of every frame in a recording, as it is iterated.
 
-    Times are as in the file, or since its first frame where the format says so.
+    Times are as in the file, or since its first frame where the format defines them so.
     """
     return RecordedFrames(pathlib.Path(path))
 
@@ -98,7 +97,7 @@ def _frame(message: can.Message) -> Frame:
 
 # --- by python-can ------------------------------------------------------------------------------------------------
 
-# stamp and bus, then an identifier (a line may be torn behind it), a name, or an error; not a request to send
+# stamp and bus, then an identifier (a line may be cut off after it), a name, or an error; not a request to send
 ASC_FRAME = re.compile(
     r"\s*\d+[.,]\d+\s+(?:\d+\s+(?:[0-9A-F]+x?\b(?!:)(?!.*\bTxRq\b)|\S+\s+(?:Tx|Rx)\b|ErrorFrame)|CANFD\s+\d)",
     re.IGNORECASE,
@@ -123,7 +122,7 @@ def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
 
 
 def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
-    """What a BLF file says of its own size, against what was there: a file that was cut off ends without a word."""
+    """Compare the size stated in a BLF file with the actual one: the reader does not report a file that was cut off."""
     missing = reader.object_count - log.read
     there = log.source.stat().st_size
     if there < reader.file_size:
@@ -137,7 +136,7 @@ def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
 
 
 class _Lines(io.TextIOBase):
-    """Lines of a file for a reader of a library, with an account of those that must become frames."""
+    """Lines of a file for a library's reader, with a count of those that must become frames."""
 
     def __init__(self, log: RecordedFrames, lines: Iterable[str], is_frame: re.Pattern[str]) -> None:
         super().__init__()
@@ -160,11 +159,11 @@ class _Lines(io.TextIOBase):
         return line
 
     def readline(self, size: int | None = -1) -> str:  # type: ignore[override]
-        """The next line, for readers that ask so."""
+        """The next line, for readers that call this."""
         return next(self, "")
 
     def settle(self) -> None:
-        """A line that did not become a frame until the next one is lost."""
+        """Count a line as lost if it did not become a frame before the next one."""
         if self.waiting:
             self.lost.append(self.waiting)
         self.waiting = 0
@@ -197,10 +196,10 @@ def _text_lines(log: RecordedFrames) -> Iterator[str]:
 
 
 def _asc_lines(log: RecordedFrames) -> Iterator[str]:
-    """Lines of an ASC file as python-can reads them: its header is ended, and stamps are those since the begin.
+    """Lines of an ASC file as python-can reads them: with the header ended, and stamps since the beginning.
 
-    The reader loses the first line behind a header that nothing ends, and takes a relative stamp, which is that since
-    the line before, for an absolute one.
+    The reader loses the first line after a header without an end, and takes a relative stamp, which counts from the
+    previous line, for an absolute one.
     """
     relative, in_header, time_s = False, True, 0.0
     for number, line in enumerate(_text_lines(log), 1):
@@ -268,9 +267,9 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
 
 
 class _ScreenLine:
-    """What candump shows on a screen: with -ta or -tA stamps are absolute, with -tz since the begin.
+    """candump's screen output: with -ta or -tA stamps are absolute, with -tz since the beginning.
 
-    With -td they are since the frame before, and look like those of -tz, but for running back.
+    With -td they are since the previous frame, and resemble those of -tz, except that they may decrease.
     """
 
     def __init__(self, lines: list[str]) -> None:
@@ -294,7 +293,7 @@ class _ScreenLine:
 
 
 def _stamp_ns(text: str) -> int:
-    """A stamp in s, or as date and time, which is taken for UTC: only differences matter."""
+    """A stamp in s, or as date and time, taken as UTC: only differences matter."""
     if re.fullmatch(r"\d+\.\d{1,9}", text):
         seconds, _, fraction = text.partition(".")
         return int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
@@ -306,7 +305,7 @@ def _stamp_ns(text: str) -> int:
 
 
 def _words(identifier: int, flags: int, length: int, data: list[str]) -> tuple[int, int, int, int]:
-    """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError for what is not a classic frame."""
+    """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError if they are not a classic frame."""
     if length > 8:
         raise ValueError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
     if len(data) != length or not all(re.fullmatch("[0-9A-Fa-f]{2}", byte) for byte in data):

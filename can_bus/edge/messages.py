@@ -18,7 +18,7 @@ def message_of_frame(
 ) -> can.Message:
     """A python-can message of a frame; `time_ns` becomes its timestamp in seconds.
 
-    A frame with FLAG_ERROR becomes an error frame without content, as python-can's readers give it.
+    A frame with FLAG_ERROR becomes an error frame without content, as python-can's readers return it.
     """
     if flags & FLAG_ERROR:
         return can.Message(timestamp=time_ns * 1e-9, is_error_frame=True, channel=channel, is_rx=is_rx)
@@ -42,7 +42,7 @@ def message_of_frame(
 def frame_of_message(message: can.Message) -> tuple[int, int, int, int]:
     """(identifier, flags, lo, hi) of a python-can message, ready for `Bus.request`.
 
-    UserError for CAN FD, which these buses do not speak. An error frame has FLAG_ERROR, identifier 0.
+    UserError for CAN FD, which these buses do not support. An error frame has FLAG_ERROR, identifier 0.
     """
     if message.is_fd:
         raise UserError(

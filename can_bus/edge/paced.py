@@ -1,4 +1,4 @@
-"""A bus of its own clock: private buses are released by the wall clock, or run as fast as frames are offered."""
+"""A bus with its own clock: private buses follow the wall clock, or run as fast as frames are offered."""
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.taps import ORDER, TRANSMIT_QUEUE, Tap, Taps
@@ -7,14 +7,14 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.user_error import UserError
 
-# bit/s; chosen by us, because it is the fastest that classic CAN adapters do (ISO 11898-2)
+# bit/s; chosen by us, because it is the fastest rate of classic CAN adapters (ISO 11898-2)
 DEFAULT_BITRATE = 1_000_000
 MAX = "max"
-BURST = 1024  # events per call at most, so that whoever calls can look after its clients; chosen by us
+BURST = 1024  # most events per call, so that the caller can serve its clients; chosen by us
 
 
 def speed_of(text: str | float) -> float:
-    """Times real time of "1", 0.05 or "max" (0.0: as fast as it goes). UserError for anything else."""
+    """Speed factor of "1", 0.05 or "max" (0.0: as fast as possible). UserError for anything else."""
     if isinstance(text, str) and text.strip().lower() == MAX:
         return 0.0
     try:
@@ -27,7 +27,7 @@ def speed_of(text: str | float) -> float:
 
 
 def alone_and_passive(bus: Bus) -> bool:
-    """True while what waits on `bus` cannot be acknowledged, by nobody, and only repeats."""
+    """True while no node can acknowledge the frames that wait on `bus`, which only repeat."""
     if bus.buffers.waiting_count == 0 or bus.acknowledging >= 2 or bus.disturbed:
         return False
     if bus.joining or bus.commands.count or bus.strike_bit < NEVER or bus.disturbance.frames_left > 0:
@@ -36,13 +36,13 @@ def alone_and_passive(bus: Bus) -> bool:
 
 
 def is_quiet(bus: Bus) -> bool:
-    """True while nothing happens on `bus` but for noise."""
+    """True while nothing happens on `bus` except noise."""
     waiting = bus.buffers.waiting_count or bus.joining or bus.commands.count
     return not waiting and not bus.disturbed and not bus.disturbance.planned_bits
 
 
 def hold_off(bus: Bus, bit: int) -> None:
-    """No attempt on `bus` before `bit`: what waits is not ready before."""
+    """Delay attempts on `bus` until `bit`: waiting frames become ready then."""
     for row in bus.buffers.waiting():
         bus.buffers.hold(row, bit)
     bus.next_bit = max(bus.next_bit, bit)
@@ -50,10 +50,10 @@ def hold_off(bus: Bus, bit: int) -> None:
 
 
 class PacedBus:
-    """A bus with clients only, that passes its own time.
+    """A bus with clients only, which advances its own time.
 
-    `speed`: virtual over wall time; 0.0 passes time only while there is something to send, at once. Stamps plus
-    `epoch_ns` are nanoseconds since 1970 (at another speed than 1: of when it was opened, plus virtual time).
+    `speed`: virtual over wall time; 0.0 advances time only while there are frames to send, without delay. Stamps plus
+    `epoch_ns` are nanoseconds since 1970 (at a speed other than 1: the opening time plus virtual time).
     `acknowledge`: see `add_acknowledger`.
     """
 
@@ -86,7 +86,7 @@ class PacedBus:
             self.add_acknowledger()
 
     def add_acknowledger(self) -> None:
-        """A node that acknowledges every frame and sends none, so that a client may be alone. One is enough."""
+        """Add a node that acknowledges every frame and sends none, so that a client may be alone. One is enough."""
         if self.acknowledger is None:
             self.advance()
             self.acknowledger = EventQueue(64)
@@ -94,7 +94,7 @@ class PacedBus:
             self.bus.nodes[node].listening = False
 
     def add(self, name: str) -> Tap:
-        """A new client, from now on."""
+        """Add a client, from now on."""
         self.advance()
         return self.taps.add(name)
 
@@ -105,16 +105,16 @@ class PacedBus:
         return int((wallclock.monotonic_ns() - self.started_ns) * self.speed)
 
     def seconds_until(self, virtual_ns: int) -> float:
-        """Wall-clock seconds until a virtual instant is allowed; 0 when it is, and at full speed."""
+        """Wall-clock seconds until a virtual time is allowed; 0 when it is, and at full speed."""
         if self.speed == 0.0:
             return 0.0
         return max(virtual_ns - self.now(), 0) * 1e-9 / self.speed
 
     def advance(self) -> int:
-        """Pass time up to now (at most BURST events); returns the next virtual instant of interest, or NEVER.
+        """Advance to now (at most BURST events); returns the next virtual time of interest, or NEVER.
 
-        Where nobody is left who could acknowledge, an error-passive sender repeats for ever without any change:
-        such repetitions are passed over, and the frame goes out as soon as somebody joins.
+        Where no node is left to acknowledge, an error-passive sender repeats for ever without any change: such
+        repetitions are skipped, and the frame is sent as soon as a client joins.
         """
         bus, taps = self.bus, self.taps
         if self.acknowledger is not None:
@@ -127,10 +127,10 @@ class PacedBus:
             due = hears if self.speed == 0.0 and is_quiet(bus) else min(bus.next_time, hears)
             waits = bus.operating < 2 and due <= until and alone_and_passive(bus)
             if waits:
-                due = hears  # what happened before is still told
+                due = hears  # earlier events are still reported
             if due > until:
                 break
-            # one bit more: what ends within it belongs to the same frame, and no frame starts so soon after another
+            # one bit more: events within it belong to the same frame, and no frame starts that soon after another
             self.time = max(self.time, min(due + bit_ns, until))
             if not waits and bus.next_time <= self.time:
                 bus.advance(self.time)

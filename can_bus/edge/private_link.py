@@ -25,12 +25,12 @@ class PrivateBus:
         self.paced = paced
         self.lock = threading.RLock()
         self.links: list[PrivateLink] = []
-        self.due = NEVER  # the next time of interest; threads that wait for time to pass sleep no longer than to here
+        self.due = NEVER  # the next time of interest; threads that wait for time to pass sleep no longer than this
 
     def pass_time(self) -> int:
-        """Up to now; every link gets its events. Returns the next time of interest, ns. The lock is held.
+        """Advance to now and give every link its events. Returns the next time of interest, ns. The lock is held.
 
-        Where that comes nearer, every thread that sleeps wakes, for all of them may sleep until the former one.
+        When that time becomes earlier, every sleeping thread wakes, because all may sleep until the former one.
         """
         while True:
             due = self.paced.advance()
@@ -39,7 +39,7 @@ class PrivateBus:
                 if events:
                     link.tap.events = []
                     link.hear(events)
-            if due > self.paced.time:  # otherwise there was more than one call does
+            if due > self.paced.time:  # otherwise there was more work than one call does
                 break
         if due < self.due:
             for link in self.links:
@@ -74,7 +74,7 @@ class PrivateLink(Link):
             bus.pass_time()
 
     def hear(self, events: list[Event]) -> None:
-        """What happened on the bus; the lock is held."""
+        """Take the events of the bus; the lock is held."""
         epoch = self.bus.paced.epoch_ns
         for event in events:
             self._arrive((event[0], event[1] + epoch, *event[2:]))
@@ -84,7 +84,7 @@ class PrivateLink(Link):
     def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
         """Queue a frame, waiting up to `timeout` s for a place.
 
-        None: as long as frames go out. Where nobody is left to acknowledge, QueueFullError tells it.
+        None: as long as frames are being sent. Raises QueueFullError where no node is left to acknowledge.
         """
         with self.changed:
             self._check()
@@ -119,7 +119,7 @@ class PrivateLink(Link):
             self.bus.pass_time()
 
     def flush(self) -> None:
-        """Drop what waits to be sent."""
+        """Drop the frames that wait to be sent."""
         with self.changed:
             self._check()
             self.tap.flush(self.bus.paced.time)
@@ -133,7 +133,7 @@ class PrivateLink(Link):
             return self.tap.state
 
     def fileno(self) -> int:
-        """A descriptor that is readable while `receive` has something. By the clock, a thread passes the time."""
+        """A descriptor that is readable while `receive` has something. By the clock, a thread advances the time."""
         with self.changed:
             self._check()
             if self.signal < 0:
@@ -144,14 +144,14 @@ class PrivateLink(Link):
             return self.signal
 
     def _pump(self) -> None:
-        """Pass the time while everybody else only watches the descriptor."""
+        """Advance the time while all other threads only watch the descriptor."""
         with self.changed:
             while not self.closed:
                 due = self.bus.pass_time()
                 self.changed.wait(STALE_S if due >= NEVER else min(self.bus.paced.seconds_until(due), STALE_S))
 
     def close(self) -> None:
-        """Leave the bus; what is queued is still sent while somebody else is there."""
+        """Leave the bus; queued frames are still sent while another client is there."""
         with self.changed:
             if self.closed:
                 return
@@ -166,7 +166,7 @@ class PrivateLink(Link):
         self._close_signal()
 
     def _unheard(self) -> bool:
-        """True while what waits on the bus cannot be acknowledged, by nobody."""
+        """True while no node can acknowledge the frames that wait on the bus."""
         return self.tap.state == ERROR_PASSIVE and alone_and_passive(self.bus.paced.bus)
 
     def _check(self) -> None:
@@ -174,7 +174,7 @@ class PrivateLink(Link):
             raise LinkError(f"{self.label}: is shut down")
 
     def _wait(self, ready: Callable[[], bool], timeout: float | None) -> None:
-        """Until `ready()` or the time is over; passes the bus's time."""
+        """Wait until `ready()` or the time is over; advances the bus's time."""
         end = FOR_EVER if timeout is None else wallclock.monotonic_s() + max(timeout, 0.0)
         while True:
             due = self.bus.pass_time()

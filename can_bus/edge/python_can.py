@@ -1,7 +1,7 @@
 """The python-can interface `ranger_sim`: can.Bus(interface="ranger_sim", channel="can1").
 
 It attaches to a running robot (`ranger-sim up`) or a host of private buses (`ranger-sim bus`) of this machine. Where
-none runs, it opens a private bus of this process with the arbitration, bit timing, error frames and bus-off of ours.
+none runs, it opens a private bus of this process with our arbitration, bit timing, error frames and bus-off.
 """
 
 import logging
@@ -54,13 +54,13 @@ _private_lock = threading.Lock()
 class RangerSimBus(can.BusABC):
     """One controller on an emulated CAN bus.
 
-    channel: "can1", or "NAME/can1" for the robot or host of that name. robot: its name (default "ranger", whose
-    absence is no error). private: True opens a private bus even if a robot runs. bitrate: of a private bus (default
-    1 Mbit/s); attached, it must be the bus's own. speed: 1.0 by the wall clock, "max" as fast as frames are sent;
-    private only, as are bit_error_rate (0 ... 0.1 per bit), seed of the disturbances, and acknowledge: True adds a
-    silent node that acknowledges every frame, for a bus with one user. receive_own_messages: also get what was sent,
-    once it is on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames kept for the reader;
-    what comes after is dropped, counted (`statistics`) and reported by an error frame.
+    channel: "can1", or "NAME/can1" for the robot or host of that name. robot: its name (default "ranger", whose absence
+    is not an error). private: True opens a private bus even if a robot runs. bitrate: of a private bus (default 1
+    Mbit/s); attached, it must be the bus's own. speed: 1.0 by the wall clock, "max" as fast as frames are sent; private
+    only, as are bit_error_rate (0 ... 0.1 per bit), seed of the disturbances, and acknowledge: True adds a silent node
+    that acknowledges every frame, for a bus with one user. receive_own_messages: also receive sent messages, once they
+    are on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames kept for the reader; later
+    ones are dropped, counted (`statistics`) and reported by an error frame.
 
     Stamps of a robot are its own time since power-up, those of other buses seconds since 1970.
     """
@@ -109,7 +109,7 @@ class RangerSimBus(can.BusABC):
             self._link = link or self._opened(bus_name, rate, listen, own, limit)
         except (UserError, ValueError, TypeError) as fault:
             raise can.CanInitializationError(str(fault)) from None
-        self.channel = channel  # as it was given: python-can's users compare messages with it
+        self.channel = channel  # as given: python-can's users compare messages with it
         self.bitrate = self._link.bitrate
         attached = isinstance(self._link, AttachedLink)
         self.channel_info = (
@@ -123,7 +123,7 @@ class RangerSimBus(can.BusABC):
     def _attached(
         self, name: str, channel: str, named: bool, rate: int | None, listen: bool, own: bool, limit: int
     ) -> AttachedLink | None:
-        """A place on a running robot's bus; None when nobody runs and nobody in particular was asked for."""
+        """A place on a running robot's bus; None when none runs and no particular one was requested."""
         try:
             link = AttachedLink(name, channel, listen, own, limit)
         except FileNotFoundError:
@@ -150,7 +150,7 @@ class RangerSimBus(can.BusABC):
         return link
 
     def _opened(self, channel: str, rate: int | None, listen: bool, own: bool, limit: int) -> PrivateLink:
-        """A place on the private bus of that name in this process, which is opened when there is none."""
+        """A place on the private bus of that name in this process, which is opened if needed."""
         wanted = self._wanted_private
         speed = None if wanted["speed"] is None else speed_of(wanted["speed"])
         errors = None if wanted["bit_error_rate"] is None else float(wanted["bit_error_rate"])
@@ -180,13 +180,13 @@ class RangerSimBus(can.BusABC):
                     bus.paced.add_acknowledger()
             return PrivateLink(bus, channel, listen, own, limit)
 
-    # ---- what python-can asks of an interface
+    # ---- methods required by python-can
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Queue a message; while the queue is full, wait up to `timeout` s (None: as long as the bus carries frames).
 
-        can.CanOperationError: no place in time, or nobody there who would acknowledge, bus-off, listening only, the
-        robot has gone, or a message that classic CAN does not have.
+        can.CanOperationError: no place in time, no node to acknowledge, bus-off, listening only, the robot has gone, or
+        a message that classic CAN does not have.
         """
         try:
             if msg.is_error_frame:
@@ -202,8 +202,8 @@ class RangerSimBus(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """The oldest message, waiting up to `timeout` s (None: without limit).
 
-        None when there is none in time. Also when the bus is shut down meanwhile, once the time is over or after one
-        second. can.CanOperationError when it was shut down before, or when the robot has gone.
+        None when none arrives in time, or, once the time is over or after one second, when the bus is shut down
+        meanwhile. can.CanOperationError when it was shut down before, or when the robot has gone.
         """
         # python-can's own loop would call a bus again that has been shut down meanwhile
         message, _ = self._recv_internal(timeout)
@@ -221,24 +221,25 @@ class RangerSimBus(can.BusABC):
             if event is None:
                 return None, False
             message = message_of_event(event, self.channel)
-            # filtered here: python-can's own loop gives up after one message that does not match when asked not to wait
+            # filtered here: python-can's own loop stops after one message that does not match when called without
+            # waiting
             if self._filters is None or self._matches_filters(message):
                 return message, True
             if end is not None:
                 timeout = max(end - wallclock.monotonic_s(), 0.0)
 
     def fileno(self) -> int:
-        """A descriptor to wait on, as asyncio and select want it."""
+        """A descriptor to wait on, for asyncio and select."""
         return self._asked(self._link.fileno)
 
     def flush_tx_buffer(self) -> None:
-        """Drop what waits to be sent."""
+        """Drop the frames that wait to be sent."""
         self._asked(self._link.flush)
 
     def shutdown(self) -> None:
-        """Leave the bus. What has been queued is still sent while somebody is there to receive it."""
+        """Leave the bus. Queued frames are still sent while another node is there to receive them."""
         was_open = not self._is_shutdown
-        super().shutdown()  # in any case, as python-can asks of its interfaces
+        super().shutdown()  # in any case, as python-can requires of its interfaces
         if was_open:
             self._link.close()
 
@@ -249,7 +250,7 @@ class RangerSimBus(can.BusABC):
 
     @state.setter
     def state(self, new_state: can.BusState) -> None:
-        """ACTIVE takes part again, also after bus-off; PASSIVE listens without acknowledging."""
+        """ACTIVE takes part again, also after bus-off; PASSIVE receives without acknowledging."""
         if new_state == can.BusState.ACTIVE:
             self._asked(self._link.activate)
         elif new_state == can.BusState.PASSIVE:
@@ -275,7 +276,7 @@ class RangerSimBus(can.BusABC):
         autostart: bool = True,
         modifier_callback: Callable[[can.Message], None] | None = None,
     ) -> CyclicSendTaskABC:
-        """python-can's task with a thread; its last message may come when the bus is shut down already."""
+        """python-can's task with a thread; its last message may be sent when the bus is shut down already."""
         if not hasattr(self, "_lock_send_periodic"):
             self._lock_send_periodic = threading.Lock()
         sender: Any = _WhileOpen(self)
@@ -283,10 +284,10 @@ class RangerSimBus(can.BusABC):
             sender, self._lock_send_periodic, msgs, period, duration, None, autostart, modifier_callback
         )
 
-    # ---- more than python-can asks for
+    # ---- in addition to python-can's methods
 
     def statistics(self) -> dict[str, int]:
-        """What became of frames: sent, dropped (ours, never sent), lost (not read here in time), missed (not taken
+        """Counts of frames: sent, dropped (ours, never sent), lost (not read here in time), missed (not taken
         from the other process in time), and the controller's two error counters."""
         self._link.present_state()
         link = self._link
@@ -316,7 +317,7 @@ class RangerSimBus(can.BusABC):
 
 
 class _WhileOpen:
-    """A bus for a task of python-can: a message that comes after the shut-down is no error."""
+    """A bus for a task of python-can: a message sent after the shut-down is not an error."""
 
     def __init__(self, bus: RangerSimBus) -> None:
         self.bus = bus

@@ -1,4 +1,4 @@
-"""An emulated bus behind a pseudo-terminal, as the serial-line CAN adapters of the LAWICEL protocol show theirs.
+"""An emulated bus on a pseudo-terminal, as with serial-line CAN adapters of the LAWICEL protocol.
 
 One line per command, ended by a carriage return; the answer ends with a carriage return too, or is a bell (refused).
 Understood: S and s (bit rate: acknowledged without effect, the bus keeps its own), O (open), L (open, listen only),
@@ -18,12 +18,12 @@ OK, BELL = b"\r", b"\a"
 # letter: (digits of the identifier, flags)
 FRAMES = {"t": (3, 0), "T": (8, FLAG_EXTENDED), "r": (3, FLAG_REMOTE), "R": (8, FLAG_EXTENDED | FLAG_REMOTE)}
 HEXADECIMAL = frozenset("0123456789abcdefABCDEF")
-# What F answers (LAWICEL): bit 0 receive queue full, 2 warning, 3 overrun, 5 error passive, 7 bus error
+# Answer to F (LAWICEL): bit 0 receive queue full, 2 warning, 3 overrun, 5 error passive, 7 bus error
 STATUS_QUEUE_FULL, STATUS_PASSIVE, STATUS_BUS_ERROR = 1 << 0, 1 << 5, 1 << 7
 
 
 class SlcanServer(StreamServer[Connection]):
-    """One bus on one pseudo-terminal; `path` is what a program opens. UserError where there are none.
+    """One bus on one pseudo-terminal; programs open `path`. UserError where pseudo-terminals are unavailable.
 
     The program's node joins the bus when it opens the channel, and leaves when it closes it. Non-blocking: poll it.
     """
@@ -41,7 +41,7 @@ class SlcanServer(StreamServer[Connection]):
         self.overlong = False
 
     def send_away(self, peer: Connection, reason: str, apology: bytes = b"") -> None:
-        """The terminal stays: the next program may be another one. The channel is closed, what waited is forgotten."""
+        """Close the channel and drop its queue; the terminal remains, because the next program may be another one."""
         self.sent_away[reason] += 1
         if peer.tap is not None:
             peer.tap.flush(self.taps.time)
@@ -52,7 +52,7 @@ class SlcanServer(StreamServer[Connection]):
         peer.wants_since_s = None
 
     def _take(self, peer: Connection) -> bool:
-        """The next command, if it has come to its carriage return."""
+        """The next command, if its carriage return has arrived."""
         end = peer.incoming.find(b"\r")
         if end < 0:
             if len(peer.incoming) >= self.limits.longest:
@@ -64,7 +64,7 @@ class SlcanServer(StreamServer[Connection]):
         if self.overlong or len(line) > self.limits.longest:
             self.overlong = False
             self._refuse()
-        elif line:  # an empty line clears what came before; it is no command
+        elif line:  # an empty line clears earlier input; it is not a command
             self._command(line)
         return True
 
@@ -111,7 +111,7 @@ class SlcanServer(StreamServer[Connection]):
             self._refuse()
 
     def _status(self) -> int:
-        """The flags that F asks for; an overrun is told once."""
+        """The flags for F; an overrun is reported once."""
         status = STATUS_QUEUE_FULL if self.overrun else 0
         self.overrun = False
         if self.program.tap is not None:
@@ -140,7 +140,7 @@ class SlcanServer(StreamServer[Connection]):
         self._answer((b"Z" if flags & FLAG_EXTENDED else b"z") + OK)
 
     def _tell(self, client: Connection) -> None:
-        """Frames of the bus, as lines."""
+        """Send frames of the bus as lines."""
         if client.tap is not None and client.tap.events:
             events, client.tap.events = client.tap.events, []
             for event in events:

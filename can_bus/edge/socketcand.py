@@ -1,8 +1,8 @@
-"""Emulated buses over TCP in the raw mode of the socketcand protocol, which several CAN programs speak.
+"""Emulated buses over TCP in the raw mode of the socketcand protocol, which several CAN programs use.
 
 `< open can1 >`, `< rawmode >`, then `< send 123 2 11 22 >` in and `< frame 123 1.000000 1122 >` out. Remote frames
 have no text in that mode (they are counted as not carried). On loopback this user's programs and root's are served;
-beyond it, where it must be allowed, everybody is.
+beyond it, where it must be allowed, all users' are.
 """
 
 import socket
@@ -18,7 +18,7 @@ from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream, listening_address
 from ranger_sim.foundation.user_error import UserError
 
-# Clients take everything that has come in for the answer to `rawmode`; a frame directly behind it confuses them. So
+# Clients read everything that has arrived as the answer to `rawmode`; a frame directly after it confuses them. So
 # nothing follows it for this long (chosen by us: the time in which a client reads its answer on a busy machine).
 QUIET_AFTER_RAWMODE_S = 0.1
 KEPT_LIMIT = 4096  # events kept meanwhile; chosen by us: 0.1 s of a full bus are 2,700 frames
@@ -40,7 +40,7 @@ class _Client(Connection):
 class SocketcandServer(StreamServer[_Client]):
     """`buses`, {channel: Bus}, on a TCP port (0: a free one; see `port`).
 
-    UserError when it cannot be had, or when it would be open to the network without `allow_network`.
+    UserError when the port is unavailable, or when it would be open to the network without `allow_network`.
     """
 
     def __init__(
@@ -64,16 +64,16 @@ class SocketcandServer(StreamServer[_Client]):
             raise UserError(f"socketcand on {host}:{port}: {reason}") from None
         super().__init__("socketcand", listener, buses, epoch_ns)
         self.totals["not_carried"] = 0
-        self.texts: dict[Event, bytes] = {}  # frames of this poll as all clients are told them
+        self.texts: dict[Event, bytes] = {}  # frames of this poll as text for all clients
         self.host, self.port = listener.getsockname()
 
     def deliver(self) -> None:
-        """As every server; each frame is put into words once, however many clients receive it."""
+        """As in every server; each frame is formatted once for all clients."""
         self.texts.clear()
         super().deliver()
 
     def patience_s(self) -> float:
-        """Until kept frames may follow the answer to rawmode."""
+        """Time until kept frames may follow the answer to rawmode."""
         patience = super().patience_s()
         return min(patience, QUIET_AFTER_RAWMODE_S) if any(client.kept for client in self.peers) else patience
 
@@ -84,7 +84,7 @@ class SocketcandServer(StreamServer[_Client]):
         return f"< error this client {REASONS[reason]} >".encode()
 
     def _take(self, client: _Client) -> bool:
-        """The next message, if it has come to its bracket."""
+        """The next message, if its closing bracket has arrived."""
         incoming = client.incoming
         del incoming[: len(incoming) - len(incoming.lstrip())]
         end = incoming.find(b">")
@@ -148,11 +148,11 @@ class SocketcandServer(StreamServer[_Client]):
         lo, hi = words_of_data(data)
         if tap.offer(identifier, length | (FLAG_EXTENDED if extended else 0), lo, hi) == QUEUED:
             self.totals["frames_in"] += 1
-        else:  # the protocol has no word for a full queue
+        else:  # the protocol has no message for a full queue
             self.totals["refused"] += 1
 
     def _tell(self, client: _Client) -> None:
-        """Frames of the bus, as text."""
+        """Send frames of the bus as text."""
         if client.tap is None or not client.tap.events and not client.kept:
             return
         events, client.tap.events = client.tap.events, []
@@ -182,7 +182,7 @@ class SocketcandServer(StreamServer[_Client]):
             totals["frames_out"] += 1
 
     def _text_of(self, event: Event) -> bytes:
-        """A frame of the bus, as the protocol has it."""
+        """A frame of the bus in the protocol's format."""
         _, time, identifier, flags, lo, hi = event
         seconds, rest = divmod(time + self.epoch_ns, 1_000_000_000)
         stamp = f"{seconds}.{rest // 1000:06d}"

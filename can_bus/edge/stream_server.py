@@ -1,7 +1,6 @@
-"""What the servers of buses have in common: peers whose nodes are on buses, polled by the process that owns these.
+"""Common base of the bus servers: peers whose nodes are on buses, polled by the process that owns the buses.
 
-`foundation/peers.py` has the rule that every peer is held to. `attach.py`, `socketcand.py` and `slcan.py` say what the
-bytes mean.
+`foundation/peers.py` limits every peer. `attach.py`, `socketcand.py` and `slcan.py` define the protocols.
 """
 
 import math
@@ -13,8 +12,8 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.taps import Tap, Taps, taps_of
 from ranger_sim.foundation.peers import ARRIVALS_PER_S, REASONS, Door, Peer, Stream
 
-HELD_ABOVE = 1 << 16  # bytes that wait for a client: a bus at full speed waits for it then
-NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: a frame from outside then waits 1 ms at most
+HELD_ABOVE = 1 << 16  # bytes waiting for a client above which a bus at full speed waits for it
+NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: an external frame then waits 1 ms at most
 QUICK_POLL_NS = 250_000  # while frames of clients wait: three transmit buffers, so 12 full frames in a millisecond
 COUNTERS = ("clients_seen", "frames_in", "frames_out", "frames_dropped", "malformed", "refused")
 
@@ -32,7 +31,7 @@ Client = TypeVar("Client", bound=Connection)
 
 
 class StreamServer(Door[Client]):
-    """Serves `buses`, {channel: Bus or Taps}, to the peers of a door of this `kind`."""
+    """Serves `buses`, {channel: Bus or Taps}, to the peers of an endpoint of this `kind`."""
 
     def __init__(
         self, kind: str, listener: socket.socket | None, buses: Mapping[str, Bus | Taps], epoch_ns: int
@@ -49,17 +48,17 @@ class StreamServer(Door[Client]):
         self.totals = dict.fromkeys(COUNTERS, 0)
 
     def _tell(self, client: Client) -> None:
-        """What happened on the bus, into `client.outgoing`."""
+        """Write the events of the bus into `client.outgoing`."""
         raise NotImplementedError
 
     def _takes_part(self, peer: Client) -> bool:
-        """Who is on a bus keeps its place."""
+        """A client on a bus keeps its place."""
         return peer.tap is not None
 
     # ---- for the process that owns the buses
 
     def poll(self, now_ns: int) -> int:
-        """Frames from clients in, frames of the buses out; returns the latest instant for the next poll, ns."""
+        """Read frames from clients, write frames of the buses; returns the latest time for the next poll, ns."""
         self.look(now_ns)
         for taps in self.own:
             taps.poll(now_ns)
@@ -68,7 +67,7 @@ class StreamServer(Door[Client]):
         return now_ns + (QUICK_POLL_NS if busy else NEXT_POLL_NS)
 
     def deliver(self) -> None:
-        """Frames of the buses out."""
+        """Write frames of the buses."""
         for client in self.peers:
             self._tell(client)
         self.write()
@@ -77,7 +76,7 @@ class StreamServer(Door[Client]):
                 client.tap.held = len(client.outgoing) > self.held_above
 
     def patience_s(self) -> float:
-        """Wall-clock seconds after which a poll has something to do even if nothing else happens."""
+        """Wall-clock seconds after which a poll has work even if nothing else happens."""
         if self.left_over:
             return 0.0
         return 1.0 / ARRIVALS_PER_S if self.knocking else math.inf
@@ -85,25 +84,25 @@ class StreamServer(Door[Client]):
     def counters(self) -> dict[str, int]:
         """Whole numbers by name: clients now, clients seen, frames in, out and dropped, malformed, refused.
 
-        And how many were sent away, by reason.
+        Also the number of disconnected clients, by reason.
         """
         away = {f"sent_away_{reason}": self.sent_away[reason] for reason in REASONS}
         return {"clients": sum(client.tap is not None for client in self.peers), **self.totals, **away}
 
     def close(self) -> None:
-        """End every connection, with what the last poll found."""
+        """End every connection, after processing the results of the last poll."""
         for client in self.peers:
             self._tell(client)
         super().close()
 
     def send_away(self, peer: Client, reason: str, apology: bytes = b"") -> None:
-        """What it had queued is dropped: who comes again and again must not fill the bus with what it left behind."""
+        """Drop its queued frames: a client that reconnects repeatedly must not fill the bus with old frames."""
         if peer.tap is not None and peer.taps is not None:
             peer.tap.flush(peer.taps.time)
         super().send_away(peer, reason, apology)
 
     def _closed(self, peer: Client) -> None:
-        """Off the bus; what a client had queued that left by itself is still sent."""
+        """Leave the bus; queued frames of a client that left by itself are still sent."""
         if peer.tap is not None and peer.taps is not None:
             peer.tap.held = False
             peer.taps.remove(peer.tap)

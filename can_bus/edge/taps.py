@@ -1,6 +1,6 @@
-"""Clients of an emulated bus: each is a node of it, with a queue of frames to send and a list of what came in.
+"""Clients of an emulated bus: each is a node of it, with a queue of frames to send and a list of received events.
 
-Whatever brings a client here (python-can, the attach protocol, slcan, socketcand), behind it stands a `Tap`.
+Every kind of client (python-can, the attach protocol, slcan, socketcand) uses a `Tap`.
 """
 
 import functools
@@ -26,43 +26,43 @@ from ranger_sim.foundation.events import (
 
 # Kinds of event, the first field of each entry of `Tap.events`.
 RECEIVED = 1  # time_ns, identifier, flags, lo, hi; with FLAG_ERROR an error frame, see linux_errors.py
-SENT = 2  # the same of a frame of ours that is on the bus whole
-DROPPED = 3  # the same of a frame of ours that never went out whole
+SENT = 2  # the same for our frame that is on the bus whole
+DROPPED = 3  # the same for our frame that was never sent whole
 STATE = 4  # time_ns, state, transmit errors, receive errors, 0
 
-# States of a tap: what ISO 11898-1 calls them, and two that a client chooses or waits for.
+# States of a tap: those of ISO 11898-1, and two that a client chooses or waits for.
 ERROR_ACTIVE = 0
 ERROR_PASSIVE = 1
 OFF = 2  # bus-off
 LISTENING = 3  # receives without acknowledging, sends nothing
 
-# What `Tap.offer` answers.
+# Results of `Tap.offer`.
 QUEUED = 0
 FULL = 1
 NOT_ON_BUS = 2  # bus-off or listening only
 
 TRANSMIT_QUEUE = 64  # frames; chosen by us, because at 3 Mbit/s it holds 3 ms: more than a poll every 1 ms needs
-TAP_LIMIT = 16  # clients of one bus, those that left and still send included; chosen by us: each hears every frame
+TAP_LIMIT = 16  # clients of one bus, including those that left and still send; chosen by us: each receives every frame
 LINGER_NS = 1_000_000_000  # how long a client that left may still send what it had queued; chosen by us
 ORDER = STAGE_BUS * 256 + 255  # after every board's controller; a tap's inbox has no other source
 
-Event = tuple[int, int, int, int, int, int]  # kind and what stands behind it, as told above
+Event = tuple[int, int, int, int, int, int]  # kind and its fields, as above
 
 
 @functools.lru_cache(maxsize=4096)
 def _key(identifier: int, kind: int) -> int:
-    """Arbitration field of a frame, remembered: a client mostly sends the same identifiers again."""
+    """Arbitration field of a frame, cached: a client mostly sends the same identifiers again."""
     key: int = arbitration_key(identifier, kind)
     return key
 
 
 def overflow_frame(time_ns: int) -> Event:
-    """The error frame that says: here frames are missing, the reader was too slow."""
+    """The error frame for an overrun: frames are missing here, because the reader was too slow."""
     return (RECEIVED, time_ns, *linux_errors.overflow())
 
 
 def fault_of_frame(identifier: int, flags: int, lo: int, hi: int) -> str:
-    """What is wrong with a frame that a client wants to send; empty when nothing is."""
+    """Error message for a frame that a client wants to send; empty when it is valid."""
     limit = HIGHEST_EXTENDED if flags & FLAG_EXTENDED else HIGHEST_STANDARD
     if not 0 <= identifier <= limit:
         return f"identifier {identifier:#x} is above {limit:#x}"
@@ -76,8 +76,8 @@ def fault_of_frame(identifier: int, flags: int, lo: int, hi: int) -> str:
 class Tap:
     """One client's controller on a bus. Frames leave in the order in which they were offered.
 
-    `events` grows with what happened, oldest first: (kind, time_ns, identifier, flags, lo, hi); its owner
-    empties it. `poll` must be called with times that never fall behind the bus.
+    `events` collects events, oldest first: (kind, time_ns, identifier, flags, lo, hi); its owner
+    empties it. `poll` must be called with times that are never before the bus's time.
     """
 
     def __init__(self, bus: Bus, name: str, depth: int = TRANSMIT_QUEUE) -> None:
@@ -89,7 +89,7 @@ class Tap:
         self.refresh(name)
 
     def refresh(self, name: str) -> None:
-        """As new: nothing queued, error counters zero."""
+        """Reset: nothing queued, error counters zero."""
         self.controller.renew(name)
         self.controller.listening = True
         self.inbox.clear()
@@ -122,7 +122,7 @@ class Tap:
         return len(self.waiting) + len(self.loaded)
 
     def offer(self, identifier: int, flags: int, lo: int, hi: int) -> int:
-        """Queue a frame (`fault_of_frame` has been asked): QUEUED, FULL or NOT_ON_BUS."""
+        """Queue a frame (already checked with `fault_of_frame`): QUEUED, FULL or NOT_ON_BUS."""
         if self.off or self.silent:
             return NOT_ON_BUS
         if len(self.waiting) + len(self.loaded) >= self.depth:
@@ -131,7 +131,7 @@ class Tap:
         return QUEUED
 
     def poll(self, now: int) -> None:
-        """Take what the bus has for us up to `now` (ns) and fill free transmit buffers."""
+        """Process the events of the bus up to `now` (ns) and fill free transmit buffers."""
         inbox = self.inbox
         while inbox.head_time <= now:
             inbox.take()
@@ -152,7 +152,7 @@ class Tap:
         """
         loaded, waiting = self.loaded, self.waiting
         if self.controller.mode == RESET or self.controller.mode == BUS_OFF:
-            return  # just plugged in, or about to hear that it is off
+            return  # just plugged in, or about to be notified that it is off
         while waiting and len(loaded) < BUFFERS:
             frame = waiting[0]
             key = _key(frame[0], frame[1] & (FLAG_REMOTE | FLAG_EXTENDED))
@@ -171,7 +171,7 @@ class Tap:
             self.bus.request(self.node, buffer, now, *frame)
 
     def _done(self, time: int, buffer: int, status: int) -> None:
-        """The frame in a buffer is through, or will not be."""
+        """The frame in a buffer has been sent, or will not be."""
         if self.loaded and self.loaded[0][0] == buffer:
             frame = self.loaded.popleft()[2]
         else:
@@ -191,10 +191,10 @@ class Tap:
         self.events.append((DROPPED, time, *frame))
 
     def _status(self, time: int, interrupts: int, transmit_errors: int, receive_errors: int, off: bool) -> None:
-        """Counters moved, a state changed or an error frame passed: told as one error frame and a state.
+        """Report changed counters, a changed state or an error frame, as one error frame and a state.
 
-        Nothing is told of a repeated attempt that changes neither: a sender that nobody acknowledges, once it is
-        error passive, repeats for ever, and its passive flags are not seen on the wire.
+        A repeated attempt that changes neither is not reported: a sender without acknowledgement, once it is error
+        passive, repeats for ever, and its passive flags are not visible on the wire.
         """
         counters = (transmit_errors, receive_errors)
         if counters == self.counters and off == self.off:
@@ -209,13 +209,13 @@ class Tap:
                 self._drop(time, self.waiting.popleft())
 
     def tell_state(self, time: int) -> None:
-        """Put the present state among the events."""
+        """Add the present state to the events."""
         self.events.append((STATE, time, self.state, *self.counters, 0))
 
-    # ---- what a client may ask for
+    # ---- requests of a client
 
     def activate(self, now: int) -> None:
-        """Take part again: out of listening only at once, out of bus-off after its 128 recessive sequences."""
+        """Take part again: from listening only at once, from bus-off after its 128 recessive sequences."""
         if self.silent:
             self._unmute()
             self.tell_state(now)
@@ -223,7 +223,7 @@ class Tap:
             self.bus.set_mode(self.node, OPERATING, now)
 
     def listen(self, now: int) -> None:
-        """Receive without acknowledging and without sending. What was queued is dropped."""
+        """Receive without acknowledging and without sending. Queued frames are dropped."""
         if self.silent or self.controller.mode == BUS_OFF:
             return
         self.flush(now)
@@ -236,24 +236,24 @@ class Tap:
         self.bus.set_silent(self.node, False)
 
     def flush(self, now: int) -> None:
-        """Drop what waits; a frame under way is completed."""
+        """Drop waiting frames; a frame under way is completed."""
         while self.waiting:
             self._drop(now, self.waiting.popleft())
         for buffer, _, _ in self.loaded:
             self.bus.abort(self.node, buffer, now)
 
     def leave(self, now: int) -> None:
-        """Off the bus, whatever waits."""
+        """Leave the bus, dropping waiting frames."""
         if self.silent:
             self._unmute()
         if self.controller.mode == BUS_OFF:
-            self.controller.unplug()  # the next client is a fresh controller
+            self.controller.unplug()  # the next client is a new controller
         else:
             self.bus.set_mode(self.node, RESET, now)
 
 
 class Taps:
-    """All clients of one bus. `time`: the virtual instant (ns) of the last poll."""
+    """All clients of one bus. `time`: the virtual time (ns) of the last poll."""
 
     def __init__(self, bus: Bus, depth: int = TRANSMIT_QUEUE) -> None:
         self.bus = bus
@@ -265,11 +265,11 @@ class Taps:
 
     @property
     def full(self) -> bool:
-        """True while no more clients find a place."""
+        """True while no more clients fit."""
         return len(self.taps) >= TAP_LIMIT
 
     def add(self, name: str) -> Tap:
-        """A new client; it is on the bus at once, or after 11 recessive bits when it takes the place of another."""
+        """Add a client; it is on the bus at once, or after 11 recessive bits when it takes the place of another."""
         for tap in self.spare:
             if tap.controller.mode == RESET:
                 self.spare.remove(tap)
@@ -282,11 +282,11 @@ class Taps:
         return tap
 
     def remove(self, tap: Tap) -> None:
-        """The client is gone: what it had queued is still sent, if anybody is there to acknowledge it."""
+        """Remove a client that is gone; its queued frames are still sent, if a node is there to acknowledge them."""
         if tap not in self.taps or tap.leaving:
             return
         tap.leaving = True
-        tap.controller.listening = False  # nobody reads it any more: what it hears would be work for nothing
+        tap.controller.listening = False  # no client reads it any more: received events would be wasted work
         self.leaving += 1
         tap.leave_by = self.time + LINGER_NS
         self._see_off(tap)
@@ -300,9 +300,9 @@ class Taps:
             self.spare.append(tap)
 
     def poll(self, now: int) -> int:
-        """Every client's `poll`; who left and has nothing more to send is taken off the bus.
+        """Poll every client; clients that left and have nothing more to send are taken off the bus.
 
-        Returns the first instant (ns) at which a client has something to hear, or NEVER.
+        Returns the first time (ns) at which a client has something to receive, or NEVER.
         """
         self.time = now
         due = NEVER
@@ -325,7 +325,7 @@ class Taps:
 
 
 def taps_of(bus: "Bus | Taps") -> tuple[Taps, bool]:
-    """(the clients of a bus, whether they were made here and so need polling by whoever asked)."""
+    """(the clients of a bus, whether they were created here and so must be polled by the caller)."""
     if isinstance(bus, Taps):
         return bus, False
     return Taps(bus), True

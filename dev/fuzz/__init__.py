@@ -1,18 +1,18 @@
-"""Fuzzers: hostile input by the thousand against one part of the robot each, everything checked after every case.
+"""Fuzzers: each sends thousands of hostile inputs to one part of the robot and checks it after every case.
 
-A fuzzer is a module with `run(cases, seed)`: it returns what it counted, and raises `Finding` as soon as something is
-not as it must be. The same seed gives the same cases. `command` is `python -m dev.fuzz`.
+A fuzzer is a module with `run(cases, seed)`: it returns its counts, and raises `Finding` as soon as a check fails. The
+same seed gives the same cases. `command` is `python -m dev.fuzz`.
 """
 
 import socket
 
 
-class Finding(Exception):  # noqa: N818  (no error of the fuzzer)
-    """What a fuzzer looks for: the program did not stand the case that the text names."""
+class Finding(Exception):  # noqa: N818  (not an error of the fuzzer)
+    """A failure found by a fuzzer: the program failed the case named in the text."""
 
 
 class Connection:
-    """One end of a connection that hostile programs use, and what it has heard. reads: it takes what comes."""
+    """One end of a connection of a hostile program, and the bytes received on it. reads: it reads incoming bytes."""
 
     def __init__(self, connected: socket.socket) -> None:
         self.socket = connected
@@ -22,7 +22,7 @@ class Connection:
         self.gone = False
 
     def say(self, data: bytes) -> None:
-        """As much as goes."""
+        """Send as much as possible."""
         try:
             self.socket.send(data)
         except BlockingIOError:
@@ -31,7 +31,7 @@ class Connection:
             self.gone = True
 
     def hear(self) -> None:
-        """What has come."""
+        """Read the bytes that have arrived."""
         try:
             while data := self.socket.recv(1 << 18):
                 self.heard += data
@@ -42,5 +42,5 @@ class Connection:
             self.gone = True
 
     def close(self) -> None:
-        """Leave."""
+        """Close the connection."""
         self.socket.close()

@@ -1,6 +1,7 @@
-"""Frames of every identifier and length, and bytes that are no frames, from outside onto the buses of a whole robot.
+"""Frames of every identifier and length, and bytes that are not frames, sent from outside to the buses of a whole
+robot.
 
-One case is one thing that one client does: a frame (any identifier, length and content), noise, a record cut or
+One case is one action of one client: a frame (any identifier, length and content), noise, a record cut or
 changed; by the attach protocol, slcan or socketcand in turn. Every poll must return, a well-behaved client must still
 be served, every board must keep its slots and stay on its bus. A robot that falls is replaced by the next one.
 """
@@ -30,7 +31,7 @@ ALIVE_NS = 5_000_000  # the slowest board's slot is 2 ms
 
 
 class Fuzz:
-    """`slice()` does some cases and passes a millisecond; Finding as soon as something is not as it must be."""
+    """`slice()` runs some cases and advances a millisecond; Finding as soon as a check fails."""
 
     def __init__(self, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "can fuzz")
@@ -42,7 +43,7 @@ class Fuzz:
         self._start()
 
     def _start(self) -> None:
-        """A fresh robot with its servers and clients."""
+        """A new robot with its servers and clients."""
         self.robot = Ranger(Scenario(seed=self.seed + self.robots))
         self.robots += 1
         self.name = f"fuzz-{os.getpid()}-{self.robots}"
@@ -105,7 +106,7 @@ class Fuzz:
         return data[: self.number(len(data))] if kind == 2 else data
 
     def case(self) -> None:
-        """One client does one thing."""
+        """One action of one client."""
         identifier, flags, lo, hi = self.frame()
         where, length, remote = self.number(4), flags & 15, flags & FLAG_REMOTE
         extended = flags & FLAG_EXTENDED
@@ -125,7 +126,7 @@ class Fuzz:
             self._write(self.daemons, where, self._daemon, self.spoilt(text.encode()))
 
     def _write(self, clients: list[socket.socket], where: int, again: Any, data: bytes) -> None:
-        """To a client's server; where that has closed the connection, over a new one."""
+        """Send to a client's server; over a new connection where the server has closed the old one."""
         try:
             with suppress(BlockingIOError):
                 if clients[where].recv(1 << 20) == b"":
@@ -138,7 +139,7 @@ class Fuzz:
             clients[where] = again(where)
 
     def slice(self) -> None:
-        """Some cases, then a millisecond of the robot, then a look at everybody."""
+        """Run some cases, then a millisecond of the robot, then check all clients and boards."""
         for _ in range(CASES_PER_SLICE):
             self.case()
         if self.asked == self.answered and not self.good_off:
@@ -160,7 +161,7 @@ class Fuzz:
             self._start()
 
     def _hear(self) -> None:
-        """The well-behaved client: answered, or thrown off the bus by collisions and back."""
+        """Check the well-behaved client: answered, or bus-off because of collisions and recovered."""
         with suppress(BlockingIOError):
             self.good_data += self.good.recv(1 << 20)
         for kind, body in wire.records_of(self.good_data):
@@ -175,7 +176,7 @@ class Fuzz:
                 raise Finding(f"the well-behaved client was refused: {body!r} (case {self.cases})")
 
     def end(self) -> None:
-        """Add up and close; Finding when a board was thrown off its bus."""
+        """Add up and close; Finding when a board went bus-off."""
         for bus in self.robot.buses:
             for node in bus.nodes:
                 if "client" in node.name or "slcan" in node.name:
@@ -195,7 +196,7 @@ class Fuzz:
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what the servers and boards counted."""
+    """Run `cases` cases; returns the counts of the servers and boards."""
     fuzz = Fuzz(seed)
     answered = 0
     while fuzz.cases < cases:

@@ -1,7 +1,7 @@
-"""Damaged words in the channel of a board process: it answers every turn, counts, and keeps its slots.
+"""Damaged words in the channel of a board process: it answers every turn, counts the damage, and keeps its slots.
 
-One case is one turn of 0.5 ms with words of the mailbox, the number of its slots, the instant or the command changed
-to anything. The board is a steering board in a process of its own, as `ranger-sim up` has it.
+One case is one turn of 0.5 ms with words of the mailbox, the number of its slots, the time or the command changed to
+any value. The board is a steering board in a separate process, as in `ranger-sim up`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TOUCHED_SLOTS = 30
 
 
 class Fuzz:
-    """`case()` is one case; Finding as soon as the board does not answer as it must."""
+    """`case()` is one case; Finding as soon as the board answers wrongly."""
 
     def __init__(self, robot: Ranger, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "channel fuzz")
@@ -53,7 +53,7 @@ class Fuzz:
         self.words[places.ASK_USED] = 0
 
     def case(self) -> None:
-        """Damage something, hand it over, and see that the next whole turn has its slot."""
+        """Damage something, pass it to the board, and check that the next whole turn has its slot."""
         for _ in range(1 + self.number(20)):
             self.words[self.block.to_board_first + self.number(TOUCHED_SLOTS * SLOT_WORDS)] = self.word()
         self.words[places.ASK_USED] = self.word() if self.number(4) == 0 else 1 + self.number(TOUCHED_SLOTS)
@@ -83,7 +83,7 @@ class Fuzz:
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what the board counted."""
+    """Run `cases` cases; returns the counts of the board."""
     with contextlib.closing(Ranger()) as robot:
         fuzz = Fuzz(robot, seed)
         with contextlib.closing(fuzz.board):

@@ -1,9 +1,10 @@
-"""Hostile programs at every door: attach, slcan, socketcand and the supervisor's requests, on buses without a robot.
+"""Hostile programs at every endpoint: attach, slcan, socketcand and the supervisor's requests, on buses without a
+robot.
 
-One case is one thing that one of them does: it connects, leaves, says something of its protocol, something near it or
-noise, once or by the thousand, in one packet or cut, and reads what it is answered or never does. After every few cases
-every door is polled and looked at: no poll does more than the table of limits says, no peer holds more memory, there
-are no more peers than places, nothing is admitted that must not be, and a well-behaved program at each is answered.
+One case is one action of one of them: it connects, leaves, sends valid or nearly valid messages of its protocol or
+noise, once or thousands of times, in one packet or split, and reads its answers or never does. After every few cases
+every endpoint is polled and checked: no poll and no peer's memory exceeds the table of limits, there are no more peers
+than places, nothing invalid is admitted, and a well-behaved program at each is answered.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from ranger_sim.harness.processes.requests import Request
 RATE = 1_000_000
 POLL_NS = 500_000
 CASES_PER_POLL = 4
-HOSTILE = 6  # peers at each door, but for the one terminal
-POLLS_TO_ANSWER = 400  # of a well-behaved program, whatever others do: its turn comes in every poll
+HOSTILE = 6  # peers at each endpoint, except the one terminal
+POLLS_TO_ANSWER = 400  # for a well-behaved program, independent of others: every poll serves it
 POLLS_TO_REPEAT = 50
 LONGEST_JSON = 70_000
 NUMBERS = ("0", "5", "-1", "1.5", "1e20", "100000000000000000000", "1e999", "NaN", "-Infinity", "true", "null", "500")
@@ -74,7 +75,7 @@ WORDS = (
     "x",
 )
 SLCAN = ("V", "v", "N", "F", "O", "L", "C", "Z0", "Z1", "S6", "t1230", "t12380011223344556677", "T1FFFFFFF0", "r7FF8")
-# How a hostile program begins, mostly: who is on a bus can do more harm.
+# Mostly the first message of a hostile program: a client on a bus can do more harm.
 GREETINGS = {
     "attach": wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0) + b"can1"),
     "slcan": b"\rO\r",
@@ -95,7 +96,7 @@ class Program:
         self.again()
 
     def say(self, data: bytes) -> None:
-        """As much of it as goes; where the door has closed the connection, over a new one next time."""
+        """Send as much as possible; where the endpoint has closed the connection, over a new one next time."""
         if self.number < 0:
             self.again()
         try:
@@ -121,7 +122,7 @@ class Program:
         return bytes(self.heard)
 
     def again(self) -> None:
-        """A new connection, if there is room in the door's queue."""
+        """Open a new connection, if the endpoint's queue has a place."""
         self.close()
         self.heard.clear()
         self.reads = True
@@ -136,7 +137,7 @@ class Program:
 
 
 class Fuzz:
-    """`case()` is one case, `poll()` polls and checks; Finding as soon as something is not as it must be."""
+    """`case()` is one case, `poll()` polls and checks; Finding as soon as a check fails."""
 
     def __init__(self, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "doors fuzz")
@@ -172,7 +173,7 @@ class Fuzz:
         self.asked = dict.fromkeys(self.questions, -1)  # at which poll; -1: answered
         self.answered = 0
 
-    # ---- what hostile programs say
+    # ---- messages of hostile programs
 
     def number(self, n: int) -> int:
         """Uniform in 0 ... n-1."""
@@ -185,7 +186,7 @@ class Fuzz:
         return bytes(self.number(256) for _ in range(self.number(64)))
 
     def of_attach(self) -> bytes:
-        """A record: of its kind, of any kind, or with a length that is not so."""
+        """A record: of its kind, of any kind, or with a wrong length."""
         kind = self.number(24)
         if kind == 0:
             channel = self.one_of((b"can1", b"", b"can9", b"\xff", b"can1\ncan1", b"x" * 900))
@@ -207,7 +208,7 @@ class Fuzz:
         return str(self.one_of(SLCAN)).encode() + self.one_of((b"\r", b"\r", b"\r", b"\n", b"", b"0" * 40 + b"\r"))
 
     def of_socketcand(self) -> bytes:
-        """Words in brackets, or nearly."""
+        """Words in brackets, or almost."""
         words = " ".join(self.one_of(WORDS) for _ in range(self.number(12)))
         send = f"< send {self.number(0x900):x} 2 1 {self.number(257):x} >"
         most = (send, send, send, "< echo >", f"< {words} >")
@@ -236,7 +237,7 @@ class Fuzz:
         return f"{{{text}}}\n".encode()
 
     def case(self) -> None:
-        """One program does one thing."""
+        """One action of one program."""
         kind = self.one_of(self.kinds)
         program = self.one_of(tuple(self.hostile[kind]))
         self.cases += 1
@@ -259,10 +260,10 @@ class Fuzz:
                 data += getattr(self, f"of_{kind}")()
             program.say(data)
 
-    # ---- what the doors do
+    # ---- checks of the endpoints
 
     def obey(self, number: int, request: Request) -> None:
-        """What passes the door must be of the model, by code that the door does not share."""
+        """Check that an admitted request fits the model, with code independent of the endpoint."""
         self.admitted += 1
         fine = {
             "status": True,
@@ -282,7 +283,7 @@ class Fuzz:
         self.control.answer(number, {"did": request.do})
 
     def poll(self) -> None:
-        """A little time, and a look at every door."""
+        """Advance a little time, and poll every endpoint."""
         self.now_ns += POLL_NS
         self.polls += 1
         before = [door.worked for door in self.doors]
@@ -302,9 +303,9 @@ class Fuzz:
                     program.heard.clear()
 
     def check(self, door: Door[Any], worked: int) -> None:
-        """Finding when a door has done or holds more than the table allows."""
+        """Raise Finding when an endpoint has done or holds more than the table allows."""
         limits = door.limits
-        answer = 4 * 1024  # the longest single answer of any door is below that
+        answer = 4 * 1024  # the longest single answer of any endpoint is below that
         most_out = limits.backlog + limits.unread + limits.burst * answer
         for what, is_so in (
             (f"{worked} requests in a poll", worked <= limits.burst),
@@ -324,7 +325,8 @@ class Fuzz:
         return max((len(getattr(peer, buffer)) for peer in door.peers), default=0)
 
     def talk(self) -> None:
-        """Well-behaved programs ask, are answered in time, and ask again. Who was sent away has a reason to tell."""
+        """Well-behaved programs send requests, are answered in time, and repeat. A disconnected one must have a
+        reason."""
         for kind, program in self.good.items():
             heard = program.hear()
             if self.asked[kind] < 0:
@@ -337,12 +339,10 @@ class Fuzz:
             elif self.polls - self.asked[kind] > POLLS_TO_ANSWER:
                 raise Finding(f"{kind}: a well-behaved program is not answered (case {self.cases}): {heard[:80]!r}")
             elif (self.polls - self.asked[kind]) % POLLS_TO_REPEAT == 0:
-                program.say(
-                    self.questions[kind]
-                )  # it had to make room, maybe, and the question was lost with its place
+                program.say(self.questions[kind])  # it may have lost its place and the request
 
     def counted(self) -> dict[str, int]:
-        """Whole numbers by name."""
+        """Counts by name."""
         found = {
             "cases": self.cases,
             "polls": self.polls,
@@ -370,14 +370,14 @@ HELLO = wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0
 
 
 def answered(kind: str, heard: bytes) -> bool:
-    """True when this is the answer to the question."""
+    """True when this is the answer to the request."""
     if kind == "attach":
         return heard.endswith(b"can1") and heard[4:5] == bytes([wire.WELCOME])
     return heard.endswith(b"< echo >" if kind == "socketcand" else b'{"did": "status"}\n')
 
 
 def parameter_limits() -> dict[str, tuple[float, float]]:
-    """{parameter: least, most} as the master file has it."""
+    """{parameter: least, most} from the master file."""
     text = (pathlib.Path(datatable.__file__).parent / "master" / "variables.csv").read_text(encoding="utf-8")
     largest = 3.4028234663852886e38  # of single precision
     return {
@@ -390,7 +390,7 @@ def parameter_limits() -> dict[str, tuple[float, float]]:
 def local(where: str) -> int:
     """A connection to a local server, as a descriptor."""
     client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    client.setblocking(False)  # a full queue is told at once
+    client.setblocking(False)  # a full queue is reported at once
     try:
         client.connect(where)
     except OSError:
@@ -400,16 +400,16 @@ def local(where: str) -> int:
 
 
 def distant(port: int) -> int:
-    """A connection over loopback, as a descriptor; it may have to knock for a while."""
+    """A connection over loopback, as a descriptor; it may need several attempts."""
     client = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     client.setblocking(False)
-    with suppress(BlockingIOError):  # it is being made
+    with suppress(BlockingIOError):  # it is being established
         client.connect(("127.0.0.1", port))
     return client.detach()
 
 
 def half_closed(number: int) -> None:
-    """Nothing more will be said; what is answered can still be heard."""
+    """Shut down sending; answers can still be received."""
     if number < 0:
         return
     client = socket.socket(fileno=os.dup(number))
@@ -418,7 +418,8 @@ def half_closed(number: int) -> None:
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what the doors counted. Any other exception than Finding is one too: its traceback says where."""
+    """Run `cases` cases; returns the counts of the endpoints. Any other exception is a finding too, located by its
+    traceback."""
     fuzz = Fuzz(seed)
     with closing(fuzz):
         try:

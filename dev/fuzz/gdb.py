@@ -1,7 +1,7 @@
-"""Hostile debuggers at a board's gdb door: requests of the protocol, near them, and noise, over a small processor.
+"""Hostile debuggers at a board's gdb port: valid and nearly valid requests and noise, with a small processor.
 
-After every case: what the door says are frames with right checksums, its answers are bounded, and every now and then a
-well-behaved debugger comes, gets all registers and leaves; the processor goes on afterwards.
+After every case: the port sends frames with correct checksums, its answers are bounded, and now and then a well-behaved
+debugger connects, reads all registers and disconnects; the processor continues afterwards.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ranger_sim.foundation.random_stream import RandomStream
 
 # add r0, r0, #1; str r0, [r1]; b to the first: it counts in RAM
 PROGRAM = (0xE3A01101, 0xE2800001, 0xE5810000, 0xEAFFFFFC)
-CYCLES = 40  # that the processor runs in a case, while nobody holds it
+CYCLES = 40  # run time of the processor in a case, while no debugger halts it
 CASES_TO_CHECK = 40
 LOOKS = 400
 # Requests of the remote serial protocol (gdb 13, appendix E); {a}: an address, {n}: a number, {h}: bytes in base 16.
@@ -48,7 +48,7 @@ PLACES = (0, 4, 8, 0x3FFF0, 0x40000, 0x40000000, 0x40003FFC, 0x40004000, 0xE0000
 
 
 class Board:
-    """What the door leads to."""
+    """The target behind the port."""
 
     name = "FUZZ"
 
@@ -59,12 +59,12 @@ class Board:
 
 
 class Fuzz:
-    """`case()` is one case; Finding as soon as something is not as it must be."""
+    """`case()` is one case; Finding as soon as a check fails."""
 
     def __init__(self, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "gdb fuzz")
         self.board = Board()
-        self.server = GdbServer(self.board, 0, ends=lambda: True)  # a board that is held is let go, nobody waits
+        self.server = GdbServer(self.board, 0, ends=lambda: True)  # a halted board is released, no debugger waits
         self.server.begin()
         self.client = self._client()
         self.cases = self.frames = self.checked = 0
@@ -77,7 +77,7 @@ class Fuzz:
         return client
 
     def again(self) -> None:
-        """Another debugger; the one before has left without a word."""
+        """Connect another debugger; the previous one has left without notice."""
         self.client.close()
         while self.server.peers:
             self.server._attend()
@@ -90,7 +90,7 @@ class Fuzz:
         return int(self.stream.integer(n))
 
     def text(self) -> bytes:
-        """A request with numbers, some of them wild."""
+        """A request with numbers, some of them extreme."""
         request = REQUESTS[self.number(len(REQUESTS))]
         while "{" in request:
             at = request.index("{")
@@ -105,7 +105,7 @@ class Fuzz:
         return request.encode()
 
     def case(self) -> None:
-        """A hostile debugger says something; the board goes on if it may."""
+        """A hostile debugger sends something; the board continues if it may."""
         self.cases += 1
         what = self.number(40)
         if what == 0:
@@ -125,7 +125,7 @@ class Fuzz:
             self.say(b"".join(framed(self.text()) for _ in range(1 + self.number(3))))
         self.look()
         if not self.server.held:
-            self.board.core.takes_aborts = True  # wherever the registers that were written lead
+            self.board.core.takes_aborts = True  # independent of the registers that were written
             self.board.core.run(self.board.core.cycles + CYCLES)
         if self.cases % CASES_TO_CHECK == 0:
             self.well_behaved()
@@ -135,7 +135,7 @@ class Fuzz:
             self.client.send(data)
 
     def look(self) -> None:
-        """The door looks once, and what it says is read."""
+        """Poll the port once, and read its output."""
         self.server._attend()
         most = self.server.limits.unread + self.server.limits.longest * 4
         for peer in self.server.peers:
@@ -150,10 +150,10 @@ class Fuzz:
         except OSError:
             pass
         self.understand()
-        self.again()  # it was sent away, or asked to leave
+        self.again()  # it was disconnected, or requested that
 
     def understand(self) -> None:
-        """Take whole frames out of what was heard."""
+        """Remove whole frames from the received bytes."""
         while True:
             self.heard = self.heard.lstrip(b"+-")
             if not self.heard:
@@ -170,7 +170,7 @@ class Fuzz:
             self.heard = self.heard[end + 3 :]
 
     def well_behaved(self) -> None:
-        """A debugger comes, asks why the board stands and for all registers, and leaves."""
+        """A debugger connects, requests the stop reason and all registers, and disconnects."""
         self.again()
         for request, is_right in (
             (b"?", lambda answer: answer[:1] in (b"S", b"T")),
@@ -194,19 +194,19 @@ class Fuzz:
             raise Finding(f"the processor stands after the debugger left (case {self.cases})")
 
     def counted(self) -> dict[str, int]:
-        """Whole numbers by name."""
+        """Counts by name."""
         away = {f"sent_away_{reason}": count for reason, count in self.server.sent_away.items()}
         requests = {"requests": self.server.worked, "debuggers": self.server.seen}
         return {"cases": self.cases, **requests, "frames": self.frames, "well_behaved": self.checked, **away}
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         self.client.close()
         self.server.close()
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what was counted."""
+    """Run `cases` cases; returns the counts."""
     fuzz = Fuzz(seed)
     with contextlib.closing(fuzz):
         for _ in range(cases):

@@ -1,10 +1,10 @@
-"""Hostile programs at the panel's doors: HTTP and the WebSocket, over a robot that has walked a little.
+"""Hostile programs at the panel's endpoints, HTTP and WebSocket, with a robot that has walked a little.
 
-One case is one thing that one of them does: it asks for a file, a selection or a page, with the token or without; says
-something of the protocols, near them, or noise, whole, cut or in pieces; stops reading, or leaves. After each the
-server does what it has to, and 5 ms pass on its clock, which is no wall clock. No request may end in an exception, no
-more pages and connections may be there than have a place, what waits for a page is bounded, all that pages hear is of
-the protocol, and a well-behaved page is answered all the time.
+One case is one action of one of them: it requests a file, a selection or a page, with or without the token; sends valid
+or nearly valid messages or noise, whole, cut or in pieces; stops reading, or leaves. After each the server does its
+work, and 5 ms pass on its clock, which is not a wall clock. No request may end in an exception, pages and connections
+must not exceed their places, output that waits for a page is bounded, pages receive only messages of the protocol, and
+a well-behaved page is always answered.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from ranger_sim.tools.panel.server import COOKIE, PLACES, PanelServer
 WALKED_S = 0.4
 CASE_S = 0.005
 HOSTILE = 12  # programs
-ABANDONED = 100  # connections that they have left open, and never come back to
-TURNS = 6  # of the server's loop after a case: a message is taken, carried out and answered in that
+ABANDONED = 100  # connections that they have left open and never use again
+TURNS = 6  # of the server's loop after a case: enough to receive, execute and answer a message
 TURNS_TO_ANSWER = 4000
 CASES_TO_CHECK = 20
 CASES_TO_VISIT = 500
-THREADS_S = 0.001  # between two looks for what a thread of the server reads from a file
+THREADS_S = 0.001  # between two checks for data that a thread of the server reads from a file
 LONGEST = 4 << 20  # bytes of a message to a page: 48 channels of 4000 points have below 3 MB
 TOKEN = "the-right-word"
 CLOSE, PING, PONG, TEXT, BINARY, MORE = 8, 9, 10, 1, 2, 0
-CODES = {*range(1000, 1016)} - {1004, 1005, 1006, 1015}  # that may be said (RFC 6455, 7.4.1); a page's own come back
+CODES = {*range(1000, 1016)} - {1004, 1005, 1006, 1015}  # that may be sent (RFC 6455, 7.4.1); a page's own are returned
 VALUES = (
     *("0", "1", "-1", "0.1", "5", "47", "4000", "4001", "1e9", "-1e9", "1e999", "NaN", "100000000000000000000", "true"),
     *("null", '""', '"MCH_ANGLE"', '"P_UI_LCD_TIME"', "[]", "{}", "[0]", "[0, 1, 2, 47]", "[-1]", "[1e3]", "[[0]]"),
@@ -87,14 +87,14 @@ METHODS = ("GET", "GET", "GET", "GET", "POST", "HEAD", "OPTIONS", "PUT", "\x00")
 
 
 class Looked(RobotSource):
-    """A robot whose requests end at the supervisor's model of them."""
+    """A robot whose requests are only checked by the supervisor's model."""
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
         return {"did": admitted(json.dumps(wish).encode()).do}
 
 
 def walked() -> Looked:
-    """What a panel has that has looked at a robot for WALKED_S."""
+    """Data of a panel that has shown a robot for WALKED_S."""
     name = f"fuzz-panel-{os.getpid()}"
     found: list[Looked] = []
     with contextlib.closing(Ranger()) as robot:
@@ -120,7 +120,7 @@ def walked() -> Looked:
 
 
 class Faults(logging.Handler):
-    """Exceptions of the panel; the server's own words on who has broken HTTP or UTF-8 are no fault."""
+    """Exceptions of the panel; the server's own messages about broken HTTP or UTF-8 are not faults."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -142,7 +142,7 @@ class Program(Connection):
 
 
 def handshake(port: int, token: str = TOKEN) -> bytes:
-    """What a page says first (RFC 6455, 4.1)."""
+    """First message of a page (RFC 6455, 4.1)."""
     return (
         f"GET /socket?token={token} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
@@ -160,7 +160,7 @@ def frame(data: bytes, code: int = TEXT, last: bool = True) -> bytes:
 
 
 def frames_of(heard: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(code, content) of every whole frame at the head of what a page has heard, which loses it."""
+    """(code, content) of every whole frame at the head of a page's received bytes, removing them."""
     while len(heard) >= 2:
         code, length, at = heard[0], heard[1], 2
         if code & 0x70 or code & 15 not in (TEXT, BINARY, CLOSE, PING, PONG) or length & 0x80:
@@ -180,7 +180,7 @@ def frames_of(heard: bytearray) -> Iterator[tuple[int, bytes]]:
 
 
 def understood(code: int, content: bytes) -> dict[str, Any]:
-    """What a frame of the panel says; ValueError where it is none of `tools/panel/messages.py`."""
+    """Message in a frame of the panel; ValueError where it is not one of `tools/panel/messages.py`."""
     if code == CLOSE:
         number = int.from_bytes(content[:2], "big")
         if number not in CODES:
@@ -231,7 +231,7 @@ def _no_number(text: str) -> None:
 
 
 class Fuzz:
-    """`case()` is one case; Finding as soon as something is not as it must be."""
+    """`case()` is one case; Finding as soon as a check fails."""
 
     def __init__(self, seed: int, source: Looked) -> None:
         self.stream: Any = RandomStream(seed, "panel fuzz")
@@ -266,7 +266,7 @@ class Fuzz:
         await self.until(self.good, b"\r\n\r\n")
         del self.good.heard[: self.good.heard.index(b"\r\n\r\n") + 4]
 
-    # ---- what hostile programs say
+    # ---- messages of hostile programs
 
     def number(self, n: int) -> int:
         """Uniform in 0 ... n-1."""
@@ -279,11 +279,11 @@ class Fuzz:
         return bytes(self.number(256) for _ in range(self.number(64)))
 
     def value(self) -> str:
-        """A value in JSON, or nearly."""
+        """A value in JSON, or almost."""
         return str(self.one_of(VALUES))
 
     def plot(self) -> str:
-        """A plot as a page wants it, some of its fields wild."""
+        """A plot as requested by a page, some of its fields extreme."""
         first = self.number(430)
         fields = {
             "channels": str([first + each for each in range(self.number(4))]),
@@ -297,7 +297,7 @@ class Fuzz:
         return "{" + ", ".join(f'"{name}": {value}' for name, value in fields.items()) + "}"
 
     def wish(self) -> bytes:
-        """A wish of a page, or nearly."""
+        """A request of a page, or almost."""
         kind = self.number(8)
         if kind == 0:
             return self.value().encode()
@@ -356,7 +356,7 @@ class Fuzz:
         return (text + "\r\n".join(heads) + "\r\n\r\n").encode("latin-1")
 
     async def case(self) -> None:
-        """One program does one thing, and the server what it has to."""
+        """One action of one program, then the server's work."""
         self.cases += 1
         place = self.number(HOSTILE)
         program = self.hostile[place]
@@ -401,19 +401,19 @@ class Fuzz:
         if self.cases % CASES_TO_VISIT == 0:
             await self.visit()
 
-    # ---- what the server does
+    # ---- checks of the server
 
     def fault(self, text: str) -> Finding:
         return Finding(f"{text} (case {self.cases})")
 
     def understand(self, program: Program) -> list[dict[str, Any]]:
-        """What a page heard, taken out of it. Of what is no page everything is taken."""
+        """Take received messages from a page. From any other connection, take everything."""
         if not program.is_page:
             program.heard.clear()
             return []
         if program.heard.startswith(b"HTTP/1.1 101") and b"\r\n\r\n" in program.heard:
             del program.heard[: program.heard.index(b"\r\n\r\n") + 4]
-        if program.heard.startswith(b"HTTP"):  # an answer to what was no request for a page
+        if program.heard.startswith(b"HTTP"):  # an answer to something other than a request for a page
             program.heard.clear()
             return []
         try:
@@ -429,7 +429,7 @@ class Fuzz:
         return found
 
     async def check(self) -> None:
-        """Nothing is above its limit, nothing has gone wrong, and the well-behaved page is answered."""
+        """Check that nothing exceeds its limit, nothing has failed, and the well-behaved page is answered."""
         if self.faults.found:
             raise self.fault(f"the server met {self.faults.found[0][:300]}")
         panel = self.panel
@@ -452,7 +452,7 @@ class Fuzz:
         raise self.fault("a well-behaved page is not answered")
 
     async def visit(self) -> None:
-        """Somebody loads the page."""
+        """A client loads the page."""
         visitor = Program(self.port)
         with contextlib.closing(visitor):
             visitor.say(f"GET /?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\n\r\n".encode())
@@ -462,7 +462,7 @@ class Fuzz:
         self.visits += 1
 
     async def until(self, program: Program, end: bytes) -> None:
-        """The server works until a program has heard that."""
+        """Run the server until a program has received that."""
         for turn in range(TURNS_TO_ANSWER):
             await asyncio.sleep(0)
             program.hear()
@@ -473,13 +473,13 @@ class Fuzz:
         raise self.fault(f"a well-behaved program waits for {end!r}, and heard {bytes(program.heard[:60])!r}")
 
     def counted(self) -> dict[str, int]:
-        """Whole numbers by name."""
+        """Counts by name."""
         found = {"cases": self.cases, "messages": self.messages, "well_behaved_answered": self.answered}
         found |= {"pages_loaded": self.visits, "closed_with_a_reason": self.sent_away}
         return found | {f"refused_{reason.replace(' ', '_')}": count for reason, count in self.panel.refused.items()}
 
     async def end(self) -> None:
-        """Give everything back."""
+        """Release everything."""
         for program in (*self.hostile, *self.abandoned, self.good):
             program.close()
         for transport in self.panel.connections.transports.values():
@@ -503,5 +503,5 @@ async def _run(cases: int, seed: int, source: Looked) -> dict[str, int]:
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what was counted."""
+    """Run `cases` cases; returns the counts."""
     return asyncio.run(_run(cases, seed, walked()))

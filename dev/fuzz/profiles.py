@@ -1,4 +1,4 @@
-"""Broken profiles: whatever a file holds, it loads or every fault is named, never a traceback."""
+"""Broken profiles: every file either loads or has all its faults named, never a traceback."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def damaged(stream: RandomStream, good: bytes) -> bytes:
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many damaged profiles and schedules: how many passed, how many were refused, how many faults were named.
+    """Run that many damaged profiles and schedules; counts those accepted, those refused, and the faults named.
 
-    Any other exception than ProfileError is a finding and leaves as it is, with its case: its traceback says where.
+    Any exception other than ProfileError is a finding and propagates with its case, located by its traceback.
     """
     stream = RandomStream(seed, "broken profiles")
     good = (profile.FOLDER / "hil-1mbit.toml").read_bytes()

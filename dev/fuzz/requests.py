@@ -1,9 +1,9 @@
-"""Hostile users of `ranger-sim ctl` and of the feed: requests that reach a walking robot, and viewers of every manner.
+"""Hostile users of `ranger-sim ctl` and of the feed: requests that reach a walking robot, and viewers of every kind.
 
 One case is one request (faults of every place, mode, parameter and condition, their ends, the stick, keys, parameters),
-as the supervisor's door admits it and the body's process carries it out, or one thing that a viewer of the feed does. A
-refusal is a line. After every few cases the robot walks on: nothing that was admitted may stop its program, the door of
-the feed keeps its limits, and a viewer that reads is shown what happens.
+admitted by the supervisor's endpoint and executed by the body's process, or one action of a viewer of the feed. A
+refusal is a line. After every few cases the robot walks on: no admitted request may stop its program, the feed's
+endpoint keeps its limits, and a viewer that reads receives the events.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from ranger_sim.harness.scenario import Scenario
 
 SLICE_S = 0.002
 CASES_PER_SLICE = 8
-POLLS_TO_SHOW = 50  # of a viewer that reads: what has happened since is there with the next
-VIEWERS = 6  # two more than find a place
+POLLS_TO_SHOW = 50  # for a viewer that reads: later events arrive with the next one
+VIEWERS = 6  # two more than there are places
 ROBOT_S = 3.0  # then another one walks: a robot takes 255 faults
 NUMBERS = ("0", "1", "-1", "0.5", "7", "100", "-3000", "1e9", "1e-9", "1e400", "nan", "", "x", "0x10", "1_000", "٣")
 CONDITIONS = (
@@ -41,7 +41,7 @@ CONDITIONS = (
 
 
 class Body(PlantRun):
-    """What the body's process does with a request, beside a robot whose boards are all in this one."""
+    """The body process's handling of a request, for a robot whose boards are all in this process."""
 
     def __init__(self, robot: Ranger) -> None:
         self.robot = robot
@@ -54,7 +54,7 @@ class Body(PlantRun):
 
 
 class Viewer(Connection):
-    """A program that looks, reads or not, and perhaps says something."""
+    """A viewer program, which reads or not, and perhaps sends something."""
 
     def __init__(self, name: str) -> None:
         super().__init__(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
@@ -65,7 +65,7 @@ class Viewer(Connection):
 
 
 class Fuzz:
-    """`case()` is one case, `walk()` lets the robot walk on and looks; Finding when something is not as it must be."""
+    """`case()` is one case, `walk()` lets the robot walk on and checks it; Finding when a check fails."""
 
     def __init__(self, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "requests fuzz")
@@ -76,7 +76,7 @@ class Fuzz:
         self._start()
 
     def _start(self) -> None:
-        """A fresh robot with its feed."""
+        """A new robot with its feed."""
         self.robots += 1
         self.robot = Ranger(Scenario(seed=self.seed + self.robots))
         self.name = f"fuzz-requests-{os.getpid()}-{self.robots}"
@@ -95,11 +95,11 @@ class Fuzz:
         return choices[self.number(len(choices))]
 
     def condition(self) -> str:
-        """When a fault begins or ends, or nearly."""
+        """A time at which a fault begins or ends, or almost."""
         return str(self.one_of(CONDITIONS)).format(n=self.number(40) / self.one_of((1, 1, 10, -1)))
 
     def fault_text(self) -> str:
-        """A fault as it is typed: of a place and a mode that go together, mostly."""
+        """A fault as typed: mostly with a matching place and mode."""
         place = self.one_of(tuple(CATALOGUE.places.values()))
         kinds = [name for kind, name in MODES if kind == place.kind] if self.number(8) else [name for _, name in MODES]
         mode = str(self.one_of(kinds)) if kinds else "stuck"
@@ -124,7 +124,7 @@ class Fuzz:
         return text
 
     def request(self) -> dict[str, Any]:
-        """What a user asks."""
+        """A user's request."""
         what = self.number(10)
         if what < 5:
             return {"do": "fault", "fault": self.fault_text()}
@@ -144,7 +144,7 @@ class Fuzz:
         return {"do": "set", "name": name, "value": value}
 
     def case(self) -> None:
-        """One request, or one thing that a viewer does."""
+        """One request, or one action of a viewer."""
         self.cases += 1
         if self.number(4) == 0:
             self.look()
@@ -155,7 +155,7 @@ class Fuzz:
         except UserError as fault:
             self.refusal(str(fault))
             return
-        if asked.do == "set":  # its way to the main brain's process is the channel's, which is fuzzed by itself
+        if asked.do == "set":  # it reaches the main brain's process through the channel, which has its own fuzzer
             self.robot.board("MB").memory[parameters.find(asked.name).id] = asked.word
             self.admitted += 1
             return
@@ -170,13 +170,13 @@ class Fuzz:
             self.armed += asked.do == "fault"
 
     def refusal(self, text: str) -> None:
-        """Counted; it is a line that can be shown."""
+        """Count it; it must be a printable line."""
         self.refused += 1
         if not text or "\n" in text or len(text) > LIMITS["control"].longest:
             raise Finding(f"a refusal is no line: {text[:100]!r} (case {self.cases})")
 
     def look(self) -> None:
-        """A viewer comes, leaves, stops reading, or says something."""
+        """A viewer connects, leaves, stops reading, or sends something."""
         place, what = self.number(VIEWERS), self.number(6)
         viewer = self.viewers[place]
         if viewer.gone or what == 0:
@@ -189,7 +189,7 @@ class Fuzz:
                 viewer.socket.send(bytes(self.number(256) for _ in range(self.number(100))))
 
     def walk(self) -> None:
-        """The robot walks on, and who looks is shown it."""
+        """The robot walks on, and viewers receive it."""
         self.robot.run_for(SLICE_S)
         if len(self.feed.peers) > LIMITS["feed"].peers:
             raise Finding(f"{len(self.feed.peers)} viewers (case {self.cases})")
@@ -200,7 +200,7 @@ class Fuzz:
             if viewer.reads:
                 viewer.hear()
                 self.understand(viewer)
-        if self.good.gone:  # another one was taken in first, and there was no place
+        if self.good.gone:  # another one was accepted first, and there was no place
             self.good.socket.close()
             self.good = Viewer(self.name)
         if self.robot.ended or self.robot.time_s > ROBOT_S:
@@ -220,7 +220,7 @@ class Fuzz:
         raise Finding(f"{text} in a record (case {self.cases})")
 
     def end(self) -> None:
-        """Count, and give everything back."""
+        """Count, and release everything."""
         self.acted += sum(fault.acted for fault in self.robot.faults)
         if self.robot.time_s > 2 * POLLS_TO_SHOW * SLICE_S and not self.shown:
             raise Finding(f"nobody was shown anything (case {self.cases})")
@@ -231,12 +231,12 @@ class Fuzz:
         self.robot.close()
 
     def close(self) -> None:
-        """Give back what is left."""
+        """Release the rest."""
         self.end()
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what was counted."""
+    """Run `cases` cases; returns the counts."""
     fuzz = Fuzz(seed)
     with closing(fuzz):
         try:

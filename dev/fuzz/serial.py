@@ -1,4 +1,4 @@
-"""Wrong bytes on the data link, both ways: the main brain keeps its slots, the logging program its head.
+"""Wrong bytes on the data link, both ways: the main brain keeps its slots, and the logging program keeps working.
 
 One case is a pass of the main brain's table (22 ms) with a few bytes from the computer: noise, packets for any
 identifier with any value, packets with a byte changed. What the board sends goes to a session of `ranger-sim daq`
@@ -26,7 +26,7 @@ FIRST_PARAMETER = table.LV_START
 
 
 class Fuzz:
-    """`case()` is one case; `counters()` what happened; Finding as soon as something is not as it must be."""
+    """`case()` is one case; `counters()` the counts; Finding as soon as a check fails."""
 
     def __init__(self, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "serial fuzz")
@@ -39,7 +39,7 @@ class Fuzz:
         self.bytes_to_robot = 0
         self.bytes_from_robot = 0
         self.bytes_to_session = 0
-        # let it walk: the machines then work with what the packets set
+        # let it walk: the machines then work with the values from the packets
         self.board.store.set_int(table.UI_BUTTONS, 2)
         self._advance()
         self.board.store.set_int(table.UI_BUTTONS, 0)
@@ -66,7 +66,7 @@ class Fuzz:
         return data[:place] + (b"", self.noise(1), self.noise(2))[kind] + data[place + 1 :]
 
     def to_robot(self) -> bytes:
-        """What the computer's side of the line carries in one case."""
+        """Bytes from the computer's side of the line in one case."""
         pieces = []
         for _ in range(self.number(4)):
             kind = self.number(4)
@@ -123,7 +123,7 @@ class Fuzz:
                 raise Finding(f"{what} (case {self.cases})")
 
     def counters(self) -> dict[str, int]:
-        """Whole numbers by name."""
+        """Counts by name."""
         link = self.board.computer
         return {
             "cases": self.cases,
@@ -137,7 +137,7 @@ class Fuzz:
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; the counters."""
+    """Run `cases` cases; returns the counters."""
     fuzz = Fuzz(seed)
     for _ in range(cases):
         fuzz.case()

@@ -1,8 +1,8 @@
-"""Hostile masters at the XCP slave's UDP door: datagrams of commands, near them, and noise, over a robot that stands.
+"""Hostile masters at the XCP slave's UDP port: valid and nearly valid commands and noise, with a robot that stands.
 
-After every case: no look carried out more than the table of limits says, answers and measurements that wait are
-bounded and no longer than the transport's packets, nothing but parameters within their limits was written, and every
-now and then a well-behaved master connects and is answered.
+After every case: no poll exceeded the table of limits, waiting answers and measurements are bounded and no longer than
+the transport's packets, only parameters within their limits were written, and now and then a well-behaved master
+connects and is answered.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.xcp.udp import LOOK_NS, MAX_CTO, MAX_DTO, WAITING, XcpUdpServer
 
 HEADER = struct.Struct("<HH")
-FIRST_COMMAND = 0xC0  # of ASAM MCD-1 XCP part 2; below stand packets that are no commands
+FIRST_COMMAND = 0xC0  # of ASAM MCD-1 XCP part 2; lower codes are not commands
 CASES_TO_CHECK = 50
-LOOKS_TO_ANSWER = 20  # a second of the robot has 250 questions for the kernel, a look takes 0.5 ms
+LOOKS_TO_ANSWER = 20  # a second of the robot has 250 queries to the kernel, a poll takes 0.5 ms
 POSITIVE, ERROR, EVENT, SERVICE = 0xFF, 0xFE, 0xFD, 0xFC
 
 
 class Fuzz:
-    """`case()` is one case; Finding as soon as something is not as it must be."""
+    """`case()` is one case; Finding as soon as a check fails."""
 
     def __init__(self, robot: Ranger, seed: int = 1) -> None:
         self.stream: Any = RandomStream(seed, "xcp fuzz")
@@ -73,7 +73,7 @@ class Fuzz:
         return bytes(body[: 1 + self.number(8)]) if self.number(4) == 0 else bytes(body)
 
     def measuring(self) -> bytes:
-        """All that begins a measurement, one of its bytes perhaps another; lengths and numbers of lists vary."""
+        """All commands that start a measurement, perhaps with one byte changed; lengths and numbers of lists vary."""
         lists, words = 1 + self.number(3), 1 + self.number(12)
         packets = [b"\xff\x00", b"\xd6", struct.pack("<BBH", 0xD5, 0, lists)]  # CONNECT, FREE_DAQ, ALLOC_DAQ
         packets += [struct.pack("<BBHB", 0xD4, 0, each, 1) for each in range(lists)]  # ALLOC_ODT
@@ -103,7 +103,7 @@ class Fuzz:
         return data[:60_000]
 
     def case(self) -> None:
-        """One datagram of a hostile master, and a look."""
+        """One datagram of a hostile master, and a poll."""
         self.cases += 1
         what = self.number(60)
         if what == 0:
@@ -116,7 +116,7 @@ class Fuzz:
             self.well_behaved()
 
     def look(self) -> list[bytes]:
-        """A little time and a look; every packet that came back."""
+        """Advance a little time and poll; returns every packet sent back."""
         self.now_ns += LOOK_NS
         before = self.server.totals["commands"]
         self.server.sample(self.now_ns)
@@ -145,7 +145,7 @@ class Fuzz:
         return found
 
     def written(self) -> None:
-        """Only parameters may have changed, each within its limits."""
+        """Check that only parameters have changed, each within its limits."""
         if any(self.table[number] != word for number, word in zip(self.others, self.before, strict=True)):
             raise Finding(f"a variable that is no parameter was written (case {self.cases})")
         if self.cases % CASES_TO_CHECK:
@@ -157,14 +157,14 @@ class Fuzz:
                 raise Finding(f"{fault} (case {self.cases})") from fault
 
     def well_behaved(self) -> None:
-        """The same program ends what it began, connects and asks for the status: it is answered."""
-        for _ in range(100):  # what hostile datagrams left comes first
+        """The same program ends its session, connects and requests the status: it must be answered."""
+        for _ in range(100):  # remaining answers to hostile datagrams come first
             if not self.server.left_over and not self.server.rest:
                 break
             self.look()
         for command, answer in ((b"\xfe", None), (b"\xff\x00", POSITIVE), (b"\xfd", POSITIVE)):
             heard: list[int] = []
-            for _ in range(LOOKS_TO_ANSWER if answer is not None else 1):  # the kernel may be asked only so often
+            for _ in range(LOOKS_TO_ANSWER if answer is not None else 1):  # queries to the kernel are limited
                 self.master.send(HEADER.pack(len(command), 0) + command)
                 heard += [packet[0] for packet in self.look()]
                 if answer in heard:
@@ -174,7 +174,7 @@ class Fuzz:
         self.checked += 1
 
     def counted(self) -> dict[str, int]:
-        """Whole numbers by name."""
+        """Counts by name."""
         server = self.server
         return {
             "cases": self.cases,
@@ -187,13 +187,13 @@ class Fuzz:
         }
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         self.master.close()
         self.server.close()
 
 
 def run(cases: int, seed: int = 1) -> dict[str, int]:
-    """So many cases; what was counted."""
+    """Run `cases` cases; returns the counts."""
     with contextlib.closing(Ranger()) as robot:
         robot.run_for(0.05)  # its program has written its parameters
         fuzz = Fuzz(robot, seed)

@@ -44,14 +44,14 @@ COUNT = 30
 LIMIT_S = 60.0
 MAP_LIMIT_S = 900
 NOTICED = (KILLED, TIMEOUT)
-# Tests of a room that stand elsewhere, since what they go through is another room's door.
+# Tests of a package that are elsewhere, because they use another package's interface.
 ALSO = {
     "datatable": ("tests/harness/test_requests.py", "tests/tools/robodaq/test_robodaq.py"),
     "can_bus": ("tests/dev/fuzz/test_can.py", "tests/tools/buses/test_bus.py"),
     "plant": ("tests/oracle/test_known_answers.py",),
     "sysid": ("tests/blind/test_generator.py", "tests/tools/diagnose/test_bad_data.py", "tests/tools/test_identify.py"),
 }
-# Walks, which end in time compiled alone; there they take part in what is tried.
+# Walks, which finish in time only compiled; there they are among the tests tried.
 WALKS = {
     "can_bus": ("tests/oracle", "tests/system/test_walking.py"),
     "plant": ("tests/oracle", "tests/system/test_walking.py"),
@@ -144,7 +144,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Known], say: Any) -> dict:
-    """Figures of one room, after all its mutants of this run have a verdict."""
+    """Figures of one package, after all its mutants of this run have a verdict."""
     equivalent = {each.key for each in listed}
     every = all_mutants(room)
     drawn = sample(every, room, options.count, options.seed)
@@ -183,7 +183,7 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
 
 
 def told(room: str, every: list[Mutant], drawn: list[Mutant], results: Results, equivalent: set[str], say: Any) -> dict:
-    """Count the verdicts and print what survived."""
+    """Count the verdicts and print the survivors."""
     counts = Counter("equivalent" if each.key in equivalent else results.verdicts[each.key].outcome for each in drawn)
     judged = len(drawn) - counts["equivalent"]
     noticed = sum(counts[outcome] for outcome in NOTICED)

@@ -57,7 +57,7 @@ class Mutant:
 
     @property
     def key(self) -> str:
-        """What names it as long as the code of its function stays: no line numbers in it."""
+        """Key that stays valid while the code of its function is unchanged: it has no line numbers."""
         return f"{self.path}::{self.function}::{self.operator}::{self.old} -> {self.new}::{self.occurrence}"
 
     def applied(self, source: str) -> str:
@@ -84,7 +84,7 @@ def mutants(source: str, path: str) -> list[Mutant]:
 
 
 class Finder(ast.NodeVisitor):
-    """Walks a syntax tree and notes in `found` what each operator can do at each place."""
+    """Walks a syntax tree and adds to `found` the possible changes of each operator at each place."""
 
     def __init__(self, source: str, path: str) -> None:
         self.source = source
@@ -100,7 +100,7 @@ class Finder(ast.NodeVisitor):
         self.lines = lines
 
     def _place(self, line: int, column: int) -> int:
-        """Where in the text a node begins or ends; columns of the tree count bytes."""
+        """Position in the text at which a node begins or ends; columns of the tree count bytes."""
         if not self.ascii:
             column = len(self.lines[line - 1].encode()[:column].decode())
         return self.starts[line - 1] + column
@@ -123,7 +123,7 @@ class Finder(ast.NodeVisitor):
         """Texts are not tested to the letter."""
 
     def visit_Raise(self, node: ast.Raise) -> None:
-        """Whether it is raised is tested, not what it says."""
+        """Only the raising is tested, not the message."""
         self._note(node, "removed statement", "pass")
 
     def visit_Assert(self, node: ast.Assert) -> None:
@@ -224,13 +224,13 @@ class Finder(ast.NodeVisitor):
         self.visit(node.value)
 
     def visit_Assign(self, node: ast.Assign) -> None:
-        """Left out, where something else than a local name is set."""
+        """Left out, where something other than a local name is set."""
         if self.first_line and all(isinstance(each, ast.Attribute | ast.Subscript) for each in node.targets):
             self._note(node, "removed statement", "pass")
         self.generic_visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> None:
-        """Calls for what they do: left out."""
+        """Calls made for their effect: left out."""
         if isinstance(node.value, ast.Constant):
             return  # a doc string
         if self.first_line:

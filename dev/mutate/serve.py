@@ -1,15 +1,15 @@
-"""A pytest plugin: one process that has collected the tests once, and forks for each mutant it is asked to try.
+"""A pytest plugin: one process that has collected the tests once, and forks for each requested mutant.
 
 A mutant inside a function is put into the loaded module: every function made from that piece of the file gets the
-changed code. Nothing is imported a second time, so a verdict costs what its tests cost. What runs while modules are
-imported cannot be exchanged afterwards; such mutants live in a file (`work.py`).
+changed code. Nothing is imported a second time, so a verdict costs what its tests cost. Code that runs while modules
+are imported cannot be exchanged afterwards; such mutants are written to a file (`work.py`).
 
 RANGER_SIM_MUTANTS names two descriptors: requests come from the first as lines of JSON, answers go to the second.
     {"map": FILE, "to": PATH, ...}                                which test of a file runs which function
     {"path": PATH, "before": TEXT, "after": TEXT, "tests": [...]}   whether these tests notice the changed text
 with `limit_s`, wall time of it all, and `limit_test_s`, processor time of one test. The answer is an object with `code`
-(0: all passed, 1: one failed, null: over the limit) and `by`. The first answer comes unasked, when all is collected:
-what is put into a file before that would be imported as if it were the original.
+(0: all passed, 1: one failed, null: over the limit) and `by`. The first answer is sent without a request, when all is
+collected: a mutant written to a file before that would be imported as if it were the original.
 
 Compiled functions cannot be exchanged nor watched: a server that runs compiled serves for plain Python modules alone.
 """
@@ -37,14 +37,14 @@ STARTING = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # the interpreter'
 
 
 class TooLong(BaseException):
-    """A test has used up its processor time. No Exception, so that nothing takes it for an error of the program."""
+    """A test has used up its processor time. Not an Exception, so that no code takes it for an error of the program."""
 
 
 # --- functions and their code -----------------------------------------------------------------------------------
 
 
 def functions_of_rooms() -> list[FunctionType]:
-    """Every function of the rooms that exists now, decorated ones and methods as well."""
+    """Every function of the packages that exists now, decorated ones and methods as well."""
     return [
         each
         for each in gc.get_objects()
@@ -61,7 +61,7 @@ def pieces(code: CodeType) -> Iterator[CodeType]:
 
 
 def by_name(code: CodeType) -> dict[tuple[str, int], CodeType]:
-    """Every piece by its qualified name and its number among those of this name: both outlive a change elsewhere."""
+    """Every piece by its qualified name and its number among those of this name: both survive a change elsewhere."""
     found: dict[tuple[str, int], CodeType] = {}
     for each in pieces(code):
         number = 0
@@ -125,20 +125,20 @@ class Watch:
         )
 
     def begin(self) -> None:
-        """Forget what was seen, and watch every function."""
+        """Clear the seen functions, and watch every function."""
         self.seen = set(self.unwatched)
         for function, stub in self.stubs.items():
             function.__code__ = stub
 
     def end(self) -> set[CodeType]:
-        """Every function is itself again; those that ran."""
+        """Restore every function; returns those that ran."""
         for function, code in self.codes.items():
             function.__code__ = code
         return self.seen
 
 
 def places(codes: set[CodeType]) -> list[str]:
-    """`path:line` of those that belong to the rooms, in order."""
+    """`path:line` of those that belong to the packages, in order."""
     root = len(str(PACKAGE)) + 1
     return sorted(
         {f"{code.co_filename[root:]}:{code.co_firstlineno}" for code in codes if code.co_filename.startswith(ROOTS)}
@@ -166,7 +166,7 @@ class Server:
             self.imported.add(frame.f_code)
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Instead of running tests: serve until nobody asks any more."""
+        """Instead of running tests: serve until the client closes."""
         sys.setprofile(None)
         self.items = {item.nodeid: item for item in session.items}
         print(json.dumps({"code": 0}), file=self.answers, flush=True)
@@ -178,11 +178,11 @@ class Server:
         return True
 
     def map(self, request: dict) -> dict:
-        """Run the tests of one file, each with its own list of functions, and write what was seen to `to`.
+        """Run the tests of one file, each with its own list of functions, and write the seen functions to `to`.
 
-        What runs while fixtures are made or taken down may serve every test of the file: `shared`. A test that was
-        ended at its limit is `late`: what it ran until then is known, not whether it passes. Those that start
-        processes run more than is seen here: `starts`.
+        Functions that run while fixtures are set up or torn down may serve every test of the file: `shared`. A test
+        that was ended at its limit is `late`: the functions it ran before that are known, not whether it passes. Tests
+        that start processes run more than is seen here: `starts`.
         """
 
         def audit(event: str, _arguments: tuple) -> None:
@@ -213,7 +213,7 @@ class Server:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Generator[None, Any, Any]:
-        """While a file is mapped: between set-up and taking down the calls are the test's own."""
+        """While a file is mapped: between set-up and teardown the calls are the test's own."""
         if self.watch is None:
             return (yield)
         outside = self.watch.end()
@@ -253,7 +253,7 @@ def run(item: pytest.Item, following: pytest.Item | None, limit_s: float) -> lis
     signal.setitimer(signal.ITIMER_PROF, limit_s)
     try:
         reports = runtestprotocol(item, log=False, nextitem=following)
-    except (Exception, TooLong):  # plugins, too, stumble over a test that ends so
+    except (Exception, TooLong):  # plugins also fail on a test that ends this way
         if not late:
             raise
         with contextlib.suppress(Exception):
@@ -265,7 +265,7 @@ def run(item: pytest.Item, following: pytest.Item | None, limit_s: float) -> lis
 
 
 def forked(work: Callable[[], dict], limit_s: float) -> dict:
-    """What `work` returns in a child process of its own group, which ends with all that it has started."""
+    """Result of `work` in a child process with its own group, which ends with all processes that it has started."""
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
@@ -289,7 +289,7 @@ def forked(work: Callable[[], dict], limit_s: float) -> dict:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Serve, if somebody asks."""
+    """Serve, if requested."""
     asked = os.environ.pop(ASKED_BY, "")
     if asked:
         requests, answers = (int(each) for each in asked.split(","))

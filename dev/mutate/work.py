@@ -29,17 +29,18 @@ from ranger_sim.loading import (
 )
 
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent.toml")
-# Beside the room's own tests, and what is not a program of ours: written by other modules, or only for users' editors.
+# Excluded: the package's own tests, and files that are not our programs, written by other modules or for users'
+# editors.
 NOT_MUTATED = ("datatable/generated/",)
 KILLED, SURVIVED, TIMEOUT, NOT_REACHED, TOO_SLOW = "killed", "survived", "timeout", "not reached", "too slow"
 NOT_WITHIN = "not within the limit"  # more tests reach it than there was time for
-# A mutant may make a test slow for good; chosen by us, beside a machine that has other work.
+# A mutant may make a test slow for ever; chosen by us, for a machine that has other work.
 SLOWER = 4.0
 START_S = 60.0
 LOOP_S = 5.0  # a test that takes so much more processor time than it did is in a loop
 BUILD_S = 600.0  # nor one module to be built, on a machine that has other work
 NOTHING: dict[str, Any] = {"imported": [], "shared": [], "tests": {}, "late": {}, "failed": []}  # a map without tests
-# They hold tables of modules that run nothing but their import: the map of functions cannot tell so.
+# They hold tables of modules that run only at import: the map of functions cannot show that.
 TABLES = ("tests/sysid/test_causes_are_documented.py",)
 NO_SUCH_TEST = 4  # pytest's exit code
 LIMIT_TEST_S = 20.0  # of processor time: a test that takes longer takes no part; chosen by us
@@ -47,8 +48,8 @@ LIMIT_TEST_S = 20.0  # of processor time: a test that takes longer takes no part
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """What became of a mutant; `by`: the test that noticed it, `tests`: how many were run at most, `left`: how many
-    reach it and were not run, for want of time.
+    """Verdict on a mutant; `by`: the test that detected it, `tests`: the most that were run, `left`: the number that
+    reach it and were not run, for lack of time.
     """
 
     key: str
@@ -62,14 +63,14 @@ class Verdict:
 
 @dataclasses.dataclass(frozen=True)
 class Known:
-    """A mutant that changes nothing which could be noticed, with the reason."""
+    """A mutant without a detectable effect, with the reason."""
 
     key: str
     reason: str
 
 
 def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
-    """What `equivalent.toml` lists. UserError for an entry without a reason, or one that stands there twice."""
+    """The entries of `equivalent.toml`. UserError for an entry without a reason, or a duplicate."""
     rows = toml_file.load(path).get("mutant", [])
     found: list[Known] = []
     for row in rows:
@@ -82,7 +83,7 @@ def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
 
 
 def all_mutants(room: str, house: pathlib.Path = PACKAGE) -> list[Mutant]:
-    """Every mutant of a room, in order of file and place."""
+    """Every mutant of a package, in order of file and place."""
     found: list[Mutant] = []
     for path in sorted((house / room).rglob("*.py")):
         name = path.relative_to(house).as_posix()
@@ -92,7 +93,7 @@ def all_mutants(room: str, house: pathlib.Path = PACKAGE) -> list[Mutant]:
 
 
 def sample(every: list[Mutant], room: str, count: int, seed: int) -> list[Mutant]:
-    """The first `count` of an order that seed and room alone decide: more of them later begin with the same ones."""
+    """The first `count` of an order fixed by seed and package: a larger count begins with the same ones."""
     order = generator(seed, f"mutants of {room}").permutation(len(every))
     return [every[number] for number in order[:count]]
 
@@ -106,7 +107,7 @@ class Copy:
     def __init__(self, folder: pathlib.Path, house: pathlib.Path | None = CHECKOUT) -> None:
         if house is None:
             raise UserError("mutants need a checkout with its .git")
-        self.folder = folder = folder.resolve()  # what runs there has another working folder than we
+        self.folder = folder = folder.resolve()  # programs there have a different working folder
         self.house = house
         listed = subprocess.run(
             ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
@@ -141,13 +142,13 @@ class Copy:
         return self.compiled and not IS_COMPILED.search((self.folder / mutant.path).read_bytes())
 
     def put(self, path: str, text: str) -> None:
-        """The file's text from now on. A time stamp that it never had, so that no byte code of before is believed."""
+        """Set the file's text, with a new time stamp, so that no earlier byte code is used."""
         self.stamp += 10
         (self.folder / path).write_text(text, encoding="utf-8")
         os.utime(self.folder / path, (self.stamp, self.stamp))
 
     def pytest(self, arguments: Iterable[str], limit_s: float, compiled: bool = False) -> tuple[int | None, str]:
-        """Run pytest there: (exit code, what it printed); None when it took longer than the limit."""
+        """Run pytest there: (exit code, output); None when it took longer than the limit."""
         with self._started(arguments, compiled, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
             try:
                 said, _ = process.communicate(timeout=limit_s)
@@ -166,7 +167,7 @@ class Copy:
             [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *arguments],
             cwd=self.folder,
             env={**os.environ, **environment},
-            start_new_session=True,  # so that what the tests have started ends with them
+            start_new_session=True,  # so that processes started by the tests end with them
             text=True,
             errors="replace",
             **options,
@@ -198,7 +199,7 @@ class Copy:
 
 
 class Built(Copy):
-    """A copy whose compiled modules are built again with each mutant: what `make test` would run."""
+    """A copy whose compiled modules are rebuilt with each mutant, as `make test` would run them."""
 
     def __init__(self, folder: pathlib.Path, house: pathlib.Path | None = CHECKOUT) -> None:
         super().__init__(folder, house)
@@ -209,11 +210,11 @@ class Built(Copy):
             shutil.copytree(self.house / "build" / made, self.folder / "build" / made)
 
     def put(self, path: str, text: str) -> None:
-        """The file's text from now on, newer than all that was built."""
+        """Set the file's text, newer than all built files."""
         (self.folder / path).write_text(text, encoding="utf-8")
 
     def build(self) -> bool:
-        """Build what is newer than its object file; False when it cannot be compiled."""
+        """Build files newer than their object files; False when one cannot be compiled."""
         subprocess.run(
             [sys.executable, "setup.py", "-q", "build_ext", "--inplace"],
             cwd=self.folder,
@@ -228,7 +229,7 @@ class Built(Copy):
 
 
 class Asked:
-    """A server from the side of those who ask; `compiled`: what it runs is."""
+    """The client side of a server; `compiled`: whether it runs compiled code."""
 
     def __init__(self, requests: TextIO, answers: TextIO, log: pathlib.Path, compiled: bool) -> None:
         self.requests = requests
@@ -243,7 +244,7 @@ class Asked:
         return self.answer()
 
     def answer(self) -> dict:
-        """The next answer. UserError when there is no server any more: the tests cannot be collected."""
+        """The next answer. UserError when the server has ended: the tests cannot be collected."""
         line = self.answers.readline()
         if not line:
             said = self.log.read_text(encoding="utf-8").strip().splitlines() or ["pytest says nothing"]
@@ -255,9 +256,9 @@ class Asked:
 
 
 class TestsOf:
-    """The tests of a room by the functions that they run, cheapest first."""
+    """The tests of a package by the functions that they run, cheapest first."""
 
-    __test__ = False  # pytest: this is none
+    __test__ = False  # pytest: not a test
 
     def __init__(self, found: dict[str, dict[str, Any]]) -> None:
         self.tests: dict[str, dict] = {name: test for each in found.values() for name, test in each["tests"].items()}
@@ -281,7 +282,7 @@ class TestsOf:
                 self._note(place, list(each["tests"]))
 
     def at_import(self, mutant: Mutant) -> bool:
-        """True for what runs while modules are imported or tests collected."""
+        """True for code that runs while modules are imported or tests collected."""
         return not mutant.first_line or f"{mutant.path}:{mutant.first_line}" in self.imported
 
     def _note(self, place: str, names: list[str]) -> None:
@@ -289,10 +290,11 @@ class TestsOf:
         self.by_module.setdefault(place.partition(":")[0], set()).update(names)
 
     def of(self, mutant: Mutant, limit_s: float) -> tuple[list[str], int]:
-        """Tests that can notice it, cheapest first, and how many more there are.
+        """Tests that can detect it, cheapest first, and the number of further ones.
 
         Those that reach it in their own process come first, as many as fit into `limit_s` (at least one); after them
-        those that start processes, for which the map does not see what runs there, as many as fit into it again.
+        those that start processes, for which the map does not see the functions run there, as many as fit into it
+        again.
         """
         place = f"{mutant.path}:{mutant.first_line}"
         late = not self.at_import(mutant)
@@ -310,9 +312,10 @@ class TestsOf:
         return chosen, left
 
     def built_of(self, mutant: Mutant, plain: "TestsOf", limit_s: float) -> tuple[list[str], int]:
-        """Tests that can notice it in a compiled module, cheapest first as they run compiled, and how many more.
+        """Tests that can detect it in a compiled module, cheapest first as they run compiled, and the number of further
+        ones.
 
-        `plain` knows what runs the mutant's function, for the tests that end in time interpreted; all others may.
+        `plain` has the tests that run the mutant's function, for those that finish in time interpreted; all others may.
         """
         place = f"{mutant.path}:{mutant.first_line}"
         reach = plain.by_module if plain.at_import(mutant) else plain.by_function
@@ -329,7 +332,7 @@ class TestsOf:
         return chosen, len(names) - len(chosen)
 
     def is_witness(self, name: str, ask: Asked, mutant: Mutant, original: str) -> bool:
-        """True for a test that passes on the original, tried once the way mutants are."""
+        """True for a test that passes on the original, tried once in the same way as mutants."""
         if name not in self.witnesses:
             limit = START_S + SLOWER * self.tests[name]["seconds"]
             same = {"path": mutant.path, "before": original, "after": original, "tests": [name]}
@@ -344,17 +347,17 @@ class TestsOf:
             names.discard(name)
 
     def seconds(self, names: list[str]) -> float:
-        """What they took together."""
+        """Their total time."""
         return sum(self.tests[name]["seconds"] for name in names)
 
 
 def reach_of(
     copy: Copy, ask: Asked, room: str, tests: list[str], limit_s: float, say: Callable[[str], None]
 ) -> TestsOf:
-    """The map of a room's tests, file by file: made by running them once, kept until the room or the file changes.
+    """The map of a package's tests, file by file: made by running them once, kept until the package or file changes.
 
     A test that takes longer than LIMIT_TEST_S is not run again, one that fails or a file that takes longer than
-    `limit_s` takes no part, and that is said. UserError when a map cannot be made at all.
+    `limit_s` takes no part, and this is reported. UserError when a map cannot be made at all.
     """
     folder = copy.folder.parent / f"reach-{room}{'-compiled' if ask.compiled else ''}"
     folder.mkdir(exist_ok=True)
@@ -390,7 +393,7 @@ def reach_of(
 
 
 def state_of(folder: pathlib.Path, room: str, tests: pathlib.Path) -> str:
-    """A digest of the room's sources, a file of tests and its helpers: what its map is made of."""
+    """A digest of the inputs of a map: the package's sources, a file of tests and its helpers."""
     digest = hashlib.sha256()
     helpers = [path for path in tests.parent.glob("*.py") if not path.name.startswith("test_")]
     for path in (*sorted((folder / room).rglob("*.py")), *sorted(helpers), tests):
@@ -407,7 +410,7 @@ def files_of_tests(path: pathlib.Path) -> list[pathlib.Path]:
 
 
 class Results:
-    """Verdicts of a room in a file of JSON lines; the last one of a key counts."""
+    """Verdicts of a package in a file of JSON lines; the last one of a key counts."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self.path = path
@@ -427,8 +430,8 @@ class Results:
 def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float) -> Verdict:
     """Put it into the copy, run the tests that reach it, and take it out again.
 
-    A test that blames it must pass on the original, or it is no witness and takes no part from then on. Tests that do
-    not come to an end must do so with the original: else it is the machine, and the mutant has not been noticed.
+    A test that fails with it must pass on the original, otherwise it takes no part from then on. Tests that do not
+    finish must finish with the original: otherwise the machine is the cause, and the mutant was not detected.
     """
     original = (copy.folder / mutant.path).read_text(encoding="utf-8")
     begun = wallclock.monotonic_s()
@@ -444,7 +447,7 @@ def judge(copy: Copy, ask: Asked, mutant: Mutant, tests: TestsOf, limit_s: float
         if code == 1 and by in tests.tests and not tests.is_witness(by, ask, mutant, original):
             tests.leave_out(by)
         elif code is None and by and verdict_of(copy, ask, mutant, tests, [by], original, original, chosen)[0] is None:
-            tests.leave_out(by)  # it needs what another test before it had made, which takes longer than itself
+            tests.leave_out(by)  # it needs the results of an earlier test, which takes longer than itself
         elif code is None and not by and verdict_of(copy, ask, mutant, tests, chosen, original, original)[0] is None:
             return Verdict(mutant.key, mutant.line, TOO_SLOW, "", len(chosen), limit_of(tests, chosen), left)
         else:
@@ -493,11 +496,11 @@ def verdict_of(
 
 
 def from_the_start(copy: Copy, chosen: list[str], limit_s: float, compiled: bool) -> tuple[int | None, str]:
-    """Run these tests in a process of their own: (pytest's exit code or None for too long, the test that failed)."""
+    """Run these tests in a separate process: (pytest's exit code or None for too long, the test that failed)."""
     listed = copy.folder.parent / "chosen-tests"
     listed.write_text("".join(f"{name}\n" for name in chosen), encoding="utf-8")
     code, said = copy.pytest(["-x", "--no-header", f"@{listed}"], limit_s, compiled)
-    if code == NO_SUCH_TEST:  # the mutant changed what tests are made of: then all of their files
+    if code == NO_SUCH_TEST:  # the mutant changed the parametrisation of tests: then all of their files
         files = dict.fromkeys(name.partition("::")[0] for name in chosen)
         code, said = copy.pytest(["-x", "--no-header", *files], limit_s + 300.0, compiled)
     blamed = [line for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
@@ -509,7 +512,7 @@ def from_the_start(copy: Copy, chosen: list[str], limit_s: float, compiled: bool
 def judge_built(built: Built, mutant: Mutant, plain: TestsOf, compiled: TestsOf, limit_s: float) -> Verdict:
     """Build it into the library and run tests that passed with the original; then take it out again.
 
-    As with `judge`, what is noticed must not be so with the original, built the same way.
+    As with `judge`, a detected failure must not occur with the original, built the same way.
     """
     original = (built.folder / mutant.path).read_text(encoding="utf-8")
     begun = wallclock.monotonic_s()
@@ -534,7 +537,7 @@ def judge_built(built: Built, mutant: Mutant, plain: TestsOf, compiled: TestsOf,
 
 
 def built_verdict(built: Built, chosen: list[str], limit_s: float) -> tuple[int | None, str]:
-    """What these tests say of the files as they are now: (pytest's exit code or None for too long, who failed)."""
+    """Result of these tests on the present files: (pytest's exit code or None for too long, the test that failed)."""
     if not built.build():
         return 1, "the build"
     return from_the_start(built, chosen, limit_s, True) if chosen else (0, "")

@@ -1,1 +1,1 @@
-"""Where the power comes from and goes: battery, bridges, motors, and what the electronics draw (EQUATIONS 10)."""
+"""Power sources and loads: battery, bridges, motors, and the electronics (EQUATIONS 10)."""

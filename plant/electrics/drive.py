@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False
-# (places in the queue are below `count`, and `count` is at most `capacity`)
-"""The H-bridge of a motor board: two PWM leads, low-side enables, and the watchdog that takes its power away.
+# (indices in the queue are below `count`, and `count` is at most `capacity`)
+"""The H-bridge of a motor board: two PWM leads, low-side enables, and the watchdog that removes its power.
 
-What a board does arrives stamped (ns) and takes effect at its stamp, also inside a step of the plant; a stamp
+A board's writes arrive stamped (ns) and take effect at their stamps, also inside a step of the plant; a stamp
 that has passed takes effect at the start of the next step. The watchdog is judged here, in plant time: the
 bridge has power until `watchdog_ns` after the last edge on the watchdog line, and again from the next edge on
 (appendix 3.9; robot.md N4.3).
@@ -37,12 +37,12 @@ class Drive(Bridge):
 
     `is_open`: no transistor conducts (no power, or a low side off), so the winding can only freewheel through the
     diodes. `switching_leads`: leads that toggle with the PWM. `sensed_lead_switches`: lead 2, where the current
-    sensor sits (chosen by us, because no source says which), is one of them. `ripple`: (|D| (1 - |D|))^2 of the duty D,
-    to which the loss of the current's ripple is proportional. `healthy_duty`, `healthy_open`: what duty and openness
-    would be if no leg were held.
+    sensor sits (chosen by us, because no source specifies it), is one of them. `ripple`: (|D| (1 - |D|))^2 of the duty
+    D, to which the loss of the current's ripple is proportional. `healthy_duty`, `healthy_open`: duty and openness if
+    no leg were held.
     """
 
-    # what a motor looks at in every step stands first, beside each other
+    # fields that a motor reads at every step come first, next to each other
     next_change_ns: cython.longlong
     duty: cython.double
     ripple: cython.double
@@ -85,7 +85,7 @@ class Drive(Bridge):
         self.healthy_duty = 0.0
         self.healthy_open = True
         self.power_losses = 0  # times the watchdog ran out
-        # the queue, a row of numbers per change: time (ns), kind, what it writes
+        # the queue, a row of numbers per change: time (ns), kind, written values
         self.changes = integers(ROW * 16)
         self.capacity = 16
         self.count = 0
@@ -153,7 +153,7 @@ class Drive(Bridge):
             self.next_change_ns = time
 
     def _grow(self) -> None:
-        """Double the queue, keeping what is there."""
+        """Double the queue, keeping its content."""
         self.capacity = 2 * self.capacity
         grown = integers(ROW * self.capacity)
         for k, number in enumerate(self.changes):

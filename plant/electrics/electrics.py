@@ -1,12 +1,12 @@
 # cython: boundscheck=False, wraparound=False
-# (places are those of the 19 wiring points, the four motors and `NoiseSource.block`)
+# (indices are those of the 19 wiring points, the four motors and `NoiseSource.block`)
 """Battery, four motors, electronics and every voltage that a board's converters see.
 
 A step of the plant in order: `step_motors` with the joint rates at its start (currents, torques for the body),
-then the body moves, then `sense` with what the feet and the steering show at its end. The voltages stand in
+then the body moves, then `sense` with the state of the feet and the steering at its end. The voltages are in
 `analog_start` and `analog_end` (V, by plant/wiring_points.py), to be read as straight lines over the step.
 
-Sensor constants are those with which each board's firmware turns counts back (robot.md N5), so a
+Sensor constants are those with which each board's firmware converts counts (robot.md N5), so a
 nominal sensor is inverted exactly: -g (raw - off) is the motor's current in A, g (raw - off) the battery's, both by
 the 14-bit converter with 2.5 V reference and the board's gain; battery voltage V = g x raw of the 10-bit one
 with 3.3 V.
@@ -114,7 +114,7 @@ class ElectricsParameters:
 class Electrics:
     """Everything electrical of the robot. `seed`: for the sensors' noise."""
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     hip: MotorUnit
     outer_ankle: MotorUnit
     inner_ankle: MotorUnit
@@ -171,7 +171,7 @@ class Electrics:
         self.analog_start = reals([0.0] * ANALOG_COUNT)
         self.analog_end = reals([0.0] * ANALOG_COUNT)
         # C arrays of ANALOG_COUNT and of MOTOR_COUNT numbers: their length is a literal
-        self.values = [0.0] * 19  # what is measured: A, V, rad
+        self.values = [0.0] * 19  # measured quantities: A, V, rad
         self.zero_V = [0.0] * 19
         self.slope_V = [0.0] * 19  # volts per ampere, volt or rad
         self.noise_V = [0.0] * 19
@@ -183,7 +183,7 @@ class Electrics:
         self.lag_s = [0.0] * 19
         self.state = [0.0] * 19
         self.battery_A = [0.0] * 4  # smoothed, per motor
-        self.steering_rad = 0.0  # twist of the feet, and what its sensor makes of it
+        self.steering_rad = 0.0  # twist of the feet, and its sensor's reading
         self.steering_shown_rad = 0.0
         self.pwm_offset_A = p.pwm_offset_A
         self.voltage_clip_V = p.voltage_clip_V
@@ -307,7 +307,7 @@ class Electrics:
         inner_load_N: cython.double,
         steering_rad: cython.double,
     ) -> cython.void:
-        """Start: all sensors as if they had stood like this for long."""
+        """Settle all sensors, as if the state had lasted for a long time."""
         i: cython.longlong
         self.outer_feet.settle(outer_contact, outer_load_N)
         self.inner_feet.settle(inner_contact, inner_load_N)
@@ -319,7 +319,7 @@ class Electrics:
 
     @cython.cfunc
     def _read(self, h: cython.double, steering_rad: cython.double) -> cython.void:
-        """Fill `analog_end`; what stood there becomes `analog_start`."""
+        """Fill `analog_end`; its previous content becomes `analog_start`."""
         V: cython.double = self.battery.voltage_V
         seen: cython.double = V if V < self.voltage_clip_V else self.voltage_clip_V
         lag: cython.double = self.lag_factor
@@ -335,7 +335,7 @@ class Electrics:
         values: cython.p_double = self.values
         battery_A: cython.p_double = self.battery_A
         for motor in range(MOTOR_COUNT):
-            # what the three sensors of a motor board measure
+            # quantities measured by the three sensors of a motor board
             unit = motors[motor]
             amps = unit.current_A
             if unit.drive.sensed_lead_switches:
@@ -378,7 +378,7 @@ class Electrics:
 
     @cython.cfunc
     def _apply_terms(self, h: cython.double) -> cython.void:
-        """Scale, offset and lag of a model file on what is measured."""
+        """Apply scale, offset and lag of a model file to the measured quantities."""
         i: cython.longlong
         value: cython.double
         for i in range(ANALOG_COUNT):

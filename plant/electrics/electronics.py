@@ -1,6 +1,6 @@
-"""What computers, sensors and radio draw: 5.15 W itemised, 4.7 W without the left outer ankle.
+"""Power drawn by computers, sensors and radio: 5.15 W itemised, 4.7 W without the left outer ankle.
 
-The total is the appendix's P_fixed (1.1.2). It is what the router board measures: it feeds all of the electronics
+The total is the appendix's P_fixed (1.1.2). The router board measures it, because it feeds all of the electronics
 "except for the motors and motor drivers" (3.8), through a converter from the battery to 5.5 V (3.6). The 65 km
 walk ran at 4.7 W because the left outer ankle was switched off, board and sensor (3.8). These two are 0.2 W each,
 so the 0.45 W saved put the converter's efficiency at 0.40 / 0.45 = 8/9, and everything else sums to that.
@@ -35,7 +35,7 @@ ITEMS = (
     ("radio receiver", 0.100, "chosen by us: 20 mA at 5 V, a usual hobby receiver"),
     ("display, lights, buzzer, keys", 0.200, "chosen by us: two of six lights on at 10 mA per colour"),
 )
-# What a walk may do without: parts that no emulated board reads, under the name that a scenario gives them.
+# Optional parts: those that no emulated board reads, under the name used in a scenario.
 LEFT_OUTER_ANKLE = ("left outer ankle board", "left outer ankle absolute encoder")
 SWITCHES = {"left-outer-ankle": LEFT_OUTER_ANKLE}
 
@@ -43,7 +43,7 @@ SWITCHES = {"left-outer-ankle": LEFT_OUTER_ANKLE}
 def itemised_W(off: tuple[str, ...] = ()) -> dict[str, float]:
     """Watts at the battery by item, those of `off` left out: names of items, or of a group of SWITCHES.
 
-    "carrier board and bus, unnamed" is what the measured total has beyond the named items.
+    "carrier board and bus, unnamed" is the rest of the measured total after the named items.
     """
     items = {name: watts for name, watts, _ in ITEMS}
     items["carrier board and bus, unnamed"] = TOTAL_W * EFFICIENCY - sum(items.values())

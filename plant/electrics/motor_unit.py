@@ -2,9 +2,9 @@
 # (only doubles are divided, by durations and resistances above zero)
 """A brushed motor with its drive: winding current in closed form, friction at the joint, heat, power balance.
 
-Everything seen from outside is in the joint's sense: a positive current turns the joint positively. `mounting`
-(+1 or -1) says how the motor sits: with -1 a positive bridge voltage turns the joint negatively (the outer
-ankle is mirrored, robot.md N4.1, N4.2).
+Everything seen from outside is in the joint's sense: a positive current turns the joint positively. `mounting` (+1 or
+-1) is the motor's orientation: with -1 a positive bridge voltage turns the joint negatively (the outer ankle is
+mirrored, robot.md N4.1, N4.2).
 
 Electrical (appendix eq. 32 with the inductance added; EQUATIONS 10.1-10.7):
 
@@ -49,11 +49,11 @@ class MotorUnit:
     Sums since power-up in J: battery_J = drawn_J - returned_J = mechanical + winding + series + contact + ripple
     + gate + diode + change of magnetic energy.
 
-    More than 40 fields, because the lines of a step use the winding's numbers and its books alike: in an object of
-    their own the books would be looked up in every line.
+    More than 40 fields, because the lines of a step use both the winding's numbers and its sums: in a separate object
+    the sums would cost a look-up in every line.
     """
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     drive: Drive
     mounting: cython.double
     gear: cython.double
@@ -75,7 +75,7 @@ class MotorUnit:
     ripple_per_ohm2: cython.double
     mu: cython.double
     C0: cython.double
-    # what a step leaves behind
+    # results of a step
     heat_s: cython.double
     size_As: cython.double
     square_A2s: cython.double
@@ -89,7 +89,7 @@ class MotorUnit:
     drive_Nm: cython.double
     coulomb_Nm: cython.double
     viscous_Nms: cython.double
-    # the rest is looked at every few steps, or by the body alone
+    # the rest is read every few steps, or by the body alone
     tau_s: cython.double
     diode_drop_V: cython.double
     diode_J: cython.double
@@ -129,7 +129,7 @@ class MotorUnit:
         self.winding_ohm = p.resistance_ohm  # at the present temperature
         self.series_ohm = p.series_resistance_ohm + p.bridge_resistance_ohm
         self.K = p.torque_constant_Nm_per_A  # at the present temperature, its mean over a turn of the rotor
-        self.angle_factor = 1.0  # of K: where the rotor stands, 1 for a motor without ripple
+        self.angle_factor = 1.0  # factor of K at the rotor's position, 1 for a motor without ripple
         self.inductance_H = p.inductance_H(p.settling_frequency_hz)
         # of EQUATIONS 10.6, without voltage, resistance and duty
         self.ripple_per_ohm2 = 1.0 / (12.0 * (p.inductance_H(p.pwm_frequency_hz) * p.pwm_frequency_hz) ** 2)
@@ -202,12 +202,12 @@ class MotorUnit:
         return self.drawn_J - self.returned_J
 
     def add_ripple(self, fraction, periods_per_turn, phase_rad) -> None:
-        """K is so much more and less of itself, with this phase where the rotor's angle is 0."""
+        """Add a ripple of K by this fraction, with this phase at rotor angle 0."""
         self.ripples = reals(list(self.ripples) + [fraction, periods_per_turn, phase_rad])
 
     @cython.ccall
     def turn(self, angle_rad: cython.double, rate_rad_s: cython.double, seconds: cython.double) -> cython.void:
-        """Set K for a step that begins at this angle of the joint: its mean over what the rotor goes through."""
+        """Set K for a step that begins at this angle of the joint: its mean over the rotor's motion."""
         half: cython.double = 0.5 * self.gear * rate_rad_s * seconds
         middle: cython.double = self.gear * angle_rad + half
         factor: cython.double = 1.0
@@ -250,8 +250,8 @@ class MotorUnit:
     ) -> cython.void:
         """Winding, bridge and heat from `t0` to `t1` (ns) at a constant joint rate and battery voltage.
 
-        Here where the bridge does not change and the current stays on its side of zero, which is nearly always;
-        in pieces otherwise (EQUATIONS 10.2-10.7).
+        Computed here if the bridge does not change and the current stays on its side of zero, which is nearly always
+        so; otherwise in pieces (EQUATIONS 10.2-10.7).
         """
         drive: Drive = self.drive
         if t1 <= t0:
@@ -508,7 +508,7 @@ class MotorUnit:
 
     @cython.cfunc
     def _know_step(self, h: cython.double, R: cython.double) -> cython.void:
-        """Keep what a step of `h` seconds at a loop resistance of `R` ohm needs of the exponential."""
+        """Keep the exponentials for a step of `h` seconds at a loop resistance of `R` ohm."""
         self.known_s = h
         self.known_ohm = R
         self.per_s = 1.0 / h
@@ -522,7 +522,7 @@ class MotorUnit:
     def _warm(self, h: cython.double) -> cython.void:
         """Winding and housing after `h` seconds of `heat_W`; R and K follow when their coefficients are set.
 
-        Asked every 8 ms, less than a 600th of any winding's time constant: chosen by us.
+        Called every 8 ms, less than a 600th of any winding's time constant: chosen by us.
         """
         inward: cython.double = (self.rotor_temperature_C - self.housing_temperature_C) * self.G_wh
         outward: cython.double = (self.housing_temperature_C - self.air_C) * self.G_ha

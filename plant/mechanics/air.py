@@ -15,7 +15,7 @@ from ranger_sim.plant.mechanics.term_torques import TermTorques
 @cython.ccall
 @cython.exceptval(check=True)
 def in_air(body: "Body", h: cython.double, stages: cython.longlong) -> cython.void:
-    """One step as `on_feet` makes it, of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to look.
+    """One step as `on_feet` makes it, of `h` seconds in flight or held (EQUATIONS 7); stages 4, or 1 to evaluate only.
 
     Inside, o is the outer leg with foot F, leg th and motor p, i the inner one with foot G, leg tw and motor n; neither
     has a role, but a standing foot in the operator's hands. One long function,
@@ -60,11 +60,11 @@ def in_air(body: "Body", h: cython.double, stages: cython.longlong) -> cython.vo
         sS, cS, rolling = standing.sin_foot, standing.cos_foot, standing.C + hands
     half: cython.double = 0.5 * h
     quarter: cython.double = 0.25 * h
-    # what rests while the operator holds it
+    # parts at rest while the operator holds the robot
     as_ = aw = axh = ayh = 0.0
     for stage in range(stages):
         if stage != 2:
-            # what depends on angles alone; stages 1 and 2 look at the same ones
+            # terms that depend on angles alone; stages 1 and 2 have the same angles
             a_s = F - th
             a_w = G - tw
             pull_s = 0.0 if o.Jf == 0.0 and standing is not o else ks * (p - a_s)
@@ -101,7 +101,7 @@ def in_air(body: "Body", h: cython.double, stages: cython.longlong) -> cython.vo
             # EQUATIONS 2.7: springs that return the foot
             back = return_k * (a_s - ankle.rest)
             if o.Jf == 0.0 and standing is not o:
-                mp -= back  # the cable hands it on
+                mp -= back  # the cable transmits it
             else:
                 Ts -= back
             back = return_k * (a_w - ankle.rest)

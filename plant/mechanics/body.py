@@ -1,14 +1,14 @@
 # cython: boundscheck=False, wraparound=False
-# (places in `saved` are all written out)
+# (all indices in `saved` are literal)
 """Ranger's body: four links, two elastic ankle drives, two feet on the floor. Equations: plant/EQUATIONS.md.
 
-Coordinates never swap names: every angle belongs to a leg, outer or inner (EQUATIONS 1; `leg.py`). What swaps is
-the role: one leg stands, the other swings, exchanged when a foot meets the floor or leaves it.
+Coordinates never swap names: every angle belongs to a leg, outer or inner (EQUATIONS 1; `leg.py`). The roles swap: one
+leg stands, the other swings, exchanged when a foot meets the floor or leaves it.
 
 Modes: held by the operator, single stance, double stance, flight, fallen. Forces are those of the floor on the
 robot, along the (sloped) floor and normal to it.
 
-The body's fields and geometry stand here. What happens to it, in the order in which one file imports the next:
+The body's fields and geometry are defined here. Its motion and events, in the order in which one file imports the next:
 
     stance, air          one step of the equations of motion: on one or two feet; in flight or in the operator's hands
     sliding              one step while a foot slides
@@ -52,10 +52,10 @@ class Body:
     """State and motion of the mechanical robot. `parameters`: BodyParameters; `floor`: Floor.
 
     `outer`, `inner`: the legs; `stance`, `swing`: the same two by role. `stance` carries in single stance and is the
-    reference leg in double stance. More than 40 fields, because a step reads most of them at every turn.
+    reference leg in double stance. More than 40 fields, because a step reads most of them.
     """
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     outer: Leg
     inner: Leg
     stance: Leg
@@ -115,7 +115,7 @@ class Body:
         self.stance = self.outer
         self.swing = self.inner
         self.hip = HipJoint(p)
-        self.ankle = Ankle(p)  # what both ankles are made of
+        self.ankle = Ankle(p)  # parts of both ankles
         self.sole = Sole(p)
 
         # state of the hip, m and m/s, along the floor and normal to it; its legs keep their own
@@ -133,7 +133,7 @@ class Body:
         self.strike_ahead = p.strike_ahead_m
         self.coulomb = p.contact == "coulomb"  # no foot pulls nor holds beyond friction (EQUATIONS 8, 9)
         self.compliant = p.contact == "compliant"  # feet press into the floor, nothing is rigid (EQUATIONS 9)
-        self.floating = False  # on such a floor, in nobody's hands: the hip hangs on no foot
+        self.floating = False  # on such a floor, not held: the hip hangs on no foot
         self.sliding = False  # a foot slides, or the hip floats: the steps are those of plant/mechanics/sliding.py
         self.watched = False  # a foot is near the bounds of its grip in this step
         self.unilateral = p.contact == "unilateral"  # the trailing foot may leave at a heel-strike (EQUATIONS 8)
@@ -155,7 +155,7 @@ class Body:
         self.time_s = 0.0  # since the body was made; only for durations
         self.elapsed = 0.0  # s since the start of the running step
         self.step_start_ns = 0
-        self.event = 0  # what is next or happens, and with which leg: plant/walking/motion.py
+        self.event = 0  # next or present event, and its leg: plant/walking/motion.py
         self.event_leg = self.outer
         self.changes = 0  # touches, lift-offs and falls so far
         self.cause = ""  # of a fall
@@ -202,18 +202,18 @@ class Body:
     @cython.ccall
     @cython.exceptval(check=False)
     def ahead(self) -> cython.double:
-        """How far the swing foot's lowest point is ahead of the stance foot's, m."""
+        """Distance of the swing foot's lowest point ahead of the stance foot's, m."""
         return self.stance.behind() - self.swing.behind()
 
     @cython.ccall
     def anchor_foot(self, leg: Leg) -> cython.void:
-        """From here on the foot stands where it is."""
+        """Anchor the foot at its place from here on."""
         leg.anchor = self.hip_x - leg.chain_x(leg.foot_angle, leg.angle)
 
     @cython.ccall
     @cython.exceptval(check=False)
     def contact_x(self, leg: Leg) -> cython.double:
-        """Where the lowest point of a foot is along the floor, m."""
+        """Position of a foot's lowest point along the floor, m."""
         return self.hip_x - leg.behind()
 
     @cython.ccall
@@ -254,7 +254,7 @@ class Body:
     @cython.ccall
     @cython.exceptval(check=False)
     def slip_m_per_s(self, leg: Leg) -> cython.double:
-        """How fast the lowest point of a foot moves along the floor, m/s (EQUATIONS 8)."""
+        """Speed of a foot's lowest point along the floor, m/s (EQUATIONS 8)."""
         leg.know_leg()
         leg.know_foot()
         along: cython.double = leg.r * cos(leg.excess(leg.foot_angle)) - leg.d * leg.cos_foot
@@ -343,7 +343,7 @@ class Body:
     @cython.ccall
     @cython.exceptval(check=False)
     def event_time_ns(self) -> cython.longlong:
-        """Instant of the running event, ns."""
+        """Time of the present event, ns."""
         return self.step_start_ns + int(self.elapsed * 1e9 + 0.5)
 
     @cython.cfunc

@@ -1,10 +1,10 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 # (indices are written out or those of loops over whole arrays; no integer is divided)
-"""What two feet may do on the floor: stand apart from it, stick, or slide (EQUATIONS 8, 9).
+"""Possible states of two feet on the floor: clear of it, sticking, or sliding (EQUATIONS 8, 9).
 
-The same ten linear equations serve a strike, in rates and impulses, and any instant between strikes, in accelerations
-and forces. Unknown are the hip along x and y, both legs, both feet, and x and y of what the floor does to each foot.
-A foot in one of its four states gives two of the equations; the state is right when its inequalities hold too:
+The same ten linear equations serve a strike, in rates and impulses, and any time between strikes, in accelerations and
+forces. The unknowns are the hip along x and y, both legs, both feet, and x and y of the floor's action on each foot. A
+foot in one of its four states gives two of the equations; the state is right when its inequalities hold too:
 
     APART         no impulse                                 the foot does not move into the floor
     STICKS        the foot does not move                     the floor pushes, along itself within mu of that
@@ -22,7 +22,7 @@ from cython.cimports.libc.math import cos, fabs, sin
 
 from ranger_sim.plant.mechanics.leg import INNER, OUTER, Leg
 
-# Columns of `matrix`, and rows of `solution`: what is unknown, and last the right-hand side.
+# Columns of `matrix`, and rows of `solution`: the unknowns, and last the right-hand side.
 COLUMN_VX: Final = 0  # of the hip
 COLUMN_VY: Final = 1
 COLUMN_LEG: Final = 2  # the outer, and next the inner leg
@@ -31,7 +31,7 @@ COLUMN_IMPULSE: Final = 6  # x and y of the outer foot, and of the inner
 COLUMN_RIGHT: Final = 10
 COLUMNS: Final = 11
 
-# what a foot does
+# states of a foot
 APART: Final = 0
 STICKS: Final = 1
 SLIDES_ON: Final = 2
@@ -41,7 +41,7 @@ STATES: Final = 4
 ARMS: Final = 4  # numbers per foot in `arm`
 
 
-# In which order pairs of states are tried: of the foot that stood, and of the one that touches. When more than one
+# Order in which pairs of states are tried: of the stance foot, and of the one that touches. When more than one
 # pair satisfies everything the first is taken: as many feet stay on the floor as can, as many of them stick as can,
 # the foot that touches before the other. Chosen by us, because it is nearest to the appendix's rule, both feet at rest.
 PAIRS = (
@@ -69,10 +69,10 @@ PAIRS = (
 class ContactEquations:
     """The equations and their solution. Arrays are by foot, outer first; "rate" may be acceleration, "impulse" force.
 
-    Filled by `begin` and its caller: `mass`, 6 x 6; `right`, momenta or forces of the first six rows; `target`, what
-    the contact's rate along and normal to the floor shall be when the foot holds; `rolling`, torque on a foot while it
-    is at the floor; `follow`, of a massless foot, what its motor's rate is, which it follows when apart. `moving`: the
-    foot slides already, its direction is known.
+    Filled by `begin` and its caller: `mass`, 6 x 6; `right`, momenta or forces of the first six rows; `target`, rates
+    of the contact along and normal to the floor when the foot holds; `rolling`, torque on a foot while it is at the
+    floor; `follow`, of a massless foot, its motor's rate, which it follows when APART. `moving`: the foot
+    slides already, its direction is known.
     """
 
     matrix: cython.double[110]
@@ -186,7 +186,7 @@ class ContactEquations:
 
     @cython.ccall
     def allow_all(self, side: cython.longlong) -> cython.void:
-        """This foot is at the floor and may do whatever fits."""
+        """Allow this foot, which is at the floor, every state."""
         n: cython.longlong
         self.at_floor[side] = True
         for n in range(STATES):
@@ -194,21 +194,21 @@ class ContactEquations:
 
     @cython.ccall
     def allow_only(self, side: cython.longlong, state: cython.longlong) -> cython.void:
-        """This foot does this, and nothing else fits."""
+        """Allow this foot only this state."""
         n: cython.longlong
         for n in range(STATES):
             self.allowed[STATES * side + n] = n == state
 
     @cython.ccall
     def leave_out(self, side: cython.longlong) -> cython.void:
-        """This foot is in the air: the floor asks nothing of it."""
+        """Put this foot in the air, without conditions from the floor."""
         self.allow_only(side, APART)
         self.at_floor[side] = False
 
     @cython.ccall
     @cython.exceptval(check=False)
     def solve(self, outer: cython.longlong, inner: cython.longlong) -> cython.bint:
-        """Solve with these states of the feet, inequalities not asked; False when the equations contradict."""
+        """Solve with these states of the feet, without checking inequalities; False when the equations contradict."""
         row: cython.longlong
         column: cython.longlong
         a: cython.p_double = self.matrix
@@ -227,7 +227,7 @@ class ContactEquations:
 
     @cython.cfunc
     def write_contact(self, side: cython.longlong, state: cython.longlong) -> cython.void:
-        """Two rows and two columns of `matrix`: what this foot does, and what its impulse does to the robot."""
+        """Fill two rows and two columns of `matrix`: this foot's conditions, and its impulse's effect on the robot."""
         along: cython.longlong = COLUMN_IMPULSE + 2 * side
         normal: cython.longlong = along + 1
         leg: cython.longlong = COLUMN_LEG + side
@@ -236,14 +236,14 @@ class ContactEquations:
         n: cython.longlong = ARMS * side
         a: cython.p_double = self.matrix
         if self.at_floor[side]:
-            # Friction of rolling does not depend on the load. A foot about to leave is asked with it too, because else
+            # Friction of rolling does not depend on the load. A foot about to leave includes it too, because otherwise
             # none of the states may fit where the load is small.
             a[COLUMNS * foot + COLUMN_RIGHT] += self.rolling[side]
         if state == APART:
             a[COLUMNS * along + along] = 1.0
             a[COLUMNS * normal + normal] = 1.0
             if self.massless[side]:
-                # it has no momentum of its own: it follows its motor
+                # it has no momentum: it follows its motor
                 a[COLUMNS * foot + foot] = 1.0
                 a[COLUMNS * foot + leg] = -1.0
                 a[COLUMNS * foot + COLUMN_RIGHT] = self.follow[side]
@@ -270,7 +270,7 @@ class ContactEquations:
     @cython.ccall
     @cython.exceptval(check=False)
     def contact_rate(self, side: cython.longlong, along: cython.longlong) -> cython.double:
-        """By how much the contact of this foot is faster than its target in `solution`: normal (0) or along (1)."""
+        """Excess of this foot's contact rate over its target in `solution`: normal (0) or along (1)."""
         x: cython.p_double = self.solution
         n: cython.longlong = ARMS * side + (0 if along else 2)
         rate: cython.double = x[COLUMN_VX] if along else x[COLUMN_VY]
@@ -280,9 +280,9 @@ class ContactEquations:
     @cython.ccall
     @cython.exceptval(check=False)
     def slack(self, side: cython.longlong, state: cython.longlong) -> cython.double:
-        """How far the inequalities of this state are from being broken in `solution`, m/s; below 0 they are.
+        """Margin of this state's inequalities in `solution`, m/s; below 0 they are violated.
 
-        Impulses count as what they give the whole robot: divided by its mass.
+        Impulses count divided by the mass of the whole robot.
         """
         push: cython.double = self.solution[COLUMN_IMPULSE + 2 * side + 1] / self.total_mass
         along: cython.double = self.solution[COLUMN_IMPULSE + 2 * side] / self.total_mass
@@ -304,8 +304,8 @@ class ContactEquations:
     def settle(self, last: cython.longlong) -> cython.double:
         """Find the feet's states, and solve with them: `state`, `solution`. `last`: side of the foot that touches.
 
-        Returns 0, or by how much (m/s, below 0) the inequalities are broken that come nearest to being kept, when
-        none of the pairs keeps all: by rounding, where a foot is just between two states.
+        Returns 0, or the smallest violation (m/s, below 0) of the inequalities, when no pair satisfies all of them: by
+        rounding, where a foot is just between two states.
         """
         first: cython.longlong = 1 - last
         a: cython.longlong
@@ -347,7 +347,7 @@ def eliminate(a: cython.p_double, x: cython.p_double, n: cython.longlong) -> cyt
             if fabs(a[COLUMNS * i + k]) > fabs(a[COLUMNS * best + k]):
                 best = i
         if fabs(a[COLUMNS * best + k]) < 1e-12:
-            return False  # no pivot, where masses are 1e-3 to 10 kg and directions about 1
+            return False  # too small for a pivot: masses are 1e-3 to 10 kg and directions about 1
         if best != k:
             for j in range(COLUMNS):
                 held = a[COLUMNS * k + j]

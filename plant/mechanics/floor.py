@@ -9,7 +9,7 @@ from ranger_sim.foundation.user_error import UserError
 class Floor:
     """Heights of the footholds, m above the mean floor; each foothold is flat and as sloped as the floor.
 
-    slope_rad: positive downhill (the body turns gravity by it, the heights stand on the sloped plane).
+    slope_rad: positive downhill (the body turns gravity by it, the heights are relative to the sloped plane).
     roughness_m: standard deviation of the height per foothold, normal, from the stream ``floor`` of the seed.
     step_at, step_m: from foothold number `step_at` on, everything lies `step_m` higher (negative: a step down).
     The first foothold (number 0) is where the robot is put down: it defines height 0 and is never rough.

@@ -1,6 +1,6 @@
 # cython: cdivision=True
 # (what is divided by is above 1)
-"""The sign of a rate as dry friction asks for it: smoothed, so that a law of torque has no jump at rest."""
+"""The sign of a rate for dry friction: smoothed, so that a law of torque has no jump at rest."""
 
 import cython
 from cython.cimports.libc.math import exp

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (places in `saved` are all written out)
+# (all indices in `saved` are literal)
 """One leg with its foot and its ankle motor; the body has two of them (EQUATIONS 1, 4).
 
 All angles are positive clockwise seen with the walking direction to the right, that is in the forward direction:
@@ -32,11 +32,11 @@ LEG_NAMES = ("outer", "inner")
 class Leg:
     """State, contact, forces and parameters of one leg. `side`: OUTER or INNER; `parameters`: BodyParameters.
 
-    Both legs have the same equations; what differs between them is numbers, and all of these stand here. More than 40
-    fields, because a step reads nearly all of them: split in two (a leg and its foot) each would cost a second look-up.
+    Both legs have the same equations; they differ only in numbers, all of which are fields here. More than 40 fields,
+    because a step reads nearly all of them: split in two (a leg and its foot) each would cost a second look-up.
     """
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     foot_angle: cython.double
     angle: cython.double
     motor_angle: cython.double
@@ -152,7 +152,7 @@ class Leg:
         if p.contact not in RIGID and self.Jf < LEAST_FOOT_INERTIA:
             self.Jf = LEAST_FOOT_INERTIA
         self.inverse_Jf = 1.0 / self.Jf if self.Jf > 0.0 else 0.0
-        # of these alone: what of the mass matrix is constant, as stance leg (m22, mt) and as the other one (1 / m33)
+        # from these alone: the constant part of the mass matrix, as stance leg (m22, mt) and as the other one (1 / m33)
         M = p.total_mass_kg
         JH = p.hip_rotor_inertia_kg_m2
         self.m22 = M * self.el * self.el - 2.0 * self.el * self.mc + self.J + JH
@@ -249,7 +249,7 @@ class Leg:
 
     @cython.ccall
     def limp(self) -> cython.void:
-        """A massless foot in the air stands where its motor holds it, q4 = q4m (EQUATIONS 5.4)."""
+        """Put a massless foot in the air where its motor holds it, q4 = q4m (EQUATIONS 5.4)."""
         self.foot_angle = self.angle + self.motor_angle
         self.foot_rate = self.rate + self.motor_rate
 

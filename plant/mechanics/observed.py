@@ -1,4 +1,4 @@
-"""What is noticed of a walk beside its events (plant/walking/watch.py): extremes, times, and the limits of a fall."""
+"""Observations of a walk in addition to its events (plant/walking/watch.py): extremes, times, limits of a fall."""
 
 import math
 
@@ -8,7 +8,7 @@ import cython
 @cython.final
 @cython.cclass
 class Observed:
-    """Starts anew when the robot is let go; read by plant/walking/watch.py, the summary of a walk, and tests."""
+    """Restarts when the robot is let go; read by plant/walking/watch.py, the summary of a walk, and tests."""
 
     foothold_due: cython.bint
     brushing: cython.bint
@@ -32,7 +32,7 @@ class Observed:
         self.scuff_time_s = -1.0
         self.passing_gap = 1.0  # m, lowest clearance while the swing foot passes
         self.friction_ratio_max = 0.0  # worst |F_x| / F_y of the walk
-        self.slip_s = 0.0  # s that a foot slides, or asks for more than the floor's friction
+        self.slip_s = 0.0  # s that a foot slides, or needs more than the floor's friction
         self.normal_force_min = math.inf  # N, lowest of a standing foot; below 0 a pull that lift-off could not answer
         self.pull_s = 0.0  # s with a pull of more than 1 N
         self.released_s = 0.0  # when the robot was let go, or made its last step

@@ -3,7 +3,7 @@
 The fields of `BodyParameters` are the one table of them: from it come the limits that are checked, what a file of
 plant/bodies may change (plant/body_files.py), and what `ranger-sim body show` prints. Sources are named in brackets:
 [A n] appendix section n, [P n], [C n] and [W n] paragraph n of those parts of docs/robot.md, "chosen by us, because
-...". Limits are wide and only keep out what means nothing: a mistyped unit or sign. They are chosen by us.
+...". Limits are wide and only exclude meaningless values: a mistyped unit or sign. They are chosen by us.
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ CONTACTS = ("sticking", "unilateral", "coulomb", "compliant")
 
 
 def number(default: float, unit: str, low: float, high: float, source: str) -> Any:
-    """A field of the table: value when nothing else is said, unit, limits (inclusive), what it is and its source."""
+    """A field of the table: default value, unit, limits (inclusive), description and source."""
     return dataclasses.field(default=default, metadata={"unit": unit, "limits": (low, high), "source": source})
 
 
@@ -89,16 +89,16 @@ class BodyParameters:
     ankle_stop_Nm_per_rad: float = number(400.0, "N m/rad", 0.0, 1e5, "chosen by us: 10 mrad under 4 N m")
     ankle_stop_Nms_per_rad: float = number(0.9, "N m s/rad", 0.0, 1e3, "chosen by us: half of critical damping")
 
-    # How a foot meets the floor; what both feet share of it.
+    # How a foot meets the floor; the part shared by both feet.
     contact: str = choice("sticking", CONTACTS, "the appendix's strike holds both feet [A 5; P 1]")
-    # Where the swing foot touches the floor beside or behind the stance foot it brushes with its sole. Chosen by us:
+    # Where the swing foot touches the floor next to or behind the stance foot it brushes with its sole. Chosen by us:
     # 20 kN/m gives 5 mm under the robot's weight, as a rubber-faced foot cut as a spring does; damping a fifth of
     # critical for a leg's 5 kg; friction as below, smoothed at 50 mm/s.
     sole_N_per_m: float = number(2.0e4, "N/m", 0.0, 1e7, "of a brushing sole; chosen by us: 5 mm under the weight")
     sole_Ns_per_m: float = number(130.0, "N s/m", 0.0, 1e5, "chosen by us: a fifth of critical damping of a leg")
     sole_sliding_smoothing_m_s: float = number(0.05, "m/s", 1e-6, 10.0, "of a brushing sole's friction; chosen by us")
     # Contact "compliant" (Hunt and Crossley 1975). Chosen by us: 1 mm under the weight; dissipation that leaves a
-    # strike of 0.2 m/s hardly a rebound; friction that a creep of some mm/s brings up as far as a foot asks for it.
+    # strike of 0.2 m/s hardly a rebound; friction that reaches a foot's demand at a creep of some mm/s.
     floor_N_per_m: float = number(1e5, "N/m", 1e3, 1e6, "of a compliant floor and sole; chosen by us: 1 mm deep")
     floor_dissipation_s_per_m: float = number(6.0, "s/m", 0.0, 100.0, "chosen by us: no rebound")
     floor_sliding_smoothing_m_s: float = number(0.01, "m/s", 1e-3, 1.0, "of its friction; chosen by us")
@@ -132,7 +132,7 @@ class BodyParameters:
 
 
 def fault_of(field: Any, value: Any) -> str | None:
-    """What is wrong with `value` in this field of the table: name, value, limit; None when nothing is."""
+    """Fault of `value` in this field of the table: name, value, limit; None when it is valid."""
     allowed = field.metadata.get("allowed")
     if allowed is not None:
         if value not in allowed or isinstance(value, bool) != isinstance(allowed[0], bool):
@@ -148,7 +148,7 @@ def fault_of(field: Any, value: Any) -> str | None:
 
 
 def faults(p: BodyParameters) -> Any:
-    """Everything wrong with these parameters, one text each."""
+    """All faults of these parameters, one text each."""
     single = [fault for field in dataclasses.fields(p) if (fault := fault_of(field, getattr(p, field.name)))]
     yield from single
     if single:

@@ -1,6 +1,6 @@
 # cython: cdivision=True
 # (only by the length of a spring, which is above zero)
-"""Parts of the body that both legs share: the hip joint between them, and what their ankles and soles are made of."""
+"""Parts of the body that both legs share: the hip joint between them, and the parts of their ankles and soles."""
 
 import cython
 from cython.cimports.libc.math import cos, sin, sqrt
@@ -101,7 +101,7 @@ class Ankle:
 @cython.final
 @cython.cclass
 class Sole:
-    """What a foot meets the floor with while it brushes, or on a compliant floor (EQUATIONS 9): N/m, N s/m, s/m, mu."""
+    """Contact of a foot that brushes, or on a compliant floor (EQUATIONS 9): N/m, N s/m, s/m, mu."""
 
     k: cython.double
     c: cython.double

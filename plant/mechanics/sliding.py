@@ -1,9 +1,9 @@
 # cython: boundscheck=False, wraparound=False
 # (indices are written out or those of loops over whole arrays)
-"""Motion while a foot slides, or any foot's state is asked for (EQUATIONS 9): the hip's coordinates are free.
+"""Motion while a foot slides, or any foot's state is needed (EQUATIONS 9): the hip's coordinates are free.
 
-Slides are short and seldom: the ten equations are written and solved anew at every stage. What `on_feet` and `in_air`
-do a thousand times as often they do in closed form. Feet have an inertia here (`Body` sees to it).
+Slides are short and rare: the ten equations are written and solved at every stage. `on_feet` and `in_air`, which run a
+thousand times as often, use closed forms. Feet have an inertia here (`Body` sees to it).
 """
 
 from typing import Final
@@ -37,7 +37,7 @@ FREEDOMS: Final = 8
 
 @cython.ccall
 def slide(body: "Body", h: cython.double, stages: cython.longlong) -> cython.void:
-    """One Runge-Kutta-Nystrom step of `h` seconds on feet of which any may slide; stages 4, or 1 to look only.
+    """One Runge-Kutta-Nystrom step of `h` seconds on feet of which any may slide; stages 4, or 1 to evaluate only.
 
     As `on_feet`, with k4 as written (EQUATIONS 15): accelerations and forces of its start are left in the legs.
     """
@@ -87,7 +87,7 @@ def slide(body: "Body", h: cython.double, stages: cython.longlong) -> cython.voi
 
 @cython.cfunc
 def accelerate(body: "Body") -> cython.void:
-    """Accelerations of the present state, with the feet doing what they do."""
+    """Accelerations of the present state, with the feet in their present states."""
     n: cython.longlong
     x: ContactEquations = body.equations
     outer: cython.longlong = state_of(body, body.outer)
@@ -103,7 +103,7 @@ def accelerate(body: "Body") -> cython.void:
 @cython.cfunc
 @cython.exceptval(check=False)
 def state_of(body: "Body", leg: "Leg") -> cython.longlong:
-    """APART, STICKS, SLIDES_ON or SLIDES_BACK: what this foot does."""
+    """State of this foot: APART, STICKS, SLIDES_ON or SLIDES_BACK."""
     if body.floating or (body.mode != DOUBLE and (body.mode != SINGLE or leg is not body.stance)):
         return APART
     if leg.slide == 0:
@@ -113,7 +113,7 @@ def state_of(body: "Body", leg: "Leg") -> cython.longlong:
 
 @cython.ccall
 def write_forces(body: "Body") -> cython.void:
-    """Into the equations: forces and torques of the present state, and what keeps a standing foot on its foothold."""
+    """Write into the equations: forces and torques of the present state, and the constraint of a standing foot."""
     n: cython.longlong
     hip: cython.double
     x: ContactEquations = body.equations

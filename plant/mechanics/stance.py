@@ -15,15 +15,15 @@ from ranger_sim.plant.mechanics.term_torques import TermTorques
 @cython.ccall
 @cython.exceptval(check=True)
 def on_feet(body: "Body", h: cython.double, stages: cython.longlong) -> cython.void:
-    """One Runge-Kutta-Nystrom step of `h` seconds in single or double stance; stages 4, or 1 to look only.
+    """One Runge-Kutta-Nystrom step of `h` seconds in single or double stance; stages 4, or 1 to evaluate only.
 
     Inside, s is the stance (reference) leg and w the other; numbers without a letter are those of s. Accelerations and
     floor forces of the start of the step are left in the legs (EQUATIONS 5, 6); the stages' angles and rates are those
     of EQUATIONS 15. The pose of the end, hip and gaps, is left there too.
 
-    One long function, because its stages share some sixty numbers: to hand these from one function to the next would
-    cost more than to work them out. It reads in paragraphs, each headed by its section of EQUATIONS: in every stage
-    torques, what depends on angles alone, forces, accelerations, the next stage's state; then the step's end.
+    One long function, because its stages share some sixty numbers: passing these between functions would cost more than
+    computing them. It is divided into paragraphs, each headed by its section of EQUATIONS: in every stage torques,
+    terms that depend on angles alone, forces, accelerations, the next stage's state; then the step's end.
     """
     s: Leg = body.stance
     w: Leg = body.swing
@@ -92,7 +92,7 @@ def on_feet(body: "Body", h: cython.double, stages: cython.longlong) -> cython.v
         mn = w.drive - w.coulomb * smoothed_sign(un * eps) - w.viscous * un
         Th = hip_drive - joint.coulomb * smoothed_sign(hd * eps) - joint.viscous * hd
         if stage != 2:
-            # what depends on angles alone; stages 1 and 2 look at the same ones
+            # terms that depend on angles alone; stages 1 and 2 have the same angles
             if stage > 0:
                 sF = sin(F)
                 cF = cos(F)
@@ -197,7 +197,7 @@ def on_feet(body: "Body", h: cython.double, stages: cython.longlong) -> cython.v
             Ts -= return_k * (a_s - ankle.rest)
             back = return_k * (a_w - ankle.rest)
             if massless:
-                mn -= back  # the cable hands it on
+                mn -= back  # the cable transmits it
             else:
                 Tw -= back
         if a_s < ankle.low or a_s > ankle.high:
@@ -205,7 +205,7 @@ def on_feet(body: "Body", h: cython.double, stages: cython.longlong) -> cython.v
         if a_w < ankle.low or a_w > ankle.high:
             stop = ankle.stop_torque(a_w, uG - uw)
             if massless:
-                mn += stop  # the cable hands it on
+                mn += stop  # the cable transmits it
             else:
                 Tw += stop
         # EQUATIONS 2.6: rolling; TF and TG act on the feet, -Ts and -Tw on the legs
@@ -362,7 +362,7 @@ def on_feet(body: "Body", h: cython.double, stages: cython.longlong) -> cython.v
     if double_stance:
         body.update_pose()
         return
-    # EQUATIONS 4: the geometry of stage 3 is that of the end, so this is `update_pose` with what stands here
+    # EQUATIONS 4: the geometry of stage 3 is that of the end, so this is `update_pose` with the numbers at hand
     body.hip_x = s.anchor + r * (F - sg) - f + ls
     body.hip_y = s.height + e + lc
     s.gap = 0.0

@@ -3,8 +3,8 @@
 """The fourth motor: twist of the inner feet, turn of the robot, path in the plane (EQUATIONS 14).
 
 The inner legs twist about their own axes and turn both inner feet; while these carry the robot they do not slide,
-so the robot turns the other way (appendix 2.7). The steering has little effect on the walk seen from the side
-(same place), so it is computed beside it: nothing flows back into the body.
+so the robot turns the other way (appendix 2.7). The steering has little effect on the walk seen from the side (same
+place), so it is computed separately: nothing flows back into the body.
 
     J dw/dt = T - k twist - c w (and a stop), yaw rate = -w while only the inner feet stand, 0 otherwise
 
@@ -65,7 +65,7 @@ class Steering:
 
     @cython.ccall
     def begin(self, hip_x: cython.double) -> cython.void:
-        """The robot is put down: path and heading start here."""
+        """Start path and heading where the robot is put down."""
         self.yaw = 0.0
         self.path_x = 0.0
         self.path_y = 0.0

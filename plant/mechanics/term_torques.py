@@ -1,6 +1,6 @@
 """The torques of additional terms, evaluated at every stage of the body's integration (EQUATIONS 12).
 
-A term is a row of numbers: form, place, up to four parameters. The forms' formulas stand here and nowhere else;
+A term is a row of numbers: form, place, up to four parameters. The forms' formulas are only in this file;
 plant/terms.py names them, their parameters and limits, and builds the rows from a model file.
 
 With w the rate and q the angle at the place (joints: as the joint sensor measures; motors: over the gear), s the

@@ -1,22 +1,22 @@
-"""What a walk looked like from outside: counts, last values and sums; memory does not grow with the walk."""
+"""Record of a walk as seen from outside: counts, last values and sums; memory does not grow with the walk."""
 
 import array
 from typing import Any
 
-RING = 4096  # strikes kept for whoever draws them later; chosen by us: 41 minutes of walking, 160 kB
+RING = 4096  # strikes kept for later drawing; chosen by us: 41 minutes of walking, 160 kB
 
 
 class WalkRecord:
     """Strikes, lift-offs, distances and oddities of one walk. Times are ns since power-up, lengths m.
 
-    A step is counted when a foot meets the floor ahead of the other one, in turn. `step_length_m` is what the walk
-    gained by it: the distance of this foot's contact point from the previous strike's. The first step counts from
-    where the robot was put down. `touches` and `lift_offs` count all of them.
+    A step is counted when a foot meets the floor ahead of the other one, in turn. `step_length_m` is its gain: the
+    distance of this foot's contact point from the previous strike's. The first step counts from the place where the
+    robot was put down. `touches` and `lift_offs` count all of them.
 
-    Oddities: `bounces` (the leading foot left the floor and came back), `recontacts` (a foot touched out of turn),
+    Oddities: `bounces` (the leading foot left the floor and returned), `recontacts` (a foot touched out of turn),
     `brushes` and `scuffs` (the swing foot's sole touched the floor before, after it passed the stance foot), `flights`
     (no foot on the floor), `slides` (a standing foot began to slide), `jams` (it could not: impulses stopped it),
-    `lead_lifts`, `tensile_strikes` (the rule of the strike asked the trailing foot to be pulled; `tensile_impulse_Ns`
+    `lead_lifts`, `tensile_strikes` (the rule of the strike required a pull on the trailing foot; `tensile_impulse_Ns`
     the last, `_min_Ns` the worst).
 
     More than 40 fields, because each of them is one figure of the summary and they are counted by the same few events.
@@ -32,7 +32,7 @@ class WalkRecord:
         self.begin(0, 0.0)
 
     def begin(self, time_ns: int, contact_x: float) -> None:
-        """Forget everything: the robot is put down at `contact_x`."""
+        """Reset the record: the robot is put down at `contact_x`."""
         self.begin_ns = time_ns
         self.start_x = contact_x
         self.last_x = contact_x
@@ -157,7 +157,7 @@ class WalkRecord:
         self.fall_time_ns = time_ns
 
     def mean_step_length_m(self) -> float | None:
-        """Mean without the first five steps; None when there are no others, as of all these figures."""
+        """Mean without the first five steps; None without others, as for all these figures."""
         return self.length_sum / self.counted if self.counted else None
 
     def mean_step_time_s(self) -> float | None:
@@ -167,7 +167,7 @@ class WalkRecord:
         return self.double_stance_sum_s / self.counted if self.counted else None
 
     def step_length_deviation_m(self) -> float | None:
-        """Standard deviation of the step length without the first five steps; None of fewer than two others."""
+        """Standard deviation of the step length without the first five steps; None for fewer than two others."""
         return self._deviation(self.length_sum, self.length_squares)
 
     def step_time_deviation_s(self) -> float | None:

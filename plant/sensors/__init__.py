@@ -1,1 +1,1 @@
-"""What shows the boards how the robot stands: encoders, feet, the inertial unit, and their noise (EQUATIONS 11)."""
+"""Sensors that show the robot's state to the boards: encoders, feet, inertial unit, and noise (EQUATIONS 11)."""

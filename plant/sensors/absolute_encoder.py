@@ -27,7 +27,7 @@ class AbsoluteEncoder:
     of its bits is read wrong (the long unshielded cable of appendix 3.8; 0 by default, because no source gives a rate).
     """
 
-    # what every word asks for stands first, beside each other
+    # fields read for every word come first, next to each other
     noise: NoiseSource
     scale: cython.double
     offset_rad: cython.double

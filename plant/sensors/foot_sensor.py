@@ -10,7 +10,7 @@ in stance (robot.md C3.2). Between them (EQUATIONS 11.4):
 (appendix 4.3) and the chain from the converter to the swing flag takes about 5 ms, so the sole needs about 9 ms
 to the threshold of 2000 counts above the baseline. Chosen by us: 12 ms; with the load of the leading foot
 rising to the weight over 30 ms of double stance that makes 9 ms (a test holds it).
-`share` stands for what the blow itself presses the gap shut at small loads: chosen by us, 0.4. `full_load`, where the
+`share` is the part of the gap that the impact itself closes at small loads: chosen by us, 0.4. `full_load`, where the
 gap is closed and the stop takes over (appendix 2.4): chosen by us, half of the weight, 50 N.
 """
 
@@ -97,5 +97,5 @@ class FootSensors:
 
     @cython.ccall
     def settle(self, contact: cython.bint, load_N: cython.double) -> cython.void:
-        """Take the value that a lasting contact and load give."""
+        """Take the steady value for this contact and load."""
         self.step(1000.0 * self.rise_time_constant_s, contact, load_N)

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (places in the ring are taken modulo its length, those in the line's buffer are below its capacity)
+# (indices in the ring are taken modulo its length, those in the line's buffer are below its capacity)
 """The inertial sensor 3DM-GX3-25 on the outer legs: packets of bytes on its serial line.
 
 It is silent until the command C4 C1 29 xx arrives, acknowledges it and then sends packet xx for ever (00 stops
@@ -8,9 +8,9 @@ it). Both packets known here have 31 bytes: header, six big-endian singles, a fo
 
 - CF: roll, pitch, yaw (rad), rates about x, y, z (rad/s), at the rate of its sensor fusion (200-250 Hz, appendix
   3.8; one packet per `fusion_divider` samples).
-- C2: accelerations x, y, z (g), rates x, y, z (rad/s), every sample, 1 kHz. ROBOT PARITY: of the record walk we
-  know only "rates alone at 1000 Hz"; C2 is the device's packet with scaled rates and no angles, as its protocol
-  describes it. The accelerations are those of gravity alone, because nothing on the robot reads them.
+- C2: accelerations x, y, z (g), rates x, y, z (rad/s), every sample, 1 kHz. ROBOT PARITY: for the record walk we know
+  only "rates alone at 1000 Hz"; C2 is the device's packet with scaled rates and no angles, as its protocol describes
+  it. The accelerations are those of gravity alone, because nothing on the robot reads them.
 
 Signs (robot.md C1.1, C3.2): with the outer legs' lean LO positive forward, rate x = bias - dLO/dt and
 roll = roll_bias - LO. So the firmware's -(rate x - bias) is the legs' rate. The physical bias is the one that the
@@ -50,11 +50,11 @@ _TEN_BITS: cython.longlong = 10000000000
 class Imu:
     """The device. `bytes`: ByteBuffer of what it sent in the last `update`, stamped with the end of each byte.
 
-    `bias_rad_s`, `noise_rad_s` of each rate; `filter_samples`: moving average over so many samples (1: none);
+    `bias_rad_s`, `noise_rad_s` of each rate; `filter_samples`: moving average over that many samples (1: none);
     `latency_ns`: sample to first start bit; `ppb`: its own clock fast by this many parts per billion.
     """
 
-    # what every step and every packet look at stands first, beside each other
+    # fields read at every step and packet come first, next to each other
     bytes: ByteBuffer
     next_sample_ns: cython.longlong
     acknowledge: cython.longlong
@@ -159,7 +159,7 @@ class Imu:
 
     @cython.ccall
     def sample_time(self, n: cython.longlong) -> cython.longlong:
-        """Instant (ns) of sample n, from the count, in a clock that is `ppb` fast."""
+        """Time (ns) of sample n, from the count, in a clock that is `ppb` fast."""
         drift: cython.longlong = (n // 1000000) * self.ppb * (self.sample_ns // 1000)
         drift += (n % 1000000) * self.ppb * self.sample_ns // 1000000000
         return self.phase_ns + n * self.sample_ns - drift
@@ -167,7 +167,7 @@ class Imu:
     @cython.ccall
     @cython.exceptval(check=False)
     def is_due(self, t1: cython.longlong) -> cython.bint:
-        """Whether an `update` up to `t1` (ns) has anything to do, if only to take away the bytes of the last one."""
+        """Whether an `update` up to `t1` (ns) has work, even if only to remove the bytes of the last one."""
         return self.next_sample_ns < t1 or self.acknowledge >= 0 or self.bytes.count > 0
 
     @cython.ccall
@@ -182,7 +182,7 @@ class Imu:
         yaw: cython.double = 0.0,
         yaw_rate: cython.double = 0.0,
     ) -> None:
-        """Take all samples of [t0, t1) and send what is due: lean (rad) and lean rate (rad/s) at both ends."""
+        """Take all samples of [t0, t1) and send due packets: lean (rad) and lean rate (rad/s) at both ends."""
         fraction: cython.double
         rate: cython.double
         roll: cython.double
@@ -226,7 +226,7 @@ class Imu:
 
     @cython.ccall
     def _begin(self) -> cython.void:
-        """Make room for a packet and start its sum."""
+        """Reserve space for a packet and start its sum."""
         line: ByteBuffer = self.bytes
         if line.count + PACKET_BYTES > line.capacity:
             line.grow()

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (places in the disc's table are taken modulo its size)
+# (indices in the disc's table are taken modulo its size)
 """An incremental encoder: every edge of channel A with the level of channel B, from angle and rate.
 
 Position is counted in edges of A, u = sign x gear x lines / pi x angle: two edges per line, as the 2X decoder
@@ -14,8 +14,8 @@ cubic is cut at its turning points and each edge found by bisection, so a revers
 Errors of the disc, all in edges (1 = half a line): `line_error` (standard deviation per line, seeded, fixed for
 a disc), `duty_error` (falling edges late by this, so that A's high time is longer), `jitter` (standard deviation
 per edge, new every time; it moves the stamp, never past a neighbour or out of the step), and eccentricity of the
-disc (rad of encoder shaft, once and twice per turn). `bounce`: share of edges that come three times, over, back and
-over again, as noise at the comparator or in the interpolated position makes them.
+disc (rad of encoder shaft, once and twice per turn). `bounce`: share of edges that occur three times, over, back and
+over again, as caused by noise at the comparator or in the interpolated position.
 """
 
 from typing import Final
@@ -41,7 +41,7 @@ class IncrementalEncoder:
     that a perfect 2X decoder would hold.
     """
 
-    # what every step looks at stands first, beside each other
+    # fields read at every step come first, next to each other
     edges: EdgeBuffer
     calm_rad: cython.double
     calm_from: cython.double
@@ -62,7 +62,7 @@ class IncrementalEncoder:
     span_ns: cython.double
     t0: cython.longlong
     last_time: cython.longlong
-    # what describes the encoder
+    # description of the encoder
     bounces: cython.longlong
     jitter: cython.double
     bounce: cython.double
@@ -194,7 +194,7 @@ class IncrementalEncoder:
 
     @cython.ccall
     def reset(self, angle: cython.double) -> cython.void:
-        """Stand at an angle without having moved: no edges. Needed after a change of what describes the encoder."""
+        """Set the angle without movement: no edges. Needed after a change of the encoder's description."""
         u: cython.double = self.position(angle)
         n: cython.longlong = int(u)
         if u < n:
@@ -228,7 +228,7 @@ class IncrementalEncoder:
         return 1 - (n & 1)
 
     @cython.ccall
-    @cython.cdivision(True)  # what is divided by is not zero
+    @cython.cdivision(True)  # the divisor is not zero
     def update(
         self,
         t0: cython.longlong,
@@ -408,7 +408,7 @@ class IncrementalEncoder:
     def add_bounces(self, t1: cython.longlong) -> cython.longlong:
         """Let edges of the last `update` bounce, which ended at `t1` (ns); returns how many do.
 
-        An edge with no room for it, before the next one or the step's end, does not.
+        An edge without enough time before the next one or the step's end does not bounce.
         """
         buffer: EdgeBuffer = self.edges
         place: cython.longlong = 0
@@ -435,7 +435,7 @@ class IncrementalEncoder:
 
     @cython.cfunc
     def _calm(self) -> cython.void:
-        """Find the joint angles between the two edges beside the present position, a tenth of an edge inside."""
+        """Find the joint angles between the two edges around the present position, a tenth of an edge inside."""
         a: cython.double = self.edges_per_rad
         b: cython.double = self.edges_at_zero
         if self.calm_rad > 0.0 or self.eccentric or a == 0.0:

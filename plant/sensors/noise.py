@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (a place is twelve bits and the table has more than 4096 values)
+# (an index is twelve bits and the table has more than 4096 values)
 """Cheap normal noise for sensors that are read at every step of the plant.
 
 A table of the 4096 quantiles of the normal distribution, scaled to variance 1 and shuffled by the seed, is
@@ -52,7 +52,7 @@ class NoiseSource:
         self.table = reals(table)
         self.word = 0
         self.left = 0
-        self.ahead = [0.0] * 60  # drawn and not given yet; the first to come last
+        self.ahead = [0.0] * 60  # drawn and not returned yet, in reverse order
         self.drawn = 0
 
     @cython.ccall
@@ -67,10 +67,10 @@ class NoiseSource:
     @cython.cfunc
     @cython.final
     def _draw_ahead(self) -> cython.void:
-        """The next 60 values at once: the processor fetches them side by side, not each from memory in its turn.
+        """The next 60 values at once: the processor fetches them in parallel, not one after the other.
 
         Measured at an absolute encoder's `word`: 34 instructions and 20 to 30 ns less than a value at a time. Three
-        words are asked for per step of the plant, so that is 0.3 ms of a simulated second, more than 1 % of a walk.
+        words are read per step of the plant, so that is 0.3 ms of a simulated second, more than 1 % of a walk.
         """
         _place: cython.longlong
         word: cython.longlong
@@ -86,7 +86,7 @@ class NoiseSource:
     @cython.ccall
     @cython.exceptval(check=False)
     def block(self) -> cython.longlong:
-        """A random place of `table` (0 ... 4095): 64 values from there on are noise of so many channels."""
+        """A random place of `table` (0 ... 4095): the 64 values from there on are noise for 64 channels."""
         place: cython.longlong
         if self.left == 0:
             self.word = self.stream.bits() >> 4

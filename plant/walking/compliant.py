@@ -36,14 +36,14 @@ def press(body: "Body", h: cython.double) -> None:
 
 @cython.cfunc
 def meet(body: "Body", leg: "Leg", before: cython.double) -> None:
-    """The foot's gap was `before` and is what it is: has it touched, or left?"""
+    """Detect a touch or lift-off from the foot's gap `before` and its gap now."""
     other: Leg = body.other(leg)
     stands: cython.bint = body.mode == DOUBLE or (body.mode == SINGLE and leg is body.stance)
     ahead: cython.double = other.behind() - leg.behind()
     if stands and before <= 0.0 and leg.gap > 0.0:
         leave(body, leg)
     elif not stands and leg.gap < 0.0 and (body.mode == FLIGHT or ahead > body.strike_ahead):
-        # beside and behind the standing foot it brushes: `watch` sees that
+        # next to and behind the standing foot it brushes: `watch` detects that
         stand(body, leg, ahead)
 
 

@@ -13,7 +13,7 @@ from ranger_sim.plant.mechanics.stance import on_feet
 from ranger_sim.plant.walking.impact import collide, take_states
 from ranger_sim.plant.walking.lift_off import leave
 
-# what `Body.event` says of `Body.event_leg`
+# values of `Body.event`, about `Body.event_leg`
 NO_EVENT: Final = 0
 TOUCH: Final = 1
 LIFT_OFF: Final = 2
@@ -35,7 +35,7 @@ def asks_too_much(body: "Body") -> cython.bint:
 @cython.cfunc
 @cython.exceptval(check=False)
 def margin(body: "Body", leg: "Leg") -> cython.double:
-    """What is left of a standing foot's friction, N; of one that slides, of its normal force."""
+    """Remaining friction of a standing foot, N; of a sliding one, its remaining normal force."""
     if leg.slide != 0:
         return leg.Fy
     return body.sole.mu * leg.Fy - fabs(leg.Fx)
@@ -46,9 +46,9 @@ def margin(body: "Body", leg: "Leg") -> cython.double:
 def near_the_bounds(body: "Body") -> cython.bint:
     """Whether an event of the grip may happen within this step, by the forces at its start.
 
-    Feet that slide, and two feet, are looked at after every step. In single stance forces change by less than 2 N in a
-    step of 250 us (17 Hz of cable and motor with 50 N), so 20 N ahead of the bound is early enough; chosen by us. What
-    escapes, because a torque jumps, is met at the start of the next step.
+    Sliding feet, and two standing feet, are checked after every step. In single stance forces change by less than 2 N
+    in a step of 250 us (17 Hz of cable and motor with 50 N), so 20 N ahead of the bound is early enough; chosen by us.
+    Events missed because a torque jumps are handled at the start of the next step.
     """
     if body.mode == SINGLE and not body.sliding:
         return margin(body, body.stance) < 20.0
@@ -57,7 +57,7 @@ def near_the_bounds(body: "Body") -> cython.bint:
 
 @cython.cfunc
 def grip_witness(body: "Body", value: cython.double) -> cython.double:
-    """The witness of the next event of the grip: `value` of another event, or less, and then `event` says which.
+    """The witness of the next event of the grip: `value` of another event, or less, and then `event` names it.
 
     SLIDE: a foot's friction is used up (N). LIFT_OFF: the normal force of a sliding foot (N). STICK: the speed of a
     sliding foot (m/s), and 1e-9 m/s beyond zero, so that a slide does not end where it begins.
@@ -89,9 +89,9 @@ def grip_witness(body: "Body", value: cython.double) -> cython.double:
 
 @cython.ccall
 def regrip(body: "Body") -> cython.bint:
-    """Find what the standing feet do from here on, by trying (EQUATIONS 9); True when that is something new.
+    """Find the states of the standing feet from here on, by trying (EQUATIONS 9); True when one changes.
 
-    `event` of `event_leg` happens now: SLIDE and STICK say what that foot cannot do any more.
+    `event` of `event_leg` happens now: SLIDE and STICK exclude the foot's former state.
     """
     leg: Leg
     side: cython.longlong
@@ -120,7 +120,8 @@ def regrip(body: "Body") -> cython.bint:
 
 @cython.cfunc
 def allow(body: "Body", leg: "Leg") -> cython.void:
-    """What this standing foot may do next: one that slides goes on or leaves, one that does not may do anything."""
+    """Set the possible states of this standing foot: a sliding one continues or leaves, any other may take any
+    state."""
     x: ContactEquations = body.equations
     way: cython.longlong = leg.slide
     side: cython.longlong = leg.side
@@ -136,9 +137,9 @@ def allow(body: "Body", leg: "Leg") -> cython.void:
 
 @cython.cfunc
 def jam(body: "Body") -> cython.bint:
-    """No state of the feet fits: forces cannot keep them out of the floor, impulses can (Painleve's paradox).
+    """Apply impulses when no state of the feet fits: forces cannot keep them out of the floor (Painleve's paradox).
 
-    True when those impulses have changed what the feet do.
+    True when those impulses have changed the feet's states.
     """
     outer: cython.longlong = body.outer.slide
     inner: cython.longlong = body.inner.slide
@@ -152,7 +153,7 @@ def jam(body: "Body") -> cython.bint:
 
 @cython.cfunc
 def take_grip(body: "Body") -> cython.bint:
-    """Let the feet do what the equations have found in `state`; True when that is something new."""
+    """Set the feet to the states found by the equations in `state`; True when one changes."""
     leg: Leg
     way: cython.longlong
     x: ContactEquations = body.equations

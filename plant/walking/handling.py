@@ -1,4 +1,4 @@
-"""What the operator does with the robot: puts it into a pose, holds it, lets it go."""
+"""Actions of the operator: puts the robot into a pose, holds it, lets it go."""
 
 import cython
 
@@ -9,7 +9,7 @@ from ranger_sim.plant.walking.watch import fall
 
 @cython.ccall
 def place(body: "Body", outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
-    """Everything at rest in the operator's hands, feet square to their legs, the hip free."""
+    """Put everything at rest in the operator's hands, feet square to their legs, the hip free."""
     leg: Leg
     body.outer.angle = outer_leg_rad
     body.inner.angle = outer_leg_rad - hip_rad
@@ -52,7 +52,7 @@ def hold(body: "Body", outer_leg_rad: cython.double) -> None:
 
 @cython.ccall
 def hold_both(body: "Body", outer_leg_rad: cython.double, hip_rad: cython.double) -> None:
-    """As `hold`, and the operator keeps the inner legs at this hip angle too."""
+    """As `hold`, but the operator also keeps the inner legs at this hip angle."""
     body.inner.angle = outer_leg_rad - hip_rad
     body.inner.rate = 0.0
     hold(body, outer_leg_rad)
@@ -85,10 +85,10 @@ def release(
     stance_foot_rate: cython.double = 0.0,
     hip_rate: cython.double = 0.0,
 ) -> None:
-    """Set the stance foot on the floor as it is and let go, with these rates (rad/s).
+    """Set the stance foot on the floor in its present pose and let go, with these rates (rad/s).
 
-    hip_rate: of h, inner legs forward. When the other foot would stand in the floor the walk ends at once
-    with that as its cause.
+    hip_rate: of h, inner legs forward. When the other foot would be inside the floor the walk ends at once with that as
+    its cause.
     """
     body.mode = SINGLE
     body.stand_on(body.leg(stance))
@@ -100,7 +100,7 @@ def release(
 
 @cython.ccall
 def begin_walk(body: "Body") -> None:
-    """Stand on the stance foot from here on: anchors, footholds and the record start anew."""
+    """Stand on the stance foot from here on: anchors, footholds and the record restart."""
     first: cython.double = body.floor.first_height()
     leg: Leg
     body.mode = SINGLE

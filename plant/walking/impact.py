@@ -21,7 +21,7 @@ from ranger_sim.plant.mechanics.leg import Leg
 @cython.cfunc
 def touch(body: "Body", leg: "Leg") -> None:
     """The leg's foot meets the floor: anchor it, take the impact, count a step when it strikes ahead."""
-    before: Leg = body.stance  # the leg that stood, or stood last
+    before: Leg = body.stance  # the stance leg, or the last one
     after: Leg = body.swing
     other: Leg = body.other(leg)
     energy: cython.double = body.energy_J()
@@ -63,7 +63,7 @@ def touch(body: "Body", leg: "Leg") -> None:
 
 @cython.cfunc
 def set_down(body: "Body", leg: "Leg") -> cython.void:
-    """The foot stands where it is, and as deep as it is when it strikes with its sole already pressed."""
+    """Anchor the foot at its place, and at its depth if it strikes with its sole already pressed."""
     body.anchor_foot(leg)
     leg.armed = False
     leg.height += leg.gap
@@ -112,7 +112,8 @@ def impact(body: "Body", outer: cython.bint, inner: cython.bint) -> None:
 def collide(body: "Body", leg: "Leg", other_stands: cython.bint) -> None:
     """Rates just after this leg's foot has met the floor, which neither pulls nor holds beyond friction (EQUATIONS 8).
 
-    `other_stands`: the other foot is on the floor too. What the feet do then is left in the equations' `state`.
+    `other_stands`: the other foot is on the floor too. The resulting states of the feet are left in the equations'
+    `state`.
     """
     equations: ContactEquations = body.equations
     write_momentum(body)
@@ -145,7 +146,7 @@ def take_states(body: "Body", leg: "Leg") -> None:
 
 @cython.cfunc
 def take_slides(body: "Body") -> cython.void:
-    """Which feet slide, and which way, out of the equations' `state`."""
+    """Read from the equations' `state` which feet slide, and in which direction."""
     equations: ContactEquations = body.equations
     leg: Leg
     for leg in (body.outer, body.inner):
@@ -159,7 +160,7 @@ def take_slides(body: "Body") -> cython.void:
 
 @cython.cfunc
 def write_momentum(body: "Body") -> None:
-    """Into the equations: what the momentum of hip, legs and feet was before, and what a massless foot does."""
+    """Write into the equations: earlier momenta of hip, legs and feet, and the motion of a massless foot."""
     row: cython.longlong
     column: cython.longlong
     total: cython.double
@@ -181,7 +182,7 @@ def write_momentum(body: "Body") -> None:
 
 @cython.cfunc
 def take_rates(body: "Body") -> None:
-    """Out of the equations: rates of hip, legs and feet, and the impulses on the feet."""
+    """Read from the equations: rates of hip, legs and feet, and the impulses on the feet."""
     leg: Leg
     x: cython.p_double = body.equations.solution
     body.hip_vx = x[COLUMN_VX]

@@ -1,4 +1,4 @@
-"""A foot leaves the floor: which one may, whether it would, and that it does (EQUATIONS 9)."""
+"""Lift-off of a foot: whether it may leave the floor, whether it would, and the lift-off itself (EQUATIONS 9)."""
 
 import cython
 

@@ -1,10 +1,10 @@
 # cython: cdivision=True
 # (only by a difference of witnesses of opposite sign)
-"""A step of the body with the events inside it: located, and acted on where they happen (EQUATIONS 9, 15).
+"""A step of the body with the events inside it, located and handled at their times (EQUATIONS 9, 15).
 
 Events are of a leg: its foot touches the floor, lifts off, begins to slide, or sticks again. Each has a witness, a
 number that is above zero before and falls through zero as it happens: the clearance of a foot in the air (m), the
-normal force on a standing one (N), what is left of its friction (N), its speed (m/s).
+normal force on a standing one (N), its remaining friction (N), its speed (m/s).
 """
 
 from typing import Final
@@ -32,7 +32,7 @@ from ranger_sim.plant.walking.impact import touch
 from ranger_sim.plant.walking.lift_off import leave, lets_go, may_leave, sole_ready
 from ranger_sim.plant.walking.watch import watch
 
-MOST_EVENTS: Final = 20  # in one step; what comes after is left for the next step
+MOST_EVENTS: Final = 20  # in one step; later ones are left for the next step
 MOST_TRIES: Final = 60  # to locate an event; a bisection needs 22
 
 
@@ -49,7 +49,7 @@ def advance(body: "Body", h: cython.double) -> None:
         remaining = 0.0
     while remaining > 0.0 and body.mode != FALLEN:
         pieces += 1
-        if body.mode != HELD:  # nothing happens in the operator's hands that a step would be taken back for
+        if body.mode != HELD:  # no event in the operator's hands requires a step to be repeated
             body.save()
         move(body, remaining)
         if body.coulomb:
@@ -77,7 +77,7 @@ def advance(body: "Body", h: cython.double) -> None:
 
 @cython.cfunc
 def move(body: "Body", h: cython.double) -> None:
-    """One step of the equations of motion, in whatever mode the body is."""
+    """One step of the equations of motion, in the body's present mode."""
     if body.sliding:
         slide(body, h, 4)
     elif body.mode == SINGLE or body.mode == DOUBLE:
@@ -89,9 +89,9 @@ def move(body: "Body", h: cython.double) -> None:
 
 @cython.cfunc
 def change_grip(body: "Body", h: cython.double) -> cython.bint:
-    """A foot would be pulled, or held beyond friction, at the start of this piece of `h` seconds: find what it does.
+    """A foot would be pulled, or held beyond friction, at the start of this piece of `h` seconds: find its new state.
 
-    True when it does something new: then the state is that of the start.
+    True when it has a new one: then the body's state is that of the start.
     """
     body.restore()
     body.event = NO_EVENT
@@ -105,7 +105,7 @@ def change_grip(body: "Body", h: cython.double) -> cython.bint:
 def let_pulled_foot_go(body: "Body", h: cython.double) -> cython.bint:
     """Let a foot go that the floor would have to pull at the start of this piece of `h` seconds.
 
-    True when one was: then the state is that of the start. The foot that is pulled more is asked first.
+    True when one was: then the state is that of the start. The foot that is pulled more is tried first.
     """
     first: Leg
     second: Leg
@@ -176,7 +176,7 @@ def touch_witness(body: "Body") -> cython.double:
     value: cython.double
     if body.mode == SINGLE:
         value = clearance(body.swing)
-        # only a foot ahead can strike; beside and behind it brushes with its sole
+        # only a foot ahead can strike; next to and behind the other it brushes with its sole
         if value < 0.0 and body.ahead() <= body.strike_ahead:
             return 1.0
         body.event = TOUCH
@@ -238,7 +238,7 @@ def locate(body: "Body", h: cython.double) -> cython.double:
 
 @cython.cfunc
 def act(body: "Body") -> None:
-    """Do what the located event asks for."""
+    """Handle the located event."""
     body.update_hip_rates()
     if body.event == TOUCH:
         touch(body, body.event_leg)

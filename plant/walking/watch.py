@@ -1,6 +1,6 @@
 # cython: cdivision=True
 # (only by forces above 5 N)
-"""What is noticed once per step of a walk: feet clear of the floor, footholds, extremes of the forces, falls."""
+"""Checks once per step of a walk: feet clear of the floor, footholds, extremes of the forces, falls."""
 
 import cython
 from cython.cimports.libc.math import fabs
@@ -78,12 +78,12 @@ def keep_forces(body: "Body", h: cython.double) -> cython.void:
 @cython.cfunc
 @cython.exceptval(check=False)
 def slips(body: "Body", leg: "Leg") -> cython.bint:
-    """Whether this foot slides or asks for more than the floor's friction; the worst friction ratio is kept."""
+    """Whether this foot slides or needs more than the floor's friction; the worst friction ratio is kept."""
     along: cython.double = fabs(leg.Fx)
     if leg.slide != 0:
         body.seen.friction_ratio_max = max(body.seen.friction_ratio_max, body.sole.mu)
         return True
-    if leg.Fy <= 5.0:  # N; below that the ratio says nothing: chosen by us
+    if leg.Fy <= 5.0:  # N; below that the ratio is meaningless: chosen by us
         return False
     if along > body.seen.friction_ratio_max * leg.Fy:
         body.seen.friction_ratio_max = along / leg.Fy
@@ -92,7 +92,7 @@ def slips(body: "Body", leg: "Leg") -> cython.bint:
 
 @cython.cfunc
 def judge_fall(body: "Body") -> None:
-    """The walk is over when the robot lies, leans too far, splits its legs or stands still (EQUATIONS 16)."""
+    """End the walk when the robot lies, leans too far, splits its legs or stops (EQUATIONS 16)."""
     seen: Observed = body.seen
     s: cython.double = body.stance.angle
     w: cython.double = body.swing.angle
