@@ -8,8 +8,7 @@ Interface of a board: advance to a time with stamped messages in `inbox`, find s
 How time passes inside:
 - A task or handler takes effect at its start, at time `now`; then the CPU is busy for its cycles.
 - Input that arrives meanwhile is handled at its stamp: by hardware (peripherals, capture registers) at once, by
-  handlers
-  as soon as FIQ, then IRQ, is free. Their cycles lengthen whatever they interrupt.
+  handlers as soon as FIQ, then IRQ, is free. Their cycles lengthen whatever they interrupt.
 - Order at equal times: edges, messages, alarms (the slot timer's last), handlers (FIQ before IRQ, then by slot), tasks.
 - A handler's `now` is its start plus the latency of its source.
 Each busy time is rounded down to whole ns; cycle counts are exact integers.

@@ -70,8 +70,7 @@ class StateMachine:
     states: State objects, the first is the start state. transitions: rows (from, to, condition) of state
     names; `from` may be one name, a tuple of names or ANY. For each state the order of the rows is the
     order of precedence. on_change: callable that gets the present state's number at the beginning of the first tick and
-    of
-    each tick after a change, or None.
+    of each tick after a change, or None.
     """
 
     name: str
