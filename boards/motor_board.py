@@ -1,6 +1,6 @@
 """What the four motor boards (B2A) share: chip, peripherals, modules, publishing, start-up.
 
-Each board's own room (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its table
+Each board's module (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its table
 of what runs when. Source: robot.md N1.2, N4, N5, N6.1.
 
 Where the numbers of cycles come from: two per instruction, as counted in the images (robot.md T2); tables read
@@ -49,7 +49,7 @@ from ranger_sim.foundation.numbers import fixed_of_float, float32
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
 
-# Processor pins by what hangs on them (robot.md N4.1, N4.4, N4.7, N4.9, N4.11); for the wiring table.
+# Processor pins by connected device (robot.md N4.1, N4.4, N4.7, N4.9, N4.11); for the wiring table.
 PINS = {
     **{f"led_{colour}": pin for colour, pin in LED_PINS.items()},
     **MOTOR_PINS,
@@ -80,8 +80,8 @@ SLOTS_BEGIN_NS = 500_000
 # The two alarms of the start
 START_VALUES, SLOTS_BEGIN = 0, 1
 
-# The external converter takes longer on the robot than its data sheet says: with this the slots of MCFI and MCSI are as
-# long as the logs' (robot.md T1). MCH keeps the data sheet's: its two end before anybody waits (T2).
+# The external converter takes longer on the robot than in its data sheet: with this the slots of MCFI and MCSI are as
+# long as the logs' (robot.md T1). MCH keeps the data sheet's: its two conversions end before any task waits (T2).
 CONVERSION_NS = 31_000
 
 BATTERY_VOLTAGE_CHANNEL: Final = 1  # AIN1, P0.28
@@ -248,7 +248,7 @@ class MotorBoard(SatelliteBoard):
         self.power_up.begin(phase_ns)
 
     def listen(self) -> None:
-        """Receive list, in the order of RECEIVE_LIST."""
+        """Fill the receive list, in the order of RECEIVE_LIST."""
         name = self.table.BOARD + "_"
         receivers = {
             "MOTOR_TARGET_CURRENT": GainReceiver(self.compliance, TARGET),
@@ -313,7 +313,7 @@ class MotorBoard(SatelliteBoard):
 
     @cython.ccall
     def set_start_values(self) -> None:
-        """When that reading has come."""
+        """Set the start values when that reading is complete."""
 
     # --- tasks ------------------------------------------------------------------------------------------
 
@@ -341,7 +341,7 @@ class MotorBoard(SatelliteBoard):
     @cython.ccall
     @cython.exceptval(check=False)
     def controlled_position(self) -> cython.longlong:
-        """Position in the compliant law, rad x 65536: of the motor, unless a room says otherwise."""
+        """Position in the compliant law, rad x 65536: of the motor, unless a board's module overrides it."""
         return self.motor.position
 
     @cython.ccall
@@ -362,7 +362,7 @@ class MotorBoard(SatelliteBoard):
     def rezero_motor(self, share: cython.double) -> None:
         """Move the motor's angle towards the joint's by `share` of their difference, in single floats.
 
-        The count is set when the line's cycles are over; edges that came since the slot read the angle are forgotten,
+        The count is set when the line's cycles are over; edges since the slot read the angle are forgotten,
         on the robot as here.
         """
         angle: cython.double = float32(self.motor.position_rad())

@@ -1,8 +1,8 @@
 """The user interface board (UI, B8A): IMU, keys, radio control, display, colour lights, buzzer.
 
-Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. What a person sees and hears hangs on its pins:
-`board.panel.text()`, `board.panel.colour(i)`, `board.panel.hertz`; `board.memory` has all of it as words, also where
-the board runs in a process of its own, and whatever program it runs (modules/front_panel.py).
+Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. The devices that a person sees and hears are connected to
+its pins: `board.panel.text()`, `board.panel.colour(i)`, `board.panel.hertz`; `board.memory` has all of it as words,
+also for a board in a separate process, and for any program (modules/front_panel.py).
 """
 
 import cython
@@ -34,8 +34,8 @@ from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import TIMER_MATCH
 from ranger_sim.foundation.events import UART_BYTE
 
-# Processor pins by what hangs on them (robot.md N4.11); for the wiring table.
-RC_PINS = (p0(22), p0(27), p0(16), p0(29))  # the third is driven by the sync light and hears no radio
+# Processor pins by connected device (robot.md N4.11); for the wiring table.
+RC_PINS = (p0(22), p0(27), p0(16), p0(29))  # the sync light drives the third, so it receives no radio
 PINS = {
     **{f"led_{colour}": pin for colour, pin in LED_PINS.items()},
     **{f"key_{key}": pin for key, pin in enumerate(KEY_PINS)},
@@ -54,8 +54,8 @@ CAN_ERROR_SLOT = 9
 # packets; here the board's slots begin at power-up and the request goes out after 20 of them (chosen by us,
 # because that delay only waits for the IMU to wake, and every run would begin with it).
 IMU_START_SLOTS = 20
-# Cycles of what the motor boards do not have, two per instruction; the instructions are estimated by us along the
-# listed work, because none were counted.
+# Cycles of the functions that the motor boards do not have, two per instruction; the instructions are estimated by us
+# along the listed work, because none were counted.
 RC_CYCLES = 2 * 66  # four flags tested, one width filtered
 UART_CYCLES = 2 * 35  # entry, U1IIR, the loop, exit
 UART_BYTE_CYCLES = 2 * 25  # U1LSR, U1RBR, the ring and its test for full
@@ -119,7 +119,7 @@ class UserInterfaceBoard(SatelliteBoard):
         self.start(self.schedule(), phase_ns)
 
     def listen(self) -> None:
-        """Receive list (robot.md N2.4)."""
+        """Fill the receive list (robot.md N2.4)."""
         listen = self.can.listen
         listen(table.TIMESTAMP, self.time)
         for quarter in range(4):
@@ -136,10 +136,10 @@ class UserInterfaceBoard(SatelliteBoard):
         """Source: robot.md N3.6.
 
         Costs: no instructions of this board were counted. Functions and lines that the motor boards have too cost what
-        was counted there (robot.md T2), keys and lights what their like costs (a look at a bit 21 instructions, three
-        timers 31). The logs' slot of 155 to 178 us (T1) is then 65 us and the six lights that the main brain of 2016
-        sends in every slot. A limit is a third above the most that a call can take: twelve lights for the frames, a
-        ring full of bytes for the sensor.
+        was counted there (robot.md T2), keys and lights as much as similar functions (a test of a bit 21 instructions,
+        three timers 31). The logs' slot of 155 to 178 us (T1) is then 65 us and the six lights that the main brain of
+        2016 sends in every slot. A limit is a third above the most that a call can take: twelve lights for the frames,
+        a ring full of bytes for the sensor.
 
         UI_ROLL, UI_PITCH and UI_YAW are 0 while the IMU sends rates alone. If the IMU falls silent, the last values are
         sent on.

@@ -76,8 +76,8 @@ USUAL_ROWS = 32_768
 class ActivityLog(RowStream):
     """The newest `rows` rows in a ring; `sinks` get all of them. `laps`: how often the ring was full.
 
-    `keep_ns`: where the board moves into a process of its own, how much is kept there until somebody asks (0: all that
-    there is room for).
+    `keep_ns`: where the board moves into a separate process, how much is kept there until a reader asks (0: as much as
+    fits).
 
     What runs is open until its end is known: the task (with its occasional list) or turn of the main loop in `code_*`
     and `list_*`, the IRQ in `irq_*`. A FIQ cannot be interrupted, so its end is known at once.

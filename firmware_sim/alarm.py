@@ -35,7 +35,7 @@ class Alarm:
     @cython.ccall
     @cython.exceptval(check=False)
     def set(self, time: cython.longlong) -> cython.longlong:
-        """It is due at `time` (ns); NEVER takes it back. Returns the instant of the chip's first alarm."""
+        """Set it to `time` (ns); NEVER cancels it. Returns the time of the chip's first alarm."""
         at: cython.longlong = self.chip.alarms_set
         if self.time < NEVER:
             return self._set_again(time)
@@ -98,7 +98,7 @@ class Alarm:
 @cython.final
 @cython.cclass
 class SlotTimer(Peripheral):
-    """The timer whose match interrupt steps the scheduler; its alarm is the last of those at one instant."""
+    """The timer whose match interrupt steps the scheduler; at equal times its alarm is the last."""
 
     alarm: Alarm
 

@@ -1,7 +1,7 @@
-"""What a board is to everything outside: stamped messages in, stamped messages out, and when it must run next.
+"""The interface of a board: stamped messages in, stamped messages out, and the time at which it must run next.
 
-An emulated microcontroller is one, and so is what stands for a board in another process; firmware compiled for the
-host or an original image would be others. Whoever passes time needs nothing but what stands here.
+An emulated microcontroller implements it, and so does the proxy of a board in another process; firmware compiled for
+the host or an original image could as well. The caller that passes time needs nothing else.
 """
 
 import array
@@ -18,15 +18,15 @@ EVERY_KIND = 0xFFFF  # bits of the message kinds to a board
 
 @cython.cclass
 class Board:
-    """A board called `name`. `advance` is what a kind of board must have; the rest has a meaning for any board.
+    """A board called `name`. Every kind of board implements `advance`; the rest has a meaning for any board.
 
-    Inputs: `inbox`, the stamped messages; `analog`, the voltages at its pins; `words`, digital words that sensors hold
-    out to it; the edges of encoders (`listen_to_edges`). Outputs: `outbox` takes each message as it is put out.
-    `next_time`: the instant (ns) at which it must run if nothing comes in; NEVER for none. `edge_time`: that of the
-    first edge that waits. `horizon`: how far it runs at most, or has run.
-    `apart`: it runs beside the others, in a process of its own: between `begin` and `advance` of one instant others
-    may begin as well.
-    `memory`: the words of its program's memory that others may read at any instant (None: none are shown).
+    Inputs: `inbox`, the stamped messages; `analog`, the voltages at its pins; `words`, digital words that sensors
+    provide; the edges of encoders (`listen_to_edges`). Outputs: `outbox` takes each message as it is output.
+    `next_time`: the time (ns) at which it must run if no input arrives; NEVER for none. `edge_time`: that of the first
+    edge that waits. `horizon`: how far it runs at most, or has run.
+    `apart`: it runs in a separate process, in parallel with the others: between `begin` and `advance` of one time
+    others may begin as well.
+    `memory`: the words of its program's memory that others may read at any time (None: none are shown).
     """
 
     next_time: cython.longlong
@@ -57,7 +57,7 @@ class Board:
     @cython.ccall
     @cython.exceptval(check=True)
     def begin(self, until: cython.longlong) -> cython.void:
-        """`advance(until)` will follow: a board that runs apart starts now."""
+        """Announce that `advance(until)` will follow: a board in a separate process starts now."""
 
     @cython.ccall
     def advance(self, until: cython.longlong) -> cython.longlong:
@@ -67,20 +67,20 @@ class Board:
     @cython.ccall
     @cython.exceptval(check=False)
     def stop_at(self, time: cython.longlong) -> cython.longlong:
-        """While it runs: run no further than to `time` (ns), which is later than now. Returns where it stops."""
+        """Limit a running board to `time` (ns), which is later than now. Returns where it stops."""
         if time < self.horizon:
             self.horizon = time
         return self.horizon
 
     @cython.ccall
     def speaks_from(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing on a bus, unless an urgent message comes in."""
+        """Earliest time (ns) at which the board can send on a bus, unless an urgent message arrives."""
         return self.next_time
 
     @cython.ccall
     @cython.exceptval(check=False)
     def quiet_until(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing out at all, whatever comes in of a kind that can wait."""
+        """Earliest time (ns) at which the board can output anything, whatever non-urgent input arrives."""
         return 0
 
     @cython.ccall
@@ -93,31 +93,31 @@ class Board:
 
     @cython.ccall
     def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
-        """Edges of `buffer` arrive on `pin`, each with the level of `partner_pin`; tell by `edges_came`."""
+        """Take edges of `buffer` on `pin`, each with the level of `partner_pin`; `edges_came` announces them."""
         raise NotImplementedError(f"{self.name}: this kind of board has no pins for an encoder")
 
     @cython.ccall
     @cython.exceptval(check=False)
     def edges_came(self) -> cython.longlong:
-        """The buffers of encoders may hold new edges; returns `edge_time`."""
+        """Note that the buffers of encoders may hold new edges; returns `edge_time`."""
         return self.edge_time
 
     @cython.ccall
     def transmit_ends(self, controller: cython.longlong) -> object:
-        """Where a bus writes the ends of the transmissions of a CAN controller; None: it sends them as messages."""
+        """The buffer for the ends of a CAN controller's transmissions; None: the bus sends them as messages."""
         return None
 
-    # --- looking in ---------------------------------------------------------------------------------------
+    # --- inspection ---------------------------------------------------------------------------------------
 
     @cython.ccall
     def move_memory(self, words) -> None:
-        """What `memory` shows stands in `words` from now on, as it is: memory that processes share."""
+        """Move the words of `memory`, with their values, into `words`: memory that processes share."""
         raise NotImplementedError(f"{self.name} shows no memory")
 
     @cython.ccall
     @cython.exceptval(check=False)
     def watched(self) -> cython.longlong:
-        """One number of its program, as a debugger would watch it; which, the kind of board says."""
+        """One number of its program, as a debugger would watch it; the kind of board defines which."""
         return 0
 
     @cython.ccall
@@ -128,5 +128,5 @@ class Board:
 
     @cython.ccall
     def counters(self) -> object:
-        """What it counted, by name."""
+        """The board's counters, by name."""
         raise NotImplementedError(f"{self.name}: this kind of board counts nothing")

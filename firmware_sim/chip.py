@@ -20,8 +20,8 @@ ALARM_PLACES: Final = 18  # with the slot timer's, and one that never comes
 class Chip(Board):
     """The hardware of a microcontroller of `hz` core clock on `crystal`, as its peripherals see it.
 
-    `now`: the instant (ns) at which the present input, handler or task takes effect. `pins`: levels 0/1. `unclaimed`:
-    messages that nobody listened to. The slot timer matched at `match_time` and will match at `tick_time`.
+    `now`: the time (ns) at which the present input, handler or task takes effect. `pins`: levels 0/1. `unclaimed`:
+    messages that no peripheral claimed. The slot timer matched at `match_time` and will match at `tick_time`.
     `panel`: what a person sees of the board, or None (`carry`).
     """
 
@@ -71,7 +71,7 @@ class Chip(Board):
         self.now = 0
         self.instant = 0  # up to which inputs have been taken in
         self.code_time = 0  # when the processor goes on with its code
-        self.stop_time = 0  # how far the processor may run before it looks at the inputs again
+        self.stop_time = 0  # how far the processor may run before it checks the inputs again
         self.waiting = False  # a task waits for a condition
         self.check_wait = False  # which may hold now
         # alarms that are set: instants and places in the order of making, the first to come last; at 0 stands one
@@ -87,12 +87,12 @@ class Chip(Board):
         self.unclaimed = 0
 
     def carry(self, panel) -> None:
-        """The board carries `panel`, what a person sees: its `words` are the board's memory, for others to read."""
+        """Attach `panel`, the person's view of the board: its `words` are the board's memory, for others to read."""
         self.panel = panel
         self.memory = panel.words
 
     def move_memory(self, words) -> None:
-        """What the panel shows stands in `words` from now on."""
+        """Keep the panel's state in `words` from now on."""
         if self.panel is None:
             Board.move_memory(self, words)
         self.panel.move(words)

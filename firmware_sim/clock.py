@@ -33,7 +33,7 @@ class Crystal:
     def tick_time_ns(
         self, n: cython.longlong, period_ns: cython.longlong, phase_ns: cython.longlong
     ) -> cython.longlong:
-        """True instant (ns) of tick `n` of a timer with `period_ns` on this clock; tick 0 is at `phase_ns`."""
+        """True time (ns) of tick `n` of a timer with `period_ns` on this clock; tick 0 is at `phase_ns`."""
         return phase_ns + self.true_ns(n * period_ns)
 
     @cython.ccall
@@ -120,7 +120,7 @@ class TickTrain:
     @cython.ccall
     @cython.exceptval(check=False)
     def next(self) -> cython.longlong:
-        """Go to the next tick; returns its instant."""
+        """Go to the next tick; returns its time."""
         self.number += 1
         self.time += self.step_ns
         self.rest += self.step_rest

@@ -1,15 +1,15 @@
 # cython: boundscheck=False, wraparound=False
 # (indices are those of pins, alarms, tasks and edge lines, checked when they are made)
-"""One microcontroller: its inputs, its interrupts and its slots, run to any instant of virtual time.
+"""One microcontroller: its inputs, its interrupts and its slots, run to any point in virtual time.
 
-To everything outside, a board is: advance to a time with stamped messages in `inbox`, find stamped messages
-in `outbox`, and the instant `next_time` at which it must run again if nothing comes in.
+Interface of a board: advance to a time with stamped messages in `inbox`, find stamped messages in `outbox`, and
+`next_time`, the time at which it must run again if no input arrives.
 
 How time passes inside:
-- A task or handler takes effect at its start, the instant `now`; then the CPU is busy for its cycles.
-- What arrives meanwhile is handled at its stamp: hardware (peripherals, capture registers) at once, handlers
-  as soon as FIQ, then IRQ, is free. Their cycles lengthen whatever they interrupt.
-- At one instant: edges, messages, alarms (the slot timer's last), handlers (FIQ before IRQ, then by slot), tasks.
+- A task or handler takes effect at its start, at time `now`; then the CPU is busy for its cycles.
+- Input that arrives meanwhile is handled at its stamp: by hardware (peripherals, capture registers) at once, by
+  handlers as soon as FIQ, then IRQ, is free. Their cycles lengthen whatever they interrupt.
+- Order at equal times: edges, messages, alarms (the slot timer's last), handlers (FIQ before IRQ, then by slot), tasks.
 - A handler's `now` is its start plus the latency of its source.
 Each busy time is rounded down to whole ns; cycle counts are exact integers.
 """
@@ -52,15 +52,15 @@ INDICES_PER_KIND: Final = 16
 
 @cython.cclass
 class Microcontroller(Chip):
-    """A chip of `hz` core clock on `crystal`, and what its processor does: messages, interrupts, the schedule.
+    """A chip of `hz` core clock on `crystal`, and the work of its processor: messages, interrupts, the schedule.
 
     Hooks (None or a callable): `on_overrun()` when a tick finds the row unfinished, `on_limit(task)` when a
     task exceeds its limit, `on_near_limit()` when a finished slot took more than 90 % of its length,
     `on_timer_tick()` in every interrupt of the slot timer.
-    `background()`: what the main loop does beside the scheduler, called while no slot runs; it returns the
-    instant (ns) at which it is done, or 0 when it found nothing to do: it is then called again after the
-    next input, interrupt or slot. It may move `now` forward for its effects, and must return once it is past
-    `horizon`, the next input, alarm or slot, so that steps of any size give the same run.
+    `background()`: the main loop's work outside the scheduler, called while no slot runs; it returns the time (ns) at
+    which it is done, or 0 when it found nothing to do: it is then called again after the next input, interrupt or slot.
+    It may move `now` forward for its effects, and must return once it is past `horizon`, the next input, alarm or slot,
+    so that steps of any size give the same run.
     """
 
     # Fields that nearly every event touches come first, close together; then those of messages and edges.
@@ -98,8 +98,8 @@ class Microcontroller(Chip):
         self.background = None
         self.background_wanted = True
         self.extra_cycles = 0
-        self.irq_free = 0  # from when on an IRQ may be served, never before
-        self.fiq_free = 0  # a FIQ
+        self.irq_free = 0  # earliest time at which an IRQ may be served
+        self.fiq_free = 0  # the same for a FIQ
         self.wait_task = None
         self.wait_start = 0
         self.wait_stolen = 0
@@ -117,12 +117,12 @@ class Microcontroller(Chip):
     # --- set-up -------------------------------------------------------------------------------------------
 
     def _check_peripheral(self, peripheral) -> None:
-        """The compiled loop takes what is claimed for a Peripheral without asking again."""
+        """The compiled loop assumes that what is claimed is a Peripheral and does not check again."""
         if not isinstance(peripheral, Peripheral):
             raise UserError(f"{self.name}: {peripheral!r} is no Peripheral, so nothing can be delivered to it")
 
     def claim(self, kind, index, peripheral) -> None:
-        """Messages of `kind` whose field a is `index` (0 ... 15) go to `peripheral.on_message`."""
+        """Route messages of `kind` whose field a is `index` (0 ... 15) to `peripheral.on_message`."""
         self._check_peripheral(peripheral)
         if not (0 <= kind < MESSAGE_KINDS and 0 <= index < INDICES_PER_KIND):
             raise UserError(
@@ -135,9 +135,9 @@ class Microcontroller(Chip):
         self.message_table[place] = peripheral
 
     def claim_pin(self, pin, channel, peripheral, source=None) -> InterruptSource:
-        """Edges of `pin` go to `peripheral.on_pin(channel, level, time)`.
+        """Route edges of `pin` to `peripheral.on_pin(channel, level, time)`.
 
-        `source`: the interrupt that it may ask for, (PIN_EDGE, pin) unless given. Returns that.
+        `source`: the interrupt that it may request, (PIN_EDGE, pin) unless given. Returns that source.
         """
         self._check_peripheral(peripheral)
         if not 0 <= pin < PINS:
@@ -150,9 +150,10 @@ class Microcontroller(Chip):
         return self.pin_sources[pin]
 
     def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
-        """Edges of `buffer` arrive on `pin`, claimed before, with the level of `partner_pin`; tell by `edges_came`.
+        """Take edges of `buffer` on `pin`, claimed before, with the level of `partner_pin`; `edges_came` announces
+        them.
 
-        Two encoders can be connected so; the edges of more would have to come as messages.
+        Two encoders can be connected this way; the edges of further ones must arrive as messages.
         """
         if not 0 <= pin < PINS or self.pin_owners[pin] is None:
             raise UserError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
@@ -165,15 +166,15 @@ class Microcontroller(Chip):
             raise UserError(f"{self.name}: pin {pin} would be the third with the edges of an encoder")
 
     def edges_came(self) -> cython.longlong:
-        """The buffers of the edge lines may hold new edges; returns the first one's instant.
+        """Note that the buffers of the edge lines may hold new edges; returns the first edge's time.
 
-        Edges of two lines at one instant come in the order in which the lines were connected, and before messages.
+        Edges of two lines at the same time come in the order in which the lines were connected, and before messages.
         """
         self.edge_time = min(self.first_line.find_next(), self.second_line.find_next())
         return self.edge_time
 
     def transmit_ends(self, controller: cython.longlong) -> object:
-        """Where the CAN controller of this number looks for the ends of its transmissions; None: it has to be told."""
+        """The buffer in which this CAN controller finds its transmissions' ends; None: it needs messages."""
         owner: Peripheral = self.message_table[controller * MESSAGE_KINDS + CAN_TX_DONE]
         return owner.transmit_ends()
 
@@ -182,17 +183,18 @@ class Microcontroller(Chip):
         return self.scheduler.slot_time
 
     def counters(self) -> object:
-        """What the board counted, by name."""
+        """The board's counters, by name."""
         return BoardCounters(hz=self.hz, unclaimed=self.unclaimed, slots=self.scheduler.counters())
 
     def keep_activity(self, log: ActivityLog | None) -> None:
-        """From now on write what the processor does into `log`; None: no longer. It changes nothing of what it does."""
+        """Write the processor's activity into `log` from now on; None: stop. This does not change the simulation."""
         self.scheduler.attach_log(log)
 
     def break_off(self, now) -> None:
-        """The processor stops at `now` (ns), up to which it has run: what it was at ends there in its activity log.
+        """Stop the processor at `now` (ns), up to which it has run: its current activity ends there in its activity
+        log.
 
-        The cycles of such rows are those that they would have taken.
+        The cycles of such rows are those that the full activity would have taken.
         """
         log = self.scheduler.log
         if log is not None:
@@ -200,13 +202,13 @@ class Microcontroller(Chip):
             log.end_code(min(self.code_time, now))
 
     def activity(self) -> ActivityLog:
-        """Its activity log; where it has none yet, it gets one now. Several readers can share it by its sinks."""
+        """The activity log, made on first use. Several readers can share it by its sinks."""
         if self.scheduler.log is None:
             self.keep_activity(ActivityLog())
         return self.scheduler.log
 
     def legend(self) -> object:
-        """What the numbers in its activity log stand for."""
+        """The meanings of the numbers in the activity log."""
         scheduler = self.scheduler
         return Legend(
             board=self.name,
@@ -236,7 +238,7 @@ class Microcontroller(Chip):
         )
 
     def new_alarm(self, peripheral, number) -> Alarm:
-        """An alarm; when due, `peripheral.on_alarm(number, time)` runs."""
+        """A new alarm; when due, it calls `peripheral.on_alarm(number, time)`."""
         self._check_peripheral(peripheral)
         if None not in self.alarms:
             raise UserError(f"{self.name}: more than {ALARMS} peripheral alarms")
@@ -264,9 +266,10 @@ class Microcontroller(Chip):
         )
 
     def retune(self, ppb, now) -> None:
-        """From `now` (ns) on, up to which it has run, its crystal runs `ppb` parts per billion fast.
+        """Let the crystal run `ppb` parts per billion fast from `now` (ns), up to which the chip has run.
 
-        What runs by it goes on where it is at the new rate: slots, timers, PWM, serial lines, the processor's cycles.
+        Everything clocked by it continues from its present state at the new rate: slots, timers, PWM, serial lines,
+        processor cycles.
         """
         before: Crystal = self.crystal
         self.crystal = Crystal(before.nominal_hz, ppb)
@@ -297,15 +300,15 @@ class Microcontroller(Chip):
     @cython.ccall
     def request(self, source: InterruptSource) -> cython.longlong:
         """Raise an interrupt line; it is served as soon as its priority allows. 1 if newly pending."""
-        if self.now > self.instant:  # a task asks, and it began after others of its row
+        if self.now > self.instant:  # a task requests it, and it began after others of its row
             self.instant = self.now
         self.next_time = self.instant
         return self.vic.raise_source(source, self.now)
 
     def stop_at(self, time: cython.longlong) -> cython.longlong:
-        """While the chip runs: it shall run no further than to `time` (ns), which is later than now.
+        """Limit a running chip to `time` (ns), which is later than now.
 
-        Returns the instant at which it stops.
+        Returns the time at which it stops.
         """
         if time < self.horizon:
             self.horizon = time
@@ -315,25 +318,25 @@ class Microcontroller(Chip):
 
     @cython.ccall
     def main_loop(self) -> cython.longlong:
-        """One turn of `background`; a board may put its main loop here instead of naming a function."""
+        """Run one turn of `background`; a board may override this instead of naming a function."""
         return call(self.background)
 
     # --- the event loop -----------------------------------------------------------------------------------
 
     @cython.ccall
     def due(self, until: cython.longlong) -> cython.bint:
-        """True when something happens here before `until`, inputs that wait included."""
+        """True when something happens here before `until`, waiting inputs included."""
         return self.next_time < until or self.inbox.head_time < until or self.edge_time < until
 
     def advance(self, until: cython.longlong) -> cython.longlong:
-        """Run everything with an instant before `until` (ns), or before `horizon` where an output brought that nearer.
+        """Run everything due before `until` (ns), or before `horizon` where an output brought that nearer.
 
         Returns `next_time`.
         """
         inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         scheduler: SlotScheduler = self.scheduler
-        entry: cython.longlong  # where the entry of the task begins in the table
+        entry: cython.longlong  # index of the task's entry in the table
         first: cython.longlong
         own: cython.longlong
         number: cython.longlong
@@ -341,13 +344,13 @@ class Microcontroller(Chip):
         items: cython.longlong
         self.horizon = until
         while True:
-            # what comes in, or comes due by itself
+            # input, or an event that is due
             first = self.alarm_time
             if inbox.head_time < first:
                 first = inbox.head_time
             if self.edge_time < first:
                 first = self.edge_time
-            # what the processor does before that: a handler, tasks, or the main loop beside them
+            # the processor's work before that: a handler, tasks, or the main loop between them
             own = NEVER
             if vic.pending != 0:
                 own = self.fiq_free if vic.pending >= FIRST_FIQ else self.irq_free
@@ -367,7 +370,7 @@ class Microcontroller(Chip):
                 if scheduler.done:
                     self._background()
                     continue
-                # tasks, one after another; what one of them does can only bring an alarm or an interrupt nearer
+                # tasks, one after another; their effects can only bring an alarm or an interrupt nearer
                 self.stop_time = self.horizon if self.horizon < first else first
                 self.extra_cycles = 0
                 if (self.waiting or scheduler.late) and not self._resume():
@@ -394,7 +397,7 @@ class Microcontroller(Chip):
                 continue
             if first >= self.horizon:
                 break
-            # at one instant: edges, messages, alarms
+            # at equal times: edges, messages, alarms
             if self.edge_time == first:
                 self._edges()
                 continue
@@ -405,7 +408,7 @@ class Microcontroller(Chip):
             else:
                 asking = cython.cast(Alarm, self.alarms[self.alarm_places[self.alarms_set - 1]]).ring(first)
             if asking is not None:
-                # mostly the processor is free for it, and nothing else comes at this instant
+                # mostly the processor is free for it, and nothing else is due at this time
                 if (
                     vic.pending == 0
                     and self.irq_free <= first
@@ -423,36 +426,37 @@ class Microcontroller(Chip):
         return own
 
     def speaks_from(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing on a bus, unless an urgent message comes in.
+        """Earliest time (ns) at which the board can send on a bus, unless an urgent message arrives.
 
-        That is its next event, or later where its schedule names the tasks that speak (`Schedule.speakers`).
+        That is its next event, or later where its schedule names the tasks that send (`Schedule.speakers`).
         """
         time: cython.longlong = self.code_time
         if not self.scheduler.announces or self.vic.pending != 0 or self.background is not None:
             return self.next_time
-        if self.waiting and self.horizon > time:  # what the task spins for has not come until then
+        if self.waiting and self.horizon > time:  # the condition that the task spins for is not met before that
             time = self.horizon
         return self.scheduler.speaks_from(time, self.tick_time)
 
     def quiet_until(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing out at all, whatever comes in of a kind that can wait."""
+        """Earliest time (ns) at which the board can output anything, whatever non-urgent input arrives."""
         if not self.scheduler.done or self.vic.pending != 0 or (self.background is not None and self.background_wanted):
             return 0
-        return self.alarm_time  # the slot timer's match is one, too
+        return self.alarm_time  # the slot timer's match is an alarm, too
 
     @cython.cfunc
     @cython.final
     def _edges(self) -> cython.longlong:
-        """Edges from the first one on, each with its fast interrupt, until something else comes first.
+        """Handle edges from the first one on, each with its fast interrupt, until something else comes first.
 
-        Hardware first: the capture happens at the edge's stamp whatever the processor does. Returns the last instant.
+        Hardware first: the capture happens at the edge's stamp whatever the processor does. Returns the last edge's
+        time.
         """
         inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         line: EdgeLine
         level: cython.longlong
         time: cython.longlong
-        # what comes first; a handler may set an alarm before it
+        # the first other event; a handler may set an alarm before it
         self.stop_time = min(self.horizon, self.alarm_time, inbox.head_time)
         self.background_wanted = True
         while True:
@@ -476,7 +480,7 @@ class Microcontroller(Chip):
                 ):
                     vic.raise_source(line.source, time)
                     return time
-                # at once: the fast interrupt is free and nobody else waits for it
+                # at once: the fast interrupt is free and no other source waits for it
                 line.source.requested = time
                 self._serve(line.source, inbox, time)
             if vic.pending != 0 or self.edge_time >= self.stop_time:
@@ -488,7 +492,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _input(self, queue: EventQueue) -> InterruptSource | None:
-        """The message just taken: hardware first. Returns the interrupt source that it makes ask for service."""
+        """Handle the message just taken: hardware first. Returns the interrupt source that it makes pending."""
         self.now = self.instant
         self.background_wanted = True
         if queue.kind == PIN_EDGE:
@@ -500,7 +504,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _pin_edge(self, queue: EventQueue) -> InterruptSource | None:
-        """An edge that came as a message."""
+        """Handle an edge that arrived as a message."""
         pin: cython.longlong = queue.a
         channel: cython.longlong = self.pin_channels[pin]
         self.pins[pin] = queue.b
@@ -527,7 +531,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _background(self) -> cython.longlong:
-        """One turn of the main loop beside the scheduler."""
+        """Run one turn of the main loop outside the scheduler."""
         if self.code_time < self.instant:
             if self.scheduler.recording:
                 self._log_end_of_code()
@@ -553,7 +557,7 @@ class Microcontroller(Chip):
     def _serve(self, source: InterruptSource, queue: EventQueue, time: cython.longlong) -> None:
         """Run the handler of `source`, which waits no longer, at `time` and let its cycles pass."""
         busy: cython.longlong
-        requested: cython.longlong = source.requested  # the handler may ask for the next service
+        requested: cython.longlong = source.requested  # the handler may request the next service
         source.served += 1
         self.background_wanted = True
         self.now = time + source.latency_ns
@@ -575,7 +579,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _note_service(self, source: InterruptSource, items: cython.longlong) -> cython.longlong:
-        """A service that handled `items`, took extra cycles or is recorded; returns how long it took (ns)."""
+        """Note a service that handled `items`, took extra cycles or is recorded; returns how long it took (ns)."""
         cycles: cython.longlong = source.base_cycles + source.per_item * items + self.extra_cycles
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         self.stolen_cycles += cycles
@@ -595,7 +599,7 @@ class Microcontroller(Chip):
         end: cython.longlong
         if self.irq_free <= time:
             log.end_irq(self.irq_free)
-        if self.code_time <= time:  # nothing is interrupted: what ran before is through
+        if self.code_time <= time:  # nothing is interrupted: the code before it is complete
             log.end_code(self.code_time)
         if source.bit >= FIRST_FIQ:
             end = time + int(cycles * self.ns_per_cycle)
@@ -607,7 +611,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _log_end_of_code(self) -> cython.longlong:
-        """What ran until now is through, and the interrupts in it; returns `code_time`."""
+        """Log that the code that ran until now, and the interrupts in it, are complete; returns `code_time`."""
         self.scheduler.log.end_irq(self.irq_free)
         self.scheduler.log.end_code(self.code_time)
         return self.code_time
@@ -615,7 +619,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _resume(self) -> cython.bint:
-        """Tasks go on after one that spins, or after one that was completed behind its slot's end.
+        """Continue tasks after one that spins, or after one that was completed behind its slot's end.
 
         False when something else comes first.
         """
@@ -630,14 +634,14 @@ class Microcontroller(Chip):
                 return False
         if scheduler.late:
             scheduler.late = False
-            scheduler.finished_time = self.code_time  # as far as it was let; a program that hangs does not come here
+            scheduler.finished_time = self.code_time  # as far as it may run; a hanging program does not reach this
             self._close_slot(scheduler.late_time)
         return True
 
     @cython.cfunc
     @cython.final
     def _end_row(self) -> cython.longlong:
-        """The row's last task has run; returns the cycles of its slot."""
+        """End the row after its last task; returns the cycles of its slot."""
         self.now = self.code_time
         self.scheduler.done = True
         self.background_wanted = True
@@ -647,7 +651,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _spent(self, task: Task, items: cython.longlong) -> cython.longlong:
-        """A task that has just run handled `items`; returns the cycles it took."""
+        """Count the `items` of a task that has just run; returns the cycles it took."""
         cycles: cython.longlong = task.base_cycles + task.per_item * items + self.extra_cycles
         self.extra_cycles = 0
         return self._charge(task, cycles, items)
@@ -655,7 +659,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _special_task(self, task: Task) -> cython.bint:
-        """A task of which not every call is alike, or whose calls are recorded. False when it has to spin."""
+        """Run a task whose calls differ, or whose calls are recorded. False when it has to spin."""
         entry: Task
         items: cython.longlong = 0
         if self.scheduler.recording:
@@ -680,7 +684,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _begin_wait(self, task: Wait) -> cython.bint:
-        """A task that spins begins; False when it has to."""
+        """Begin a task that spins; False when it has to."""
         self.wait_task = task
         self.wait_start = self.code_time
         self.wait_stolen = self.stolen_cycles
@@ -695,7 +699,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _wait_over(self) -> cython.longlong:
-        """The condition of the spinning task came true: its cycles are the spinning, less what was stolen."""
+        """End the spinning after its condition became true: its cycles are the spinning, less the stolen ones."""
         task: Wait = self.wait_task
         spun: cython.longlong = int((self.code_time - self.wait_start) * self.cycles_per_ns)
         before: cython.longlong = self.code_time
@@ -713,7 +717,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _charge(self, task: Task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
-        """Let the cycles of a task that handled `items` pass and hold them against its limit."""
+        """Let the cycles of a task that handled `items` pass and compare them with its limit."""
         busy: cython.longlong = int(cycles * self.ns_per_cycle)
         if self.scheduler.recording:
             self._log_task(task, cycles, items)
@@ -728,7 +732,7 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _log_task(self, task: Task, cycles: cython.longlong, items: cython.longlong) -> cython.longlong:
-        """Write into the log that a task has the processor; returns since when (ns)."""
+        """Log that a task has the processor; returns since when (ns)."""
         scheduler: SlotScheduler = self.scheduler
         kind: cython.longlong = TASK_RAN
         since: cython.longlong = self.code_time

@@ -64,7 +64,7 @@ class Unclaimed(Peripheral):
     """Where messages end that no peripheral has claimed."""
 
     def on_message(self, queue: EventQueue) -> InterruptSource | None:
-        """The interrupt source of its kind and index keeps it, if anybody listens there."""
+        """Keep it in the interrupt source of its kind and index, if a handler is attached there."""
         source: InterruptSource = self.chip.vic.sources.get((queue.kind, queue.a))
         if source is not None and source.bit != 0:
             source.keep_message(queue)

@@ -30,7 +30,7 @@ HISTOGRAM_BINS: Final = 21  # twenty of 5 % of a slot, the last for overruns
 ENTRY: Final = 4
 ENTRY_CODE: Final = 0  # the two addresses by which its function is called
 ENTRY_OWNER: Final = 1
-ENTRY_NS: Final = 2  # of a call without items, or -1: every call must be looked at more closely
+ENTRY_NS: Final = 2  # of a call without items, or -1: every call must be checked individually
 ENTRY_CALLS: Final = 3  # calls that took that
 
 
@@ -173,7 +173,7 @@ class Task:
 class Wait(Task):
     """A task that spins until `function()` is true, as `while (!done);` does in C.
 
-    The condition is looked at when the task starts and after every interrupt or peripheral event; the
+    The condition is checked when the task starts and after every interrupt or peripheral event; the
     spinning time counts as cycles of the task. `waits` counts the calls that had to spin. A slot tick does
     not end the spinning (the task in progress always finishes).
     """
@@ -232,7 +232,7 @@ class Schedule:
     `rows`: a tuple of task tuples, one per row; `last`: tasks that close every slot. `occasional`: a tuple
     of tasks (or an Occasional) called once per pass, at the end of row `occasional_row`.
     `divider`: timer ticks per slot (the timer then runs at slot/divider). `completion_flag=False`: the
-    runner keeps no DONE flag, so an overrun drops tasks but tells nobody (main-brain scheduler).
+    runner keeps no DONE flag, so an overrun drops tasks without a report (main-brain scheduler).
     `speakers`: names of those tasks in `every` and `last` that may put something on a bus (None: any of them);
     tasks of rows and of the occasional list always may. To be named only where no interrupt handler and no main loop
     sends. It lets the rest of the robot run ahead of a board that has nothing to say, and changes no result.
@@ -475,12 +475,12 @@ class SlotScheduler:
 
     @cython.ccall
     def speaks_from(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
-        """Before this instant (ns) no task puts anything on a bus.
+        """Earliest time (ns) at which a task sends on a bus.
 
         `code_time`: no task of the row that runs starts earlier; `tick_time`: no slot.
         """
         next_row: cython.longlong = self.end + 1 if self.row + 1 < self.row_count else 0
-        # an instant and a lead are at most NEVER, so their sum fits
+        # a time and a lead are at most NEVER, so their sum fits
         first: cython.longlong = tick_time + self.leads[next_row]
         if not self.done and code_time + self.leads[self.position] < first:
             first = code_time + self.leads[self.position]
@@ -598,7 +598,7 @@ class SlotScheduler:
             log.put(SLOT_ENDED, self.slot_count, since, time, cycles, 0, self.row, 0)
 
     def find(self, name):
-        """The one task of this name (or the Task itself), wherever it stands in the table."""
+        """The one task of this name (or the Task itself), wherever it is in the table."""
         tasks = self.schedule.all_tasks()
         found = [task for task in tasks if task is name or task.name == name]
         if not found:

@@ -3,7 +3,7 @@
 An `InterruptSource` is one line into the controller. A request is pending until served; a second request
 of a pending source merges with it, as on a level-sensitive line. FIQ sources share the one FIQ and are
 served in the order in which they were attached. IRQs do not nest; FIQ pre-empts IRQ and code. The event
-loop in microcontroller.py serves; this file only keeps who waits.
+loop in microcontroller.py serves; this file only keeps the pending sources.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 
 FIQ: Final = -1
 IRQ_SLOTS: Final = 16
-FIRST_FIQ: Final = 1 << 16  # in the word of pending sources the FIQ sources stand above the slots
+FIRST_FIQ: Final = 1 << 16  # in the word of pending sources the FIQ sources are above the slots
 
 MOST_FIQ_SOURCES = 46  # bits of a word of 64, without the sign and the slots
 
@@ -30,7 +30,7 @@ SLOT_TIMER = 69  # the scheduler's own timer
 SOFTWARE = 70  # index free: VICSoftInt
 DMA_DONE = 71  # index: DMA channel; transfer complete
 
-# What a line is called until a handler with a name of its own is attached; {} is its index.
+# A line's name until a handler with its own name is attached; {} is its index.
 LINES = {
     PIN_EDGE: "pin {} edge",
     CAN_RX: "can{} receive",
@@ -59,7 +59,7 @@ IRQ_LATENCY = 25
 class InterruptSource:
     """One interrupt line. Cycle counts and `requests`, `merged`, `served` are ground truth for tests.
 
-    `bit`: its place in the controller's word of pending sources, 0 while nobody listens. A service that takes
+    `bit`: its place in the controller's word of pending sources, 0 while no handler is attached. A service that takes
     `base_cycles` is only counted (`served`), the others are noted with their cycles. A source whose message no
     peripheral stores keeps that one message (`keep_message`): while it waits, a newer message overwrites the older
     one (counted in `merged`).
@@ -105,7 +105,7 @@ class InterruptSource:
         self.kind = kind
         self.index = index
         self.number = 0  # in the order in which the controller's sources were made
-        self.requested = 0  # instant (ns) of the request that is or was served
+        self.requested = 0  # time (ns) of the request that is or was served
         self.name = LINES.get(kind, f"line {kind}/{{}}").format(index)
         self.handler = None
         self.service = None  # what is called: the handler, or before it what gives it the message
@@ -138,7 +138,7 @@ class InterruptSource:
 
     @property
     def attached(self) -> bool:
-        """True while a handler listens."""
+        """True while a handler is attached."""
         return self.bit != 0
 
     @property
@@ -148,7 +148,7 @@ class InterruptSource:
 
     @property
     def requests(self) -> int:
-        """Requests while somebody listened."""
+        """Requests while a handler was attached."""
         return self.served + self.merged + self.forgotten + int(self.pending)
 
     @property
@@ -220,7 +220,7 @@ class InterruptSource:
 @cython.final
 @cython.cclass
 class InterruptController:
-    """Sources by (kind, index), who is pending, and who comes first. `ns_per_cycle`: of this CPU."""
+    """Sources by (kind, index), the pending ones, and their order. `ns_per_cycle`: of this CPU."""
 
     pending: cython.longlong
     newest: InterruptSource
@@ -286,7 +286,7 @@ class InterruptController:
         return source
 
     def retune(self, ns_per_cycle) -> None:
-        """The processor's cycles last so long from now on."""
+        """Set the duration of the processor's cycles from now on."""
         self.ns_per_cycle = ns_per_cycle
         for source in self.sources.values():
             source.base_ns = int(source.base_cycles * ns_per_cycle)
@@ -307,7 +307,7 @@ class InterruptController:
     @cython.ccall
     @cython.exceptval(check=False)
     def raise_source(self, source: InterruptSource, time: cython.longlong) -> cython.bint:
-        """Request service at `time` (ns); False when nobody listens or the request merged with a pending one."""
+        """Request service at `time` (ns); False without a handler, or when the request merged with a pending one."""
         if self.pending & source.bit:
             source.merged += 1
             return False
@@ -322,7 +322,7 @@ class InterruptController:
     @cython.boundscheck(False)
     @cython.wraparound(False)
     def take_first(self) -> InterruptSource:
-        """Who is served now, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
+        """The source served now, only while `pending` is not 0: the first FIQ source attached, else the lowest slot."""
         first: InterruptSource = self.newest
         place: cython.longlong
         if self.pending != first.bit:  # not alone, as it nearly always is

@@ -6,10 +6,10 @@ a ring that DMA empties. From the computer come packets of 8 bytes: identifier, 
 plus 1. After a wrong sum the reader goes on one byte later.
 
 What is sent: in each cycle every variable of the fast list that is new, the next one of the medium list that is new
-(the look for it ends at the list's end and begins anew in the next cycle), and the next of all variables whether new or
+(the search ends at the list's end and begins anew in the next cycle), and the next of all variables whether new or
 not. 48 variables of the table, LV_CH_0 ... LV_CH_47, choose: identifier
 plus 65536 for the medium list, plus 131072 for the fast one. How many steps of this a slot may take follows from how
-full the ring is: an integral controller keeps it half filled. A step is one look at a list entry, sent or skipped, or
+full the ring is: an integral controller keeps it half filled. A step is one check of a list entry, sent or skipped, or
 the return to the start of the cycle. The end of the fast or the medium list costs no step.
 """
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 POINTS_PER_SEGMENT: Final = 9
 POINT_BYTES: Final = 10
 SEGMENT_BYTES: Final = 92
-SEGMENT_SUM: Final = 90  # where its checksum stands
+SEGMENT_SUM: Final = 90  # the place of its checksum
 RING_SEGMENTS: Final = 20
 MOST_FULL: Final = 18  # of them: one is being filled, and one stays between writer and reader
 HALF_FULL: Final = 10  # what the rate controller aims at, with the one being filled
 PACKET_BYTES: Final = 8
-PACKET_SUM: Final = 6  # where its checksum stands
+PACKET_SUM: Final = 6  # the place of its checksum
 RECEIVE_RING: Final = 500  # one place stays empty, as in all rings of the firmware
 CHANNELS: Final = 48
 # Added to the identifier in a channel's value; below 2 x FAST it is such a value.
@@ -67,13 +67,14 @@ KINDS = {"f32": SINGLE, "i32": SIGNED, "u32": UNSIGNED}
 
 @cython.cclass
 class DataLink:
-    """Both directions. `report(code)` hears the errors; `checked`: only parameters can be written, each
+    """Both directions. `report(code)` receives the errors; `checked`: only parameters can be written, each
     within its limits (ROBOT PARITY: the real robot takes any value for any variable).
 
     Its 45 fields are two rings, three lists and the counters of both directions, each a number of the firmware's.
 
-    Counters: points, segments, steps, packets (good ones), bad_packets (bytes skipped), refused (writes to what is no
-    parameter, or beyond its limits), ring_full (bytes lost because they came faster than they were parsed).
+    Counters: points, segments, steps, packets (good ones), bad_packets (bytes skipped), refused (writes to a variable
+    that is not a parameter, or beyond its limits), ring_full (bytes lost because they arrived faster than they were
+    parsed).
     """
 
     chip: "Microcontroller"
@@ -395,7 +396,7 @@ class DataLink:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _number(self, number: cython.longlong, word: cython.longlong) -> cython.double:
-        """What a word stands for in the variable `number`."""
+        """The value of a word in the variable `number`."""
         if self.kinds[number] == SINGLE:
             return float_of_word(word)
         return wrap_i32(word) if self.kinds[number] == SIGNED else word

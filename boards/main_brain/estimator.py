@@ -165,7 +165,7 @@ class HeelSensor:
 
 @cython.cclass
 class Estimator:
-    """update() once per slot. report(code): callable told of an error that was noticed.
+    """update() once per slot. report(code): callable that receives each error noticed.
 
     More than 40 fields, because half are the numbers of its variables in the data table, which compiled code then finds
     without a look into a dictionary.
@@ -601,7 +601,7 @@ class Estimator:
     @cython.ccall
     @cython.exceptval(check=True)
     def judge_fall(self, hip: cython.double) -> cython.void:
-        """A leg beyond 45 degrees is a fall (robot.md N4.17); told once per walk."""
+        """A leg beyond 45 degrees is a fall (robot.md N4.17); reported once per walk."""
         limit: float = self.store.get_float(self.P_E_FALL_ANG)
         lo: float = self.outer_angle
         li: float = lo - hip

@@ -43,7 +43,7 @@ COMMON = (
     "DC_F_PP_L_ABSRATE",
     "DC_F_PP_L_ABSRATE2",
 )
-# Parameters that each pair has of its own.
+# Parameters that are separate for each pair.
 OF_ONE_PAIR = ("P_FO_PP_THEIGHT", "P_FI_PP_THEIGHT")
 
 

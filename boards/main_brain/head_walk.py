@@ -1,13 +1,13 @@
 """The walk machine of the program "head-2015": one machine of six states for the whole robot.
 
-Source: robot.md C6.3 C, with C2.2 for what the log of 20 August 2015 does not tell. States have the log's numbers. Both
+Source: robot.md C6.3 C, with C2.2 for what the log of 20 August 2015 does not show. States have the log's numbers. Both
 pushes begin by the lean of the OUTER leg: while it stands, and while it swings. So the machine itself is not alike for
 the two legs.
 
 It is stepped first; hip and ankles (head_joints.py) take their laws by FSM_LEG, which is told at the beginning of a
 tick: commands are those of the state at the tick's start (robot.md C2.2).
 
-Chosen by us, because the log does not tell: setup ends by a time, and flight as in C2.2 when the outer feet stand.
+Chosen by us, because the log does not show it: setup ends by a time, and flight as in C2.2 when the outer feet stand.
 """
 
 from typing import TYPE_CHECKING, Final

@@ -60,7 +60,7 @@ class IoData:
         self.turn = 0
 
     def known(self, numbers):
-        """`numbers` as an array; UserError for one that is no id of the table."""
+        """`numbers` as an array; UserError for one that is not an id of the table."""
         for number in numbers:
             if not 0 <= number < self.store.size:
                 raise UserError(f"io data: id {number} is not 0 ... {self.store.size - 1}")

@@ -3,7 +3,7 @@
 A controller file says which one it is for (`program = "reflex"`), and has to give the parameters of that one and of
 what all share: estimator, steering, display. To add a program of your own:
 
-1. a module with its machines beside reflex_hip.py: tables of states and transitions (state_machine.py), and `READS`,
+1. a module with its machines next to reflex_hip.py: tables of states and transitions (state_machine.py), and `READS`,
    the variables that it reads. Without `import cython` it runs interpreted, beside compiled ones;
 2. its parameters as rows of datatable/master/variables.csv, published by PC for MB, then `ranger-sim table generate`;
 3. a function that builds its machines, and a line in PROGRAMS;

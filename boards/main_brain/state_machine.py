@@ -5,9 +5,9 @@ the first one whose condition holds is taken; with none, the state's main action
 action, the first time). A transition is complete within its tick: the old state's exit action, then both entry
 and main action of the new state; an old state that was entered but never ran gets its entry and main
 first. A machine takes no second transition in the same tick, and a transition to the present state is no change.
-It tells its state at the beginning of a tick, so that others that look at the number see a change one tick later.
+It reports its state at the beginning of a tick, so that readers of the number see a change one tick later.
 
-A state may hold machines of its own. They are stepped after its main action, in their written order,
+A state may hold nested machines. They are stepped after its main action, in their written order,
 so a state of an outer machine (walking) contains machines that run concurrently (one per motor).
 Conditions and actions are callables without arguments; conditions must not change anything.
 """
@@ -69,8 +69,8 @@ class StateMachine:
 
     states: State objects, the first is the start state. transitions: rows (from, to, condition) of state
     names; `from` may be one name, a tuple of names or ANY. For each state the order of the rows is the
-    order of precedence. on_change: callable told the present state's number at the beginning of the first tick and of
-    each tick after a change, or None.
+    order of precedence. on_change: callable that gets the present state's number at the beginning of the first tick and
+    of each tick after a change, or None.
     """
 
     name: str

@@ -29,7 +29,7 @@ LOWEST_HZ, HIGHEST_HZ = 1, 30_000
 
 @cython.cclass
 class Buzzer:
-    """`update` runs once per slot of 1 ms; `hertz` is the tone that the PWM unit was last told, 0 for silence."""
+    """`update` runs once per slot of 1 ms; `hertz` is the tone last set in the PWM unit, 0 for silence."""
 
     pwm: Pwm
     beeps: cython.bint
@@ -160,7 +160,7 @@ class BuzzerFrequency(Receiver):
         self.buzzer = buzzer
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A frame came; a negative number is beyond what the buzzer sounds."""
+        """Take a frame; a negative number is beyond the buzzer's range."""
         self.frames += 1
         self.buzzer.frequency_hertz = value_word
 
@@ -176,7 +176,7 @@ class TuneStart(Receiver):
         self.buzzer = buzzer
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A frame came."""
+        """Take a frame."""
         self.frames += 1
         if value_word != 0:
             self.buzzer.start_tune()
@@ -196,7 +196,7 @@ class ErrorSound(Receiver):
         self.buzzer = buzzer
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A frame came."""
+        """Take a frame."""
         self.frames += 1
         if value_word & 0xFFFF:
             self.buzzer.error_sound(value_word & 0xFFFF)

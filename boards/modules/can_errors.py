@@ -1,4 +1,4 @@
-"""What a CAN controller's error interrupt tells, as error codes: the same chain of tests on every board."""
+"""A CAN controller's error interrupt as error codes: the same chain of tests on every board."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,7 @@ OPERATING = 0  # CxMOD: not in reset
 
 
 class CanErrors:
-    """The error interrupt of one controller; `report(code)` hears what it was."""
+    """The error interrupt of one controller; `report(code)` receives the codes."""
 
     def __init__(self, controller: CanController, report: Callable[[int], object]) -> None:
         self.controller = controller

@@ -14,7 +14,7 @@ from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.foundation.numbers import integers
 
 CODES: Final = 1024  # codes 0 ... CODES-1 can be noted (the table has about 120)
-# Errors that wait to be sent: a ring of 32, which knows by a flag of its own whether it is empty.
+# Errors that wait to be sent: a ring of 32, with a separate flag for empty.
 RING_MASK: Final = 31
 MOST_WAITING: Final = 32
 # Fields of an error word: code, number of the board, count.

@@ -1,7 +1,7 @@
-"""The user interface board's front panel: what hangs on the pins of its processor for a person, and its state as words.
+"""The user interface board's front panel: the devices on its processor's pins for a person, and their state as words.
 
 It knows levels of pins, words on the SSP and the PWM unit's registers, of whatever program: robot.md N4.11. `WORDS` of
-them, which others may read at any instant: the display's sixteen characters (0 while it is off), the six colour lights
+them, which others may read at any time: the display's sixteen characters (0 while it is off), the six colour lights
 as command words (red in the lowest byte), the tone in Hz (0: silence), the sync light, the keys that are down and the
 lights beside the processor that are lit (a bit each: green, red, blue).
 """
@@ -47,7 +47,7 @@ BUZZER_CHANNEL = 5
 @cython.final
 @cython.cclass
 class FrontPanel(Peripheral):
-    """What a person sees, hears and presses, at the pins of `chip`. `ssp`: what hangs on its SSP, the lights."""
+    """What a person sees, hears and presses, at the pins of `chip`. `ssp`: the device on its SSP, the lights."""
 
     display: CharacterDisplay
     ssp: LedDrivers
@@ -93,7 +93,7 @@ class FrontPanel(Peripheral):
         return 0
 
     def on_pwm(self, pwm: object) -> cython.int:
-        """The tone is that of PWM5, if it has pulses: pins that stand still are not heard."""
+        """Set the tone to that of PWM5, if it has pulses: pins without edges make no sound."""
         unit: Pwm = pwm
         hertz: cython.longlong = 0
         if unit.driven >> BUZZER_CHANNEL & 1 and 0 < unit.latched_MR5 < unit.latched_MR0:
@@ -131,14 +131,14 @@ class FrontPanel(Peripheral):
         return self.ssp.level(light // LIGHTS_PER_DRIVER, (3 * light + colour) % PORTS_USED)
 
     def move(self, words) -> None:
-        """The words stand in `words` from now on, as they are: memory that processes share."""
+        """Keep the words, with their values, in `words` from now on: memory that processes share."""
         words[:] = memoryview(self.words)
         self.words = words
 
-    # --- for who looks from within the process ------------------------------------------------------------
+    # --- for readers within the process -------------------------------------------------------------------
 
     def text(self) -> str:
-        """Both lines as a person reads them, joined by a line feed; what is no printable ASCII shows as a space."""
+        """Both lines as a person reads them, joined by a line feed; anything but printable ASCII shows as a space."""
         codes = [self.words[CHARACTERS + place] for place in range(2 * CHARACTERS_PER_LINE)]
         shown = "".join(chr(code) if 0x20 <= code < 0x7F else " " for code in codes)
         return f"{shown[:CHARACTERS_PER_LINE]}\n{shown[CHARACTERS_PER_LINE:]}"

@@ -40,7 +40,7 @@ def start_command(header) -> bytes:
 class ImuParser:
     """Bytes in by `push` or `receive`, one packet out per `update`; values stay until the next good packet.
 
-    `report(code)` hears MSIMU_RX_OF when the ring is full. `late_by_one_byte`: the firmware waits for
+    `report(code)` receives MSIMU_RX_OF when the ring is full. `late_by_one_byte`: the firmware waits for
     more than 31 bytes, so a packet stays unread until its successor has begun.
     """
 

@@ -57,7 +57,7 @@ class AnkleSafety:
     of it by friction and by the zero error of its current sensor. That error has the mounting's sign and shifts
     the rest by 0.05 A / 1.5 A/rad = 0.033 rad: with our 0.05 A the inner ankles rest at 0.18 rad and the outer
     ones at 0.22 rad; with 0 A both boards raise it alike, with -0.05 A only the outer one does (measured). The
-    2015 records of the robot tell the same: blocked below 0.2 rad, an ankle does not quite reach that target.
+    2015 records of the robot show the same: blocked below 0.2 rad, an ankle does not quite reach that target.
     """
 
     encoder: AbsoluteEncoder

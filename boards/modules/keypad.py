@@ -9,7 +9,7 @@ from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 
 @cython.cclass
 class Keypad:
-    """Levels of the keys through `gpio.level(pin)`; `report(code)` hears BUTTON_OOB."""
+    """Levels of the keys through `gpio.level(pin)`; `report(code)` receives BUTTON_OOB."""
 
     gpio: Gpio
     pins: cython.longlong[6]

@@ -1,4 +1,4 @@
-"""The three LEDs beside the processor, and the heartbeat (robot.md N1.8, N4.11)."""
+"""The three LEDs next to the processor, and the heartbeat (robot.md N1.8, N4.11)."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""The robot's time as this board last heard it: the router's millisecond count, from identifier 0.
+"""The robot's time as this board last received it: the router's millisecond count, from identifier 0.
 
 A board has no other clock and neither corrects its crystal nor shifts its slots: without sync frames it stops
 (robot.md N1.4).

@@ -94,7 +94,7 @@ class RoutingTable:
 @cython.final
 @cython.cclass
 class Router:
-    """The rings and the moves. `report(code)` hears errors.
+    """The rings and the moves. `report(code)` receives errors.
 
     `one_frame_lag` is the firmware's quirk: its receive interrupt advances the write index before storing
     and its reader takes before advancing, so a frame waits for its successor.

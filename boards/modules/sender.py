@@ -25,7 +25,7 @@ class Sender:
     def send_words(
         self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong
     ) -> cython.bint:
-        """Queue a frame of two words (0 ... 2^32-1 each); False when there is no room and it is lost."""
+        """Queue a frame of two words (0 ... 2^32-1 each); False when the queue is full and it is lost."""
         return False
 
     @cython.ccall

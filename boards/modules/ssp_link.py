@@ -33,7 +33,7 @@ SEGMENT_ROWS: Final = 18  # of six frames
 HEADER_ONES: Final = 0x7800  # bits 11-14 of every header
 HEADER_REMOTE: Final = 0x8000
 HEADER_SHIFT: Final = 11
-HEADER_MARK: Final = 0x0F  # what stands above the identifier of a data frame
+HEADER_MARK: Final = 0x0F  # the bits above the identifier of a data frame
 IDENTIFIER: Final = 0x7FF
 HALF_WORD: Final = 0xFFFF
 MOST_BEFORE_A_FRAME: Final = 494  # half-words in the ring of 500: with more a frame does not fit, as one stays free
@@ -176,7 +176,7 @@ class MainBrainSspLink:
 
     @cython.ccall
     def exchanged(self, segment: SspSegment) -> SspSegment:
-        """Both slave-select edges: keep what came, return the segment to load for the next exchange."""
+        """Both slave-select edges: keep the received segment, return the segment to load for the next exchange."""
         self.receive(segment)
         return self.next_segment()
 
@@ -438,7 +438,7 @@ class RouterSspLink:
 
     @cython.cfunc
     def _lose(self) -> cython.bint:
-        """A frame finds no room: False."""
+        """A frame does not fit: False."""
         self.transmit_lost += 1
         self.report(self.code_transmit_full)
         return False
@@ -471,7 +471,7 @@ class RouterSspLink:
 
     @cython.ccall
     def next_segment(self, now: cython.longlong) -> SspSegment:
-        """The segment that is exchanged from instant `now` (ns) on.
+        """The segment that is exchanged from time `now` (ns) on.
 
         Of a frame being pushed at that moment only the half-words already written are seen.
         """
@@ -514,8 +514,8 @@ class RouterSspLink:
     def tick(self, now: cython.longlong) -> SspSegment:
         """The 200 us interrupt: judge the exchange that should be over, return the next segment.
 
-        An exchange that did not bring 31 half-words is SSP_LOW_RATE, and so is the first tick, which has none behind
-        it. With all places full the newest segment is overwritten by the next (SSP_RX_BUF_OF).
+        An exchange that did not bring 31 half-words is SSP_LOW_RATE, and so is the first tick, which no exchange
+        precedes. With all places full the newest segment is overwritten by the next (SSP_RX_BUF_OF).
         """
         following: cython.longlong
         if self.exchange_running:
@@ -543,7 +543,7 @@ class RouterSspLink:
     @cython.ccall
     def receive(self, segment: SspSegment) -> cython.void:
         """The end of an exchange: the main brain's half-words lie in the current place."""
-        # a segment that starts with zero is passed over without a look at its checksum, as the robot does
+        # a segment that starts with zero is skipped without a check of its checksum, as the robot does
         self.received_frames[self.received_write] = frames_in(segment) if segment.rows[0] != 0 else 0
         self.received[self.received_write] = segment
         self.exchange_done = True

@@ -3,7 +3,7 @@
 Key 4 down for 100 slots in all, also with pauses, toggles it. The time is cut into cells of 125 ms, a
 flash lasts 50 ms, and ten patterns follow each other. A low level at P0.16 lights it, and light 2
 shows the same. Source: robot.md N4.11. The patterns are ours: pattern n is ten cells with
-flashes in the first n + 1, so the run of flashes tells where in the cycle a video frame lies.
+flashes in the first n + 1, so the run of flashes shows where in the cycle a video frame lies.
 """
 
 import cython

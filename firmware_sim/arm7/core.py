@@ -20,14 +20,14 @@ everything waits. Chosen by us, because the manual does not say: a prefetch begi
 entered, and the two fetches by which the pipeline runs ahead of a branch do not count.
 
 Straight code does not wait, a branch to a new place waits `mam_timing - 1` clocks, as does a constant out of another
-line. What compiled code comes to is told in docs/explanation/arm7.md. `cycles_per_instruction`, when not 0, takes the
-place of all of this: every instruction then takes so many cycles, the entry of an interrupt or abort 3 as ever.
+line. docs/explanation/arm7.md gives the results for compiled code. `cycles_per_instruction`, when not 0, takes the
+place of all of this: every instruction then takes that number of cycles, the entry of an interrupt or abort 3 as ever.
 
 A debugger (`firmware_sim/gdb`) takes part by `debugger`: `run` then asks it at breakpoints, watchpoints and steps, and
-looks at its door now and then. It stops between two instructions, for as long as it likes; no cycle passes meanwhile,
-and what was not changed by hand goes on as without it.
+polls its endpoint periodically. It stops between two instructions, for as long as it likes; no cycle passes meanwhile,
+and everything not changed by hand goes on as without it.
 
-An access to what is not there raises `BusFault` with address and program counter. With `takes_aborts` the program
+An access to an unmapped address raises `BusFault` with address and program counter. With `takes_aborts` the program
 gets its data or prefetch abort instead, as on the chip, and `fault_address` keeps the address.
 """
 
@@ -51,7 +51,7 @@ SYSTEM: Final = 0x1F
 IRQ_LINE: Final = 1
 FIQ_LINE: Final = 2
 STATE: Final = 53  # numbers of Core.state_into
-LOOK_CYCLES: Final = 60_000  # between two looks at a debugger's door; chosen by us: 1 ms of the robot's processors
+LOOK_CYCLES: Final = 60_000  # between two polls of a debugger's endpoint; chosen by us: 1 ms of the robot's processors
 
 # C variables when compiled: Cython makes a Python object of every literal above 31 bits.
 _MASK: cython.longlong = 4294967295
@@ -59,8 +59,8 @@ _SIGN: cython.longlong = 2147483648
 _STATUS: cython.longlong = 4026532095
 
 MODES = (USER, FAST, INTERRUPT, SUPERVISOR, ABORT, UNDEFINED, SYSTEM)
-# A store to a port behind the bridge, at the processor's own clock, takes 7 clocks instead of 2: the data sheet of the
-# LPC2194/01 has its fast ports, which stand beside memory, toggle pins up to 3.5 times as fast as the old ones.
+# A store to a port behind the bridge, at the processor's own clock, takes 7 clocks instead of 2: by the data sheet of
+# the LPC2194/01 its fast ports, which are next to memory, toggle pins up to 3.5 times as fast as the old ones.
 DEVICE_WAITS = 5
 BRIDGE_BASE = 0xE0000000  # where the peripheral bus begins (user manual, chapter 2)
 MAM_TIMING = 4  # clocks of a flash access at 60 MHz: what all of the robot's boards write to MAMTIM
@@ -71,7 +71,7 @@ class ProcessorError(UserError):
 
 
 class BusFault(ProcessorError):  # noqa: N818  (what processors call it)
-    """The program reached for an address where nothing is; `address` and `pc` say where, both as numbers."""
+    """The program accessed an unmapped address; `address` and `pc` give the place, both as numbers."""
 
     def __init__(self, text, address, pc) -> None:
         UserError.__init__(self, text)
@@ -113,14 +113,14 @@ class Device:
 class Core:
     """One processor with flash, RAM and a hook for everything else.
 
-    `device`: an object with read(address, size) -> value and write(address, size, value), size in bytes 1, 2 or 4;
-    both raise LookupError where nothing is. A `Device` is called faster, and ends the run itself where nothing is.
-    `written`: by part of RAM of 256 bytes, whether it was written since somebody set that to 0. `lines` holds the two
-    interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by devices. `r` holds the registers of the present mode, `pc` the
-    address of the next instruction (`r[15]` is only valid inside an instruction). `cycles` and `instructions` count
-    from the start; `began` is what `cycles` was when the present instruction began: devices take that as the instant of
-    its accesses. The fields are so many because a processor's state is, and because in one object what an instruction
-    touches lies together in memory.
+    `device`: an object with read(address, size) -> value and write(address, size, value), size in bytes 1, 2 or 4; both
+    raise LookupError at an unmapped address. A `Device` is called faster, and ends the run itself at an unmapped
+    address. `written`: by part of RAM of 256 bytes, whether it was written since it was last set to 0. `lines` holds
+    the two interrupt inputs (IRQ_LINE, FIQ_LINE), levels set by devices. `r` holds the registers of the present mode,
+    `pc` the address of the next instruction (`r[15]` is only valid inside an instruction). `cycles` and `instructions`
+    count from the start; `began` is the value of `cycles` at the begin of the present instruction: devices take that as
+    the time of its accesses. The class has many fields because a processor has much state, and because one object keeps
+    what an instruction touches together in memory.
     """
 
     pc: cython.longlong
@@ -198,7 +198,7 @@ class Core:
         self.cycles_per_instruction = 0
         self.takes_aborts = False
         self.fault_address = -1
-        self.ram_open = ram_size  # as far as loads and stores need no second look: none of it while data are watched
+        self.ram_open = ram_size  # as far as loads and stores need no second check: none of it while data are watched
         self.flash_open = flash_size
         self.debugger = None
         self.armed = False
@@ -296,7 +296,7 @@ class Core:
 
     @cython.ccall
     def set_cpsr(self, value: cython.longlong) -> cython.int:
-        """Write all of it; registers change with the mode. ProcessorError for a mode that is none."""
+        """Write all of it; registers change with the mode. ProcessorError for an invalid mode."""
         self.switch_mode(value & 0x1F)
         self.n = value >> 31 & 1
         self.z = value >> 30 & 1
@@ -687,7 +687,7 @@ class Core:
     def debugged(self) -> cython.int:
         """An instruction, an interrupt's entry, or a halt.
 
-        A step goes over what an interrupt does meanwhile: it has ended when an instruction of its own is done.
+        A step passes over interrupts that occur meanwhile: it ends when one of its own instructions is done.
         """
         if self.return_pc == self.pc and self.return_mode == self.control & 0x1F:
             self.return_pc = -1
@@ -711,7 +711,7 @@ class Core:
         return 0
 
     def halt(self, error) -> None:
-        """The debugger has it for as long as it likes. `error`: what the program did; it ends the run after that."""
+        """Give control to the debugger. `error`: the program's error, which ends the run after that."""
         self.stepping = 0
         self.return_pc = -1
         self.debugger.halted(error)
@@ -760,7 +760,7 @@ class Core:
         self.rearm()
 
     def go_on(self, step) -> None:
-        """What the debugger wants after a halt: on from here, over a point that may be here, or one instruction."""
+        """Go on after a halt: from here, over a point that may be here, or for one instruction."""
         self.passing = self.pc
         self.stepping = 1 if step else 0
         self.rearm()
@@ -770,9 +770,10 @@ class Core:
 
     @cython.ccall
     def state_into(self, into: cython.longlong[::1]) -> cython.int:
-        """All that the next instruction can depend on beside memory, inputs and time, as STATE numbers; returns STATE.
+        """Write all state that the next instruction can depend on, except memory, inputs and time, as STATE numbers;
+        returns STATE.
 
-        What flash has under way counts from now: the same numbers at another cycle are the same state.
+        Flash accesses under way count from now: the same numbers at another cycle are the same state.
         """
         i: cython.longlong
         place: cython.longlong

@@ -11,7 +11,7 @@ SPECIAL = b"$#}*"
 
 
 class MalformedError(Exception):
-    """The bytes are no frame of this protocol."""
+    """The bytes are not a frame of this protocol."""
 
 
 def framed(payload: bytes) -> bytes:
@@ -42,7 +42,7 @@ def unescaped(data: bytes) -> bytes:
 def take_frame(incoming: bytearray) -> tuple[bytes, bool] | None:
     """The first frame of `incoming`, taken out of it: its payload, and whether the checksum is right.
 
-    None when it has not come whole. The first byte is a `$`; MalformedError for a checksum that is no number.
+    None for an incomplete one. The first byte is a `$`; MalformedError for a checksum that is not a number.
     """
     end = incoming.find(b"#")
     if end < 0 or len(incoming) < end + 3:

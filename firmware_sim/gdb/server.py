@@ -1,7 +1,8 @@
-"""Where a debugger comes in: a TCP port per board, one debugger at a time, under the rule of foundation/peers.py.
+"""The debugger's endpoint: a TCP port per board, one debugger at a time, under the rule of foundation/peers.py.
 
 A debugger that connects halts the board before its next instruction. While it holds a board, the process that runs the
-robot waits here: no virtual time passes for anybody. When it leaves, its points go with it and the run goes on.
+robot waits here, and virtual time stands still for all boards. When the debugger leaves, its points are removed and the
+run goes on.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ranger_sim.foundation.peers import (
 )
 from ranger_sim.foundation.user_error import UserError
 
-# Chosen by us: so long a held process waits before it asks whether it is to end (Ctrl-C at its own terminal).
+# Chosen by us: how long a held process waits before it asks whether it should end (Ctrl-C at its own terminal).
 WAIT_S = 0.2
 
 
@@ -36,23 +37,24 @@ class _Client(Peer):
         super().__init__(SocketStream(connection))
         with suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.latest = b""  # frame, for a debugger that has not understood it
+        self.latest = b""  # the last frame, sent again to a debugger that did not understand it
 
 
 def never() -> bool:
-    """Nobody asks this process to end."""
+    """No request to end this process."""
     return False
 
 
 def unseen(_stands: bool) -> None:
-    """Nobody wants to know that the process waits for a debugger."""
+    """Default `stands`: ignores that the process waits for a debugger."""
 
 
 class GdbServer(Door[_Client]):
-    """A debugger's door to `board`, on `host`:`port` (0: a free one; see `port`).
+    """A debugger's endpoint for `board`, on `host`:`port` (0: a free port; see `port`).
 
-    `ends` is asked while the board is held: True lets it go. `stands` is told when the process begins and ends to wait
-    for a debugger. UserError when the port cannot be had, or would be open to the network without `allow_network`.
+    `ends` is asked while the board is held: True releases it. `stands` is called when the process begins and stops
+    waiting for a debugger. UserError when the port is not available, or would be open to the network without
+    `allow_network`.
     """
 
     def __init__(
@@ -83,15 +85,16 @@ class GdbServer(Door[_Client]):
         self.held = False
         self.seen = 0  # debuggers so far
         self.halts = 0
-        self.looks = 0  # while it ran
+        self.looks = 0  # polls while the board ran
         self.doors: list[GdbServer] = [self]
         self.leads_to(board)
 
-    # ---- for whoever runs the board
+    # ---- for the caller that runs the board
 
     def begin(self) -> None:
-        """From now on debuggers are heard. gdb gives up after 2 s without an answer, and tries again what is refused:
-        so the port is taken when the door is made, and opened when somebody looks at it. UserError: it cannot be."""
+        """Accept debuggers from now on. gdb gives up after 2 s without an answer, and tries again after a refusal: so
+        the constructor takes the port, and this method opens it, when something polls it. UserError: the port cannot be
+        opened."""
         assert self.listener is not None
         try:
             self.listener.listen(self.limits.peers)
@@ -100,7 +103,7 @@ class GdbServer(Door[_Client]):
             raise UserError(f"{what}: {error.strerror}") from None
 
     def leads_to(self, board: Debuggable) -> None:
-        """From now on this is the board: at first, and when a new one takes its place."""
+        """Set the board: at first, and when a new one replaces it."""
         self.board = board
         self.target = Target(board)
         self.stub = Stub(self.target)
@@ -108,11 +111,11 @@ class GdbServer(Door[_Client]):
         board.core.debugger = self
 
     def together(self, doors: list[GdbServer]) -> None:
-        """The doors of one process, this one among them: while one board is held, all are looked at."""
+        """Poll all `doors` of this process, including this one, while one board is held."""
         self.doors = doors
 
     def wait_for_debugger(self) -> None:
-        """Wait until one has come to each of the doors and let its board go, or until `ends` says so."""
+        """Wait until a debugger has connected to each endpoint and released its board, or until `ends` returns True."""
         for door in self.doors:
             door.begin()
         with self._standing():
@@ -121,20 +124,21 @@ class GdbServer(Door[_Client]):
         self._stand()
 
     def close(self) -> None:
-        """The board is left alone from now on."""
+        """Release the board for good."""
         super().close()
         self.board.core.debugger = None
 
     # ---- what the processor calls, between two instructions
 
     def poll(self) -> None:
-        """Somebody may have come, or wants the board halted. Once in a millisecond of the board (Core.LOOK_CYCLES)."""
+        """Check for a debugger that connects or wants to halt the board. Once per millisecond of the board
+        (Core.LOOK_CYCLES)."""
         self.looks += 1
         self._attend(self.looks * MS)
         self._stand()
 
     def halted(self, error: UserError | None) -> None:
-        """A point or a step has been reached, or (`error`) the program did what it may not."""
+        """Halt at a point or after a step, or (`error`) because the program did something illegal."""
         if self.client is None:
             return
         if error is not None:
@@ -143,7 +147,7 @@ class GdbServer(Door[_Client]):
         self._stand()
 
     def _halt(self, signal: int) -> None:
-        """The board is the debugger's from now on."""
+        """Give control of the board to the debugger."""
         self.held = True
         self.halts += 1
         reply = self.stub.stopped(signal, self.board.core.hit)
@@ -151,7 +155,7 @@ class GdbServer(Door[_Client]):
             self._reply(self.client, reply)
 
     def _stand(self) -> None:
-        """Nothing runs until no board of this process is held any more."""
+        """Wait until no board of this process is held."""
         if not any(door.held for door in self.doors):
             return
         with self._standing():
@@ -164,22 +168,22 @@ class GdbServer(Door[_Client]):
 
     @contextmanager
     def _standing(self) -> Iterator[None]:
-        """Inside, the process waits for a debugger."""
+        """Context in which the process waits for a debugger."""
         self.stands(True)
         try:
             yield
         finally:
             self.stands(False)
 
-    # ---- a look at the door
+    # ---- polling the endpoint
 
     def _attend(self, now_ns: int = 0) -> None:
-        """What has come is carried out, as far as there is room, and answers go out; 0: the board stands."""
+        """Carry out received requests, as far as buffers allow, and send answers; 0: the board is halted."""
         self.look(now_ns)
         self.write()
 
     def _wait(self) -> None:
-        """Until a door has something to do, at most WAIT_S; then it is done."""
+        """Wait until an endpoint has work, at most WAIT_S, and do it."""
         to_read, to_write = [], []
         for door in self.doors:
             door.write()
@@ -194,7 +198,7 @@ class GdbServer(Door[_Client]):
         return _Client(connection)
 
     def let_in(self, peer: _Client) -> None:
-        """The first one has the board from now on; it asks by itself why that stands."""
+        """Give the board to the first debugger; it asks by itself why the board has halted."""
         super().let_in(peer)
         if self.client is None:
             self.client = peer
@@ -214,7 +218,7 @@ class GdbServer(Door[_Client]):
             self._let_go()
 
     def _let_go(self) -> None:
-        """No points, no step; the board runs on."""
+        """Remove points and step; the board runs on."""
         self.target.clear_points()
         self.board.core.stepping = 0
         self.board.core.rearm()
@@ -222,14 +226,14 @@ class GdbServer(Door[_Client]):
         self.held = False
 
     def _skip_idle(self) -> None:
-        """A board that skips loops that wait does not while there are points in them."""
+        """Disable the skipping of wait loops while points are set in them."""
         if self.skips_idle:
             self.board.skips_idle = not self.board.core.armed  # type: ignore[attr-defined]
 
     # ---- frames
 
     def _take(self, peer: _Client) -> bool:
-        """One frame, or the interrupt byte."""
+        """Take one frame, or the interrupt byte."""
         incoming = peer.incoming
         del incoming[: len(incoming) - len(incoming.lstrip(b"+"))]
         if not incoming:
@@ -263,7 +267,7 @@ class GdbServer(Door[_Client]):
         return True
 
     def _carry_out(self, peer: _Client, payload: bytes) -> None:
-        """A request. One that comes while the board runs is answered by an error, except leaving."""
+        """Carry out a request. While the board runs, every request except leaving is answered by an error."""
         if not self.held and payload[:1] not in (b"D", b"k"):
             self._reply(peer, b"E10")  # EBUSY
             return
@@ -287,6 +291,7 @@ class GdbServer(Door[_Client]):
         peer.answer(peer.latest)
 
     def _say(self, text: str) -> None:
-        """Lines on the debugger's console; the protocol has that before a stop reply and the answer of `monitor`."""
+        """Print lines on the debugger's console; the protocol allows this before a stop reply and before the answer of
+        `monitor`."""
         if self.client is not None:
             self.client.answer(packets.framed(b"O" + text.encode().hex().encode()))

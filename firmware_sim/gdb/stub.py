@@ -11,7 +11,7 @@ from collections.abc import Callable
 from ranger_sim.firmware_sim.gdb.packets import escaped, unescaped
 from ranger_sim.firmware_sim.gdb.target import CPSR, PC, READ, SIZES, WRITE, Target, TargetError, description
 
-PACKET_SIZE = 0x4000  # bytes of the longest packet either way, told to gdb; chosen by us
+PACKET_SIZE = 0x4000  # bytes of the longest packet either way, reported to gdb; chosen by us
 LONGEST_READ = PACKET_SIZE // 2 - 8
 MOST_POINTS = 1000  # breakpoints and watchpoints together; chosen by us: each watchpoint is asked at every access
 SIGNAL_INTERRUPT, SIGNAL_TRAP, SIGNAL_BAD_ACCESS = 2, 5, 11  # gdb's numbers

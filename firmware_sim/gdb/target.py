@@ -1,4 +1,4 @@
-"""What a debugger sees of a board: registers, memory, points at which to halt.
+"""A debugger's view of a board: registers, memory, points at which to halt.
 
 Names and numbers of registers are those of gdb's feature `org.gnu.gdb.arm.core` (Debugging with GDB, appendix G.5.3).
 A second feature has what the other modes keep, and the cycle counter.
@@ -28,7 +28,7 @@ READ, WRITE = 1, 2  # kinds of Core.watches
 
 
 class TargetError(Exception):
-    """A register or an address that the debugger asked for cannot be had; the text says why."""
+    """A register or an address that the debugger asked for is not available; the text gives the reason."""
 
 
 class Debuggable(Protocol):
@@ -39,7 +39,7 @@ class Debuggable(Protocol):
 
 
 class Region(NamedTuple):
-    """A part of the address space, as gdb's memory map tells of it: ram or flash."""
+    """A part of the address space, as in gdb's memory map: ram or flash."""
 
     kind: str
     start: int
@@ -79,7 +79,7 @@ class Target:
     # ---- registers
 
     def register(self, number: int) -> int:
-        """The value of register `number` of `NAMES`. TargetError: there is none."""
+        """The value of register `number` of `NAMES`. TargetError: unknown number."""
         core = self.core
         if number < PC:
             return core.r[number]
@@ -95,7 +95,7 @@ class Target:
         return words[place]
 
     def set_register(self, number: int, value: int) -> None:
-        """Write it. TargetError: there is none, or it takes no such value."""
+        """Write it. TargetError: unknown number, or a value that the register does not take."""
         core = self.core
         if not 0 <= value <= 0xFFFFFFFF:
             raise TargetError(f"{value:#x} has more than the 32 bits of a register")
@@ -115,7 +115,7 @@ class Target:
             words[place] = value
 
     def _bank(self, name: str) -> tuple[Any, int]:
-        """Where a register stands that a mode has for itself: among the present ones when that mode runs."""
+        """Where a mode's own register is kept: among the present ones when that mode runs."""
         core = self.core
         what, _, mode = name.partition("_")
         bank = MODES.index(mode)
@@ -168,9 +168,9 @@ class Target:
         return None
 
     def read(self, address: int, length: int) -> bytes:
-        """Bytes of memory, or of device registers as far as they can be looked at without doing anything.
+        """Bytes of memory, or of device registers as far as they can be read without side effects.
 
-        TargetError: nothing is there, or reading would change the device (`monitor read` does that).
+        TargetError: an unmapped address, or reading would change the device (`monitor read` does that).
         """
         found = self._memory(address, length)
         if found is not None:
@@ -232,7 +232,7 @@ class Target:
         self._set()
 
     def clear_point(self, kind: str, address: int, length: int) -> None:
-        """Take it away; nothing happens when there is none."""
+        """Remove it; nothing happens when it is not set."""
         if kind in self.points:
             self.points[kind].discard(address)
         else:
@@ -248,7 +248,7 @@ class Target:
         self._set()
 
     def count(self) -> int:
-        """How many there are."""
+        """The number of points."""
         return sum(map(len, self.points.values())) + sum(map(len, self.watches.values()))
 
     def _set(self) -> None:
@@ -258,7 +258,7 @@ class Target:
         self.core.set_points(self.points["0"] | self.points["1"], watches)
 
     def told_time(self) -> str:
-        """Where the board is in time, in a line."""
+        """The board's time, in a line."""
         core = self.core
         time_of = getattr(self.board, "time_of", None)
         at = f"{time_of(core.cycles) * 1e-9:.9f} s, " if time_of is not None else ""

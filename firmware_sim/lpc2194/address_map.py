@@ -2,7 +2,7 @@
 # (the place of a block is worked out from the address's bits, below the size of the table)
 """Where the processor's loads and stores go that are neither flash nor RAM: the blocks, by address.
 
-An access acts at the instant at which its instruction begins: what happens in the chip from then on comes after it.
+An access acts at the time at which its instruction begins: later events in the chip come after it.
 """
 
 from typing import TYPE_CHECKING, Final
@@ -23,7 +23,7 @@ NAME_OF_ACCESS = {1: "byte", 2: "half-word", 4: "word"}
 
 
 class NotModelledAccess(UserError):  # noqa: N818  (it is what the program did)
-    """The program reached for what is not modelled; `address` and `pc` say where, as numbers."""
+    """The program accessed something that is not modelled; `address` and `pc` give the place, as numbers."""
 
     def __init__(self, text, address, pc) -> None:
         UserError.__init__(self, text)
@@ -107,7 +107,8 @@ class AddressMap(Device):
     @cython.ccall
     @cython.locals(offset=cython.longlong, value=cython.longlong)
     def peek(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
-        """What a load would give, for a debugger: it does nothing. LookupError where it would, or where nothing is."""
+        """The value of a load, for a debugger, without side effects. LookupError for a load with side effects, or an
+        unmapped address."""
         block: Block = self.find(address)
         if block is None:
             raise LookupError(f"no device is modelled at {address:#010x}")

@@ -1,18 +1,18 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is a register's number, a place in RAM, or a pin 0 ... 63 that whoever wires the board has checked)
+# (every index below is a register's number, a place in RAM, or a pin 0 ... 63 that the board's wiring has checked)
 """A board whose processor runs a firmware image, instruction by instruction, on the models of the chip's devices.
 
-How time passes: an instruction acts, on memory and devices, at the instant at which it begins; it begins when the one
-before it has taken its cycles. What comes in, an edge, a message, an alarm of a device, is taken in at its stamp:
-before every instruction that begins then or later. Interrupt lines are levels, looked at before each instruction. So a
-run does not depend on the steps in which `advance` is called.
+How time passes: an instruction acts, on memory and devices, at the time at which it begins; it begins when the one
+before it has taken its cycles. An input (an edge, a message, an alarm of a device) is handled at its stamp: before
+every instruction that begins then or later. Interrupt lines are levels, checked before each instruction. So a run does
+not depend on the steps in which `advance` is called.
 
-A loop that waits is skipped: when memory, registers and the flash accelerator are after a number of instructions what
-they were before them, and no device was asked or told anything that could matter, then nothing changes until the next
-event but the cycles. `skips_idle = False` executes every pass; results are the same.
+A waiting loop is skipped: when memory, registers and the flash accelerator have the same state after a number of
+instructions as before them, and no access to a device had an effect, then nothing but the cycles changes until the next
+event. `skips_idle = False` executes every pass; results are the same.
 
-A slot begins with the match of one timer; its work lasts until the main program's last access to a device, as those
-that look at a status are none, and those of interrupts are not the main program's.
+A slot begins with the match of one timer; its work lasts until the main program's last access to a device, not counting
+status reads and the accesses of interrupts.
 """
 
 import array
@@ -46,11 +46,11 @@ from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.ssp import SspDevice
 from ranger_sim.foundation.events import CAN_RX, NEVER, PIN_EDGE, EventQueue
 
-# Chosen by us: how many cycles pass before it is asked whether the program waits, and how long a loop that waits
-# may be. A slot of the robot's boards takes some 10,000 cycles, their main loops below 200 instructions.
+# Chosen by us: the number of cycles between two checks whether the program waits, and the longest loop that counts as
+# waiting. A slot of the robot's boards takes some 10,000 cycles, their main loops below 200 instructions.
 STINT: Final = 256
 LONGEST_PASS: Final = 600
-DOUBTS: Final = 8  # of so many stints elsewhere one is asked
+DOUBTS: Final = 8  # outside known wait loops, one stint in this many is checked
 SLOT_SHARES: Final = 20
 PART_WORDS: Final = 64  # of Core.written
 
@@ -130,7 +130,7 @@ class ImageBoard(Microcontroller):
         self.most_cycles = 0
         self.all_cycles = 0
         self.slots_by_cycles = [0] * 21
-        self.base_cycles = 0  # cycles and instant from which time is counted: the clock's latest change
+        self.base_cycles = 0  # cycles and time from which time is counted: the clock's latest change
         self.base_ns = phase_ns
         self.running_to = 0
         self.asleep = False
@@ -148,7 +148,7 @@ class ImageBoard(Microcontroller):
         self.next_time = phase_ns
 
     def _build(self, hardware) -> None:
-        """The chip's blocks and what hangs on them."""
+        """Build the chip's blocks and the devices connected to them."""
         clocks = self.clocks
         self.map = AddressMap(self)
         self.vic_block = VicBlock(self, clocks)
@@ -204,7 +204,7 @@ class ImageBoard(Microcontroller):
 
     @cython.ccall
     def time_of(self, cycles: cython.longlong) -> cython.longlong:
-        """The instant (ns, rounded down) at which the processor has passed so many cycles."""
+        """The time (ns, rounded down) at which the processor has passed `cycles`."""
         return self.base_ns + self.crystal.cycles_to_ns(cycles - self.base_cycles, self.clocks.cclk)
 
     @cython.cfunc
@@ -220,7 +220,7 @@ class ImageBoard(Microcontroller):
 
     @cython.ccall
     def set_clocks(self, cclk, divider) -> object:
-        """The program sets PLL or VPBDIV: the instruction that does it is the last one at the old rate."""
+        """Set PLL or VPBDIV by the program: the instruction that does it is the last one at the old rate."""
         if (cclk, divider) == (self.clocks.cclk, self.clocks.divider):
             return
         self.base_ns = self.time_of(self.core.began)
@@ -250,12 +250,12 @@ class ImageBoard(Microcontroller):
     @cython.cfunc
     @cython.exceptval(check=True)
     def reach(self) -> cython.void:
-        """The present instruction reaches for a device: devices see the instant at which it began."""
+        """Begin the present instruction's access to a device: devices see the time at which the instruction began."""
         self.now = self.time_of(self.core.began)
 
     @cython.cfunc
     def work(self) -> cython.void:
-        """The present access does something: when the main program makes it, it works."""
+        """Note that the present access has an effect: if the main program makes it, the program is at work."""
         mode: cython.longlong = self.core.control & 0x1F
         if mode != FAST and mode != INTERRUPT:
             self.worked_until = self.now
@@ -296,9 +296,9 @@ class ImageBoard(Microcontroller):
     # --- passing time -------------------------------------------------------------------------------------
 
     def advance(self, until: cython.longlong) -> cython.longlong:
-        """Run everything with an instant before `until` (ns), or before `horizon` where an output brought that nearer.
+        """Run everything due before `until` (ns), or before `horizon` where an output brought that nearer.
 
-        Returns `next_time`. NotModelledAccess, a UserError, for what the program wants and no device here does.
+        Returns `next_time`. NotModelledAccess, a UserError, for an access that no device here models.
         """
         core: Core = self.core
         inbox: EventQueue = self.inbox
@@ -314,7 +314,7 @@ class ImageBoard(Microcontroller):
                 first = self.edge_time
             own = NEVER
             stop = first if first < self.horizon else self.horizon
-            if self.idle and core.debugger is not None:  # who waits for ever is to be found by a debugger, too
+            if self.idle and core.debugger is not None:  # a debugger must also find a program that waits for ever
                 own = self.time_of(core.next_look)
                 if own < stop:
                     self._catch_up(own)
@@ -333,7 +333,7 @@ class ImageBoard(Microcontroller):
 
     @cython.cfunc
     def _run(self, stop: cython.longlong) -> cython.int:
-        """The processor runs until the instant `stop` (ns), or less far where an access asks for it."""
+        """Run the processor until time `stop` (ns), or less far where an access asks for it."""
         core: Core = self.core
         target: cython.longlong
         touched: cython.longlong
@@ -368,7 +368,8 @@ class ImageBoard(Microcontroller):
 
     @cython.cfunc
     def _waits(self, target: cython.longlong) -> cython.bint:
-        """Execute until everything is as it was, or `target` cycles, or some hundred instructions. True: it waits."""
+        """Execute until the state repeats, or `target` cycles, or some hundred instructions. True: the program
+        waits."""
         core: Core = self.core
         pc: cython.longlong = core.pc
         cycles: cython.longlong = core.cycles
@@ -388,7 +389,7 @@ class ImageBoard(Microcontroller):
                 self.pass_cycles = core.cycles - cycles
                 self.pass_instructions = core.instructions - instructions
                 self.pass_looks = self.map.looks != looks
-                # not beyond `target`: what comes then is seen by the pass that is under way
+                # not beyond `target`: the pass under way sees what arrives then
                 if not self.waits[self._flash_place(pc)] and core.cycles + self.pass_cycles <= target:
                     self._learn(self.pass_instructions)
                 return True
@@ -445,7 +446,7 @@ class ImageBoard(Microcontroller):
 
     @cython.cfunc
     def _catch_up(self, time: cython.longlong) -> cython.int:
-        """A processor that waits: pass the loop as often as it fits until `time` (ns), and its begin once more."""
+        """Repeat the loop of a waiting processor as often as it fits until `time` (ns), and begin it once more."""
         core: Core = self.core
         target: cython.longlong
         passes: cython.longlong
@@ -480,7 +481,7 @@ class ImageBoard(Microcontroller):
 
     @cython.cfunc
     def _take_in(self, time: cython.longlong) -> cython.int:
-        """The first of what comes at `time` (ns): edges before messages before alarms."""
+        """Handle the first input at `time` (ns): edges before messages before alarms."""
         vic: VicBlock = self.vic_block
         inbox: EventQueue = self.inbox
         line: EdgeLine
@@ -533,14 +534,14 @@ class ImageBoard(Microcontroller):
             self.others.on_message(queue)
         return 0
 
-    # --- what whoever passes time asks ---------------------------------------------------------------------
+    # --- what the caller that passes time asks ---------------------------------------------------------------
 
     def speaks_from(self) -> cython.longlong:
-        """Before this instant (ns) the board puts nothing on a bus, unless something comes in."""
+        """Earliest time (ns) at which the board can send on a bus, unless input arrives."""
         return self.next_time
 
     def quiet_until(self) -> cython.longlong:
-        """Whatever comes in may be answered at once by a handler."""
+        """Earliest time (ns) of any output: a handler may answer every input at once."""
         return 0
 
     def stop_at(self, time: cython.longlong) -> cython.longlong:
@@ -551,14 +552,14 @@ class ImageBoard(Microcontroller):
                 self.stop_time = time
         return self.horizon
 
-    # --- looking in ---------------------------------------------------------------------------------------
+    # --- inspection ---------------------------------------------------------------------------------------
 
     def catch_up(self) -> None:
-        """Bring the processor to the instant up to which the board has run: a loop that waits is only noted."""
+        """Bring the processor to the time up to which the board has run: a waiting loop is only noted."""
         self._catch_up(self.horizon)
 
     def counters(self) -> object:
-        """What the board counted, by name. Its program's own queues and slots are not known."""
+        """The board's counters, by name. Its program's own queues and slots are not known."""
         return ImageCounters(
             hz=self.hz,
             unclaimed=self.unclaimed,
@@ -573,7 +574,7 @@ class ImageBoard(Microcontroller):
 
     @cython.ccall
     def slot_counters(self) -> SlotCounters:
-        """Its slots: whether one was left unfinished, or tasks were dropped, only its program knows."""
+        """Its slots: only its program knows whether one was left unfinished, or tasks were dropped."""
         return SlotCounters(
             count=self.slots_begun,
             latest_ns=self.latest_slot(),

@@ -9,7 +9,7 @@ from ranger_sim.firmware_sim.native.hardware import Hardware
 class BoardHardware(Hardware):
     """As for firmware in C, and what such a program is not asked about.
 
-    pulled_up: pins that read 1 while nobody drives them. slot_timer: 0 or 1, the timer whose match begins a slot.
+    pulled_up: pins that read 1 while undriven. slot_timer: 0 or 1, the timer whose match begins a slot.
     segment_interval_ns: not 0 where the SSP is the master of a link of segments (then there is no external converter):
     the least time from one exchange to the next. `hz` is what the PLL makes of the crystal; the program sets it itself.
     """

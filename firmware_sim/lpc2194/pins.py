@@ -43,7 +43,7 @@ EXTERNAL_INTERRUPTS = {
 @cython.final
 @cython.cclass
 class PinSelectBlock(Block):
-    """PINSEL0 ... PINSEL2, and the edges of pins. `external`: who hears those of external interrupts."""
+    """PINSEL0 ... PINSEL2, and the edges of pins. `external`: the receiver of external interrupts' edges."""
 
     words: cython.longlong[3]
     timer0: ProgrammedTimer

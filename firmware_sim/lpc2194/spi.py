@@ -1,7 +1,7 @@
 """SPI 0's registers, with an absolute encoder at it, and SPI 1's, with nothing. LPC2194 user manual, SPI.
 
-The encoder is peripherals/spi_encoder.py: what the program sends reaches nobody. Not modelled: slave mode, mode fault,
-a transfer of SPI 1, whose pins the SSP has.
+The encoder is peripherals/spi_encoder.py: no device receives what the program sends. Not modelled: slave mode, mode
+fault, a transfer of SPI 1, whose pins the SSP has.
 """
 
 from typing import Final

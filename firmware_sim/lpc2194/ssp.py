@@ -1,9 +1,9 @@
 # cython: boundscheck=False, wraparound=False
 # (places in the FIFOs are 0 ... 7)
-"""The SSP's registers as a master: two FIFOs of eight words, a word after the other, and what hangs on its wires.
+"""The SSP's registers as a master: two FIFOs of eight words, sent one after another, and the device on its wires.
 
 LPC2194 user manual (LPC2194/01), SSP. Not modelled: slave mode. Words follow each other without a gap while the
-transmit FIFO has some. What hangs there is an `SspDevice`: the external converter, or the end of a link of segments.
+transmit FIFO has some. The device is an `SspDevice`: the external converter, or the end of a link of segments.
 """
 
 from typing import TYPE_CHECKING, Final
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 DEPTH: Final = 8
 WORD_ALARM: Final = 0
 SILENCE_ALARM: Final = 1
-SILENT_BITS: Final = 32  # after so many bit times without a read what was received asks for the time-out interrupt
+SILENT_BITS: Final = 32  # bit times without a read, after which received words raise the time-out interrupt
 
 # SSPSR
 SR_TFE: Final = 1
@@ -81,8 +81,8 @@ class SerialConverter(SspDevice):
 class SegmentLink(SspDevice):
     """The master's end of a link of segments (peripherals/ssp.py), word by word.
 
-    Both ends of the link take a segment as a whole, the other one at the end of an exchange. So a segment of ours
-    starts when its last word is out, not sooner after the one before than `interval_ns`, and what comes in goes to the
+    Both ends of the link take a segment as a whole, the other end at the end of an exchange. So a segment of ours
+    starts when its last word is out, at least `interval_ns` after the one before, and a received segment reaches the
     program with the words of the next segment.
     ROBOT PARITY: each way takes one segment, 200 us on Ranger, longer than on the robot.
     """
@@ -100,16 +100,16 @@ class SegmentLink(SspDevice):
         SspDevice.__init__(self, chip)
         self.interval_ns = interval_ns
         self.earliest = 0  # start of the next exchange
-        self.going = None  # a segment that waits for that
+        self.going = None  # a segment that waits for that time
         self.alarm = chip.new_alarm(self, 0)
         self.sent = 0  # words of the present segment
         self.words = [0] * 31
-        self.coming = [0] * 30 + [1]  # nothing, and its checksum
-        self.came = None  # half-words of the segment that came in last, until it is on its way to the program
+        self.coming = [0] * 30 + [1]  # an empty segment: zeros, and its checksum
+        self.came = None  # half-words of the last received segment, until the program starts to read them
         chip.claim(SSP_SEGMENT, 0, self)
 
     def on_message(self, queue) -> InterruptSource | None:
-        """The other end's segment is in. It is copied at once: the other end may fill it anew."""
+        """Receive the other end's segment. It is copied at once, because the other end may fill it anew."""
         self.came = queue.ref.words
         return None
 
@@ -136,13 +136,13 @@ class SegmentLink(SspDevice):
         return came
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """The segment that waits may start."""
+        """Start the segment that waits."""
         self._start(time)
         return None
 
     @cython.ccall
     def _start(self, time) -> object:
-        """The exchange begins."""
+        """Begin the exchange."""
         self.earliest = time + self.interval_ns
         self.chip.outbox.push(time, 0, SSP_START, 0, 0, 0, 0, 0, 0, self.going)
 
@@ -158,7 +158,7 @@ def used_of(words) -> int:
 @cython.final
 @cython.cclass
 class SspBlock(Block):
-    """Words that wait to go out and those that came in, the oldest first."""
+    """The words waiting to be sent and the received words, the oldest first."""
 
     device: SspDevice
     CR0: cython.longlong
@@ -207,7 +207,7 @@ class SspBlock(Block):
         self.word = 0
         self.word_ns = 0
         self.bit_ns = 0
-        self.words = 0  # that have gone out
+        self.words = 0  # words sent so far
         self.word_alarm = chip.new_alarm(self, WORD_ALARM)
         self.silence_alarm = chip.new_alarm(self, SILENCE_ALARM)
 
@@ -230,7 +230,7 @@ class SspBlock(Block):
 
     @cython.ccall
     def _set_rate(self) -> object:
-        """How long a word takes, by the divisors."""
+        """Set the duration of a word from the divisors."""
         if self.CPSR:
             clocks = self.CPSR * ((self.CR0 >> 8 & 0xFF) + 1)
             bits = (self.CR0 & 15) + 1
@@ -239,7 +239,7 @@ class SspBlock(Block):
 
     @cython.cfunc
     def _start(self, time: cython.longlong) -> cython.int:
-        """The oldest word goes out from `time` on."""
+        """Send the oldest word from `time` on."""
         i: cython.longlong
         self.word = self.going[0]
         self.going_count -= 1
@@ -252,7 +252,7 @@ class SspBlock(Block):
         return 0
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """A word is through, or nobody read what came."""
+        """End a word, or signal that received words were not read in time."""
         came: cython.longlong
         if alarm == SILENCE_ALARM:
             if self.came_count > 0:

@@ -4,8 +4,8 @@
 
 LPC2194 user manual, Timer 0 and 1. The count goes up with every PR + 1 clocks of the peripherals; a match acts one
 count later, when a reset would show. Not modelled: counting of edges at a pin (TxCTCR), match outputs at pins (TxEMR).
-A count that the program reads is that of the instant at which its instruction begins, rounded down to whole ns: it may
-be one less than the clock's edge would give.
+The program reads the count at the time at which its instruction begins, rounded down to whole ns: it may be one less
+than the clock's edge would give.
 """
 
 from typing import Final
@@ -36,8 +36,8 @@ CLOCK_OF_BEGIN = 60_000_000  # with a period of one millisecond: the device is b
 class ProgrammedTimer(TimerCapture):
     """A timer whose period is the program's: TCR, PR, TC, MCR and MR0 ... MR3 at run time.
 
-    While it runs, `wrap_time` is the instant of the count 0 and `next_wrap_time` that at which the count begins anew.
-    `planned`: the instant of the next match that interrupts or stops, or of the wrap before it.
+    While it runs, `wrap_time` is the time of the count 0 and `next_wrap_time` that at which the count begins anew.
+    `planned`: the time of the next match that interrupts or stops, or of the wrap before it.
     """
 
     clocks: "Clocks"
@@ -58,7 +58,7 @@ class ProgrammedTimer(TimerCapture):
         self.PR = 0
         self.MCR = 0
         self.match = [0] * 4
-        self.held = 0  # the count while it stands
+        self.held = 0  # the count while it is stopped
         self.passed = 0  # matches of smaller counts have acted in this period
         self.planned = NEVER
         self.matches = 0  # that asked for an interrupt
@@ -69,7 +69,7 @@ class ProgrammedTimer(TimerCapture):
 
     @cython.ccall
     def stand(self, count) -> object:
-        """The count stands at `count` from now on."""
+        """Hold the count at `count` from now on."""
         self.held = count
         self.counts_per_ns = 0.0
         self.wrap_time = 0
@@ -81,7 +81,7 @@ class ProgrammedTimer(TimerCapture):
     @cython.ccall
     @cython.exceptval(check=False)
     def running(self) -> cython.bint:
-        """It counts."""
+        """True while it counts."""
         return self.TCR & (TCR_ENABLE | TCR_RESET) == TCR_ENABLE
 
     @cython.ccall
@@ -98,7 +98,7 @@ class ProgrammedTimer(TimerCapture):
         return int(clocks) % (self.PR + 1)
 
     def go_on_from(self, count) -> None:
-        """It counts from `count` on, which it has now: with the registers as they are."""
+        """Count from `count` on, the present count, with the registers as they are."""
         now = self.chip.now
         if not self.running():
             self.stand(0 if self.TCR & TCR_RESET else count)
@@ -132,7 +132,7 @@ class ProgrammedTimer(TimerCapture):
         self.go_on_from(self.count())
 
     def retune(self, now, before) -> None:
-        """The count goes on where it is."""
+        """Continue from the present count."""
         if self.running():
             count = self.count_at(now)
             self.chip.now = now
@@ -142,7 +142,7 @@ class ProgrammedTimer(TimerCapture):
 
     @cython.cfunc
     def _plan(self) -> cython.longlong:
-        """Find the next match that acts; returns its instant."""
+        """Find the next match that acts; returns its time."""
         n: cython.longlong
         acts: cython.longlong = 0
         next_count: cython.longlong = self.MR0
@@ -161,7 +161,7 @@ class ProgrammedTimer(TimerCapture):
         return self.planned
 
     def _wrap_to(self, time: cython.longlong) -> cython.longlong:
-        """Let every match and wrap up to `time` act; returns the instant of the latest wrap."""
+        """Let every match and wrap up to `time` act; returns the time of the latest wrap."""
         if self.planned < NEVER:
             while self.planned <= time:
                 self._act()
@@ -249,7 +249,7 @@ class ProgrammedTimer(TimerCapture):
 
     @cython.ccall
     def _stop_at(self, count) -> object:
-        """A match stops the timer: TCR's enable bit falls, the count stands."""
+        """A match stops the timer: TCR's enable bit falls, the count stops."""
         self.TCR &= ~TCR_ENABLE
         self.stand(max(count, 0))
 

@@ -24,7 +24,7 @@ TRIGGERS = (1, 4, 8, 14)  # by UnFCR bits 6-7
 @cython.final
 @cython.cclass
 class UartBlock(Block):
-    """`holds`: the transmit FIFO became empty, which asks for an interrupt until it is told."""
+    """`holds`: the transmit FIFO became empty, which asks for an interrupt until UnIIR reports it."""
 
     uart: Uart
     IER: cython.longlong
@@ -76,7 +76,7 @@ class UartBlock(Block):
 
     @cython.cfunc
     def look(self) -> cython.void:
-        """What the UART's alarms have told."""
+        """Take over what the UART's alarms have set."""
         if self.uart.IIR == IIR_TRANSMIT:
             self.uart.IIR = IIR_NONE
             self.holds = True

@@ -19,22 +19,22 @@ HERE = pathlib.Path(__file__).resolve().parent
 INCLUDE = HERE / "include"
 RUNTIME = HERE / "runtime" / "runtime.c"
 COMPILERS = ("cc", "gcc", "clang")
-LONGEST_S = 600.0  # a compiler that takes longer than this stands still
+LONGEST_S = 600.0  # a compiler that takes longer than this hangs
 WORD_BITS = sys.maxsize.bit_length() + 1  # of pointers, and of long in the data models of Unix
 
-# -std=c99: what the chip's compiler is asked for as well. No fused multiply-add and no fast mathematics, so that floats
-# come out as on the chip and in the emulated boards. Fields left out of a structure are 0, as firmware.h says.
+# -std=c99: as for the chip's compiler. No fused multiply-add and no fast mathematics, so that floats have the same
+# results as on the chip and in the emulated boards. Fields left out of a structure are 0, as firmware.h says.
 OPTIONS = (
     "-std=c99", "-O2", "-g", "-fPIC", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fno-fast-math",
     "-Wall", "-Wextra", "-Wno-missing-field-initializers",
     "-Werror=implicit-function-declaration", "-Werror=incompatible-pointer-types", "-Werror=int-conversion",
     f"-DFW_LONG_BITS={WORD_BITS}", f"-DFW_POINTER_BITS={WORD_BITS}",
 )  # fmt: skip
-# Its own functions come first, whatever else is loaded; what is missing is told now and not at loading.
+# The library's own functions come first, whatever else is loaded; missing ones are reported at linking, not at loading.
 LINKING = ("-shared", "-Wl,-Bsymbolic", "-Wl,--no-undefined")
-# A call of these ends the process as a failure that says where it was made (runtime.c).
+# A call of these ends the process as a failure that reports the place of the call (runtime.c).
 ENDING = ("exit", "_exit", "_Exit", "quick_exit")
-# -O1 and functions as they were written keep lines and variables true; findings are told, and the program goes on.
+# -O1 and functions kept as written keep lines and variables true; findings are reported, and the program goes on.
 SANITIZING = (
     "-O1",
     "-fno-inline",
@@ -52,7 +52,7 @@ UNDEFINED = re.compile(r"(?P<place>[^\s:]+\.c:\d+): undefined reference to `(?P<
 
 @dataclasses.dataclass(frozen=True)
 class Built:
-    """A library that is up to date. `warnings` of the compiler, a line each; none when nothing had to be done."""
+    """An up-to-date library. `warnings` of the compiler, a line each; none when nothing had to be compiled."""
 
     path: pathlib.Path
     warnings: tuple[str, ...] = ()
@@ -61,14 +61,14 @@ class Built:
 
 @dataclasses.dataclass(frozen=True)
 class Addition:
-    """What the caller compiles along: folders of headers, sources."""
+    """What the caller adds to the compilation: folders of headers, sources."""
 
     include: tuple[pathlib.Path, ...] = ()
     sources: tuple[pathlib.Path, ...] = ()
 
 
 def compiler() -> str:
-    """The C compiler: $CC, or the first of those usual; UserError when there is none."""
+    """The C compiler: $CC, or the first of the usual ones; UserError when none is found."""
     asked = os.environ.get("CC")
     for name in (asked.split()[-1],) if asked and asked.split() else COMPILERS:
         found = shutil.which(name)
@@ -81,9 +81,9 @@ def compiler() -> str:
 def build(
     manifest: Manifest, sanitize: bool = False, coverage: bool = False, addition: Addition | None = None
 ) -> Built:
-    """Compile unless it is up to date; UserError with a line for each error of the compiler.
+    """Compile unless up to date; UserError with a line for each error of the compiler.
 
-    sanitize: told at run time what is out of bounds or undefined. coverage: lines that ran are counted.
+    sanitize: report out-of-bounds accesses and undefined behaviour at run time. coverage: count the lines that ran.
     """
     addition = addition if addition is not None else Addition()
     program = compiler()
@@ -122,7 +122,7 @@ def build(
 
 
 def _keep_notes(making: pathlib.Path, place: pathlib.Path) -> None:
-    """The compiler's notes on what it counts, for who reads the counts (coverage.py)."""
+    """Keep the compiler's notes on its counts, for the reader of the counts (coverage.py)."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir()
     for note in making.glob("*.gcno"):
@@ -137,7 +137,7 @@ def _compile(
     making: pathlib.Path,
     manifest: Manifest,
 ) -> tuple[str, ...]:
-    """Compile and link in the folder `making`; returns the warnings. The runtime is not watched itself."""
+    """Compile and link in the folder `making`; returns the warnings. The runtime itself is not instrumented."""
     said: list[str] = []
     objects = [str(making / "runtime.o")]
     counting = ["-DFW_COVERAGE"] if "--coverage" in watching else []
@@ -164,7 +164,7 @@ def _compile(
 
 
 def run_compiler(command: list[str]) -> tuple[int, list[str]]:
-    """Exit code and lines of a compiler, told in English."""
+    """Exit code and output lines of a compiler, in English."""
     setting = {**os.environ, "LC_ALL": "C"}
     try:
         done = subprocess.run(command, capture_output=True, check=False, timeout=LONGEST_S, env=setting)
@@ -174,13 +174,13 @@ def run_compiler(command: list[str]) -> tuple[int, list[str]]:
 
 
 def message_of(line: str) -> str | None:
-    """A compiler's line as we tell it; None for those that only explain."""
+    """A compiler's line in our format; None for lines that only explain."""
     found = MESSAGE.match(line)
     return f"{found['file']}:{found['line']}: {found['kind']}: {found['text']}" if found else None
 
 
 def errors_in(manifest: Manifest, said: list[str]) -> list[str]:
-    """What went wrong: compiler's errors, or what the linker misses, or, where neither reads so, all it said."""
+    """The errors: the compiler's, or the linker's missing names, or, where neither format matches, the whole output."""
     errors = [line for line in map(message_of, said) if line and "error: " in line]
     for line in said:
         found = UNDEFINED.search(line)

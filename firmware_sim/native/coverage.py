@@ -1,7 +1,7 @@
 """Which lines and branches of a program in C ran: gcov's counts, read by the gcov of the compiler.
 
-A board writes its counts into a folder of its own (`NativeBoard.write_counts`); the compiler's notes stand beside the
-library. Only the firmware's own files are told of, not the table's.
+A board writes its counts into a separate folder (`NativeBoard.write_counts`); the compiler's notes are next to the
+library. The report covers only the firmware's own files, not the table's.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ LONGEST_S = 120.0  # some seconds for large programs
 
 @dataclasses.dataclass
 class FileCounts:
-    """How often each line of `path` ran that has code; branches: of each line, how often each was taken."""
+    """How often each line of `path` with code ran; branches: for each line, how often each was taken."""
 
     path: pathlib.Path
     lines: dict[int, int] = dataclasses.field(default_factory=dict)
@@ -73,9 +73,9 @@ def notes_of(library: pathlib.Path) -> pathlib.Path:
 
 
 def read(library: pathlib.Path, folder: pathlib.Path, counts: pathlib.Path) -> list[FileCounts]:
-    """Of each file of the firmware in `folder`, from all counts below the folder `counts`; by name.
+    """The counts of each file of the firmware in `folder`, from all counts below the folder `counts`; by name.
 
-    A file whose counts were not written has none: all its lines are told as not run.
+    A file without written counts has none: all its lines are reported as not run.
     """
     files: dict[pathlib.Path, FileCounts] = {}
     with tempfile.TemporaryDirectory(prefix="ranger-sim-gcov-") as work:
@@ -95,7 +95,7 @@ def read(library: pathlib.Path, folder: pathlib.Path, counts: pathlib.Path) -> l
 
 
 def _told(place: pathlib.Path, stem: str) -> list[FileCounts]:
-    """What gcov says of one object's notes and counts in the folder `place`."""
+    """gcov's output for one object's notes and counts in the folder `place`."""
     command = [gcov(), "--json-format", "--stdout", "--branch-probabilities", f"{stem}.gcno"]
     done = subprocess.run(command, cwd=place, capture_output=True, check=False, timeout=LONGEST_S)
     found = []

@@ -1,4 +1,4 @@
-"""Where a program in C was when it ended its process: the runtime leaves a record, this says it in words.
+"""Where a program in C ended its process: the runtime leaves a record, this module describes it.
 
 The record is `RECORD` numbers: the signal, plus `OVERFLOW` when the stack was left, or `EXITED` plus the code where the
 program called exit; then places in the library's code from its beginning, the innermost function first, 0 for none. The
@@ -21,23 +21,24 @@ OVERFLOW = 256  # OVERFLOW_FLAG of runtime.c
 EXITED = 512  # EXIT_FLAG of runtime.c
 LARGEST_PLACE = 1 << 48  # bytes; a library is smaller by far
 UNREADABLE = "the record of its end is not readable: its program wrote over it"
-ASKED = signal.SIGXCPU  # sent to a program that lets no time pass, to be told where it is
+ASKED = signal.SIGXCPU  # sent to a program that lets no time pass, to get its place
 LONGEST_S = 20.0  # binutils read some megabytes of debug information at most
-UNKNOWN = "??"  # what addr2line says for what it does not know
+UNKNOWN = "??"  # addr2line's output for an unknown place
 
 ENTRY_WORDS = 256  # of a notebook: a record, and what it is about as JSON, its length in bytes before it
 ENTRIES = 16
 
 
 class Notebook:
-    """Memory for records of a process that runs programs in C itself, for who forked it: `told` says what ended it."""
+    """Memory for records of a process that runs programs in C, for the process that forked it: `told` gives the cause
+    of its end."""
 
     def __init__(self) -> None:
         self.words = memoryview(mmap.mmap(-1, 8 * ENTRIES * ENTRY_WORDS)).cast("q")
         self.used = 0
 
     def new_record(self, board: str, library: pathlib.Path, sources: pathlib.Path) -> Any:
-        """In that process: memory for the record of a board, whose program stands in `library`."""
+        """In that process: memory for the record of a board, whose program is in `library`."""
         entry = self.words[self.used % ENTRIES * ENTRY_WORDS :][:ENTRY_WORDS]
         self.used += 1
         about = json.dumps([board, str(library), str(sources)]).encode()[: 8 * (ENTRY_WORDS - RECORD - 1)]
@@ -60,7 +61,8 @@ class Notebook:
         return ""
 
 
-# Who has forked this process and will tell of its end; None: nobody, and the program's last word goes to the terminal.
+# The process that forked this one and reports its end; None: no such process, and the program's last word goes to the
+# terminal.
 notebook: Notebook | None = None
 
 
@@ -75,7 +77,7 @@ def record_of(board: str, library: pathlib.Path, sources: pathlib.Path) -> tuple
 def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) -> str:
     """`SIGSEGV (Segmentation fault) in control() at hip.c:42, called from slot() at hip.c:17`; "" for no record.
 
-    library: the file with its debug information; sources: folder that files are told relative to.
+    library: the file with its debug information; sources: the folder to which file names are relative.
     """
     if record[0] == 0:
         return ""
@@ -96,7 +98,7 @@ def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) ->
     if not places:
         return f"{what}, outside of the program's code"
     lines = lines_of(library, sources, places)
-    once = [line for i, line in enumerate(lines) if line not in lines[:i]]  # a recursion is told once
+    once = [line for i, line in enumerate(lines) if line not in lines[:i]]  # a recursion is reported once
     return f"{what} in {', called from '.join(once)}"
 
 

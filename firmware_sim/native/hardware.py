@@ -9,7 +9,7 @@ from ranger_sim.firmware_sim.peripherals import adc_external
 
 @dataclasses.dataclass(frozen=True)
 class ExternalConverter:
-    """An ADS7871 on the SSP. `inputs`: the analog place behind each multiplexer code; one not told is that number."""
+    """An ADS7871 on the SSP. `inputs`: the analog place behind each multiplexer code; by default the code itself."""
 
     eint: int = 1
     conversion_ns: int = adc_external.CONVERSION_NS
@@ -21,7 +21,7 @@ class ExternalConverter:
 
 @dataclasses.dataclass(frozen=True)
 class InternalConverter:
-    """The chip's own. `inputs`: the analog place behind each channel; one not told is that number."""
+    """The chip's own. `inputs`: the analog place behind each channel; by default the channel's number."""
 
     reference_V: float = 3.3
     scale: float = 1.0
@@ -41,7 +41,7 @@ class SpiDevice:
 
 @dataclasses.dataclass(frozen=True)
 class Hardware:
-    """Core clock (Hz), converters (None: there is none), and what hangs on each SPI.
+    """Core clock (Hz), converters (None: no converter), and the device on each SPI.
 
     panel: makes, of the chip, what a person sees of the board, as boards/modules/front_panel.py: it has `words`, `move`
     and, as `ssp`, what hangs on the SSP. None: there is nothing to be seen, and no SspDevice.

@@ -37,7 +37,7 @@ OPTIONS = (
     "-Wall", "-Wextra", "-Wno-missing-field-initializers",
     "-Werror=implicit-function-declaration", "-Werror=incompatible-pointer-types", "-Werror=int-conversion",
 )  # fmt: skip
-# What stands in support.c would else be made a call of itself.
+# Without it, the functions in support.c would be compiled to calls of themselves.
 SUPPORT_OPTIONS = ("-fno-tree-loop-distribute-patterns", "-fno-lto")
 LINKING = ("-nostdlib", "-Wl,--gc-sections", "-Wl,--no-warn-rwx-segments", "-Wl,--build-id=none")
 SIZES = re.compile(r"^\s*(?P<text>\d+)\s+(?P<data>\d+)\s+(?P<bss>\d+)\s", re.MULTILINE)
@@ -137,7 +137,7 @@ def _compile(
 
 
 def _too_large(manifest: Manifest, said: Sequence[str]) -> list[str]:
-    """What the linker says of a program that does not fit, in a line."""
+    """The linker's message about a program that does not fit, in a line."""
     for line in said:
         found = TOO_LARGE.search(line)
         if found:

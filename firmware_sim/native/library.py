@@ -1,4 +1,4 @@
-"""The compiled firmware as a library of its own for every board: loaded, and what it must have looked at.
+"""The compiled firmware as a separate library for every board: loading, and the checks that precede it.
 
 Every board gets a copy of the file, so that two boards from one source share no variable.
 """
@@ -73,7 +73,7 @@ ffi.cdef(DECLARATIONS)
 class Library:
     """One loaded copy of the firmware in the file `path`, which messages call `shown`.
 
-    `schedule`: whether it offers a schedule, else it has a main loop. UserError for a file that is no such library.
+    `schedule`: whether it offers a schedule, else it has a main loop. UserError for a file that is not such a library.
     What the program itself does is not looked at: none of its functions is called.
     """
 

@@ -1,7 +1,7 @@
 """Running a program with the compiler's sanitizers: what their runtime needs of a process, and what it found.
 
-The runtime of the address sanitizer must be in a process before anything else, so a run with it is a process of its
-own, started with LD_PRELOAD. What is found goes to files, and the run goes on.
+The runtime of the address sanitizer must be in a process before anything else, so a run with it is a separate process,
+started with LD_PRELOAD. Findings go to files, and the run goes on.
 """
 
 import collections
@@ -20,8 +20,8 @@ from ranger_sim.firmware_sim.native.build import compiler
 from ranger_sim.firmware_sim.native.crash import lines_of
 from ranger_sim.foundation.user_error import UserError
 
-# Findings are told once for each place. Leaks are not looked for: the program allocates nothing, Python does. What a
-# signal ends is told by crash.py.
+# Each place is reported once. Leaks are not checked: the program allocates nothing, Python does. crash.py reports
+# programs that a signal ended.
 OPTIONS = "detect_leaks=0:halt_on_error=0:handle_segv=0:handle_sigbus=0:handle_sigfpe=0:handle_abort=0:handle_sigill=0"
 PLACE = "RANGER_SIM_FINDINGS"  # beginning of the files' names
 UNDEFINED_RUNTIMES = ("libubsan.so.1", "libubsan.so.2")
@@ -52,7 +52,7 @@ def environment(logs: pathlib.Path) -> dict[str, str]:
 def lead_findings() -> None:
     """After a library was loaded: what its undefined-behaviour sanitizer finds goes to the same place.
 
-    Beside the address sanitizer that runtime reads no options of its own.
+    With the address sanitizer, that runtime reads no options of its own.
     """
     place = os.environ.get(PLACE)
     if place is None:
@@ -68,7 +68,7 @@ def lead_findings() -> None:
 class Finding:
     """One place at which something is wrong. `function`: empty where it is not known.
 
-    count: how often it was reported; each process tells of a place once, however often it runs through it.
+    count: how often it was reported; each process reports a place once, however often it runs through it.
     """
 
     file: str
@@ -85,7 +85,7 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Program:
-    """Whose findings are looked for: a library, and the folder of its sources."""
+    """The program whose findings are wanted: a library, and the folder of its sources."""
 
     library: pathlib.Path
     folder: pathlib.Path
@@ -144,7 +144,7 @@ def _address(text: str, what: str, programs: list[Program]) -> Finding:
 
 @functools.cache
 def _functions(library: pathlib.Path) -> tuple[tuple[str, int, str], ...]:
-    """(file, first line, name) of every function of a library, by nm of the binutils; none where there is no nm."""
+    """(file, first line, name) of every function of a library, by nm of the binutils; none without nm."""
     program = shutil.which("nm")
     if program is None or not library.is_file():
         return ()

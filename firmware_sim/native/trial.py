@@ -1,6 +1,6 @@
-"""A program in C is first loaded and started in a process of its own, whatever that does to its process.
+"""A program in C is first loaded and started in a separate process, so that a failure ends only that process.
 
-The process reports over a pipe how far it came; its exit code is the program's to choose, and proves nothing.
+The process reports its progress over a pipe; the program chooses its exit code, so the code proves nothing.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from ranger_sim.foundation.user_error import UserError
 
 PATIENCE_S = 10.0  # of the clock: to load and to start takes milliseconds; chosen by us
 LONGEST_TEXT = 32768  # less than a pipe holds
-LOADED, STARTED, REFUSED = b"L", b"S", b"R"  # what the process writes: how far it came; behind the last one the reason
+LOADED, STARTED, REFUSED = b"L", b"S", b"R"  # reports of the process: its progress; after the last one the reason
 THROUGH = (LOADED + STARTED, STARTED)
 IN_TRIAL = "RANGER_SIM_TRIAL"  # in the environment of that process: runtime.c prints nothing there
 
@@ -36,7 +36,7 @@ def tried(
     made: pathlib.Path | None = None,
 ) -> None:
     """Load a library in a forked process, then call `start(record)` there. UserError, which begins with `what`, when
-    the program ends that process or does not come to the end of that; a UserError of `start` is raised here as well.
+    the program ends that process or does not return in time; a UserError of `start` is raised here as well.
 
     record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet.
     """
@@ -87,7 +87,7 @@ def _load_and_start(
 
 
 def _all_of(pipe: int) -> bytes:
-    """What comes through a pipe until the program is through, the pipe ends, or PATIENCE_S are over."""
+    """Bytes from a pipe until the program is done, the pipe ends, or PATIENCE_S are over."""
     said = b""
     until_s = wallclock.monotonic_s() + PATIENCE_S
     while said not in THROUGH and descriptors.wait([pipe], [], until_s - wallclock.monotonic_s())[0]:
@@ -99,7 +99,7 @@ def _all_of(pipe: int) -> bytes:
 
 
 def _end_of(process: int, is_over: bool) -> int | None:
-    """The exit code of a process that is to end; None when it did not and was killed."""
+    """The exit code of an ending process; None when it did not end and was killed."""
     if not is_over and hasattr(os, "pidfd_open"):
         watch = os.pidfd_open(process)
         is_over = not descriptors.wait([watch], [], PATIENCE_S)[0]
@@ -113,7 +113,7 @@ def _end_of(process: int, is_over: bool) -> int | None:
 
 
 def _be_the_trial(work: Callable[[Callable[[bytes], object]], None], writing: int) -> None:
-    """In the forked process, which leaves here."""
+    """Run the trial in the forked process, which exits here."""
     os.environ[IN_TRIAL] = "1"
     try:
         work(lambda reached: os.write(writing, reached))

@@ -4,7 +4,7 @@
 
 HD44780U data sheet. A byte, or in 4-bit mode half of one on DB7 ... DB4, is taken at the falling edge of E: an
 instruction with RS low, a character with RS high. With R/W high the display drives the data pins while E is high.
-Not modelled: the shapes of own characters, cursor and blinking, which nobody reads.
+Not modelled: the shapes of own characters, cursor and blinking, which no code reads.
 ROBOT PARITY: each byte is done at once and the busy flag is never set; the device takes 37 us, 1.5 ms to go home.
 """
 

@@ -41,7 +41,7 @@ class Gpio(Peripheral):
 
     @cython.ccall
     def write(self, pin: cython.longlong, level: cython.longlong) -> None:
-        """Drive an output; a change is told outside as PIN_OUTPUT at `now`."""
+        """Drive an output; a change is sent outside as PIN_OUTPUT at `now`."""
         if self.chip.pins[pin] != level or self.outputs[pin] == 0:
             self._drive(pin, level)
 

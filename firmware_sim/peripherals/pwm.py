@@ -32,7 +32,7 @@ LONGEST_PERIOD_S = 2  # so that products of times and rates stay within 64 bits
 class Pwm(Peripheral):
     """Seven match registers; `latched_MRn` are the values that drive the pins. `period`: MR0 in counts.
 
-    `period_start`: instant (ns) of the period that has what was latched last. `driven`: the channels whose pins it
+    `period_start`: time (ns) of the period that has what was latched last. `driven`: the channels whose pins it
     drives, bit n for channel n.
     """
 
@@ -132,7 +132,7 @@ class Pwm(Peripheral):
 
     @cython.ccall
     def tell(self) -> None:
-        """Whoever follows the unit's pins on the board (`Chip.pwm_follower`) sees what was latched.
+        """Pass the latched values to the follower of the unit's pins on the board (`Chip.pwm_follower`).
 
         ROBOT PARITY: at once, where the pins have it from the next period on; and not what `write` does to a bridge.
         """
@@ -167,7 +167,7 @@ class Pwm(Peripheral):
     @cython.cfunc
     @cython.exceptval(check=False)
     def _go_on(self, periods: cython.longlong) -> cython.longlong:
-        """Go on by so many periods; returns how long they take (ns)."""
+        """Go on by `periods`; returns how long they take (ns)."""
         parts: cython.longlong = self.rest + periods * self.period_ns * 1000000000
         whole: cython.longlong = parts // self.rate
         self.rest = parts - whole * self.rate
