@@ -96,7 +96,7 @@ class FrameFault(ControllerFault):
 
 
 class ErrorFault(FrameFault):
-    """One of the errors of FMI-LS-BUS, seen by this controller first. `seen`: nodes and errors (`tampering.Misreading`)."""
+    """One of the errors of FMI-LS-BUS, seen by this controller first. `seen`: by each node (`tampering.Misreading`)."""
 
     unit = "errors"
     tamper: Any

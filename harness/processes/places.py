@@ -23,9 +23,7 @@ UNTIL: Final = 19  # ns: run everything before this time
 ASK_USED: Final = 20  # slots in use of the mailbox to the board
 ROWS: Final = 21  # rows of the stage that were written so far
 POWER_UP: Final = 22  # ns: when a restarted board gets its power
-KEEP_NS: Final = (
-    23  # how much of its activity the board keeps for later readers; 0: as much as fits
-)
+KEEP_NS: Final = 23  # how much of its activity the board keeps for later readers; 0: as much as fits
 # the board's words
 ANSWERED: Final = 32  # how often the board has rung
 PLANT_SLEEPS: Final = 33

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MESSAGE_BYTES: Final = 8  # a UART_BYTE carries at most this many,
 WORD_BYTES: Final = 4  # half of them in each of its two words
-PAUSE_NS: Final = 25_000  # from byte to byte; a longer pause begins a new message (at 460,800 baud a byte takes 21.7 us)
+PAUSE_NS: Final = 25_000  # from byte to byte; after more a new message begins (at 460,800 baud a byte takes 21.7 us)
 
 
 @cython.final
