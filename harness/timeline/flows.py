@@ -145,7 +145,7 @@ def receive(
 def paired(came_ns: np.ndarray, asked_ns: np.ndarray, longest_ns: int) -> np.ndarray:
     """For each frame, received at `came_ns`, the index of its interrupt of those requested at `asked_ns`; -1 for none.
 
-    Both in order of time. An interrupt belongs to the frame that was heard at its request, be it with the tolerance of
+    Both in order of time. An interrupt belongs to the frame received at its request, within the tolerance of
     a rounded bit; those left over, from the last one on, to the latest frame left over before them, in `longest_ns`.
     """
     found = np.full(len(came_ns), -1, dtype=np.int64)
