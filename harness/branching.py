@@ -1,7 +1,7 @@
-"""One run in a forked process: a branch of a robot that walks already, or a robot of its own.
+"""One run in a forked process: a branch of a robot that walks already, or a new robot.
 
-The branch has everything of the robot as it is at that instant, and nothing that it does comes back but its result. A
-branch that raises, dies or takes too long is a result as well, and harms nobody.
+The branch has the robot's whole state at that time, and returns only its result. A branch that raises, dies or takes
+too long is a result as well, and harms no other process.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ CHUNK = 1 << 16
 
 
 class BranchError(Exception):
-    """The branch gave no result. `outcome`: "crashed" or "timed out"; the text says why."""
+    """The branch returned no result. `outcome`: "crashed" or "timed out"; the text says why."""
 
     def __init__(self, outcome: str, why: str) -> None:
         Exception.__init__(self, why)
@@ -29,15 +29,15 @@ class BranchError(Exception):
 
 
 def fork() -> int:
-    """`os.fork` of a process whose other threads, if there are any, hold nothing that the branch needs."""
+    """`os.fork` of a process whose other threads, if any, hold nothing that the branch needs."""
     with warnings.catch_warnings():
-        # Python 3.12 on warns of threads; the callers have none of their own, those of numerical libraries sleep
+        # Python 3.12 on warns about threads; the callers have none, those of numerical libraries sleep
         warnings.simplefilter("ignore", DeprecationWarning)
         return os.fork()
 
 
 def die_with(parent: int) -> None:
-    """Where the kernel can, it kills this process when `parent` (its parent's process id) ends, however it ends."""
+    """Let the kernel, if it can, kill this process when `parent` (its parent's process id) ends in any way."""
     if sys.platform.startswith("linux"):
         from ranger_sim.harness.processes import kernel
 
@@ -45,10 +45,10 @@ def die_with(parent: int) -> None:
 
 
 def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> dict[str, Any]:
-    """What `work` returns in a forked process; BranchError when it raises, dies, or takes too long.
+    """Return what `work` returns in a forked process; BranchError when it raises, dies, or takes too long.
 
-    cpu_s: of computing, which a machine that does other things does not change. wall_s: of the wall clock, for what
-    waits for ever and computes nothing.
+    cpu_s: of computing, which other load of the machine does not change. wall_s: of the wall clock, for work that waits
+    for ever and computes nothing.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -63,7 +63,7 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     finally:
         os.close(reading)
         with contextlib.suppress(ProcessLookupError):
-            os.kill(child, signal.SIGKILL)  # it has told all it will, or is late
+            os.kill(child, signal.SIGKILL)  # its output is complete, or it is late
         _, status = os.waitpid(child, 0)
     if answer is None:
         raise BranchError("timed out", f"no result within {wall_s:g} s of the wall clock")
@@ -88,7 +88,7 @@ def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int
         os.close(reading)
         die_with(parent)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        allowed = max(1, round(cpu_s))  # whole seconds; a forked process counts from nothing
+        allowed = max(1, round(cpu_s))  # whole seconds; a forked process counts from 0
         resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 1))
         try:
             answer = json.dumps(work())
@@ -104,7 +104,7 @@ def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int
 
 
 def _read(pipe: int, deadline_s: float) -> bytes | None:
-    """Everything until the other end is closed; None when that is not before the deadline."""
+    """Read until the other end is closed; None when that does not happen before the deadline."""
     parts: list[bytes] = []
     while True:
         left = deadline_s - wallclock.monotonic_s()

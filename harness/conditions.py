@@ -1,14 +1,14 @@
 """Conditions on a running robot, as tests, faults and campaigns write them.
 
     "12.3 s"                    virtual time since power-up
-    "step 12"                   so many steps walked
+    "step 12"                   a number of steps walked
     "hip in HI_premid"          a machine of the main brain is in a state (leg, hip, inner_foot, outer_foot, steering)
-    "MCH_ANGLE > 0.3"           a variable, as the main brain's data table has it
+    "MCH_ANGLE > 0.3"           a variable, by the main brain's data table
     "hip_rad < -0.2"            a quantity of the body (plant.ranger.SAMPLES)
-    "error MC_TCURR_OOB from MCH"   a board notes an error that it had not noted when the waiting began
+    "error MC_TCURR_OOB from MCH"   a board records an error after the waiting began
     "fell"                      the robot fell
 
-A function of the robot is a condition as well. Conditions are looked at between two steps of the plant, every 250 us.
+A function of the robot is a condition as well. Conditions are checked between two steps of the plant, every 250 us.
 """
 
 import re
@@ -48,13 +48,13 @@ STATE_VARIABLES = {
 
 
 def state_names(robot: Any, machine: str) -> dict[int, str]:
-    """{number: state} of a machine of the main brain's program; empty where that program has none of this name."""
+    """{number: state} of a machine of the main brain's program; empty where that program does not have it."""
     states = getattr(robot.boards["MB"].modes, machine, None)
     return {} if states is None else {state.number: state.name for state in states.machine.states}
 
 
 class Step(Condition):
-    """So many steps since the robot was let go."""
+    """A number of steps since the robot was let go."""
 
     def __init__(self, text: str, steps: int) -> None:
         Condition.__init__(self, text)
@@ -110,7 +110,7 @@ class State(Condition):
 
 
 class Quantity(Comparison):
-    """A variable of the main brain's table, or a quantity of the body, against a number."""
+    """A variable of the main brain's table, or a quantity of the body, compared with a number."""
 
     def __init__(self, text: str, name: str, sign: str, value: float) -> None:
         Comparison.__init__(self, text, name, sign, value, SAMPLES)
@@ -132,7 +132,7 @@ class Quantity(Comparison):
 
 
 def condition(wanted: str | Condition | Callable[[Any], Any]) -> Condition:
-    """The condition that is written in `wanted`, or is it already. UserError for a text that is none."""
+    """The condition described by `wanted`, a text or a condition. UserError for a text that does not describe one."""
     if isinstance(wanted, Condition):
         return wanted
     if callable(wanted):

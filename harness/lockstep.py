@@ -1,34 +1,34 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below counts boards, buses or wires, or stands in a table filled when the robot is wired)
+# (every index below counts boards, buses or wires, or is in a table filled when the robot is wired)
 """The loop that everything serves: conservative simulation with lookahead, in virtual time.
 
     plant -> sensors -> pins -> interrupts and slots -> data table -> CAN -> router -> main brain
           -> CAN -> slots -> PWM -> plant
 
-Boards, buses and plant have events of their own, each with its instant. In conservative simulation nobody runs past an
-instant at which something may still reach it, so nothing is ever taken back. How far ahead of the others a board may
-run safely is its lookahead: the least time in which something that another one puts out can arrive.
+Boards, buses and plant each have their own events, each at a time. In conservative simulation nothing runs past a time
+at which something may still reach it, so nothing is ever taken back. How far ahead of the others a board may run safely
+is its lookahead: the least time in which an output of another board can arrive.
 
-The lookahead is 31 us (WINDOW_NS). That is shorter than the shortest frame on Ranger's buses: its receivers have it
+The lookahead is 31 us (WINDOW_NS). It is shorter than the shortest frame on Ranger's buses: the receivers have it
 35.6 us after its start. And it is shorter than the pause between two exchanges on the serial link: 34.67 us, less the
-1.7 us by which a frame's interrupt can hold up the start of the first. So the result depends neither on the order in
-which boards run nor on how far each of them goes.
+1.7 us by which a frame's interrupt can delay the start of the first. So the result depends neither on the order in
+which boards run nor on how far each of them runs.
 
-Within a step of the plant the board that is due first runs, to 31 us beyond the instant at which the next board or bus
-is due. It stops earlier where an answer to its own output could reach it (`Board.stop_at`). At one instant the order
+Within a step of the plant the board that is due first runs, to 31 us beyond the time at which the next board or bus
+is due. It stops earlier where an answer to its own output could reach it (`Board.stop_at`). The order at one time
 is: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
 
 A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. On some boards frames,
 edges and bytes wait for a task (`hears_in_its_slots`). Such a board is due only when it may put something on a bus
-(`Board.speaks_from`). Until then it is left alone, and does everything else later, each thing at its instant. Edges and
-voltages stand for one step of the plant, so it has caught up with its own events by the end of the step. A frame or a
-byte that it has only heard may wait longer: until the board is due, or until `run` returns.
+(`Board.speaks_from`). Before that the loop leaves it alone; it then handles everything else late, each event at its
+time. Edges and voltages are kept for one step of the plant, so the board has caught up with its own events by the end
+of the step. A frame or a byte that it has only received may wait longer: until the board is due, or `run` returns.
 
-Boards that run apart (`Board.apart`), each in a process of its own, run side by side: in windows as long as the
-lookahead, each from the first instant at which anything is due, all boards that are due in a window at once.
+Boards that run out of process (`Board.apart`), one process each, run in parallel: in windows as long as the lookahead,
+each from the first time at which anything is due, all boards that are due in a window at once.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
-to 250 us late. Sensors show a straight line over a step (voltages) or stand through it (words).
+to 250 us late. Sensors show a straight line over a step (voltages) or a constant (words).
 """
 
 import array
@@ -85,7 +85,7 @@ class Lockstep:
     stop_wanted: cython.bint
 
     def __init__(self, plant, boards, buses, sampler, start_ns) -> None:
-        # the compiled loop takes these for what they should be without asking again
+        # the compiled loop uses these without checking their types again
         for thing, kind in ((plant, Plant), *((b, Board) for b in boards), *((b, Bus) for b in buses)):
             if not isinstance(thing, kind):
                 raise UserError(f"lockstep: {thing!r} is no {kind.__name__}")
@@ -94,7 +94,7 @@ class Lockstep:
         self.buses = buses
         self.sampler = sampler
         self.strikes = None  # a StepEnd
-        self.watchers = []  # StepWatch: what looks at every step of the plant, or reaches into it
+        self.watchers = []  # StepWatch: observers of every step of the plant, which may change it
         self.stop_wanted = False  # a watcher sets it: `run` returns before the step
         self.time = start_ns
         self.window_ns = WINDOW_NS
@@ -114,16 +114,16 @@ class Lockstep:
         self.serial_device = None
 
     def _put(self, place, board) -> None:
-        """`board` stands at `place`, on the wires there."""
+        """Set `board` at index `place`, on the wires there."""
         self.boards[place] = board
         self.wires[place].lead_from(board)
         self.side_by_side = any(each.apart for each in self.boards)
 
     def _seat(self) -> None:
-        """Places for all boards: where those who send to one tell when it must run."""
+        """Rebuild the due table of all boards, in which senders note when a board must run."""
         count = len(self.boards)
-        # per board the instant (ns) at which it must run, and that at which something comes in that may wait;
-        # behind the boards' the instant at which a bus must decide
+        # per board the time (ns) at which it must run, and that at which an input arrives that may wait; after the
+        # boards' the time at which a bus must decide
         self.due = integers(count + 1, self.time)
         self.came = integers(count, self.time)
         before, self.prompt = list(self.prompt), integers(count, 1)
@@ -135,24 +135,24 @@ class Lockstep:
             bus.wake(self.due, count)
 
     def _hear(self, place) -> None:
-        """The inbox of the board there tells when it must run: at once, or by `prompt` when it likes."""
+        """Let that board's inbox report when it must run: at once, or by `prompt` at a time of its choice."""
         self.boards[place].inbox.wake(self.due if self.prompt[place] else self.came, self.due, place)
 
     # --- wiring -------------------------------------------------------------------------------------------
 
     def place(self, name) -> int:
-        """Where the board of this name stands among the boards."""
+        """Return the index of the board of this name."""
         for place, board in enumerate(self.boards):
             if board.name == name:
                 return place
         raise UserError(f"lockstep: no board is called {name}")
 
     def board(self, name) -> Board:
-        """The board of this name."""
+        """Return the board of this name."""
         return self.boards[self.place(name)]
 
     def add(self, board) -> BoardWires:
-        """One more board, behind those that are there; between two runs. Returns its wires, which lead nowhere yet."""
+        """Add a board after the existing ones, between two runs. Returns its wires, not yet connected."""
         if not isinstance(board, Board) or board.name in [each.name for each in self.boards]:
             raise UserError(f"lockstep: {board!r} is no Board, or there is one of its name")
         wires = BoardWires(board, WINDOW_NS)
@@ -163,9 +163,9 @@ class Lockstep:
         return wires
 
     def replace(self, board) -> None:
-        """`board` stands from now on where the board of its name stood: on the same wires, at the same sensors.
+        """Put `board` in the place of the board of its name: on the same wires, at the same sensors.
 
-        Its inbox is that of the other one, because buses, link and operator write there.
+        It takes over the inbox of the previous board, because buses, link and operator write there.
         """
         place = self.place(board.name)
         before = self.boards[place]
@@ -185,45 +185,45 @@ class Lockstep:
                 watcher.board = board
 
     def hears_in_its_slots(self, board) -> None:
-        """Not urgent messages (`EventQueue.put`) wait for tasks of `board`: no handler sends or looks at a sensor."""
+        """Messages that are not urgent (`EventQueue.put`) wait for tasks of `board`; no handler sends or senses."""
         place = self.place(board.name)
         self.prompt[place] = 0
         self._hear(place)
 
     def connect_encoder(self, encoder, board, pin_a, pin_b) -> None:
-        """Channels A and B of `encoder` on two pins of `board`."""
+        """Connect channels A and B of `encoder` on two pins of `board`."""
         place = self.place(board.name)
         board.listen_to_edges(encoder.edges, pin_a, pin_b)
         self.encoder_wires.append((place, encoder.edges, pin_a, pin_b))
         self.encoder_boards = array.array("q", sorted({wire[0] for wire in self.encoder_wires}))
 
     def connect_voltage(self, source, board, channel) -> None:
-        """Voltage `source` of the plant on analog input `channel` of `board`."""
+        """Connect voltage `source` of the plant to analog input `channel` of `board`."""
         board.analog.follow(channel, self.step_times, self.plant.analog_start, self.plant.analog_end, source)
 
     def connect_word(self, source, board, word) -> None:
-        """Digital word `source` of the plant is word `word` of `board`."""
+        """Connect digital word `source` of the plant to word `word` of `board`."""
         self.word_wires.append(WordWire(source, board, word))
 
     def connect_link(self, master, slave, exchange_ns, idle_segment) -> None:
-        """The serial link between two boards; the slave sends `idle_segment` until it has put one up itself."""
+        """Connect two boards by the serial link; the slave sends `idle_segment` until it has queued one itself."""
         link = SspWire(master, slave, exchange_ns, idle_segment)
         for board in (master, slave):
             self.wires[self.place(board.name)].link = link
 
     def connect_serial_device(self, device, board, uart) -> None:
-        """`device` of the plant (a SerialDevice that hears `from_board`) hangs on UART `uart` of `board`."""
+        """Connect `device` of the plant (a SerialDevice that receives `from_board`) to UART `uart` of `board`."""
         self.serial_device = device
         self.connect_serial_line(board, uart, device)
 
     def connect_serial_line(self, board, uart, line) -> None:
-        """What `board` sends by UART `uart` goes to `line.from_board(time, byte, count, data)`, and nowhere else."""
+        """Send the output of UART `uart` of `board` to `line.from_board(time, byte, count, data)` only."""
         self.wires[self.place(board.name)].serial_lines[uart] = line
 
     # --- passing time -------------------------------------------------------------------------------------
 
     def stop_at(self, steps, distance_m) -> None:
-        """The walk is over after so many steps, or so many metres; None: no such end."""
+        """End the walk after `steps` steps or `distance_m` metres; None: no such end."""
         self.stop_steps = NEVER if steps is None else steps
         self.stop_distance_m = ANY_DISTANCE_M if distance_m is None else distance_m
 
@@ -242,9 +242,9 @@ class Lockstep:
         board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
         came: cython.longlong[::1] = self.came
-        due[board_count] = self.time  # between two runs anything may have been done to a bus
+        due[board_count] = self.time  # a bus may have been changed between two runs
         for i in range(board_count):
-            # between two runs anything may have been done to a board
+            # a board may have been changed between two runs
             board = boards[i]
             due[i] = came[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
             wires = self.wires[i]
@@ -279,9 +279,9 @@ class Lockstep:
     @cython.cfunc
     @cython.final
     def _run_in_turn(self, end: cython.longlong, last: cython.bint) -> cython.longlong:
-        """Run boards and buses to `end` (ns), always the one that is due first; returns when the next one is.
+        """Run boards and buses to `end` (ns), always the one that is due first; returns when the next one is due.
 
-        `last`: somebody looks at the boards then. Otherwise a board that has only heard something is left alone.
+        `last`: a reader sees the boards then. Otherwise a board that has only received something is left alone.
         """
         board: Board
         i: cython.longlong
@@ -290,12 +290,12 @@ class Lockstep:
         second: cython.longlong
         time: cython.longlong
         later: cython.longlong
-        # compiled, addresses: to take a memoryview into a variable is counted by an atomic instruction
+        # compiled, addresses: a memoryview in a variable costs an atomic reference count
         due: cython.p_longlong = cython.address(self.due[0]) if cython.compiled else self.due
         came: cython.p_longlong = cython.address(self.came[0]) if cython.compiled else self.came
         board_count: cython.longlong = len(self.boards)
         while True:
-            if cython.compiled:  # without a branch: no processor could foresee which board is next
+            if cython.compiled:  # without a branch: a processor cannot predict which board is next
                 alone = board_count
                 first = due[board_count]
                 second = NEVER
@@ -325,7 +325,7 @@ class Lockstep:
     @cython.cfunc
     @cython.final
     def _run_side_by_side(self, end: cython.longlong) -> cython.longlong:
-        """Run boards that run apart, and buses, to `end` (ns) in windows; returns how many there were."""
+        """Run out-of-process boards, and buses, to `end` (ns) in windows; returns how many windows there were."""
         i: cython.longlong
         now: cython.longlong = self.time
         late: cython.longlong = 0
@@ -388,7 +388,7 @@ class Lockstep:
 
     @cython.cfunc
     def _decide(self, until: cython.longlong) -> cython.longlong:
-        """Let every bus decide what starts up to and including `until` (ns); returns their next instant of interest."""
+        """Let every bus decide what starts up to and including `until` (ns); returns their next time of interest."""
         bus: Bus
         i: cython.longlong
         next_time: cython.longlong
@@ -405,7 +405,7 @@ class Lockstep:
 
     @cython.cfunc
     def _sense(self) -> None:
-        """What the plant's sensors showed during the step that was just integrated."""
+        """Record what the plant's sensors showed during the step just integrated."""
         plant: Plant = self.plant
         i: cython.longlong
         end: cython.longlong = plant.time_ns
@@ -428,7 +428,7 @@ class Lockstep:
 
     @cython.cfunc
     def _watch_before(self, now: cython.longlong) -> cython.bint:
-        """Every watcher once per step, before it; True when one of them wants to stop here."""
+        """Call every watcher once before a step; True when one of them wants to stop here."""
         watch: StepWatch
         for watch in list(self.watchers):
             if watch.seen_ns < now:
@@ -441,14 +441,14 @@ class Lockstep:
 
     @cython.cfunc
     def _watch_after(self, start: cython.longlong, end: cython.longlong) -> None:
-        """Every watcher once per step, when the sensors of that step are known and no board has seen them."""
+        """Call every watcher once per step, when its sensors are known and no board has read them."""
         watch: StepWatch
         for watch in list(self.watchers):
             watch.after_step(start, end)
 
     @cython.cfunc
     def _show_words(self) -> cython.void:
-        """What the absolute encoders hold at the start of the step: their words stand until the next one."""
+        """Show the absolute encoders' words at the start of the step; they hold until the next one."""
         plant: Plant = self.plant
         wire: WordWire
         for wire in self.word_wires:

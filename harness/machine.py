@@ -35,20 +35,20 @@ from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting, Wanted
 from ranger_sim.harness.wiring.wires import Wiring
 
-GRID_NS = 20_000_000  # whoever acts from outside does so on this grid: a run does not depend on how it is sliced
+GRID_NS = 20_000_000  # actions from outside happen on this grid, so that a run does not depend on how it is sliced
 
 
 class Machine:
     """One machine. Same parts and seed, same bytes. Close it when done (or use contextlib.closing).
 
-    boards: {name: Board}, in the order in which they run and are sorted within an instant. buses: {name: bit/s}, with
+    boards: {name: Board}, in the order in which they run and are sorted within one time. buses: {name: bit/s}, with
     names can1, can2, ...; seed: of crystals, noise and faults, as far as the parts take it from here; log: "none",
-    "window" (the last seconds in memory) or "full" (on disk), what `logbook` has of frames and samples.
+    "window" (the last seconds in memory) or "full" (on disk), `logbook`'s frames and samples.
     words: (how many, board): the memory of a board that the log keeps as well. names: of frames and errors, as
-    `Names.of(load_table(folder))` has them; without, frames have numbers alone. places: where faults can sit.
+    `Names.of(load_table(folder))` has them; without, frames have only numbers. places: where faults can be.
     """
 
-    backend = "sim"  # what it runs on; harness/testing/backends.py has the others
+    backend = "sim"  # its execution backend; harness/testing/backends.py has the others
     lost = False  # a part of it that runs elsewhere is gone: it can pass no more time
 
     def __init__(
@@ -90,22 +90,22 @@ class Machine:
             self.logbook.close()
             raise
         self.faults: list[Any] = []  # armed so far
-        self.pace: Any = None  # an `outside.Pace` holds virtual time back to the wall clock's
-        self.polled: list[Any] = []  # ends of wires that lead out of the simulation
-        self.poll_due: list[int] = []  # when each of them asked to be looked at next, ns
+        self.pace: Any = None  # an `outside.Pace` slows virtual time down to the wall clock's
+        self.polled: list[Any] = []  # ends of wires that leave the simulation
+        self.poll_due: list[int] = []  # when each of them wants the next poll, ns
         self.next_poll_ns = self.start_ns
         self.names = names if names is not None else Names()
         self.catalogue = Catalogue(
             [*places, *network_places.controllers(wiring.can), *network_places.buses(len(buses))], self.condition
         )
         self.slot_views: dict[str, Any] = {}  # of boards whose slots are recorded
-        self.observed: Any = None  # what harness.testing keeps beside it: the last frames, what was measured
+        self.observed: Any = None  # what harness.testing keeps with it: the last frames, what was measured
         self.cpu_s = 0.0
         self.wall_s = 0.0
         self.ended = ""
 
     def _connect(self) -> None:
-        """Solder every wire of the tables."""
+        """Connect every wire of the tables."""
         loop, wiring = self.loop, self.wiring
         place = {name: number for number, name in enumerate(self.boards)}
         for name in wiring.hear_in_slots:
@@ -147,7 +147,7 @@ class Machine:
     # --- passing time -------------------------------------------------------------------------------------
 
     def act(self, end_ns: int) -> None:
-        """Who works with the machine from outside acts here, once before each 20 ms of virtual time."""
+        """Act from outside; subclasses override it. Called once before each 20 ms of virtual time."""
 
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
         """Pass up to `slice_s` of virtual time; True when the stop rule is met or the machine can go no further."""
@@ -178,19 +178,19 @@ class Machine:
         return bool(self.ended)
 
     def run_for(self, duration: Duration) -> None:
-        """Pass so much virtual time ("20 ms", or a number of seconds), or less when the machine can go no further."""
+        """Pass this much virtual time ("20 ms", or a number of seconds), or less when the machine can go no further."""
         seconds = duration_ns(duration, "run_for") * 1e-9
         self.run(StopRule(time_s=self.time_s + seconds), seconds)
 
     def condition(self, wanted: Wanted) -> Condition:
-        """The condition that is written in `wanted` (harness/waiting.py)."""
+        """The condition described by `wanted` (harness/waiting.py)."""
         return waiting.condition(wanted, self.plant.sample_names, self.names, tuple(self.boards))
 
     def until(self, wanted: Wanted, within: Duration = "60 s") -> float:
         """Pass time until a condition holds; returns the virtual time since power-up, s.
 
         ConditionNotMetError, an AssertionError, when it does not hold `within` this time from now, or the machine can
-        go no further before. It is looked at between two steps of the plant.
+        go no further before. It is checked between two steps of the plant.
         """
         __tracebackhide__ = True
         waited = Waiting(self, self.condition(wanted))
@@ -211,7 +211,7 @@ class Machine:
     end_word, end_name = "the machine stopped", "its end"
 
     def whereabouts(self) -> str:
-        """How far it came, beside the time, as the end of a message; empty where time says all."""
+        """Its progress in addition to the time, as the end of a message; empty where the time suffices."""
         return ""
 
     @property
@@ -223,16 +223,16 @@ class Machine:
         """Virtual seconds per wall-clock second of the stepping loop."""
         return self.time_s / self.wall_s if self.wall_s > 0.0 else 0.0
 
-    # --- what leads outside -------------------------------------------------------------------------------
+    # --- external connections------------------------------------------------------------------------------
 
     def attach(self, end: Any) -> None:
-        """From now on `end.poll(now_ns)` is called as often as it asks for; it returns when it wants to be next."""
+        """Call `end.poll(now_ns)` from now on as often as it requests; it returns the time of its next poll."""
         self.polled.append(end)
         self.poll_due.append(self.loop.time)
         self.next_poll_ns = self.loop.time
 
     def _poll(self) -> int:
-        """Poll every end that leads outside, when it is time; returns until when the loop may run."""
+        """Poll every external connection that is due; returns until when the loop may run."""
         now: int = self.loop.time
         if now >= self.next_poll_ns:
             for place, end in enumerate(self.polled):
@@ -242,12 +242,12 @@ class Machine:
         return self.next_poll_ns
 
     def poll_now(self) -> None:
-        """Poll every end at once: something waits at one of them."""
+        """Poll every external connection at once: something waits at one of them."""
         self.next_poll_ns = self.loop.time
         self.poll_due = [self.loop.time] * len(self.polled)
         self._poll()
 
-    # --- looking in, reaching in --------------------------------------------------------------------------
+    # --- inspection and changes ---------------------------------------------------------------------------
 
     def board(self, name: str) -> Any:
         """The board of this name. UserError for any other."""
@@ -268,15 +268,15 @@ class Machine:
         self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)
 
     def counters(self) -> dict[str, Any]:
-        """What every board counted, by its name; also of a board that runs in another process."""
+        """Every board's counters, by its name; also of a board that runs in another process."""
         return {name: self.loop.board(name).counters() for name in self.boards}
 
     def slots(self, board: Any) -> Any:
-        """The slots of a board from now on, or from the first time on that they were asked for: a
+        """The slots of a board from the first request for them on: a
         `harness.timing.machine_slots.MachineSlots`.
         """
         if board not in self.slot_views:
-            from ranger_sim.harness.timing.machine_slots import slot_view  # numpy: only where slots are looked at
+            from ranger_sim.harness.timing.machine_slots import slot_view  # numpy: only where slots are used
 
             self.slot_views[board] = slot_view(self, board)
         return self.slot_views[board]
@@ -285,7 +285,7 @@ class Machine:
         """Frames on a bus, their periods and latencies, as assertions: a `harness.testing.wire.Wire`.
 
         Frames of the last 20 s are kept from the first call on, or from power-up with log="full" and in a machine that
-        harness.testing made. since_s: of the time since power-up; UserError where they are not kept so far back.
+        harness.testing made. since_s: in time since power-up; UserError where no frames are kept that far back.
         """
         from ranger_sim.harness.testing.wire import wire_of
 
@@ -301,12 +301,12 @@ class Machine:
         **parameters: Any,
     ) -> Fault:
         """Arm a fault: `mode` at `place` from the condition `at` on (None: at once) `until` another one or for a
-        length, as "+50 ms" (None: it stays). UserError for a place, mode, parameter or value that there is not. The
-        Fault tells what became of it: `acted`, the stamps, the largest difference at its place.
+        length, as "+50 ms" (None: it stays). UserError for an unknown place, mode, parameter or value. The
+        Fault reports its result: `acted`, the stamps, the largest difference at its place.
 
         Both are names of the machine's catalogue, or a `Place` and a class of faults (harness/faults/fault.py).
 
-        proof: it can also be asked for `detected`, `detection_ms`, `reaction` and the rest of its `proof()`: a forked
+        proof: it then also has `detected`, `detection_ms`, `reaction` and the rest of its `proof()`: a forked
         process is the machine without it, both are recorded from now on (2 MB a second each of Ranger), until `close`.
         """
         if isinstance(mode, str):
@@ -335,7 +335,7 @@ class Machine:
         return int(self.loop.time) if self.plant.fell else -1
 
     def error_watch(self) -> Any:
-        """What sees which error each board notes, and when, from now on: a StepWatch with `rows`."""
+        """A StepWatch whose `rows` hold each board's errors and their times from now on."""
         return ErrorRows(self.loop.boards, max(self.names.errors, default=-1) + 1)
 
     def trace_digest(self) -> str:
@@ -344,7 +344,7 @@ class Machine:
         return digest
 
     def close(self) -> None:
-        """Give back the log's files, the ends that lead outside, and the golden runs of faults."""
+        """Close the log's files, external connections, and the golden runs of faults."""
         self.logbook.close()
         for end in self.polled:
             end.close()
@@ -354,8 +354,8 @@ class Machine:
 
 
 def accept_lists(plant: Any) -> None:
-    """A body's `fill_sample` in Python gets an array of numpy: `row[:2] = [angle, rate]` is refused by a buffer."""
+    """Give a body's `fill_sample` in Python a numpy array: a buffer refuses `row[:2] = [angle, rate]`."""
     fill = plant.fill_sample
-    # a body of the package has no __dict__: compiled, and interpreted too
+    # a body of the package has no __dict__, neither compiled nor interpreted
     if inspect.isfunction(getattr(type(plant), "fill_sample", None)) and hasattr(plant, "__dict__"):
         plant.fill_sample = lambda row: fill(np.asarray(row))

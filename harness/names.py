@@ -1,4 +1,4 @@
-"""What the numbers on a machine's buses are called: identifiers, types, errors and boards, by its master table."""
+"""Names of the numbers on a machine's buses: identifiers, types, errors and boards, by its master table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Names:
-    """Variables and boards by number, errors by code; `normal_*`: how often a healthy machine's boards note an error.
+    """Variables and boards by number, errors by code; `normal_*`: how often a healthy machine's boards record an error.
 
     hash: of the master files.
     """
@@ -51,7 +51,7 @@ class Names:
         )
 
     def identifier(self, name: str | int) -> int:
-        """The identifier of a variable; a number stands for itself. UserError for a name that the table has not."""
+        """The identifier of a variable; a number is returned unchanged. UserError for a name not in the table."""
         if isinstance(name, int):
             return name
         number = self.ids.get(name)
@@ -64,12 +64,12 @@ class Names:
         return self.variables.get(identifier, f"{identifier:03X}")
 
     def value(self, identifier: int, word: int) -> float:
-        """The value word as the table's type reads it; of an identifier without one, as it is."""
+        """The value word as the table's type reads it; unchanged for an identifier without one."""
         kind = self.types.get(identifier)
         return word if kind is None else value_of_word(kind, word)
 
     def error_text(self, word: int) -> str:
-        """An error word in words."""
+        """The text of an error word."""
         code, board, count = parts_of_error_word(word)
         return f"{self.errors.get(code, code)} x {count} from {self.boards.get(board, board)}"
 
@@ -78,12 +78,12 @@ class Names:
         return {number for number, name in self.variables.items() if name.startswith("ERROR_")}
 
     def is_normal(self, word: int) -> bool:
-        """Whether the error of an error word is one that a healthy machine's board notes."""
+        """Whether the error of an error word is one that a healthy machine's board records."""
         code, board, _ = parts_of_error_word(word)
         return self.boards.get(board) in self.normal_per_s.get(code, {})
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """What a wrong name may have been, as the end of a message."""
+    """Suggestions for a wrong name, as the end of a message."""
     near = difflib.get_close_matches(name, list(known), 3)
     return f"; meant was perhaps {' or '.join(near)}" if near else ""

@@ -1,4 +1,4 @@
-"""The person beside the robot: holds it, presses keys, gives it a push, steers by radio.
+"""The person next to the robot: holds it, presses keys, gives it a push, steers by radio.
 
 What the person does comes from the parameter set's [operator] table; times count from power-up.
 """
@@ -15,8 +15,8 @@ PIN_ORDER = STAGE_PINS * 256 + 128
 # steering machine takes 4e-5 * (width in 1/60 us) - 3.4 for the stick (robot.md C1.6), so the
 # centre is 85,000 ticks = 1.4167 ms and one unit is 25,000 ticks = 0.4167 ms; 20 ms is the hobby standard.
 CENTRE_NS, REACH_NS, FRAME_NS = 1_416_667, 416_667, 20_000_000
-# The receiver's wire lies beside the motors' leads, and the robot's board told of RCX_BAD_LVLS (robot.md T3): spikes
-# that end before the interrupt looks at the pin, 0.4 us later, so both of their edges have one stamp here. How often is
+# The receiver's wire runs next to the motors' leads, and the robot's board reported RCX_BAD_LVLS (robot.md T3): spikes
+# that end before the interrupt reads the pin, 0.4 us later, so both of their edges have one stamp here. Their rate is
 # chosen by us: in one pause of 200, so every 4 s.
 SPIKE_SHARE = 0.005
 
@@ -45,20 +45,20 @@ class Operator:
             self.press(press.key, start_ns + round(press.time_s * 1e9), round(press.hold_s * 1e9))
 
     def press(self, key: int, time_ns: int, hold_ns: int) -> None:
-        """Key 0-5 goes down at `time_ns` and up `hold_ns` later."""
+        """Press key 0-5 at `time_ns` and release it `hold_ns` later."""
         pin = wiring.PINS["UI"][f"key_{key}"]
         self.inbox.push(time_ns, PIN_ORDER, PIN_EDGE, pin, 1, -1, 0)
         self.inbox.push(time_ns + hold_ns, PIN_ORDER, PIN_EDGE, pin, 0, -1, 0)
 
     def act(self, until_ns: int) -> None:
-        """What is due before `until_ns`: radio pulses, letting go."""
+        """Do what is due before `until_ns`: radio pulses, letting go."""
         pin = wiring.PINS["UI"]["radio_0"]
         while self.next_radio_ns < until_ns:
             width = CENTRE_NS + round(REACH_NS * self.stick)
             self.inbox.push(self.next_radio_ns, PIN_ORDER, PIN_EDGE, pin, 1, -1, 0)
             self.inbox.push(self.next_radio_ns + width, PIN_ORDER, PIN_EDGE, pin, 0, -1, 0)
             if self.spikes.uniform() < SPIKE_SHARE:
-                # in the pause between two pulses; the board's interrupt finds the level that it knows already
+                # in the pause between two pulses; the board's interrupt finds the level unchanged
                 spike_ns = self.next_radio_ns + FRAME_NS // 2 + self.spikes.integer(FRAME_NS // 4)
                 self.inbox.push(spike_ns, PIN_ORDER, PIN_EDGE, pin, 1, -1, 0)
                 self.inbox.push(spike_ns, PIN_ORDER, PIN_EDGE, pin, 0, -1, 0)

@@ -1,7 +1,7 @@
 """The whole robot, wired: seven boards, four buses, one link, one body.
 
-Follow the loop here: `Ranger.__init__` builds the plant and the boards; harness/machine.py connects them and the buses
-by the tables of harness/wiring/ranger.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
+`Ranger.__init__` builds the plant and the boards; harness/machine.py connects them and the buses by the tables of
+harness/wiring/ranger.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from ranger_sim.harness.processes.apart import Apart
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
-# Boards get their power together but their resets and start-up code differ: first slots spread over 2 ms.
+# Boards are powered up together but their resets and start-up code differ: first slots spread over 2 ms.
 POWER_UP_SPREAD_NS = 2_000_000
 GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
 
@@ -102,7 +102,7 @@ class Ranger(Machine):
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.controller = controllers.load(self.scenario.controller)
-        # the controller's program brings its estimator with it
+        # the controller's program has its own estimator
         self.quirks = program(self.controller.program).switches(quirks if quirks is not None else Quirks())
         start_ns = self.scenario.start_uptime_ms * 1_000_000
         seed = self.scenario.seed
@@ -139,7 +139,7 @@ class Ranger(Machine):
         for name in self.images:
             if name in self.firmware:
                 raise UserError(f"{name} is to run both {self.firmware[name].folder} and {self.images[name].path}")
-        # interrupts and slots: each board on its own crystal, powered up in its own moment
+        # interrupts and slots: each board on its own crystal, powered up at its own time
         boards = {name: self.new_board(name, start_ns + self._stream(name)[1]) for name in BOARD_CLASSES}
         if "CSR" not in self.images:
             boards["CSR"].time.ms = self.scenario.start_uptime_ms
@@ -167,12 +167,12 @@ class Ranger(Machine):
         self.catalogue = CATALOGUE
 
     def _stream(self, board: str) -> tuple[Any, int]:
-        """(crystal, power-up instant after the robot's in ns) of a board, drawn from the scenario's seed."""
+        """(crystal, power-up time after the robot's in ns) of a board, drawn from the scenario's seed."""
         stream = RandomStream(self.scenario.seed, f"board {board}")
         return seeded_crystal(stream), stream.integer(POWER_UP_SPREAD_NS)
 
     def _try_firmware(self, start_ns: int) -> None:
-        """Start each program once in a process that it may end. UserError where it does."""
+        """Start each program once in a process that it may crash. UserError where it does."""
         for name, firmware in self.firmware.items():
 
             def start(record: Any, name: str = name) -> None:
@@ -185,13 +185,13 @@ class Ranger(Machine):
                 self.printed.drop(name)  # its program will print that again
 
     def _printing(self, board: str) -> contextlib.AbstractContextManager[None]:
-        """Inside, what programs in C print in this process is the output of `board`."""
+        """Within it, output of programs in C in this process counts as output of `board`."""
         return self.printed.during(board) if self.printed is not None else contextlib.nullcontext()
 
     def new_board(self, name: str, power_up_ns: int, record: Any = None) -> Any:
-        """A board fresh from the shelf, with its own crystal, powered up at `power_up_ns`; not wired.
+        """A new, unwired board with its own crystal, powered up at `power_up_ns`.
 
-        record: memory in which a program in C leaves where it was when it ended this process.
+        record: memory in which a program in C leaves its position when it ends this process.
         """
         crystal = self._stream(name)[0]
         if name in self.firmware:
@@ -200,7 +200,7 @@ class Ranger(Machine):
             with self._printing(name):
                 board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
             board.counts = self.firmware[name].counts
-            if record is None and self.is_watched:  # one that takes another's place
+            if record is None and self.is_watched:  # it replaces another board
                 self._watch(board)
             return board
         if name in self.images:
@@ -214,12 +214,12 @@ class Ranger(Machine):
         return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
 
     def _connect(self) -> None:
-        """Solder every wire of the tables, and what only Ranger has: the serial link and the inertial unit."""
+        """Connect every wire of the tables, and what only Ranger has: the serial link and the inertial unit."""
         Machine._connect(self)
         loop, boards = self.loop, self.boards
         for name in wiring.HEAR_IN_SLOTS:
             if name in self.images:
-                continue  # nobody knows what its handlers do
+                continue  # what its handlers do is unknown
             if name not in self.firmware or boards[name].scheduler.announces:  # else its handlers may send
                 loop.hears_in_its_slots(boards[name])
         loop.connect_link(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment())
@@ -230,9 +230,9 @@ class Ranger(Machine):
     # --- passing time -------------------------------------------------------------------------------------
 
     def start(self) -> Apart | None:
-        """Give each board that is to have a process of its own that process, if that has not been done.
+        """Start a process for each board that is to have its own, if that has not been done.
 
-        A program in C that runs in this process is watched from now on.
+        A program in C that runs in this process is monitored from now on.
         """
         if self.processes is None and self.in_own_process:
             from ranger_sim.harness.processes.apart import Apart
@@ -247,7 +247,7 @@ class Ranger(Machine):
         return self.processes
 
     def _watch(self, board: Any) -> None:
-        """From now on the program of a board in this process says where it was when it ends it."""
+        """Let the program of a board in this process record its position if it ends the process."""
         firmware = self.firmware[board.name]
         if board.counts is not None:
             os.environ[coverage.PREFIX] = str(board.counts)  # for a crash, which writes them as well
@@ -256,7 +256,7 @@ class Ranger(Machine):
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
         """Pass up to `slice_s` of virtual time; True when the stop rule is met, the robot fell or has no charge left.
 
-        A board whose process ends meanwhile is off its buses from then on, and stands in `deaths`.
+        A board whose process ends meanwhile is off its buses from then on, and is listed in `deaths`.
         """
         __tracebackhide__ = True
         apart = self.start()
@@ -272,9 +272,9 @@ class Ranger(Machine):
                 self.printed.poll()
 
     def until(self, wanted: Wanted, within: Duration = "60 s") -> float:
-        """Pass time until a condition holds, as any machine does.
+        """Pass time until a condition holds, as for any machine.
 
-        What boards noted that run in processes of their own is asked of them at each step then, which takes time.
+        Boards in separate processes are then asked for their errors at each step, which takes time.
         """
         __tracebackhide__ = True
         wanted = self.condition(wanted)
@@ -289,25 +289,25 @@ class Ranger(Machine):
             self.loop.watchers.remove(asking)
 
     def counters(self) -> dict[str, Any]:
-        """What every board counted by now, by its name."""
+        """Every board's counters until now, by its name."""
         if self.processes is not None:
             self.processes.fetch_counters()
         return Machine.counters(self)
 
     def inject(self, *place_and_mode: Any, **more: Any) -> Any:
-        """Arm a fault, as any machine does.
+        """Arm a fault, as for any machine.
 
-        Processes of boards begin now, so that a fault that would have to be inside one is refused.
+        Board processes start now, so that a fault that would have to be inside one is refused.
         """
         self.start()
         return Machine.inject(self, *place_and_mode, **more)
 
     def act(self, end_ns: int) -> None:
-        """The operator: holds the robot, lets it go, presses keys."""
+        """Act as the operator: hold the robot, let it go, press keys."""
         self.operator.act(end_ns)
 
     def condition(self, wanted: Wanted) -> Condition:
-        """The condition that is written in `wanted` (harness/conditions.py)."""
+        """The condition described by `wanted` (harness/conditions.py)."""
         return condition(wanted)
 
     @property
@@ -330,7 +330,7 @@ class Ranger(Machine):
         return self.distance_m / self.walked_s if self.walked_s > 0.0 else 0.0
 
     def fraction_done(self, stop: StopRule) -> float:
-        """How much of the stop rule is reached, 0 ... 1."""
+        """How much of the stop rule is done, 0 ... 1."""
         shares = [0.0]
         if stop.steps is not None:
             shares.append(self.steps / stop.steps)
@@ -340,9 +340,9 @@ class Ranger(Machine):
             shares.append(self.distance_m / stop.distance_m)
         return min(1.0, max(shares))
 
-    # --- looking in, reaching in --------------------------------------------------------------------------
+    # --- inspection and changes ---------------------------------------------------------------------------
 
-    @overload  # type: ignore[override]  # here a name that is none is a fault of types, too
+    @overload  # type: ignore[override]  # here an unknown name is a type error, too
     def board(self, name: Literal["MCH"]) -> HipBoard: ...
     @overload
     def board(self, name: Literal["MCFO"]) -> OuterFeetBoard: ...
@@ -357,7 +357,7 @@ class Ranger(Machine):
     @overload
     def board(self, name: Literal["MB"]) -> MainBrainBoard: ...
     def board(self, name: str) -> Any:
-        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB. UserError for another name, or one that is elsewhere."""
+        """The board MCH, MCFO, MCFI, MCSI, UI, CSR or MB. UserError for another name, or a board elsewhere."""
         board = Machine.board(self, name)
         if self.processes is not None and name in self.processes.names:
             raise UserError(
@@ -367,15 +367,15 @@ class Ranger(Machine):
         return board
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Write a parameter into the main brain's table now, as the computer's link would.
+        """Write a parameter into the main brain's table now, as the computer's link does.
 
-        UserError for what is no parameter, and for a value beyond its limits or that is no number.
+        UserError for a name that is not a parameter, and for a value beyond its limits or that is not a number.
         """
         row = parameters.parameter(name)
         self._write_word(row.id, parameters.checked_word(row, value))
 
     def _write_word(self, number: int, word: int) -> None:
-        """Into the main brain's table, as of its own clock; through the channel when it is in another process."""
+        """Write to the main brain's table, stamped by its clock; through the channel if in another process."""
         if self.loop.board("MB").apart:
             self.loop.board("MB").send(SET_WORD, self.loop.time, number, word)
             return
@@ -405,7 +405,7 @@ class Ranger(Machine):
         Machine.replace(self, board, task, function, cost, limit)
 
     def slots(self, board: BoardName) -> MachineSlots:
-        """The slots of a board from now on, or from the first time on that they were asked for (harness/timing)."""
+        """The slots of a board from the first request for them on (harness/timing)."""
         view: MachineSlots = Machine.slots(self, board)
         return view
 
@@ -416,7 +416,7 @@ class Ranger(Machine):
         return Recorded(self)
 
     def error_meaning(self, name: str) -> str:
-        """What an error code means, in the words of the master table."""
+        """The meaning of an error code, from the master table."""
         return self.names.descriptions.get(self.names.codes.get(name, -1), "")
 
     def machines(self) -> dict[str, StateWord]:
@@ -446,8 +446,8 @@ class Ranger(Machine):
                 self.processes.fetch_counters((name,))
 
     def close(self) -> None:
-        """Give back the log's files, the ends that lead outside, golden runs and the processes of boards."""
-        if self.counts is None and not self.lost:  # somebody else reads them
+        """Close the log's files, external connections, golden runs and the processes of boards."""
+        if self.counts is None and not self.lost:  # another process reads them
             self.write_counts()
         if self.processes is not None:
             self.processes.close()

@@ -1,4 +1,4 @@
-"""The names of Ranger's variables, boards and errors, out of what was generated from its master table."""
+"""The names of Ranger's variables, boards and errors, from the code generated from its master table."""
 
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.generated import errors as error_table

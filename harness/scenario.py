@@ -1,4 +1,4 @@
-"""What is to be run: one frozen record, checked when it is made."""
+"""The description of a run: one frozen record, checked when it is made."""
 
 import dataclasses
 import math

@@ -13,7 +13,7 @@ MOST_DISTANCE_M = 1e9
 
 @dataclasses.dataclass(frozen=True)
 class StopRule:
-    """When a walk is done: after so many steps, so much time, or so much distance; whichever comes first."""
+    """The end of a walk: after a number of steps, a time, or a distance; whichever comes first."""
 
     steps: int | None = None
     time_s: float | None = None

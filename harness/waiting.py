@@ -1,7 +1,7 @@
-"""Waiting for something in a machine: a condition is looked at between two steps of its plant.
+"""Waiting for something in a machine: a condition is checked between two steps of its plant.
 
-What any machine can be asked for stands here: an instant ("12.3 s"), a quantity of its body ("angle_rad > 0.5"), an
-error that a board notes ("error FOLLOWING from CONTROL"), its end, a function. Ranger's own: harness/conditions.py.
+This module has the conditions of any machine: a time ("12.3 s"), a quantity of its body ("angle_rad > 0.5"), an
+error that a board records ("error FOLLOWING from CONTROL"), its end, a function. Ranger's own: harness/conditions.py.
 """
 
 import array
@@ -28,18 +28,18 @@ COMPARED = rf"(\w+) ?(<=|>=|==|!=|<|>) ?({NUMBER})"
 
 
 class ConditionNotMetError(AssertionError):
-    """A condition was not met in its time; the text says what was nearest."""
+    """A condition was not met in its time; the message has the nearest value."""
 
 
 class Condition:
-    """`text`: as it was written. `begin(robot)` once, then `met()` as often as it is asked."""
+    """`text`: as written. Call `begin(robot)` once, then `met()` any number of times."""
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.robot: Any = None
 
     def begin(self, robot: Any) -> None:
-        """From now on the condition is about `robot`."""
+        """Apply the condition to `robot` from now on."""
         self.robot = robot
 
     def met(self) -> bool:
@@ -47,15 +47,15 @@ class Condition:
         raise NotImplementedError
 
     def nearest(self) -> str:
-        """How near it came since `begin`, for the message of a test that waited in vain."""
+        """The nearest value since `begin`, for the message of a test that waited in vain."""
         raise NotImplementedError
 
 
-Wanted = str | Condition | Callable[[Any], Any]  # as it is written
+Wanted = str | Condition | Callable[[Any], Any]  # as written
 
 
 class At(Condition):
-    """An instant, `time_ns` since power-up."""
+    """A time, `time_ns` since power-up."""
 
     def __init__(self, text: str, time_ns: int) -> None:
         Condition.__init__(self, text)
@@ -69,7 +69,7 @@ class At(Condition):
 
 
 class Ended(Condition):
-    """The machine can go no further: its plant says so."""
+    """The machine can go no further, as its plant reports."""
 
     def met(self) -> bool:
         return bool(self.robot.plant.fell)
@@ -79,7 +79,7 @@ class Ended(Condition):
 
 
 class Comparison(Condition):
-    """A quantity of the body against a number. `quantities`: {name: unit}, as the plant samples them."""
+    """A comparison of a quantity of the body with a number. `quantities`: {name: unit}, as the plant samples them."""
 
     def __init__(self, text: str, name: str, sign: str, value: float, quantities: Mapping[str, str]) -> None:
         Condition.__init__(self, text)
@@ -107,7 +107,7 @@ class Comparison(Condition):
         return self.compare(now, self.value)
 
     def unit(self) -> str:
-        """Of the quantity."""
+        """Unit of the quantity."""
         return self.quantities[self.name]
 
     def nearest(self) -> str:
@@ -115,7 +115,7 @@ class Comparison(Condition):
 
 
 class ErrorNoted(Condition):
-    """One of `boards` notes an error of `names`; `board` None: any of them."""
+    """One of `boards` records an error of `names`; `board` None: any of them."""
 
     def __init__(self, text: str, error: str, board: str | None, names: Names, boards: Sequence[str]) -> None:
         Condition.__init__(self, text)
@@ -133,11 +133,11 @@ class ErrorNoted(Condition):
         self.before = self.counts()
 
     def counts(self) -> list[int]:
-        """How often each of these boards noted it since its power-up."""
+        """How often each of these boards recorded it since its power-up."""
         return [self.count_of(self.robot.loop.board(name)) for name in self.boards]
 
     def count_of(self, board: Any) -> int:
-        """The same of a board, also of one in another process."""
+        """The same for one board, also of one in another process."""
         module = getattr(board, "errors", None)
         totals = module.totals if module is not None else board.counters().errors
         return int(totals[self.code]) if self.code < len(totals) else 0
@@ -145,7 +145,7 @@ class ErrorNoted(Condition):
     def met(self) -> bool:
         now = self.counts()
         noted = any(count > before for count, before in zip(now, self.before, strict=True))
-        self.before = [min(pair) for pair in zip(now, self.before, strict=True)]  # a board that begins anew counts anew
+        self.before = [min(pair) for pair in zip(now, self.before, strict=True)]  # a restarted board counts anew
         return noted
 
     def nearest(self) -> str:
@@ -167,7 +167,7 @@ class Function(Condition):
 
 
 def instant(text: str) -> At | None:
-    """The condition of a text like "12.3 s"; None for another one."""
+    """The condition of a text like "12.3 s"; None for other texts."""
     seconds = in_base_units(text, TIMES) if re.search(r"[a-z]$", text) else None
     return At(text, round(seconds * 1e9)) if seconds is not None and seconds >= 0.0 else None
 
@@ -175,8 +175,8 @@ def instant(text: str) -> At | None:
 def condition(
     wanted: Wanted, quantities: Mapping[str, str], names: Names | None = None, boards: Sequence[str] = ()
 ) -> Condition:
-    """The condition that is written in `wanted`, or is it already, for a machine of these `boards` whose plant samples
-    `quantities` and whose table has `names`.
+    """Make the condition of `wanted`, a text or already a condition, for a machine of these `boards` whose plant
+    samples `quantities` and whose table has `names`.
     """
     if isinstance(wanted, Condition):
         return wanted

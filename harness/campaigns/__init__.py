@@ -1,1 +1,1 @@
-"""Campaigns: many runs of one plan, each with a fault or a changed parameter, and what they add up to."""
+"""Campaigns: many runs of one plan, each with a fault or a changed parameter, and their totals."""

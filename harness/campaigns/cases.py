@@ -15,7 +15,7 @@ from ranger_sim.harness.campaigns.walks import WALKS
 from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.scenario import Scenario
 
-# What decides the outcome of a run: these rooms' sources and data.
+# What decides the outcome of a run: the sources and data of these packages.
 ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness")
 SOURCES = {".py", ".pxd", ".toml", ".csv"}
 
@@ -51,22 +51,22 @@ class Settings:
 
     @property
     def subject(self) -> Any:
-        """What it is of: makes it, knows its faults, judges it."""
+        """The subject of its runs: makes the machine, has its faults, judges it."""
         return subject_of(self.machine)
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON can carry it; the same settings give the same text."""
+        """As plain types for JSON; the same settings give the same text."""
         found: dict[str, Any] = {
             name: dict(sorted(value.items())) for name, value in dataclasses.asdict(self).items() if name != "machine"
         }
         return {**found, "machine": self.machine} if self.machine else found
 
     def text(self) -> str:
-        """Canonical, for keys and for grouping."""
+        """Canonical text, for keys and for grouping."""
         return json.dumps(self.as_dict(), sort_keys=True)
 
     def robot(self) -> Any:
-        """A fresh robot, or machine, with these settings. UserError for what it does not have."""
+        """A new robot, or machine, with these settings. UserError for settings that it does not have."""
         robot = self.subject.machine(self.walk) if self.machine else self._ranger()
         for task, factor in self.costs.items():
             board, _, entry = task.partition(".")
@@ -98,12 +98,12 @@ class Settings:
 
 
 def subject_of(machine: str) -> Any:
-    """Of Settings.machine."""
+    """The subject of Settings.machine."""
     return own_machine(machine) if machine else WALKS
 
 
 def written(path: pathlib.Path, base: str, values: dict[str, float], explained: str) -> str:
-    """A parameter file over `base` with these values; returns its name."""
+    """Write a parameter file over `base` with these values; returns its name."""
     lines = [f"base = {json.dumps(str(base))}", "", "[parameters]"]
     lines += [f"{name} = {value!r}" for name, value in values.items()]
     lines += ["", f"[{explained}]", *(f'{name} = "set by a campaign"' for name in values)]
@@ -113,7 +113,7 @@ def written(path: pathlib.Path, base: str, values: dict[str, float], explained: 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One run. `fault` as it is typed, None for a sweep of settings; `reference`: of the golden run, where other.
+    """One run. `fault` as typed, None for a sweep of settings; `reference`: of the golden run, where other.
 
     axes: what the plan varied, by name, for the tables; it is not part of the key.
     """
@@ -124,12 +124,12 @@ class Case:
     axes: dict[str, Any] = dataclasses.field(default_factory=dict, compare=False)
 
     def key(self, version: str, watch: dict[str, Any]) -> str:
-        """By this a result is known: what was run, by which version, and how it was watched."""
+        """Key of a result: what was run, by which version, and how it was monitored."""
         settings = self.settings.as_dict()
         whole: dict[str, Any] = {"settings": settings, "fault": self.fault, "version": version, "watch": watch}
         if self.reference is not None:
             whole["reference"] = self.reference.as_dict()
-        if self.settings.machine:  # wherever its folder is; what is in it, the version says
+        if self.settings.machine:  # independent of its folder; the version covers the content
             for each in (settings, whole.get("reference", {})):
                 each.pop("machine", None)
         return hashlib.blake2b(json.dumps(whole, sort_keys=True).encode(), digest_size=10).hexdigest()

@@ -2,7 +2,7 @@
 
 A client of a Dask scheduler can run code as the scheduler's user. Each part of this cluster therefore accepts only
 connections with the cluster's own certificate, which is made for one campaign. The HTTP servers that Dask starts in
-every part (port 8787, the dashboard) ask for no certificate, so they are left out.
+every part (port 8787, the dashboard) require no certificate, so they are left out.
 """
 
 import logging
@@ -16,10 +16,10 @@ LOOPBACK = "127.0.0.1"
 
 
 class NoPages:
-    """Of a part of the cluster: it starts no HTTP server."""
+    """A part of the cluster that starts no HTTP server."""
 
     def start_http_server(self, *_arguments: Any, **_settings: Any) -> None:
-        """Nothing listens for HTTP."""
+        """Start no HTTP server."""
 
 
 class Scheduler(NoPages, distributed.Scheduler):
@@ -31,7 +31,7 @@ class Worker(NoPages, distributed.Worker):
 
 
 class OwnCluster:
-    """A scheduler in this process and `jobs` workers of one thread in processes of their own."""
+    """A scheduler in this process and `jobs` workers of one thread in separate processes."""
 
     def __init__(self, jobs: int) -> None:
         security: Any = distributed.Security.temporary()  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""Runs a plan: healthy walks first, then every run that is not on the disk yet, in groups with one golden run each."""
+"""Runs a plan: healthy walks first, then every run that is not on disk yet, in groups with one golden run each."""
 
 import hashlib
 import json
@@ -14,10 +14,10 @@ from ranger_sim.harness.campaigns.plan import Plan, Range, combinations
 from ranger_sim.harness.campaigns.statistics import Stopping
 from ranger_sim.harness.campaigns.store import Store
 
-# Runs of a group: few enough that a group's results are not long on the way and the workers end together, many enough
+# Runs of a group: few enough that a group's results arrive soon and the workers end together, many enough
 # that its golden run, walked twice (3 s of computing), is shared: chosen by us.
 MOST_IN_A_GROUP = 16
-# A golden run, walked twice, costs what three runs do: a round of a search is not dealt out one by one.
+# A golden run, walked twice, costs what three runs do: a round of a search is not distributed one by one.
 LEAST_IN_A_GROUP = 4
 NARROWER = 0.5  # of a search's box, from round to round
 FIRST_BOX = 0.25  # half its width in the first round, of the whole range
@@ -39,14 +39,14 @@ class Campaign:
         self.version = version(plan.machine)
         self.store = Store(jsonl(folder))
         self.cases: list[Case] = []
-        self.stopped_at: int | None = None  # look at which a sample had told enough
+        self.stopped_at: int | None = None  # look at which a sample sufficed
 
     def key(self, case: Case) -> str:
-        """By which the result of a case is known."""
+        """The key under which the result of a case is stored."""
         return case.key(self.version, self.plan.watch_key())
 
     def result(self, case: Case) -> Result | None:
-        """The result of a case, when it is there; None as well for one that timed out and has more time now."""
+        """The stored result of a case, or None; None as well for one that timed out and has more time now."""
         found = self.store.results.get(self.key(case))
         if found is not None and found["outcome"] == "timed out" and found["limit_s"] < self.plan.watch.limit_s:
             return None
@@ -54,7 +54,7 @@ class Campaign:
 
     @property
     def foreseen(self) -> int:
-        """How many runs the plan will come to, at most."""
+        """The most runs that the plan can have."""
         plan = self.plan
         if plan.sample:
             return plan.sample.runs
@@ -63,7 +63,7 @@ class Campaign:
         return len(self.cells()) * (plan.search.first + plan.search.rounds * plan.search.each)
 
     def run(self, pool: Any, tell: Callable[[int, str], None]) -> None:
-        """Do what is missing. `tell(done, what)` after every result; `pool`: of pools.py."""
+        """Run what is missing. It calls `tell(done, what)` after every result; `pool`: of pools.py."""
         plan = self.plan
         self.cases, self.stopped_at = [], None
         if plan.search:
@@ -85,13 +85,13 @@ class Campaign:
                 break
 
     def settled(self, stopping: Stopping, look: int) -> bool:
-        """Whether the sample, which is whole up to look number `look`, has told enough."""
+        """Whether the sample, complete up to look number `look`, suffices."""
         self.stopped_at = look
         hits = sum((self.result(case) or {}).get("outcome") == stopping.outcome for case in self.cases)
         return stopping.decides(stopping.interval(hits, len(self.cases), look))
 
     def take_known(self) -> None:
-        """The runs decided on that have results, as far as the plan had come when it was left; nothing is run."""
+        """The runs decided on that have results, as far as the plan was carried out; nothing is run."""
         plan = self.plan
         self.cases, self.stopped_at = [], None
         if plan.search:
@@ -114,7 +114,7 @@ class Campaign:
         self.stopped_at = None if len(self.cases) < len(cases) else self.stopped_at
 
     def do(self, cases: list[Case], pool: Any, tell: Callable[[int, str], None]) -> None:
-        """Run those of `cases` whose results are not there."""
+        """Run those of `cases` whose results are missing."""
         keys = {self.key(case): case for case in cases if self.result(case) is None}
         groups: dict[str, list[tuple[str, Case]]] = {}
         for key, case in keys.items():
@@ -146,17 +146,17 @@ class Campaign:
 
     @property
     def done(self) -> int:
-        """Of the cases decided on, how many have results."""
+        """The number of decided cases that have results."""
         return sum(self.result(case) is not None for case in self.cases)
 
     def healthy_key(self, golden: Settings) -> str:
-        """By which the healthy walks with these settings (of any seed) are known."""
+        """The key of the healthy walks with these settings (of any seed)."""
         walk = {name: value for name, value in golden.walk.items() if name != "seed"}
         whole = {**golden.as_dict(), "walk": walk, "version": self.version, "watch": self.plan.watch_key()}
         return "healthy-" + hashlib.blake2b(json.dumps(whole, sort_keys=True).encode(), digest_size=8).hexdigest()
 
     def healthy(self, goldens: list[Settings], pool: Any, tell: Callable[[int, str], None]) -> dict[str, Result]:
-        """What healthy walks raise, for each of these settings; walked when it is not there."""
+        """What healthy walks raise, for each of these settings; walked when it is missing."""
         wanted = {self.healthy_key(golden): golden for golden in goldens}
         requests = [
             {
@@ -179,7 +179,7 @@ class Campaign:
         return None if found is None else found["healthy"]
 
     def healthy_results(self) -> list[Result]:
-        """What there is of healthy walks."""
+        """The stored results of healthy walks."""
         goldens = {self.healthy_key(case.golden()) for case in self.cases}
         return [self.store.results[key] for key in sorted(goldens) if key in self.store.results]
 
@@ -213,7 +213,7 @@ class Campaign:
         return list(combinations({name: each for name, each in self.plan.axes.items() if not isinstance(each, Range)}))
 
     def close(self) -> None:
-        """Let another one write the results."""
+        """Release the results for another writer."""
         self.store.close()
 
 

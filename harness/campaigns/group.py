@@ -1,10 +1,10 @@
-"""A group of runs with one golden run: walked once for its record, and once more to branch the runs off it.
+"""A group of runs with one golden run: walked once for its record, and again to branch the runs off it.
 
     python -m ranger_sim.harness.campaigns.group     # one request as a line of JSON in, one result a line out
 
-The process has one thread, so it may fork; whatever deals the groups out (threads, Dask's workers) starts one for each
-group. A fault's run branches off `BRANCH_EARLY_NS` before the fault begins in the golden run, so that the walk
-before it is paid for once per group; a sweep of settings differs from power-up on and branches there.
+The process has one thread, so it may fork; whatever distributes the groups (threads, Dask's workers) starts one process
+for each group. A fault's run branches off `BRANCH_EARLY_NS` before the fault begins in the golden run, so that the walk
+before it is computed once per group; a sweep of settings differs from power-up on and branches there.
 """
 
 import dataclasses
@@ -29,11 +29,11 @@ from ranger_sim.harness.machine import GRID_NS, Machine
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.stop_rule import StopRule
 
-# Before the fault begins, so that what looks back a little (a delay line, the last edge) has something to look at:
-# chosen by us, a tenth of a step.
+# Before the fault begins, so that state with a short history (a delay line, the last edge) is filled: chosen by us, a
+# tenth of a step.
 BRANCH_EARLY_NS = 60_000_000
 SLICE_NS = 250_000_000
-WALL_PER_CPU = 20.0  # a run that got so little of the processor hangs
+WALL_PER_CPU = 20.0  # a run with less of the processor than that hangs
 
 BAND = tuple(field.name for field in dataclasses.fields(Band))  # of Ranger's walks
 
@@ -42,10 +42,10 @@ Result = dict[str, Any]
 
 @dataclasses.dataclass(frozen=True)
 class Watch:
-    """How runs are watched: `after_s` from the fault's start on; golden runs look for starts until `patience_s`.
+    """How runs are monitored: `after_s` from the fault's start on; golden runs look for starts until `patience_s`.
 
-    from_s: where the gait of a run without a fault is judged from. limit_s: of computing, per run. band: of a machine
-    of one's own {quantity: how far it may be from the golden run's}.
+    from_s: from where the gait of a run without a fault is judged. limit_s: of computing, per run. band: of a user's
+    machine, {quantity: how far it may be from the golden run's}.
     """
 
     after_s: float = 7.0
@@ -55,18 +55,18 @@ class Watch:
     band: Band | dict[str, float] = dataclasses.field(default_factory=Band)
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON can carry it."""
+        """As plain types for JSON."""
         return dataclasses.asdict(self)
 
     @classmethod
     def from_dict(cls, found: dict[str, Any]) -> "Watch":
-        """The same from what `as_dict` gave."""
+        """The same from the result of `as_dict`."""
         band = found["band"]
         return cls(**{**found, "band": Band(**band) if set(band) == set(BAND) else band})
 
 
 class Probe(StepWatch):
-    """When a start condition first holds in a run without the fault, `met_ns`; -1: not yet."""
+    """Finds when a start condition first holds in a run without the fault, `met_ns`; -1: not yet."""
 
     def __init__(self, robot: Machine, text: str) -> None:
         StepWatch.__init__(self)
@@ -82,7 +82,7 @@ class Probe(StepWatch):
 
 
 def digest_of(path: str) -> str:
-    """Of a file's content. UserError when it cannot be read."""
+    """Digest of a file's content. UserError when it cannot be read."""
     try:
         return hashlib.blake2b(pathlib.Path(path).read_bytes(), digest_size=16).hexdigest()
     except OSError as error:
@@ -90,7 +90,7 @@ def digest_of(path: str) -> str:
 
 
 def start_of(fault: str) -> str:
-    """When a typed fault begins, as a condition; at once, when it does not say."""
+    """When a typed fault begins, as a condition; at once by default."""
     return typed_text.parse(fault).start or "0 s"
 
 
@@ -101,7 +101,7 @@ def walk_until(robot: Machine, end_ns: int) -> None:
 
 
 class Golden:
-    """The golden run of a group: its record, when each start came, and what its gait is from there on."""
+    """The golden run of a group: its record, the time of each start, and its gait from there on."""
 
     def __init__(self, settings: Settings, starts: set[str], watch: Watch) -> None:
         self.subject = settings.subject
@@ -110,7 +110,7 @@ class Golden:
         probes = {text: Probe(robot, text) for text in sorted(starts)}
         robot.loop.watchers.extend(probes.values())
         self.starts: dict[str, int] = {}
-        # Whole nanoseconds: sums of seconds may be a last digit beyond what the clock can reach.
+        # Whole nanoseconds: sums of seconds may be a last digit beyond what the clock can represent.
         after_ns, patience_ns = round(watch.after_s * 1e9), robot.start_ns + round(watch.patience_s * 1e9)
         end_ns = robot.start_ns + round(watch.from_s * 1e9) + after_ns if not probes else 0
         while not robot.ended:
@@ -129,9 +129,9 @@ class Golden:
         self.known: dict[int, Healthy] = {}
 
     def healthy(self, others: Healthy | None, until_ns: int) -> Healthy:
-        """What is normal for a run that ends at `until_ns`: what other walks raise, and this one until then.
+        """What is normal for a run that ends at `until_ns`: what other walks raise, and this one until that time.
 
-        Not more of this one, so that a result does not depend on which runs were in its group.
+        Not more of this one, so that a result does not depend on the other runs of its group.
         """
         if until_ns not in self.known:
             own = Healthy.of([self.record.until(until_ns)])
@@ -140,11 +140,11 @@ class Golden:
 
 
 def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
-    """Run the cases of a request and `emit` the result of each as soon as it is there.
+    """Run the cases of a request and `emit` the result of each as soon as it is available.
 
     request: version, settings of the golden run, watch, healthy (`Healthy.as_dict`), fault_module
     (name and digest, or None), cases: [{key, fault, settings}].
-    UserError when this installation has other sources than the one that asks.
+    UserError when this installation has other sources than the requester's.
     """
     settings = Settings(**request["settings"])
     here = version(settings.machine)
@@ -183,7 +183,7 @@ def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
 
 
 def finished(case: dict[str, Any], work: Callable[[], Result], watch: Watch) -> Result:
-    """The result of a case, run in a branch; also when the branch gave none."""
+    """The result of a case, run in a branch; also when the branch returned none."""
     begun = wallclock.monotonic_s()
     try:
         result = branch(work, watch.limit_s, WALL_PER_CPU * watch.limit_s)
@@ -196,7 +196,7 @@ def finished(case: dict[str, Any], work: Callable[[], Result], watch: Watch) -> 
 def fault_run(
     text: str, robot: Machine, evidence: Evidence, golden: Golden, healthy: Healthy | None, watch: Watch
 ) -> Result:
-    """In the branch: inject, walk on, and hold the record against the golden one."""
+    """In the branch: inject, walk on, and compare the record with the golden one."""
     try:
         fault = robot.arm(robot.catalogue.typed(text))
     except UserError as refused:
@@ -217,7 +217,7 @@ def fault_run(
 
 
 def alone(case: Case, watch: Watch, healthy: dict[str, Any] | None) -> Result:
-    """A case in this process, from power-up, without any branch: the same result as a group gives."""
+    """Run a case in this process, from power-up, without a branch: the same result as in a group."""
     normal = Healthy.from_dict(healthy) if healthy else None
     starts = {start_of(case.fault)} if case.fault else set()
     golden = Golden(case.golden(), starts, watch)
@@ -228,7 +228,7 @@ def alone(case: Case, watch: Watch, healthy: dict[str, Any] | None) -> Result:
 
 
 def sweep_run(case: dict[str, Any], golden: Golden, healthy: Healthy | None, watch: Watch) -> Result:
-    """In the branch: another robot from power-up, held against the golden one of the plan's own settings."""
+    """In the branch: another robot from power-up, compared with the golden one of the plan's own settings."""
     try:
         robot = Settings(**case["settings"]).robot()
     except UserError as refused:
@@ -261,9 +261,9 @@ def slots_of(robot: Machine) -> Result:
 def judged(
     subject: Any, proof: Proof, golden: Record, record: Record, since_ns: int, watch: Watch, is_sweep: bool = False
 ) -> Result:
-    """Outcome, reason and what the proof has, as JSON can carry it; times in ms from the fault's start.
+    """Outcome, reason and the proof's content, as plain types for JSON; times in ms from the fault's start.
 
-    golden: its record until the instant at which this run was to end.
+    golden: its record until the time at which this run was to end.
     """
     verdict = subject.judge(proof, golden, record, since_ns, watch.band, is_sweep)
 
@@ -297,12 +297,12 @@ def judged(
 
 
 def rounded(value: Any) -> Any:
-    """Six digits of a number, for files that people read; anything else as it is."""
+    """Six digits of a number, for files that people read; other values unchanged."""
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def healthy_walks(settings: Settings, seeds: list[int], watch: Watch) -> Result:
-    """What walks of these seeds without a fault raise, and how often the rule for detection would cry wolf at them."""
+    """What walks of these seeds without a fault raise, and how many false alarms the rule for detection then gives."""
     records = []
     falls = []
     starts_s = settings.subject.starts_s
@@ -335,7 +335,7 @@ def request_of(
     version: str,
     fault_module: str | None = None,
 ) -> dict[str, Any]:
-    """What a worker is asked."""
+    """The request to a worker."""
     return {
         "version": version,
         "settings": golden.as_dict(),
@@ -350,7 +350,7 @@ def request_of(
 
 
 def answer(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
-    """Do what a request asks: runs of a group, or healthy walks."""
+    """Carry out a request: runs of a group, or healthy walks."""
     if "seeds" in request:
         watch = Watch.from_dict(request["watch"])
         found = healthy_walks(Settings(**request["settings"]), request["seeds"], watch)
@@ -360,20 +360,20 @@ def answer(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
 
 
 def main() -> int:
-    """One request on standard input; results on standard output. It ends with the process that has started it."""
+    """One request on standard input; results on standard output. It ends with its parent process."""
     die_with(os.getppid())
     results = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what a user's fault module prints is no result
+    os.dup2(2, 1)  # what a user's fault module prints is not a result
 
     def emit(result: Result) -> None:
         try:
             results.write(json.dumps(result) + "\n")
             results.flush()
-        except BrokenPipeError:  # the process that asked has ended: no result is of use any more
+        except BrokenPipeError:  # the requesting process has ended: results are useless
             os._exit(1)
 
     request = sys.stdin.readline()
-    if not request:  # who asked is gone already
+    if not request:  # the requester has ended already
         return 1
     try:
         answer(json.loads(request), emit)

@@ -1,11 +1,11 @@
-"""What a run came to, in one word, by criteria that are written down; the first that holds is the run's."""
+"""The outcome of a run in one word, by written criteria; the first that holds applies."""
 
 import dataclasses
 from typing import Any
 
 from ranger_sim.harness.faults.proof import Gait, Proof
 
-# name: criterion, in the order in which they are asked
+# name: criterion, in the order in which they are checked
 CRITERIA = {
     "crashed": "the simulation raised an exception, or its process died: a defect of ours, not of the robot",
     "timed out": "the run took more computing than its limit, or hung",
@@ -21,7 +21,7 @@ CRITERIA = {
     "undetected wrong": "the robot walks on with its gait outside the band, and no error tells of it",
 }
 OUTCOMES = tuple(CRITERIA)
-# How bad, for the order of worst cases and for searches; what proves nothing is not bad.
+# Severity, for the order of worst cases and for searches; a run that proves nothing has none.
 SEVERITY = {
     "damage": 5,
     "fall": 4,
@@ -50,7 +50,7 @@ class Band:
 
 
 def beyond(gait: Gait, golden: Gait, band: Band) -> str:
-    """What of the gait is outside its band, in a few words; empty when all is inside."""
+    """The gait's quantities outside their band, in a few words; empty when all are inside."""
     if gait.step_length_m is None or gait.step_time_s is None:
         return f"{gait.steps} steps made" if golden.step_length_m is not None else ""
     if golden.step_length_m is None or golden.step_time_s is None:
@@ -66,7 +66,7 @@ def beyond(gait: Gait, golden: Gait, band: Band) -> str:
 
 
 def deviation(gait: Gait, golden: Gait, band: Band) -> float:
-    """The largest deviation of the gait in parts of what is allowed; 2 where there is no gait left to measure."""
+    """The largest deviation of the gait in parts of what is allowed; 2 where no gait is left to measure."""
     if gait.step_length_m is None or gait.step_time_s is None:
         return 2.0
     if golden.step_length_m is None or golden.step_time_s is None or golden.motor_power_W <= 0.0:
@@ -79,7 +79,7 @@ def deviation(gait: Gait, golden: Gait, band: Band) -> float:
 
 
 def classify(proof: Proof, gait: Gait, golden: Gait, overload: str, band: Band) -> tuple[str, str]:
-    """(outcome, why) of a run that ended by itself. `overload`: what `proof.damage` says of it."""
+    """(outcome, why) of a run that ended by itself. `overload`: the result of `proof.damage` for it."""
     if not proof.acted:
         return "invalid", "the fault never acted"
     if overload:
@@ -98,9 +98,9 @@ def classify(proof: Proof, gait: Gait, golden: Gait, overload: str, band: Band) 
 def against_fallen(
     outcome: str, why: str, golden_fell_ms: float | None, golden_cause: str, is_sweep: bool
 ) -> tuple[str, str]:
-    """(outcome, why) beside a golden run that fell `golden_fell_ms` after the watching began; None: it stood.
+    """(outcome, why) with a golden run that fell `golden_fell_ms` after monitoring began; None: it did not fall.
 
-    Nothing that a faulty run does then is the fault's doing. A sweep's run that fell or was damaged did so by itself.
+    After such a fall, nothing is attributed to the fault. A sweep's run that fell or was damaged did so by itself.
     """
     if golden_fell_ms is None or (is_sweep and outcome in ("damage", "fall")):
         return outcome, why
@@ -108,7 +108,7 @@ def against_fallen(
 
 
 def severity(result: dict[str, Any]) -> float:
-    """How bad a result is: its outcome's rank, then how soon it fell, or how far its gait went."""
+    """How bad a result is: its outcome's rank, then how soon it fell, or how far its gait deviated."""
     rank = SEVERITY[result["outcome"]]
     if result.get("fall_ms") is not None:
         return rank + 1.0 / (1.0 + max(0.0, result["fall_ms"]) / 1e3)

@@ -1,6 +1,6 @@
-"""A campaign as a TOML file: what is run, how it is watched, what is asked of the results. README.md here has the form.
+"""A campaign as a TOML file: what is run, how it is monitored, what the results must meet. README.md here has the form.
 
-Whatever is wrong with a file is a UserError of one line: file, key, value, what is allowed.
+Any mistake in a file is a UserError of one line: file, key, value, what is allowed.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ from ranger_sim.harness.scenario import Scenario
 
 TEXTS = ("title", "description", "fault_module")
 TABLES = (*TEXTS, "walk", "machine", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
-# What may stand in [walk] and, with several values, in [vary]: the field of Scenario, and its units.
+# Keys of [walk] and, with several values, of [vary]: the field of Scenario, and its units.
 WALK: dict[str, tuple[str, dict[str, float] | None]] = {
     "controller": ("controller", None),
     "body": ("body", None),
@@ -37,9 +37,9 @@ WALK: dict[str, tuple[str, dict[str, float] | None]] = {
     "battery_capacity": ("battery_capacity_Wh", {"Wh": 1.0}),
 }
 PREFIXES = ("controller.", "body.", "cost.")
-OWN_PREFIXES = ("machine.", "cost.")  # of a machine of one's own
+OWN_PREFIXES = ("machine.", "cost.")  # of a user's machine
 MOST_RUNS = 1_000_000
-MOST_CHECKED = 10_000  # texts of one fault that are read before anything runs; of more, so many
+MOST_CHECKED = 10_000  # texts of one fault that are read before anything runs; of more, only this many
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Range:
     def size(self) -> int:
         """How many values a range with a step has."""
         assert self.step is not None
-        return 1 + math.floor((self.high - self.low) / self.step + 1e-9)  # with a last one that rounding put beyond
+        return 1 + math.floor((self.high - self.low) / self.step + 1e-9)  # includes a last one that rounding put beyond
 
     @property
     def values(self) -> list[float]:
@@ -82,14 +82,14 @@ class Range:
         return float(f"{value:.6g}")
 
     def text(self) -> str:
-        """For people."""
+        """Text for people."""
         told = f"{self.low:g} to {self.high:g}"
         return told + (f" by {self.step:g}" if self.step is not None else ", by factors" if self.log else "")
 
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """What is asked of a time: `share` of the runs within `limit_ms`, with `confidence` when they are a sample."""
+    """A requirement on a time: `share` of the runs within `limit_ms`, with `confidence` when they are a sample."""
 
     what: str  # "detection" or "reaction"
     limit_ms: float
@@ -110,9 +110,9 @@ class Sample:
 
 @dataclasses.dataclass(frozen=True)
 class Search:
-    """For the worst case: `first` runs spread over the ranges, then `rounds` of `each` around the worst so far.
+    """Search for the worst case: `first` runs spread over the ranges, then `rounds` of `each` around the worst so far.
 
-    least: the range whose smallest value with this `outcome` is looked for; None: what is worse by `severity`.
+    least: the range whose smallest value with this `outcome` is searched for; None: the worst by `severity`.
     """
 
     first: int = 12
@@ -129,7 +129,7 @@ class Search:
         return bool(result["outcome"] == self.outcome or (self.outcome == "fall" and result.get("fall_ms") is not None))
 
     def badness(self, value: float, result: dict[str, Any] | None) -> tuple[float, float]:
-        """By this runs are ordered, the worst last. `value`: of the range `least`, as a share of its length."""
+        """Sort key of runs, the worst last. `value`: of the range `least`, as a share of its length."""
         if self.least is not None and self.hits(result):
             return 1.0, -value
         return 0.0, severity(result or {"outcome": "invalid"})
@@ -154,12 +154,12 @@ class Plan:
 
     @property
     def subject(self) -> Any:
-        """What the runs are of (subjects.py)."""
+        """What the runs use as machine (subjects.py)."""
         return subject_of(self.machine)
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """The name of its files."""
         return pathlib.Path(self.path).stem
 
     @property
@@ -168,7 +168,7 @@ class Plan:
         return "sample" if self.sample else "search" if self.search else "census"
 
     def watch_key(self) -> dict[str, Any]:
-        """What of the watching decides results."""
+        """The settings of monitoring that affect results."""
         found = self.watch.as_dict()
         del found["limit_s"]
         if self.fault_module is not None:
@@ -176,7 +176,7 @@ class Plan:
         return {**found, "healthy_seeds": list(self.healthy_seeds)}
 
     def population(self) -> str:
-        """What the runs stand for, in a sentence."""
+        """The population that the runs represent, in a sentence."""
         parts = []
         for name, values in self.axes.items():
             if isinstance(values, Range):
@@ -238,7 +238,7 @@ def drawn(values: list[Any] | Range, stream: Any) -> Any:
 
 
 def shown(value: Any) -> str:
-    """A value as it stands in a fault's text."""
+    """A value as written in a fault's text."""
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -342,7 +342,7 @@ def machine_of(data: dict[str, Any], path: str) -> tuple[str, dict[str, Any]]:
 
 
 def module_of(data: dict[str, Any], path: str, subject: Any) -> str | None:
-    """`fault_module`, a file beside the plan: its modes and places are in the catalogue from here on."""
+    """`fault_module`, a file next to the plan: its modes and places are in the catalogue from here on."""
     name = data.get("fault_module")
     if name is None:
         return None
@@ -357,7 +357,7 @@ def module_of(data: dict[str, Any], path: str, subject: Any) -> str | None:
 
 
 def check_settings(settings: Settings, where: str) -> None:
-    """UserError, naming `where`, for settings of which no robot can be made."""
+    """UserError, naming `where`, for settings from which no robot can be made."""
     try:
         if not settings.machine:
             Scenario(**settings.walk)
@@ -414,7 +414,7 @@ def names_in(fault: str, path: str) -> set[str]:
 
 
 def is_setting(name: str, machine: str) -> bool:
-    """Whether an axis is something that is set before power-up, and not a name in a fault's text."""
+    """Whether an axis is a setting from before power-up, and not a name in a fault's text."""
     if machine:
         return name == "seed" or name.startswith(OWN_PREFIXES)
     return name in WALK or name.startswith(PREFIXES)
@@ -432,7 +432,7 @@ def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, lis
     if listed:
         if "fault" in axes:
             raise UserError(f"{path}: [vary] fault and [[faults]]: one of them")
-        axes["fault"] = listed  # last, so that a campaign that is cut short has every fault at the first of the starts
+        axes["fault"] = listed  # last, so that an interrupted campaign has every fault at the first of the starts
     used: set[str] = set()
     for fault in axes.get("fault", []):  # type: ignore[union-attr]
         used |= names_in(fault, path)
@@ -650,7 +650,7 @@ def only(data: dict[str, Any], allowed: tuple[str, ...], where: str) -> None:
 
 
 def table(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:
-    """A table of a file, empty when it is not there."""
+    """A table of a file, empty when it is missing."""
     value = data.get(key, {})
     if not isinstance(value, dict):
         raise UserError(f"{where}: {key} = {value!r}: a table is expected")

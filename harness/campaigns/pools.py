@@ -1,8 +1,8 @@
-"""Who does the runs: processes of this machine, or the workers of a Dask cluster.
+"""Pools that do the runs: processes of this machine, or the workers of a Dask cluster.
 
-Either way a group of runs has a process of its own (`group`), with one thread, so that it may fork; Dask's workers have
-several threads and start such a process for each group. What a process gave before it died is kept, the rest of its
-group is asked for again; a run at which `ATTEMPTS` processes died is "crashed".
+Either way a group of runs has its own process (`group`), with one thread, so that it may fork; Dask's workers have
+several threads and start such a process for each group. Results that a process returned before it died are kept, the
+rest of its group is requested again; a run at which `ATTEMPTS` processes died is "crashed".
 """
 
 import contextlib
@@ -28,7 +28,7 @@ Result = dict[str, Any]
 
 
 def process_for(request: Request) -> "subprocess.Popen[str]":
-    """A process that works on a request, which has been handed over. Ctrl-C is not for it but for who started it."""
+    """A process that works on a request, which it has received. Ctrl-C does not reach it, only its parent process."""
     process = subprocess.Popen(
         COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -40,12 +40,12 @@ def process_for(request: Request) -> "subprocess.Popen[str]":
 
 
 def asked(request: Request) -> list[str]:
-    """The keys that a request asks for."""
+    """The keys of a request's cases."""
     return [case["key"] for case in request["cases"]] if "cases" in request else [request["key"]]
 
 
 def without(request: Request, done: set[str]) -> Request | None:
-    """What is left of a request; None when nothing is."""
+    """What is left of a request; None when nothing is left."""
     if not set(asked(request)) - done:
         return None
     if "cases" not in request:
@@ -54,7 +54,7 @@ def without(request: Request, done: set[str]) -> Request | None:
 
 
 def results_of(request: Request, start: Callable[[Request], "subprocess.Popen[str]"] = process_for) -> Iterator[Result]:
-    """The results of a request, each as it comes, in as many processes as it takes. `start` gives one its request."""
+    """The results of a request, each as it arrives, in as many processes as needed. `start` starts one."""
     left: Request | None = request
     deaths = 0
     while left is not None:
@@ -100,7 +100,7 @@ class LocalPool:
         self.closed = False
 
     def run(self, requests: list[Request]) -> Iterator[Result]:
-        """The results of all requests, each as it comes."""
+        """The results of all requests, each as it arrives."""
         waiting: queue.Queue[Request] = queue.Queue()
         for request in requests:
             waiting.put(request)
@@ -113,7 +113,7 @@ class LocalPool:
                         results.put(result)
             except (queue.Empty, ClosedError):
                 pass
-            except BaseException as error:  # told to who waits for the results
+            except BaseException as error:  # raised where the results are awaited
                 results.put(error)
             results.put(None)
 
@@ -132,7 +132,7 @@ class LocalPool:
                 yield result
 
     def _start(self, request: Request) -> "subprocess.Popen[str]":
-        """A process for a request, in the calling thread; ClosedError when the pool has been closed."""
+        """Start a process for a request, in the calling thread; ClosedError when the pool has been closed."""
         with self.lock:
             if self.closed:
                 raise ClosedError
@@ -149,16 +149,16 @@ class LocalPool:
 
 
 def work_of(request: Request) -> list[Result]:
-    """What a Dask worker does: all results of a request."""
+    """The work of a Dask worker: all results of a request."""
     return list(results_of(request))
 
 
 class DaskPool:
     """The workers of a Dask cluster: that of the scheduler at `address`, or one of `jobs` workers on this machine.
 
-    The own one is encrypted, accepts its own certificate alone and is bound to the loopback address (dask_cluster.py).
-    tls: Dask's names of the files of certificates for `address` (`tls_ca_file`, `tls_client_cert`, `tls_client_key`).
-    A worker that dies gives nothing back; the scheduler gives its groups to another one. UserError when the
+    Our own cluster is encrypted, accepts only its own certificate and is bound to the loopback address
+    (dask_cluster.py). tls: Dask's names of the certificate files for `address` (`tls_ca_file`, `tls_client_cert`,
+    `tls_client_key`). A worker that dies returns nothing; the scheduler gives its groups to another one. UserError when
     scheduler cannot be reached or goes away.
     """
 
@@ -213,7 +213,7 @@ class DaskPool:
             self.client.cancel([future for future in futures if not future.done()])
 
     def close(self) -> None:
-        """Leave the cluster; end it when it is ours."""
+        """Leave the cluster; end it when it is our own."""
         self.client.close()
         if self.cluster is not None:
             self.cluster.close()

@@ -1,12 +1,12 @@
 """Intervals that fit a campaign's design, and rules for stopping early.
 
-A census asks every member of its population: its shares are exact, and no interval belongs to them. A random sample of
-a stated population has one: Clopper and Pearson's, which covers at least what it says, or Wilson's, which is shorter
-and covers it on the average. Looking at a growing sample again and again would break both; O'Brien and Fleming's or
-Pocock's bounds repair that: with them the interval may be looked at `looks` times and be believed at each.
+A census covers every member of its population: its shares are exact and have no interval. A random sample of
+a stated population has one: Clopper and Pearson's, which covers at least its nominal confidence, or Wilson's, which is
+shorter and covers it on average. Repeated looks at a growing sample would break both; O'Brien and Fleming's or
+Pocock's bounds repair that: with them the interval may be inspected at `looks` looks and is valid at each.
 
-Times are held against a tolerance interval of order statistics: it asks nothing of the distribution, and a run in which
-nothing was detected counts as later than any limit.
+Times are compared with a tolerance interval of order statistics: it assumes nothing about the distribution, and a run
+in which nothing was detected counts as later than any limit.
 
 Sources: Clopper and Pearson, Biometrika 26 (1934); Wilson, JASA 22 (1927); Wilks, Ann. Math. Stat. 12 (1941); Armitage,
 McPherson and Rowe, JRSS A 132 (1969) for the recursion; Jennison and Turnbull, "Group Sequential Methods" (2000),
@@ -27,12 +27,12 @@ CONFIDENCE = 0.95
 # Points of the grid on which the score statistic's density is carried from look to look: the integrands are smooth, and
 # four times as many change no bound in the fifth decimal.
 GRID_POINTS = 101
-WIDEST_Z = 8.0  # beyond it nothing is left of a standard normal: 1e-15
+WIDEST_Z = 8.0  # beyond it a standard normal has 1e-15 left
 
 
 @dataclasses.dataclass(frozen=True)
 class Share:
-    """`count` of `total`; from `low` to `high` with `confidence`, or exactly (None) when all were asked."""
+    """`count` of `total`; from `low` to `high` with `confidence`, or exactly (None) when it covers all members."""
 
     count: int
     total: int
@@ -42,7 +42,7 @@ class Share:
 
     @property
     def value(self) -> float:
-        """The share itself, 0-1; 0 of nothing is not a number."""
+        """The share itself, 0-1; NaN for 0 of 0."""
         return self.count / self.total if self.total else math.nan
 
 
@@ -54,7 +54,7 @@ def _check(count: int, total: int, confidence: float) -> None:
 
 
 def clopper_pearson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
-    """Exact interval: no share outside would give a count so extreme with more than (1 - confidence) / 2."""
+    """Exact interval: a share outside gives a count this extreme with at most (1 - confidence) / 2."""
     _check(count, total, confidence)
     tail = (1.0 - confidence) / 2.0
     low = 0.0 if count == 0 else float(stats.beta.ppf(tail, count, total - count + 1))
@@ -70,7 +70,7 @@ def wilson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
 
 
 def _score_interval(count: int, total: int, z: float) -> tuple[float, float]:
-    """The shares p of which `count` is not further than z sqrt(p (1 - p) total) away."""
+    """The shares p for which `count` differs from p total by at most z sqrt(p (1 - p) total)."""
     share, square = count / total, z * z / total
     middle = (share + square / 2.0) / (1.0 + square)
     half = z * math.sqrt(share * (1.0 - share) / total + square / (4.0 * total)) / (1.0 + square)
@@ -78,7 +78,7 @@ def _score_interval(count: int, total: int, z: float) -> tuple[float, float]:
 
 
 def census(count: int, total: int) -> Share:
-    """The share of a population of which every member was asked."""
+    """The share of a population of which every member was counted."""
     return Share(count, total)
 
 
@@ -88,7 +88,7 @@ def census(count: int, total: int) -> Share:
 def upper_tolerance(values: Sequence[float], share: float, confidence: float) -> float | None:
     """Limit below which at least `share` of the population lies, with `confidence`; None when there are too few values.
 
-    The limit is the smallest order statistic that serves: value number m with P(Binomial(n, share) < m) >= confidence.
+    The limit is the smallest sufficient order statistic: value number m with P(Binomial(n, share) < m) >= confidence.
     """
     ordered = sorted(values)
     place = tolerance_place(len(ordered), share, confidence)
@@ -96,7 +96,7 @@ def upper_tolerance(values: Sequence[float], share: float, confidence: float) ->
 
 
 def tolerance_place(total: int, share: float, confidence: float) -> int | None:
-    """Which order statistic (1 ... total) of `total` values is the upper tolerance limit; None: none serves."""
+    """Which order statistic (1 ... total) of `total` values is the upper tolerance limit; None: none suffices."""
     for name, value in (("share", share), ("confidence", confidence)):
         if not 0.0 < value < 1.0:
             raise UserError(f"tolerance: {name} is {value!r}, allowed is above 0 and below 1")
@@ -106,26 +106,26 @@ def tolerance_place(total: int, share: float, confidence: float) -> int | None:
 
 
 def shown_to_miss(within: int, total: int, share: float, confidence: float) -> bool:
-    """Whether `within` of `total` are so few that less than `share` of the population are, with `confidence`.
+    """Whether `within` of `total` shows, with `confidence`, that less than `share` of the population is within.
 
-    If just `share` were, so few would come with a probability of 1 - confidence at most: Clopper and Pearson, one side.
+    At exactly `share`, this few have a probability of at most 1 - confidence: Clopper and Pearson, one side.
     """
     return bool(stats.binom.cdf(within, total, share) <= 1.0 - confidence)
 
 
 def values_needed(share: float, confidence: float) -> int:
-    """The fewest values of which the largest is an upper tolerance limit (Wilks): 59 for 95 % with 95 %."""
+    """The fewest values whose largest is an upper tolerance limit (Wilks): 59 for 95 % with 95 %."""
     return math.ceil(math.log(1.0 - confidence) / math.log(share))
 
 
-# --- looking more than once -------------------------------------------------------------------------------------------
+# --- repeated looks --------------------------------------------------------------------------------------------------
 
 
 def crossing_probability(bounds: Sequence[float]) -> float:
     """P(|Z_k| >= bounds[k] at one of the looks) of a score statistic without effect, looks after equal shares of data.
 
-    S_k = sqrt(k) Z_k is a sum of k independent standard normals; its density is carried from look to look over what
-    has not crossed yet (Simpson's rule).
+    S_k = sqrt(k) Z_k is a sum of k independent standard normals; its density is carried from look to look over the
+    region not yet crossed (Simpson's rule).
     """
     inside = 1.0
     points = density = np.empty(0)
@@ -171,9 +171,10 @@ def _bounds(shape: list[float], error: float) -> list[float]:
 
 @dataclasses.dataclass(frozen=True)
 class Stopping:
-    """When a sample has told enough: at a look, the repeated interval of a class's share lies on one side of `limit`.
+    """When a sample suffices: at a look, the repeated interval of a class's share is on one side of `limit`.
 
-    runs: of the whole sample; looks: after how many equal parts of it one may stop; rule: "obrien-fleming" or "pocock".
+    runs: of the whole sample; looks: the number of equal parts after each of which it may stop; rule: "obrien-fleming"
+    or "pocock".
     """
 
     outcome: str
@@ -197,7 +198,7 @@ class Stopping:
         return RULES[self.rule](self.looks, 1.0 - self.confidence)
 
     def look_after(self, look: int) -> int:
-        """After how many runs look number `look` (from 1) is."""
+        """The number of runs after which look number `look` (from 1) happens."""
         return math.ceil(self.runs * look / self.looks)
 
     def interval(self, count: int, total: int, look: int) -> Share:
@@ -207,7 +208,7 @@ class Stopping:
         return Share(count, total, low, high, self.confidence)
 
     def decides(self, share: Share) -> bool:
-        """True when the interval leaves no doubt on which side of the limit the share is."""
+        """True when the interval is on one side of the limit."""
         return bool(share.low is not None and share.high is not None and not share.low <= self.limit <= share.high)
 
 

@@ -1,6 +1,6 @@
-"""Results on disk: one line of JSON each, there for good before the next is asked for.
+"""Results on disk: one line of JSON each, permanent before the next is requested.
 
-A campaign that is killed has lost nothing but the runs that were under way. A line that was being written when the
+A killed campaign loses only the runs that were in progress. A line that was being written when the
 machine stopped is cut off; a result that comes twice (a worker was thought dead) counts once; two campaigns cannot
 write one file at a time.
 """
@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 class Store:
-    """The file `path`, opened for one writer. `results`: {key: result}; `repeated`: results that came once more."""
+    """The file `path`, opened for one writer. `results`: {key: result}; `repeated`: results that came again."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self.path = path
@@ -46,7 +46,7 @@ class Store:
         self.file.seek(0, os.SEEK_END)
 
     def add(self, result: dict[str, Any]) -> bool:
-        """Keep a result; False when it is there already. It is on the disk when this returns."""
+        """Store a result; False when it exists already. It is on disk when this returns."""
         if result["key"] in self.results:
             self.repeated += 1
             return False
@@ -57,9 +57,9 @@ class Store:
         return True
 
     def forget(self, key: str) -> None:
-        """A result that is to be had anew; in the file the later one counts."""
+        """Forget a result that is to be computed again; in the file the later one counts."""
         self.results.pop(key, None)
 
     def close(self) -> None:
-        """Let another one write."""
+        """Release the file for another writer."""
         self.file.close()

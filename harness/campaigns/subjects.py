@@ -1,8 +1,8 @@
-"""What the runs of a campaign are of: Ranger's walks, or a machine of one's own, `[machine] make = "servo.py:new"`.
+"""The machine that a campaign runs: Ranger's walks, or a user's machine, `[machine] make = "servo.py:new"`.
 
-A subject makes the machine, knows its faults and conditions, and judges a run against the golden one. The outcomes are
-the same for all (outcomes.py); what "the gait" is differs: of an own machine the quantities of its body that [band]
-names, each with how far it may be from the golden run's at the same instant.
+A subject makes the machine, has its faults and conditions, and judges a run against the golden one. The outcomes are
+the same for all (outcomes.py); "the gait" differs: for a user's machine it is the quantities of its body in [band],
+each with how far it may be from the golden run's at the same time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.evidence import Record
 from ranger_sim.harness.faults.proof import Proof
 
-# What decides the outcome of a run beside our own sources: these files of the folder that the machine is made in.
+# What decides the outcome of a run besides our own sources: these files of the folder that the machine is made in.
 SOURCES = {".py", ".toml", ".csv", ".c", ".h"}
 
 CRITERIA = {
@@ -43,8 +43,8 @@ class OwnMachine:
     """A machine that `make` of a file makes: `reference` is FILE.py:NAME, relative to the folder of the plan."""
 
     criteria = CRITERIA
-    after_s, from_s, patience_s = 1.0, 0.5, 10.0  # of [watch], where the plan does not say; chosen by us
-    starts_s = (0.5, 0.75, 1.0)  # instants at which healthy runs are judged as if a fault had begun; chosen by us
+    after_s, from_s, patience_s = 1.0, 0.5, 10.0  # of [watch], where the plan does not set it; chosen by us
+    starts_s = (0.5, 0.75, 1.0)  # times at which healthy runs are judged as if a fault had begun; chosen by us
 
     def __init__(self, reference: str) -> None:
         self.reference = reference
@@ -57,7 +57,7 @@ class OwnMachine:
 
     @functools.cached_property
     def make(self) -> Callable[..., Any]:
-        """What makes one."""
+        """The function that makes one."""
         folder = str(self.file.resolve().parent)
         if folder not in sys.path:
             sys.path.insert(0, folder)
@@ -73,7 +73,7 @@ class OwnMachine:
         return found
 
     def machine(self, settings: Mapping[str, Any]) -> Any:
-        """One with these keywords, fresh. UserError for a keyword that `make` does not take."""
+        """A new one with these keywords. UserError for a keyword that `make` does not take."""
         try:
             inspect.signature(self.make).bind(**settings)
             return self.make(**settings)
@@ -82,18 +82,18 @@ class OwnMachine:
 
     @functools.cached_property
     def shown(self) -> Any:
-        """One of them, never run, for what all have in common."""
+        """One of them, never run, for their common properties."""
         machine = self.machine({})
         machine.close()
         return machine
 
     @property
     def catalogue(self) -> Any:
-        """Of its faults."""
+        """Catalogue of its faults."""
         return self.shown.catalogue
 
     def condition(self, wanted: str) -> Any:
-        """A condition of it."""
+        """One of its conditions."""
         return self.shown.condition(wanted)
 
     def version(self) -> str:
@@ -116,7 +116,7 @@ class OwnMachine:
     def judge(
         self, proof: Proof, golden: Record, record: Record, since_ns: int, band: Mapping[str, float], is_sweep: bool
     ) -> dict[str, Any]:
-        """Outcome, why, the largest differences by quantity, and the largest of them in parts of its band."""
+        """Outcome, why, the largest differences by quantity, and the largest in parts of its band."""
         off = {name: farthest(golden.sample(name), record.sample(name), golden, record, since_ns) for name in band}
         parts = {name: value / band[name] for name, value in off.items()}
         worst = max(parts, key=lambda name: parts[name], default="")
@@ -148,7 +148,7 @@ class OwnMachine:
 
 
 def farthest(there: np.ndarray, here: np.ndarray, golden: Record, record: Record, since_ns: int) -> float:
-    """How far a quantity was at most from the golden run's of the same instant, from `since_ns` on."""
+    """The largest distance of a quantity from the golden run's at the same time, from `since_ns` on."""
     common = min(len(there), len(here))
     window = record.samples[:common, 0] >= since_ns * 1e-9
     return float(np.abs(here[:common] - there[:common])[window].max()) if window.any() else 0.0

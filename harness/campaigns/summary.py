@@ -1,4 +1,4 @@
-"""What a campaign's results add up to: shares with the intervals of its design, times against their tolerance, the
+"""Totals of a campaign's results: shares with the intervals of its design, times compared with their tolerance, the
 tables by place and mode, and the worst cases with the commands that replay them."""
 
 import collections
@@ -88,17 +88,17 @@ def of(campaign: Campaign) -> dict[str, Any]:
 
 
 def is_finished(campaign: Campaign, rows: Sequence[Row]) -> bool:
-    """Whether everything that the plan asks for has been run."""
+    """Whether all runs of the plan are done."""
     return bool(rows) and (len(rows) == campaign.foreseen or campaign.stopped_at is not None)
 
 
 def counted(rows: Sequence[Row], hit: Callable[[Result], bool]) -> tuple[int, int]:
-    """(how many hit, of how many)."""
+    """(number of hits, total)."""
     return sum(hit(result) for _, result in rows), len(rows)
 
 
 def sharing(campaign: Campaign, rows: Sequence[Row]) -> Callable[[int, int], Share]:
-    """How a share of this campaign's runs is told: as it is, or with the interval of its finished sample."""
+    """How a share of this campaign's runs is reported: plain, or with the interval of its finished sample."""
     sample = campaign.plan.sample
     if sample is None or not is_finished(campaign, rows):
         return census
@@ -110,7 +110,7 @@ def sharing(campaign: Campaign, rows: Sequence[Row]) -> Callable[[int, int], Sha
 
 
 def interval_text(plan: Plan, finished: bool) -> str:
-    """How shares are to be read, in a sentence."""
+    """How to read the shares, in a sentence."""
     if not finished:
         return "Shares are of the runs that are there and of nothing else: those that end soon come first."
     if plan.search:
@@ -131,7 +131,7 @@ def interval_text(plan: Plan, finished: bool) -> str:
 
 
 def as_dict(share: Share) -> dict[str, Any]:
-    """As JSON can carry it."""
+    """As plain types for JSON."""
     value = None if share.total == 0 else share.value
     return {"count": share.count, "of": share.total, "share": value, "low": share.low, "high": share.high}
 
@@ -144,7 +144,7 @@ def first_ms(result: Result, what: str) -> float:
 
 
 def tolerance(plan: Plan, wanted: Tolerance, felt: Sequence[Row]) -> dict[str, Any]:
-    """A time against its tolerance: of a sample the tolerance limit, of a census the share itself."""
+    """A time compared with its tolerance: of a sample the tolerance limit, of a census the share itself."""
     times = sorted(first_ms(result, wanted.what) for _, result in felt)
     within = sum(each <= wanted.limit_ms for each in times)
     told: dict[str, Any] = {
@@ -178,7 +178,7 @@ def finite(value: float) -> float | None:
 
 
 def varies(rows: Sequence[Row], name: str) -> bool:
-    """Whether an axis has two to twenty values, so that a table by them says something."""
+    """Whether an axis has two to twenty values, so that a table by them is useful."""
     return 2 <= len({str(case.axes.get(name)) for case, _ in rows}) <= 20
 
 
@@ -202,7 +202,7 @@ def heat(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def settings_table(plan: Plan, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Of a sweep that is a census, each run: settings, outcome, gait, and the slot with the least margin."""
+    """Each run of a sweep that is a census: settings, outcome, gait, and the slot with the least margin."""
     if plan.design != "census" or len(rows) > MOST_SETTINGS:
         return []
     return [
@@ -219,7 +219,7 @@ def settings_table(plan: Plan, rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def least_slot(result: Result) -> dict[str, Any]:
-    """{board, margin, overruns}: of the board whose longest slot left least, and the overruns of all boards."""
+    """{board, margin, overruns}: of the board with the least margin, and the overruns of all boards."""
     slots = result.get("slots")
     if not slots:
         return {"board": "", "margin": None, "overruns": None}
@@ -229,7 +229,7 @@ def least_slot(result: Result) -> dict[str, Any]:
 
 
 def extremes(plan: Plan, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Of a search, for each listed combination: how many came to the outcome, the least value, the soonest fall."""
+    """For each listed combination of a search: how many had the outcome, the least value, the soonest fall."""
     if plan.search is None:
         return []
     search = plan.search
@@ -263,7 +263,7 @@ def worst_of(outcomes: Sequence[str]) -> str:
 
 
 def codes(felt: Sequence[Row]) -> list[dict[str, Any]]:
-    """Which errors told of faults first: board, code, how often, median ms; also who told nothing."""
+    """The errors that revealed faults first: board, code, how often, median ms; also faults without one."""
     found: dict[tuple[str, str], list[float]] = {}
     own: collections.Counter[tuple[str, str]] = collections.Counter()
     for case, result in felt:
@@ -285,8 +285,8 @@ def codes(felt: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def worst(valid: Sequence[Row]) -> list[Row]:
-    """The worst cases, worst first; what falls fastest before what falls later."""
-    once = {result["key"]: (case, result) for case, result in valid}.values()  # a search may come to a point again
+    """The worst cases, worst first; earlier falls before later ones."""
+    once = {result["key"]: (case, result) for case, result in valid}.values()  # a search may repeat a point
     bad = [row for row in once if SEVERITY[row[1]["outcome"]] >= SEVERITY["degraded gait"]]
     return sorted(bad, key=lambda row: -severity(row[1]))[:WORST]
 
@@ -320,7 +320,7 @@ def replay(plan: Plan, row: Row) -> str:
         if value is not None:
             parts += [
                 options.get(field, "--" + name.replace("_", "-")),
-                str(value),  # every digit: it has to be the same run
+                str(value),  # every digit, to repeat the same run
             ]
     began = (result.get("fault") or {}).get("activated_s")
     since_s = plan.watch.from_s if began is None else began
@@ -368,5 +368,5 @@ def name_of(difference: dict[str, Any] | None) -> str:
 
 
 def reaction_text(reaction: dict[str, Any] | None) -> str:
-    """Which machine first went another way."""
+    """The machine that first differed."""
     return f"{reaction['machine']}: {reaction['state']}, not {reaction['instead_of']}" if reaction else ""

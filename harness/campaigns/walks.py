@@ -1,4 +1,4 @@
-"""Ranger's walks as what the runs of a campaign are of."""
+"""Ranger's walks as the subject of a campaign's runs."""
 
 import dataclasses
 from typing import Any
@@ -11,7 +11,7 @@ from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 
 
 class Walks:
-    """As subjects.py has it of an own machine."""
+    """The counterpart of a user's machine in subjects.py."""
 
     criteria = CRITERIA
     catalogue = CATALOGUE
@@ -24,14 +24,14 @@ class Walks:
 
     @staticmethod
     def version() -> str:
-        """It is all in our own sources."""
+        """Empty: it is all in our own sources."""
         return ""
 
     @staticmethod
     def judge(
         proof: Proof, golden: Record, record: Record, since_ns: int, band: Band, is_sweep: bool
     ) -> dict[str, Any]:
-        """Outcome, why, the gait and the golden one's, and how far it is from it."""
+        """Outcome, why, the gait and the golden one's, and the distance between them."""
         here = gait(record, since_ns)
         there = gait(golden, since_ns, record.end_ns)
         outcome, why = classify(proof, here, there, damage(record, since_ns), band)

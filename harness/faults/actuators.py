@@ -1,6 +1,6 @@
 """Faults between the bridges and the joints: bridge, winding, magnets, cable, joint.
 
-Windings and joints get other numbers, or torques on top of those that are there (plant/mechanics/term_torques.py);
+Windings and joints get other numbers, or torques in addition to the existing ones (plant/mechanics/term_torques.py);
 what the firmware has written stays.
 """
 
@@ -46,7 +46,7 @@ class MotorFault(Fault):
         self.change()
 
     def change(self) -> None:
-        """Give the motor the numbers that it has with the fault."""
+        """Set the motor's numbers with the fault."""
         raise NotImplementedError
 
     def finish(self, now_ns: int) -> None:
@@ -55,10 +55,10 @@ class MotorFault(Fault):
     def _put(self, numbers: dict[str, float]) -> None:
         for name, value in numbers.items():
             setattr(self.motor, name, value)
-        self.motor.known_s = 0.0  # what it keeps of a step's exponential is of other numbers
+        self.motor.known_s = 0.0  # its stored exponential of a step belongs to other numbers
 
     def settled_A(self) -> float:
-        """The current, in the joint's sense, that voltage and rate of now lead to (EQUATIONS 10.2)."""
+        """The current, in the joint's sense, to which the present voltage and rate lead (EQUATIONS 10.2)."""
         motor, drive = self.motor, self.motor.drive
         battery_V = self.robot.plant.electrics.battery.voltage_V
         back_V = motor.mounting * motor.gear * motor.K * motor.angle_factor * self.rate_rad_s()
@@ -72,7 +72,7 @@ class MotorFault(Fault):
         return float(motor.mounting * math.copysign((abs(volts) - drop) / loop_ohm, volts))
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """Its numbers are its own again; a motor that warms has computed those of its temperature."""
+        """Whether its numbers are its own again; a motor that warms computes those of its temperature."""
         p, motor = self.motor.parameters, self.motor
         if not motor.heat_matters:
             return all(getattr(motor, name) == value for name, value in self.usual.items())
@@ -82,7 +82,7 @@ class MotorFault(Fault):
 
 
 class WindingFault(MotorFault):
-    """Other numbers of winding or magnets: noted by the current that they would give and do give."""
+    """Other numbers of winding or magnets: measured by the currents without and with them."""
 
     def before(self, now_ns: int) -> None:
         self.change()  # again: a motor that warms has just computed its numbers anew
@@ -97,9 +97,9 @@ class WindingFault(MotorFault):
 
 @mode
 class OpenWinding(WindingFault):
-    """The winding's circuit is broken: what current there is ends in an arc, and none comes.
+    """The winding's circuit is broken: a present current ends in an arc, and no new one flows.
 
-    The arc's voltage stands as the brushes' drop: chosen by us, 100 V, more than battery and motor have together.
+    The arc's voltage acts as the brushes' drop: chosen by us, 100 V, more than battery and motor have together.
     """
 
     mode = "open_winding"
@@ -195,12 +195,12 @@ class OneLeg(Fault):
         self.drive.hold_leg(int(self.values["leg"]), state)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """Duty and openness are those that the registers ask for."""
+        """Whether duty and openness are those set in the registers."""
         drive = self.drive
         return bool(drive.is_open == drive.healthy_open and drive.duty == drive.healthy_duty)
 
 
-# --- torques on top of those that are there -------------------------------------------------------------------
+# --- torques in addition to existing ones --------------------------------------------------------------------
 
 
 class TorqueFault(Fault):
@@ -215,7 +215,7 @@ class TorqueFault(Fault):
         self.rows: list[tuple[int, int, int, tuple[float, ...]]] = []
 
     def add(self, *rows: tuple[int, int, int, tuple[float, ...]]) -> None:
-        """Torques (form, place, side, parameters) of plant/mechanics/term_torques.py."""
+        """Add torques (form, place, side, parameters) of plant/mechanics/term_torques.py."""
         self.rows.extend(rows)
         self._build(rows_of(self.body.terms) + [row_with_zeros(row) for row in rows])
 
@@ -227,7 +227,7 @@ class TorqueFault(Fault):
         self._build(rows)
 
     def _build(self, rows: list[tuple[int, int, int, tuple[float, ...]]]) -> None:
-        """The body's additional torques are these."""
+        """Set the body's additional torques."""
         plant = self.robot.plant
         if not rows:
             self.body.terms = None
@@ -241,7 +241,7 @@ class TorqueFault(Fault):
         self.body.terms = terms
 
     def joint(self) -> tuple[float, float]:
-        """Angle and rate of the joint now, rad and rad/s."""
+        """Present angle and rate of the joint, rad and rad/s."""
         body, plant = self.body, self.robot.plant
         if self.side < 0:
             return float(body.outer.angle - body.inner.angle), float(body.outer.rate - body.inner.rate)
@@ -249,7 +249,7 @@ class TorqueFault(Fault):
         return float(leg.foot_angle - leg.angle + plant.zero), float(leg.foot_rate - leg.rate)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """No torque of the fault is left among the body's, and none is kept in its legs."""
+        """Whether no torque of the fault is left among the body's or kept in its legs."""
         body = self.body
         kept = any(leg.extra_ankle or leg.extra_motor for leg in (body.outer, body.inner))
         return not self.rows and (body.terms is not None or not kept)
@@ -272,7 +272,7 @@ def row_with_zeros(row: tuple[int, int, int, tuple[float, ...]]) -> tuple[int, i
 
 @mode
 class JammedJoint(TorqueFault):
-    """Something is caught in the joint: it is held at the angle at which it was.
+    """An object is caught in the joint: it is held at its angle.
 
     Held as by the ankles' stops (plant/mechanics/parameters.py): a spring of 400 N m/rad with half of critical damping
     for a foot; at the hip, where a leg of 0.5 kg m^2 swings, five times as stiff. The steering's is a damper:
@@ -321,9 +321,9 @@ class JammedJoint(TorqueFault):
 
 @mode
 class CableSlip(TorqueFault):
-    """The cable jumps on its pulley: motor and joint stand to each other otherwise than before, by an angle.
+    """The cable jumps on its pulley: the angle between motor and joint changes.
 
-    The cable's torque is then k (stretch - angle) in place of k stretch (EQUATIONS 2.3). It jumps back at the end.
+    The cable's torque is then k (stretch - angle) instead of k stretch (EQUATIONS 2.3). It jumps back at the end.
     """
 
     mode = "cable_slip"

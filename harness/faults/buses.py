@@ -1,4 +1,4 @@
-"""Faults on the wire of a bus: who does not belong there, and noise."""
+"""Faults on the wire of a bus: nodes that do not belong there, and noise."""
 
 from typing import Any
 
@@ -31,16 +31,16 @@ class BusFault(Fault):
         return [count for node in self.own for count in (node.transmit_errors, node.receive_errors)]
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """Error counters fall by one with each good frame."""
+        """Whether the error counters are back; they fall by one with each good frame."""
         calm = all(now <= before for now, before in zip(self._counters(), self.counters_before, strict=True))
         return calm and all(node.mode == OPERATING for node in self.own)
 
 
 class IntruderFault(BusFault):
-    """A controller is clipped on the bus while the fault works, and taken off at its end.
+    """A controller is connected to the bus while the fault works, and removed at its end.
 
-    Of a bus outside it is one more peer on the same interface (`outside.py`); what nodes there count is not seen here,
-    so the place is clear when the peer is gone.
+    On a bus outside it is another peer on the same interface (`outside.py`); the counters of nodes there are not
+    visible here, so the place is clear when the peer is gone.
     """
 
     tamper: Any
@@ -52,7 +52,7 @@ class IntruderFault(BusFault):
             BusFault.connect(self)
 
     def made_outside(self) -> OutsideIntruder:
-        """What the intruder does on a bus outside."""
+        """The intruder's actions on a bus outside."""
         raise NotImplementedError
 
     def before(self, now_ns: int) -> None:
@@ -75,7 +75,7 @@ class IntruderFault(BusFault):
         wake_buses(self.robot, now_ns)
 
     def clip_on(self, now_ns: int) -> None:
-        """Make `tamper`: what the intruder does."""
+        """Make `tamper`: the intruder's actions."""
         raise NotImplementedError
 
     def finish(self, now_ns: int) -> None:
@@ -90,7 +90,7 @@ class IntruderFault(BusFault):
 
 @mode
 class BabblingNode(IntruderFault):
-    """A node that sends without being asked. With a low identifier it wins every arbitration: others starve."""
+    """A node that sends unasked. With a low identifier it wins every arbitration: others starve."""
 
     mode = "babbling"
     meaning = "has a node that sends frames of one identifier all the time"
@@ -120,11 +120,11 @@ class BabblingNode(IntruderFault):
 
 @mode
 class DuplicateIdentifier(IntruderFault):
-    """A second node sends an identifier that has its sender already: at the same bit, with another value.
+    """A second node sends an identifier that already has a sender: at the same bit, with another value.
 
-    On a bus outside the bit cannot be met: there it sends its frame behind each of the other's.
-    Arbitration does not part the two, so the first bit of the data that differs is a bit error of one of them. Both
-    repeat at once, until both are error passive and the one whose flag is silent gives way.
+    On a bus outside the bit cannot be matched: there it sends its frame after each of the other's.
+    Arbitration does not separate the two, so the first data bit that differs is a bit error of one of them. Both
+    repeat at once, until both are error passive and the node whose error flag is silent yields.
     """
 
     mode = "duplicate"
@@ -150,7 +150,7 @@ class DuplicateIdentifier(IntruderFault):
 
 @mode
 class Noise(BusFault):
-    """Bits inverted for everybody, at random: a bad termination, a motor's leads beside the cable."""
+    """Bits inverted for all nodes, at random: a bad termination, a motor's leads next to the cable."""
 
     mode = "noise"
     meaning = "has bits inverted at random, for everybody"

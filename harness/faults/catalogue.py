@@ -1,6 +1,6 @@
-"""What can be made to fail on a machine: its places, every mode, and which mode a place takes.
+"""The possible faults of a machine: its places, every mode, and which mode a place takes.
 
-A mode belongs to kinds of places, not to a machine: what an encoder's edges can suffer, those of any machine can.
+A mode belongs to kinds of places, not to a machine: a fault of an encoder's edges applies to those of any machine.
 Ranger's places, and the modes that only it has, are in ranger_catalogue.py.
 """
 
@@ -23,14 +23,14 @@ Kind = TypeVar("Kind", bound=Fault)
 
 # by (kind of place, name of the mode)
 MODES: dict[tuple[str, str], type[Fault]] = {}
-# The same, of modes that a kind of place does not take for a reason of its own.
+# Reasons why a kind of place does not take a mode, by the same keys.
 REASONS: dict[tuple[str, str], str] = {}
 # Files of users that have been run.
 FILES: set[pathlib.Path] = set()
 
 
 def mode(kind: type[Kind]) -> type[Kind]:
-    """A class decorator: places of its kinds take the mode."""
+    """Class decorator that registers a mode for places of its kinds."""
     for place_kind in kind.kinds:
         if (place_kind, kind.mode) in MODES:
             raise UserError(f"fault mode {kind.mode} at {place_kind}: it is in the catalogue already")
@@ -40,7 +40,7 @@ def mode(kind: type[Kind]) -> type[Kind]:
 
 class Catalogue:
     """The places of a machine, by name. `condition` makes its conditions; modules: of this package, that have its modes
-    (and add places, in the order in which they are listed). `hint`: who lists it all, for messages.
+    (and add places, in the order in which they are listed). `hint`: the command that lists it all, for messages.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Catalogue:
         self.add_places(places)
 
     def load(self) -> None:
-        """Have its modes: import the modules. A second call does nothing."""
+        """Load its modes: import the modules. A second call does nothing."""
         for name in self.modules:
             importlib.import_module(f"ranger_sim.harness.faults.{name}")
 
@@ -68,7 +68,7 @@ class Catalogue:
         return self.known
 
     def add_places(self, places: Iterable[Place]) -> None:
-        """Put places in the catalogue. UserError for a name that is there."""
+        """Add places to the catalogue. UserError for a name that it has already."""
         for place in places:
             if place.name in self.known:
                 raise UserError(f"fault place {place.name}: it is in the catalogue already")
@@ -93,7 +93,7 @@ class Catalogue:
         return f"it needs {needs or 'a place that is a ' + ' or a '.join(sorted(others))}"
 
     def named(self, name: str, there: Iterable[str], what: str) -> str:
-        """`name`, which must be `there`; otherwise a UserError with the nearest ones."""
+        """Return `name`, which must be in `there`; otherwise a UserError with the nearest ones."""
         names = list(there)
         if name not in names:
             near = difflib.get_close_matches(name, names, 3)
@@ -122,12 +122,12 @@ class Catalogue:
         return kind.asked(where, start, end, parameters, self.condition)
 
     def typed(self, text: str) -> Fault:
-        """The fault that somebody typed (harness/faults/text.py)."""
+        """The fault of a typed text (harness/faults/text.py)."""
         parts = typed_text.parse(text)
         return self.fault(parts.place, parts.mode, parts.start, parts.end, parts.parameters)
 
     def load_file(self, name: str | pathlib.Path) -> None:
-        """Run a user's .py file, which puts modes and places here. UserError when it cannot be read, or does not run.
+        """Run a user's .py file, which adds modes and places here. UserError when it cannot be read, or does not run.
 
         A second call with the same file does nothing: several plans of one process may name it.
         """

@@ -1,7 +1,7 @@
 """Faults of the analog-digital converters: of their transfer, and conversions that come late or never.
 
-What is changed are the converter's own numbers, as the data sheets give them: gain, offset, reference, time. Whether it
-acts is seen by what the same voltage gives with and without the fault, once the board has converted it.
+The faults change the converter's own numbers from the data sheets: gain, offset, reference, time. A fault acts
+if the same voltage converts differently with and without it, once the board has converted it.
 """
 
 import math
@@ -18,7 +18,7 @@ from ranger_sim.harness.faults.reach import emulated
 
 CONVERTERS = (CONVERTER, INTERNAL_CONVERTER, BURST_CONVERTER)
 AWAITED = (CONVERTER, INTERNAL_CONVERTER)
-# Nobody waits so long for a conversion: a year.
+# A year: no program waits that long for a conversion.
 NEVER_DONE_NS = 31_536_000_000_000_000
 
 
@@ -44,7 +44,7 @@ class ConverterFault(Fault):
         self.change()
 
     def change(self) -> None:
-        """Give the converter the numbers that it has with the fault."""
+        """Set the converter's numbers with the fault."""
         raise NotImplementedError
 
     def finish(self, now_ns: int) -> None:
@@ -77,10 +77,10 @@ class TransferFault(ConverterFault):
             self.note(now_ns, difference)
 
     def _results(self, now_ns: int) -> Iterator[int]:
-        """What the converter makes of the present voltages at its inputs that are used."""
+        """The converter's results for the present voltages at its used inputs."""
         converter, volts = self.converter, self.board.analog.volts
         if self.external:
-            # a program in C keeps its sequence to itself: known is what it has started last
+            # a program in C does not expose its sequence: only its last start is known
             for code in converter.sequence[: converter.length] or [converter.register4]:
                 gain = code >> GAIN_SHIFT & GAIN_MASK
                 yield converter.convert(volts(converter.inputs[code & 15], now_ns), gain)
@@ -148,7 +148,7 @@ class ReferenceSag(TransferFault):
 
 
 class TimeFault(ConverterFault):
-    """A conversion takes longer than it should. `lateness_ns`: by how much."""
+    """A conversion takes too long. `lateness_ns`: by how much."""
 
     unit = "us"
     fields = ("conversion_ns",)
@@ -183,10 +183,10 @@ class LateConversion(TimeFault):
 
 @mode
 class MissingConversion(TimeFault):
-    """A conversion is begun and never ends: no interrupt comes.
+    """A conversion starts and never ends: no interrupt comes.
 
-    A motor board waits in its slot for the external converter (robot.md N4.5) and has no time-out: it stands still from
-    then on, also when the converter works again.
+    A motor board waits in its slot for the external converter (robot.md N4.5) and has no time-out: it hangs from then
+    on, also when the converter works again.
     """
 
     mode = "missing_conversion"
@@ -210,7 +210,7 @@ class MissingConversion(TimeFault):
             self.note(now_ns, overdue_ns * 1e-3)
 
     def finish(self, now_ns: int) -> None:
-        """The converter is as after its own reset: nothing is under way."""
+        """Reset the converter: no conversion is in progress."""
         super().finish(now_ns)
         if self.converter.busy and self.converter.alarm.time > now_ns + NEVER_DONE_NS // 2:
             self.converter.alarm.set(NEVER)

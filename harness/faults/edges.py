@@ -1,12 +1,12 @@
 """Faults of incremental encoders: the edges between sensor and board are rewritten before the board sees them.
 
-The wire shows a count of its own beside the sensor's, `true`, both in edges of channel A as
+The wire has its own count in addition to the sensor's, `true`, both in edges of channel A as
 plant/sensors/incremental_encoder.py counts them. Channel A is high at even counts; going up, B is its opposite at an
-edge, going down its equal, and the board counts by that alone. So whatever a fault makes of the count, edges come out
-that a sensor could have sent.
+edge, going down its equal, and the board counts by that alone. So whatever a fault does to the count, the edges are
+such as a sensor could have sent.
 
-Two families. Faults of the value (offset, drift, noise ...) let the wire run after a wrong count: extra edges come
-SPACING_NS apart, and after the end the wire runs back, so that the board's count is right again. Faults of the line
+Two families. Faults of the value (offset, drift, noise ...) let the wire follow a wrong count: extra edges come
+SPACING_NS apart, and after the end the wire returns, so that the board's count is right again. Faults of the line
 (stuck, lost edges, swapped channels ...) act on the edges themselves: after the end the levels are the sensor's again,
 and the board keeps the miscount.
 
@@ -29,7 +29,7 @@ from ranger_sim.plant.sensors.incremental_encoder import BOUNCE_NS
 # From one extra edge to the next. Chosen by us: 50 per slot of a board, so that its ring of 63 takes them all, and as
 # fast as the ankles' motor encoders at 18 rad/s of the joint.
 SPACING_NS = 10_000
-# What keeps a board's count wrong after lost edges, where the place does not say (`kept` of its details).
+# What keeps a board's count wrong after lost edges, where the place does not define it (`kept` of its details).
 KEPT = "the board's count, until its next power-up; it uses only the rate"
 
 COUNTS = Quantity(
@@ -44,7 +44,7 @@ COUNTS = Quantity(
 
 
 class Wire:
-    """What the two channels show: a count, the level of A, and the edges of a step as (time, A, B)."""
+    """The state of the two channels: a count, the level of A, and the edges of a step as (time, A, B)."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -53,12 +53,12 @@ class Wire:
         self.edges: list[tuple[int, int, int]] = []
 
     def step(self, way: int, time_ns: int) -> None:
-        """One edge up (1) or down (-1)."""
+        """Make one edge up (1) or down (-1)."""
         level = 1 - self.level_a
         self.edge(time_ns, level, 1 - level if way > 0 else level)
 
     def edge(self, time_ns: int, level_a: int, level_b: int) -> None:
-        """An edge to these levels, counted as the board does."""
+        """Make an edge to these levels, counted as the board does."""
         self.count += 1 if level_a != level_b else -1
         self.level_a = level_a
         self.latest_ns = time_ns
@@ -81,7 +81,7 @@ class EdgeFault(Fault):
         self.sign: int = self.encoder.sign
 
     def joint_rad(self) -> float:
-        """Angle now, which this encoder measures."""
+        """The present angle, which this encoder measures."""
         return float(self.robot.plant.encoder_rad(self.number))
 
     def begin(self, now_ns: int) -> None:
@@ -93,7 +93,7 @@ class EdgeFault(Fault):
         self.begin_on_wire(now_ns)
 
     def begin_on_wire(self, now_ns: int) -> None:
-        """The wire is there, nothing has happened on it yet."""
+        """Start with a wire on which nothing has happened yet."""
 
     def finish(self, now_ns: int) -> None:
         self.level_b = self.encoder.level_b(self.joint_rad())
@@ -106,7 +106,7 @@ class EdgeFault(Fault):
         return self.on_the_wire_as_at_the_sensor() and self.sensor_as_its_model()
 
     def _write(self, rewrite: Any, start_ns: int, end_ns: int) -> None:
-        """Let `rewrite` make the step's edges anew, of those that the sensor has sent."""
+        """Let `rewrite` replace the step's edges, based on those that the sensor has sent."""
         buffer = self.encoder.edges
         sent = list(buffer.kept[: buffer.count]) if buffer.count else []
         shown = self.wire.edges
@@ -122,21 +122,21 @@ class EdgeFault(Fault):
         self.note(time_ns, self.sign * (self.wire.count - self.true))
 
     def pass_on(self, sent: list[int], start_ns: int, end_ns: int) -> None:
-        """While it works: put the step's edges on the wire."""
+        """Put the step's edges on the wire while the fault works."""
         raise NotImplementedError
 
     def resume(self, sent: list[int], start_ns: int, end_ns: int) -> None:
-        """After the end: as the sensor sends."""
+        """Pass the sensor's edges on after the end."""
         raise NotImplementedError
 
     def on_the_wire_as_at_the_sensor(self) -> bool:
-        """Whether the wire shows what the sensor does."""
+        """Whether the wire shows the sensor's levels."""
         return self.wire.level_a == 1 - (self.true & 1)
 
     def sensor_as_its_model(self) -> bool:
         """Whether the sensor's count is that of the joint's present angle, and followed here edge by edge.
 
-        An edge of the disc lies at most 0.4 edges beside its place (plant/sensors/incremental_encoder.py).
+        An edge of the disc is at most 0.4 edges from its place (plant/sensors/incremental_encoder.py).
         """
         position = self.encoder.position(self.joint_rad())
         return bool(self.true == self.encoder.cell and -0.5 <= position - self.true <= 1.5)
@@ -146,10 +146,10 @@ class EdgeFault(Fault):
 
 
 class RunsAfter(EdgeFault):
-    """The wire runs after a count that `target` says."""
+    """The wire follows a count that `target` returns."""
 
     def target(self, time_ns: int) -> int:
-        """The count that the wire is to show at this instant."""
+        """The count that the wire is to show at this time."""
         raise NotImplementedError
 
     def pass_on(self, sent: list[int], start_ns: int, end_ns: int) -> None:
@@ -157,7 +157,7 @@ class RunsAfter(EdgeFault):
         self.note_step(sent, end_ns)
 
     def note_step(self, sent: list[int], end_ns: int) -> None:
-        """Note by how much the wire's count is off at the end, with the first edge of the step that was another one."""
+        """Record the error of the wire's count at the end, at the time of the first edge of the step that differs."""
         if self.wire.count == self.true:
             return
         shown = [time_ns << 2 | level_a << 1 | level_b for time_ns, level_a, level_b in self.wire.edges]
@@ -171,7 +171,7 @@ class RunsAfter(EdgeFault):
         return self.wire.count == self.true and super().on_the_wire_as_at_the_sensor()
 
     def _follow(self, sent: list[int], start_ns: int, end_ns: int, target: Any) -> None:
-        """Edges to `target` at the step's start and at each edge of the sensor; what is behind comes later."""
+        """Make edges to `target` at the step's start and at each edge of the sensor; the rest comes later."""
         self._run_to(target(start_ns), start_ns, sent[0] >> 2 if sent else end_ns, at_once=False)
         for place, edge in enumerate(sent):
             even = self.wire.count == target(edge >> 2)
@@ -180,12 +180,12 @@ class RunsAfter(EdgeFault):
             self._run_to(target(edge >> 2), edge >> 2, until_ns, at_once=even)
 
     def _run_to(self, count: int, time_ns: int, until_ns: int, at_once: bool) -> None:
-        """Edges from `time_ns` on, before `until_ns`, until the wire shows `count`; the first one then if `at_once`."""
+        """Make edges from `time_ns` to `until_ns` until the wire shows `count`; the first at `time_ns` if `at_once`."""
         wire = self.wire
         while wire.count != count:
             if not at_once:
                 time_ns = max(time_ns, wire.latest_ns + SPACING_NS)
-            # an extra edge keeps the distance of the shortest pulse that a board can see
+            # an extra edge keeps the distance of the shortest pulse that a board detects
             if time_ns >= until_ns or (not at_once and time_ns + BOUNCE_NS > until_ns):
                 return
             at_once = False
@@ -193,7 +193,7 @@ class RunsAfter(EdgeFault):
 
 
 class SignalOnEdges(RunsAfter, SignalFault):
-    """A signal of harness/faults/signals.py in the place of the count."""
+    """A signal of harness/faults/signals.py instead of the count."""
 
     def begin_on_wire(self, now_ns: int) -> None:
         self.signal = self.new_signal()
@@ -212,7 +212,7 @@ for each in VALUE_MODES:
 
 @mode
 class EdgesScale(SignalOnEdges):
-    """What the joint turns from the start on is shown times a factor: the disc of another encoder."""
+    """The joint's motion from the start on is scaled by a factor: the disc of another encoder."""
 
     mode = "scale"
     kinds = (EDGES,)
@@ -225,7 +225,7 @@ class EdgesScale(SignalOnEdges):
 
 @mode
 class EdgesSaturation(SignalOnEdges):
-    """The count goes no further than so many edges from where it starts: the disc's end, a torn coupling."""
+    """The count stays within a number of edges of its start: the disc's end, a torn coupling."""
 
     mode = "saturation"
     kinds = (EDGES,)
@@ -239,7 +239,7 @@ class EdgesSaturation(SignalOnEdges):
 
 @mode
 class EdgesDelay(RunsAfter):
-    """Every edge comes late by the same time; the end lets those that are under way come at once."""
+    """Every edge is late by the same time; at the end all delayed edges come at once."""
 
     mode = "delay"
     kinds = (EDGES,)
@@ -276,13 +276,13 @@ class OnTheLine(EdgeFault):
         return self.sign * (self.wire.count - self.true) if self.activated_ns >= 0 else 0
 
     def as_the_sensor(self, time_ns: int) -> None:
-        """The wire takes the levels of the sensor."""
+        """Set the wire to the levels of the sensor."""
         level_a = 1 - (self.true & 1)
         if self.wire.level_a != level_a:
             self.wire.edge(time_ns, level_a, self.level_b)
 
     def send(self, edge: int) -> None:
-        """An edge of the sensor goes on as it is, if the wire is not at its level already."""
+        """Pass an edge of the sensor on unchanged, if the wire is not at its level already."""
         if self.wire.level_a != edge >> 1 & 1:
             self.wire.edge(edge >> 2, edge >> 1 & 1, edge & 1)
 
@@ -369,7 +369,7 @@ class EdgesDropOut(OnTheLine):
                 self.send(edge)
 
     def _change(self, time_ns: int) -> None:
-        """The channels go low, or come back."""
+        """Set the channels low, or restore them."""
         if not self.gaps.on(time_ns):
             self.as_the_sensor(time_ns)
         elif self.wire.level_a:

@@ -1,4 +1,4 @@
-"""Which error each board of any machine noted, and when; and where a state machine of it is looked up."""
+"""Each board's errors and their times, for any machine; and the place of a state machine's state."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -8,17 +8,17 @@ from ranger_sim.harness.step_watch import StepWatch
 
 
 class StateWord(NamedTuple):
-    """A state machine: the word of the logged memory that has its state, and what its states are called."""
+    """A state machine: the word of the logged memory that has its state, and the names of its states."""
 
     word: int
     states: dict[int, str]
 
 
 class ErrorRows(StepWatch):
-    """Fills `rows`: time (ns), place of the board in `boards`, code, how often since it was last looked.
+    """Fills `rows`: time (ns), place of the board in `boards`, code, how often since the last check.
 
-    boards: the list that the loop runs, each with `error_totals`. codes: 0 ... codes - 1 are looked at. Times are those
-    of the plant's step before which the error was noted. Ranger's own, compiled for its error modules: error_watch.py.
+    boards: the list that the loop runs, each with `error_totals`. codes: 0 ... codes - 1 are checked. Times are those
+    of the plant's step before which the error was recorded. Ranger's, compiled for its error modules: error_watch.py.
     """
 
     def __init__(self, boards: Sequence[Any], codes: int) -> None:
@@ -29,13 +29,13 @@ class ErrorRows(StepWatch):
         self.before = [list(board.error_totals(codes)) for board in boards]
 
     def before_step(self, now_ns: int) -> None:
-        """Keep what came since the last step."""
+        """Record the errors since the last step."""
         for place, board in enumerate(self.boards):
             totals = list(board.error_totals(self.codes))
             if totals == self.before[place]:
                 continue
             for code, (now, before) in enumerate(zip(totals, self.before[place], strict=True)):
-                more = now - before if now >= before else now  # a board fresh from its reset counts from nothing
+                more = now - before if now >= before else now  # a board counts from 0 after its reset
                 if more:
                     at = self.rows.used
                     for column, value in enumerate((now_ns, place, code, more)):

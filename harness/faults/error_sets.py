@@ -14,7 +14,7 @@
     port.activate()
 
 A set becomes active by its trigger: the condition it names (XIL's software trigger), or `port.trigger()` (the manual
-one). Then the faults of the set before end. Those of this one begin when all places are clear. An empty set clears.
+one). Then the faults of the previous set end. Those of this one begin when all places are clear. An empty set clears.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ from ranger_sim.harness.waiting import Condition
 
 @dataclasses.dataclass(frozen=True)
 class ErrorSet:
-    """Faults that act together, each as it is typed but without start and end. `trigger`: None, or a condition."""
+    """Faults that act together, each as typed but without start and end. `trigger`: None, or a condition."""
 
     name: str
     errors: tuple[str, ...]
@@ -44,7 +44,7 @@ class ErrorConfiguration:
 
 
 class ErrorPort(StepWatch):
-    """Where a robot's error sets are chosen. `active_set`: the one that works, None before the first trigger."""
+    """Selects a robot's error sets. `active_set`: the active one, None before the first trigger."""
 
     def __init__(self, robot: Any) -> None:
         StepWatch.__init__(self)
@@ -52,19 +52,19 @@ class ErrorPort(StepWatch):
         self.configuration: ErrorConfiguration | None = None
         self.active_set: ErrorSet | None = None
         self.active_errors: list[Fault] = []  # those of the active set
-        self.leaving: list[Fault] = []  # those of the one before whose places are not clear yet
+        self.leaving: list[Fault] = []  # those of the previous set whose places are not clear yet
         self.coming: list[Fault] = []  # those of the active set while places are not clear yet
         self.number = -1
         self.waits: Condition | None = None
         self.triggered = False
 
     def set_configuration(self, configuration: ErrorConfiguration) -> None:
-        """What will be activated. UserError for a fault that cannot be, or one that has a start or an end."""
+        """Set what will be activated. UserError for an impossible fault, or one that has a start or an end."""
         if self in self.robot.loop.watchers:
             raise UserError(f"error port: {configuration.name}: deactivate the one that is active first")
         for one in configuration.sets:
             for each in one.errors:
-                self._made(configuration, each)  # so that mistakes are told now
+                self._made(configuration, each)  # so that mistakes are reported now
             if one.trigger is not None:
                 self.robot.condition(one.trigger)
         self.configuration = configuration
@@ -76,7 +76,7 @@ class ErrorPort(StepWatch):
         return fault
 
     def activate(self) -> None:
-        """From now on the first set waits for its trigger. UserError without a configuration."""
+        """Let the first set wait for its trigger from now on. UserError without a configuration."""
         if self.configuration is None:
             raise UserError("error port: there is no configuration to activate")
         if self in self.robot.loop.watchers:
@@ -87,7 +87,7 @@ class ErrorPort(StepWatch):
         self._wait_for_next()
 
     def trigger(self) -> None:
-        """The next set becomes active with the next step of the plant, whatever trigger it names."""
+        """Make the next set active with the next step of the plant, regardless of its trigger."""
         if self.configuration is None or self not in self.robot.loop.watchers:
             raise UserError("error port: there is nothing to trigger before a configuration is activated")
         if self.number + 1 >= len(self.configuration.sets):
@@ -95,7 +95,7 @@ class ErrorPort(StepWatch):
         self.triggered = True
 
     def deactivate(self) -> None:
-        """Every fault of the configuration ends; no set is active. It may be activated again: from its first set on."""
+        """End every fault of the configuration; no set is active. It may be activated again from its first set on."""
         for fault in self.active_errors:
             fault.stop()
         self.leaving += self.active_errors
@@ -114,7 +114,7 @@ class ErrorPort(StepWatch):
             self.active_errors, self.coming = self.coming, []
 
     def _next(self) -> None:
-        """The next set is the active one: faults of the last one end."""
+        """Make the next set active: faults of the last one end."""
         assert self.configuration is not None
         self.number += 1
         for fault in self.active_errors:
@@ -126,7 +126,7 @@ class ErrorPort(StepWatch):
         self._wait_for_next()
 
     def _wait_for_next(self) -> None:
-        """For the trigger of the set after the active one, if it has one."""
+        """Wait for the trigger of the set after the active one, if it has one."""
         assert self.configuration is not None
         self.waits = None
         if self.number + 1 < len(self.configuration.sets):

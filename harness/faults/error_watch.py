@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
 # (every index below is a board, a code of the error module, or a column of the stream)
-"""Which error each board noted, and when: the counts are the boards' own, looked at between two steps of the plant."""
+"""Each board's errors and their times: the boards' own counts, checked between two steps of the plant."""
 
 import cython
 
@@ -13,11 +13,11 @@ from ranger_sim.harness.step_watch import StepWatch
 @cython.final
 @cython.cclass
 class ErrorWatch(StepWatch):
-    """Fills `rows`: time (ns), place of the board in `boards`, code, how often since it was last looked.
+    """Fills `rows`: time (ns), place of the board in `boards`, code, how often since the last check.
 
-    boards: the list that the loop runs, so that a board that takes another one's place is seen; what stands behind the
-    boards with errors, as a calibration probe, is not looked at. codes: 0 ... codes - 1
-    are looked at. Times are those of the 250 us step before which the error was noted.
+    boards: the list that the loop runs, so that a board that replaces another one is seen; entries after the
+    boards with errors, such as a calibration probe, are not checked. codes: 0 ... codes - 1
+    are checked. Times are those of the 250 us step before which the error was recorded.
     """
 
     boards: list
@@ -38,7 +38,7 @@ class ErrorWatch(StepWatch):
                 self.before[place * codes + code] = board.errors.totals[code]
 
     def before_step(self, now_ns: cython.longlong) -> object:
-        """Keep what came since the last step."""
+        """Record the errors since the last step."""
         place: cython.longlong
         code: cython.longlong
         at: cython.longlong
@@ -54,7 +54,7 @@ class ErrorWatch(StepWatch):
                 if more == 0:
                     continue
                 self.before[at] = errors.totals[code]
-                if more < 0:  # a board fresh from its reset counts from nothing
+                if more < 0:  # a board counts from 0 after its reset
                     more = errors.totals[code]
                     if more == 0:
                         continue

@@ -1,6 +1,6 @@
-"""What a run leaves behind for a comparison: frames, the body, the variables that the log keeps, the boards' errors.
+"""Records of a run for a comparison: frames, the body, the variables that the log keeps, the boards' errors.
 
-An `Evidence` listens to a machine from the moment it is made; its `record()` is arrays, the same for the same run, also
+An `Evidence` records a machine from its creation on; its `record()` is arrays, the same for the same run, also
 when it was made in a forked process.
 """
 
@@ -17,12 +17,12 @@ from ranger_sim.harness.names import Names
 
 @dataclasses.dataclass
 class Record:
-    """A run between two instants (ns since the simulation's zero, as all times here).
+    """A run between two times (ns since the simulation's zero, as all times here).
 
     frames: {bus: rows of `foundation.row_stream.FrameStream`}. samples: rows of time (s) and the plant's quantities,
     words: rows of time and the memory of the board `memory` (empty: of none), both every 2 ms. errors: rows of
-    `ErrorRows`, places as in `boards`. quantities: names of the samples' columns behind the time. machines: those whose
-    state is in the words. fell_ns: -1 when it stands at the end.
+    `ErrorRows`, places as in `boards`. quantities: names of the samples' columns after the time. machines: those whose
+    state is in the words. fell_ns: -1 when it has not fallen by the end.
     """
 
     begin_ns: int
@@ -61,9 +61,9 @@ class Record:
 
 
 class Evidence:
-    """Listens to `robot` (a `harness.machine.Machine`) from now on, beside what its log keeps.
+    """Records `robot` (a `harness.machine.Machine`) from now on, in addition to its log.
 
-    UserError for one with boards in other processes: their errors come too late to be timed.
+    UserError for one with boards in other processes: their errors arrive too late to be timed.
     """
 
     def __init__(self, robot: Any) -> None:
@@ -96,7 +96,7 @@ class Evidence:
         return keep
 
     def alone(self) -> None:
-        """From now on the robot's streams go here and nowhere else: in a branch, whose parent has the log's files."""
+        """Take the robot's streams exclusively from now on: in a branch, whose parent has the log's files."""
         for name, stream in self.streams.items():
             stream.sink = self._keeper(self.blocks[name], None)
 

@@ -1,4 +1,4 @@
-"""One fault: what every kind of fault has, from being armed until its place is as it should be again.
+"""One fault: what every kind of fault has, from arming until its place is back to normal.
 
 A fault sits at a physical place: on a wire, in a sensor, a winding, a bus, the floor. It never writes what firmware
 keeps. Its life, each stamp in ns of virtual time, -1 for not yet:
@@ -28,7 +28,7 @@ from ranger_sim.harness.waiting import Condition, Wanted
 class Parameter:
     """A number that a mode takes. `source`: where default and limits come from, or why we chose them.
 
-    default: NaN where none is given means what `source` says then, as a level that stands as it is.
+    default: NaN for none; `source` then describes the effect, such as keeping the present level.
     """
 
     name: str
@@ -67,7 +67,7 @@ class WholeNumber(Parameter):
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """Where a fault can sit. `name` as it is typed ("MCH.joint_encoder"); `kind` decides which modes are possible.
+    """Where a fault can sit. `name` as typed ("MCH.joint_encoder"); `kind` decides which modes are possible.
 
     `details`: what the modes of this kind need in order to find it on a robot, from harness/wiring/ranger.py.
     """
@@ -79,7 +79,7 @@ class Place:
 
 
 class Lasting(Condition):
-    """The end of a fault so long after its beginning, as "+50 ms"."""
+    """The end of a fault a given time after its start, as "+50 ms"."""
 
     def __init__(self, text: str) -> None:
         Condition.__init__(self, text)
@@ -101,10 +101,10 @@ def end_condition(wanted: Wanted | None, condition: Callable[[Wanted], Condition
 
 
 class Fault(StepWatch):
-    """A mode at a place. Subclasses are modes: they name themselves and say what they do.
+    """A mode at a place. Subclasses are modes: they define their names and effects.
 
     `mode`, `kinds` of places, `meaning` (one sentence), `parameters`, `unit` of the difference at the place.
-    `needs`: what a place must have for it, told where it is refused ("a serial word").
+    `needs`: what a place must have for it, named where the fault is refused ("a serial word").
     `permanent`: what ends its consequence ("a power cycle"), empty when the place is clear as soon as the fault ends.
     """
 
@@ -115,7 +115,7 @@ class Fault(StepWatch):
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     unit: str = ""
     permanent: str = ""
-    # The board whose processor or converters it reaches into, and the one that it takes away and puts back; "": none.
+    # The board whose processor or converters it acts inside, and the one that it removes and restores; "": none.
     inside: str = ""
     restarts: str = ""
 
@@ -130,9 +130,9 @@ class Fault(StepWatch):
         self.acted_count = 0
         self.largest_difference = 0.0
         self.stop_wanted = False
-        self.gives_way = False  # where another fault still works it never begins; else that ends the run
+        self.gives_way = False  # where another fault still works it never begins; otherwise the conflict ends the run
         self.gave_way_ns = -1
-        self.gave_way_to = ""  # which fault had its place when it was to begin
+        self.gave_way_to = ""  # the fault that had its place when it was due
         self.twin: Any = None  # harness.faults.twin.Twin: of a fault that is to be proven
 
     @classmethod
@@ -144,7 +144,7 @@ class Fault(StepWatch):
         parameters: Mapping[str, Any],
         condition: Callable[[Wanted], Condition],
     ) -> Self:
-        """One that is not armed yet; `condition` makes the machine's conditions. UserError for a parameter or a value
+        """Make an unarmed one; `condition` makes the machine's conditions. UserError for a parameter or value
         that the mode does not have.
         """
         known = {parameter.name: parameter for parameter in cls.parameters}
@@ -156,32 +156,32 @@ class Fault(StepWatch):
             values[name] = known[name].checked(value, where)
         return cls(place, None if start is None else condition(start), end_condition(end, condition), values)
 
-    # --- what a mode says -----------------------------------------------------------------------------------
+    # --- what a mode defines -----------------------------------------------------------------------------------
 
     def connect(self) -> None:
-        """Once, when it is armed: find the place on `self.robot`. UserError when it cannot act there."""
+        """Find, once, when it is armed, the place on `self.robot`. UserError when it cannot act there."""
 
     def claims(self) -> tuple[str, ...]:
-        """What it has for itself while it works: its place. Finer, where several can act at one place side by side."""
+        """What it claims while it works: its place, or finer where several can act at one place together."""
         return (self.place.name,)
 
     def begin(self, now_ns: int) -> None:
-        """It begins to work."""
+        """Begin to work."""
 
     def before(self, now_ns: int) -> None:
-        """While it works, before each step of the plant."""
+        """Act before each step of the plant while it works."""
 
     def after(self, start_ns: int, end_ns: int) -> None:
-        """While it works, when the sensors of a step are there and no board has seen them."""
+        """Act, while it works, when a step's sensors are known and no board has read them."""
 
     def finish(self, now_ns: int) -> None:
-        """It stops working: whatever it changed at its place is put back."""
+        """Stop working: restore all that it changed at its place."""
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """After its end, once per step until it is true: the place shows what it shows without a fault."""
+        """Whether the place shows what it shows without a fault; called after its end, once per step until true."""
         return True
 
-    # --- its life -------------------------------------------------------------------------------------------
+    # --- life cycle ------------------------------------------------------------------------------------------
 
     @property
     def acted(self) -> bool:
@@ -195,11 +195,11 @@ class Fault(StepWatch):
 
     @property
     def over(self) -> bool:
-        """Nothing of it is left to come: its place is clear, or it was stopped before it began."""
+        """It is finished: its place is clear, or it was stopped before it began."""
         return self.cleared_ns >= 0 or (self.stop_wanted and self.activated_ns < 0)
 
     def arm(self, robot: Any) -> None:
-        """It waits on `robot` for its start; without a start condition it begins with the next step."""
+        """Wait on `robot` for its start; without a start condition it begins with the next step."""
         self.robot = robot
         self.random = RandomStream(robot.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
         self.connect()
@@ -212,11 +212,11 @@ class Fault(StepWatch):
         robot.loop.watchers.append(self)
 
     def stop(self) -> None:
-        """End it with the next step of the plant, whatever its end condition says; what has not begun never does."""
+        """End it with the next step of the plant, regardless of its end condition; an unstarted fault never begins."""
         self.stop_wanted = True
 
     def note(self, time_ns: int, difference: float) -> None:
-        """For modes: at `time_ns` the place differed by `difference` (`unit`) from what it shows without the fault."""
+        """Record, for modes, that the place at `time_ns` differed by `difference` (`unit`) from the unfaulted one."""
         if self.acted_count == 0:
             self.acted_ns = time_ns
         self.acted_count += 1
@@ -252,14 +252,14 @@ class Fault(StepWatch):
             self.before(now_ns)
 
     def _in_its_way(self) -> str:
-        """Which fault that is not clear yet has one of its claims, or nothing: neither could be proved, nor undone."""
+        """The uncleared fault that has one of its claims, or "": two could be neither proved nor undone."""
         for other in self.robot.faults:
             if other is self or other.activated_ns < 0 or other.cleared_ns >= 0:
                 continue
             common = [each for each in self.claims() if each in other.claims()]
             if other.restarts and other.restarts in (self.inside, self.restarts):
                 common.append(f"{other.restarts}, which is not back yet")
-            if self.restarts and self.restarts == other.inside and other.active:  # what has ended, a restart may cure
+            if self.restarts and self.restarts == other.inside and other.active:  # a restart may cure an ended fault
                 common.append(f"{other.inside}, which would be taken away under it")
             if common:
                 return f"{other.text()} still works at {common[0]}"
@@ -274,19 +274,19 @@ class Fault(StepWatch):
             self.cleared_ns = end_ns
             self.robot.loop.watchers.remove(self)
 
-    # --- what it did, against the golden run ------------------------------------------------------------------
+    # --- what it did, compared with the golden run -----------------------------------------------------------------
 
     def proof(self) -> Any:
         """A `harness.faults.proof.Proof` until now. UserError for a fault that was injected without `proof=True`.
 
-        What is normal is what the golden run raised since the fault was armed. A detection by rate alone (`rate`) can
-        therefore be a false alarm: one walk does not know how loud another healthy one is; a campaign walks several.
-        Faults that have one golden run in common, as those of `walk --proof`, are held against it together, from the
-        first one's activation on: nothing says whose doing a difference is.
+        What the golden run raised since the fault was armed is normal. A detection by rate alone (`rate`) can therefore
+        be a false alarm: one walk does not show how noisy another healthy one is; a campaign walks several.
+        Faults that share one golden run, as those of `walk --proof`, are compared with it together, from the first
+        one's activation on: the comparison does not attribute a difference to one of them.
         """
         if self.twin is None:
             raise UserError(f"fault {self.text()}: it has no golden run; Ranger.inject(..., proof=True) gives it one")
-        from ranger_sim.harness.faults import proof  # only here: it brings numpy's part of the comparison
+        from ranger_sim.harness.faults import proof  # only here: it imports numpy for the comparison
 
         golden, faulty = self.twin.records()
         together = self._together()
@@ -294,17 +294,17 @@ class Fault(StepWatch):
         return proof.prove(golden, faulty, began_ns, any(each.acted for each in together))
 
     def _together(self) -> list["Fault"]:
-        """The faults that have begun and have this one's golden run."""
+        """The faults that have begun and share this one's golden run."""
         return [each for each in self.robot.faults if each.twin is self.twin and each.activated_ns >= 0]
 
     @property
     def detected(self) -> Any:
-        """The first error that tells of it (`code`, `board`), None: none does. As `proof`."""
+        """The first error that reveals it (`code`, `board`), None: none does. As `proof`."""
         return self.proof().detected
 
     @property
     def detection_ms(self) -> float | None:
-        """Activation to the first error that tells of it, ms. As `proof`."""
+        """Activation to the first error that reveals it, ms. As `proof`."""
         found: float | None = self.proof().detection_ms
         return found
 
@@ -314,9 +314,9 @@ class Fault(StepWatch):
         return self.proof().reaction
 
     def text(self) -> str:
-        """As it is typed after --fault."""
+        """As typed after --fault."""
         values = "".join(
-            # every digit: it has to give the same run again
+            # every digit, to reproduce the run
             f",{name}={value if isinstance(value, str) else repr(value).removesuffix('.0')}"
             for name, value in self.values.items()
             if value != self.default(name) and (isinstance(value, str) or not math.isnan(value))
@@ -330,7 +330,7 @@ class Fault(StepWatch):
         return next(parameter.default for parameter in cls.parameters if parameter.name == name)
 
     def summary(self) -> dict[str, Any]:
-        """What became of it; times in s since power-up, None for not yet. proof: None without a golden run."""
+        """Its result; times in s since power-up, None for not yet. proof: None without a golden run."""
 
         def seconds(stamp_ns: int) -> float | None:
             return None if stamp_ns < 0 else (stamp_ns - self.robot.start_ns) * 1e-9

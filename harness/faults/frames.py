@@ -1,7 +1,7 @@
-"""Faults at a CAN controller of a board: errors that it sees in frames, and what its program has of them.
+"""Faults at a CAN controller of a board: errors that it sees in frames, and what its program receives of them.
 
 The errors have the names of FMI-LS-BUS. The node that misreads a bit sees its error first (primary); the others see one
-because of its error flag (secondary). Counters, flags, repetitions and bus-off are the controllers' own doing.
+because of its error flag (secondary). The controllers produce counters, flags, repetitions and bus-off themselves.
 """
 
 from typing import Any, ClassVar
@@ -31,7 +31,7 @@ SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, "chance of each, by the fault's o
 
 
 class ControllerFault(Fault):
-    """A fault at one controller. Clear when all on its bus take part and their counters are where they were."""
+    """A fault at one controller. Clear when all on its bus take part and their counters are back at their values."""
 
     kinds = (CONTROLLER,)
     needs = "a CAN controller"
@@ -44,7 +44,7 @@ class ControllerFault(Fault):
 
     @property
     def controller_node(self) -> Any:
-        """The controller as its bus has it."""
+        """The controller's node on its bus."""
         return self.bus.nodes[self.node]
 
     def counters(self) -> list[int]:
@@ -55,7 +55,7 @@ class ControllerFault(Fault):
         self.counters_before = self.counters()
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """Error counters fall by one with each good frame."""
+        """Whether the error counters are back; they fall by one with each good frame."""
         calm = all(now <= before for now, before in zip(self.counters(), self.counters_before, strict=False))
         return calm and all(node.mode == OPERATING or node.index >= len(self.nodes()) for node in self.bus.nodes)
 
@@ -65,7 +65,7 @@ class ControllerFault(Fault):
 
 
 class FrameFault(ControllerFault):
-    """A fault that picks frames: by name, every n-th, by chance, so many."""
+    """A fault that picks frames: by name, every n-th, by chance, a number of them."""
 
     parameters: ClassVar[tuple[Parameter, ...]] = (FRAME, EVERY, COUNT, SHARE)
 
@@ -80,11 +80,11 @@ class FrameFault(ControllerFault):
         self.tamper.noted = self.note
 
     def made(self) -> tampering.Tamper:
-        """What it does on the bus."""
+        """Its effect on the bus."""
         raise NotImplementedError
 
     def claims(self) -> tuple[str, ...]:
-        """Faults of other frames act beside it."""
+        """Its frames: faults of other frames may act at the same time."""
         return (f"{self.place.name}:{self.mode} of frame {self.values['frame']}",)
 
     def begin(self, now_ns: int) -> None:
@@ -96,7 +96,7 @@ class FrameFault(ControllerFault):
 
 
 class ErrorFault(FrameFault):
-    """One of the errors of FMI-LS-BUS, seen by this controller first. `seen`: who saw what (`tampering.Misreading`)."""
+    """One of the errors of FMI-LS-BUS, seen by this controller first. `seen`: by each node (`tampering.Misreading`)."""
 
     unit = "errors"
     tamper: Any
@@ -156,20 +156,20 @@ ERROR_MODES = {
 
 
 class Reception(FrameFault):
-    """What its program has of good frames differs: behind the transceiver and the check of the CRC."""
+    """Its program receives good frames differently: after the transceiver and the check of the CRC."""
 
     def finish(self, now_ns: int) -> None:
         FrameFault.finish(self, now_ns)
         self.received = self.controller_node.received
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """The next frame has come in as it was sent."""
+        """Whether the next frame has arrived as it was sent."""
         return bool(self.controller_node.received > self.received)
 
 
 @mode
 class Loss(Reception):
-    """Frames are acknowledged and lost behind the receive path: an acceptance filter or a buffer that failed."""
+    """Frames are acknowledged and lost after the receive path: an acceptance filter or a buffer that failed."""
 
     mode = "loss"
     meaning = "acknowledges frames that its program never has"
@@ -184,7 +184,7 @@ class Corruption(Reception):
     """Other data than was sent, unnoticed.
 
     On the wire the CRC finds all errors of up to five bits (CAN Specification 2.0, 3.1.1: Hamming distance 6), so such
-    data comes from a controller's memory or from a router that copies frames; it sits behind the check here.
+    data comes from a controller's memory or from a router that copies frames; it acts after the check here.
     """
 
     mode = "corruption"
@@ -225,7 +225,7 @@ class Delay(Reception):
 
 @mode
 class BusOff(ControllerFault):
-    """Bit errors in all that it sends until it is bus-off; its recovery is its program's and the bus's doing."""
+    """Bit errors in all that it sends until it is bus-off; its program and the bus make its recovery."""
 
     mode = "bus_off"
     meaning = "is driven bus-off by bit errors in the frames that it sends"
@@ -239,7 +239,7 @@ class BusOff(ControllerFault):
         self.silence()
 
     def silence(self) -> None:
-        """Once more."""
+        """Disturb it once more."""
         self.tamper = tampering.Silence(self.node)
         self.tamper.noted = self.note
         tampering.tampering_of(self.bus).add(self.tamper)
@@ -255,7 +255,7 @@ class BusOff(ControllerFault):
 
 @mode
 class WrongBitRate(ControllerFault):
-    """A wrong prescaler in CxBTR: its bits are longer or shorter than everybody else's."""
+    """A wrong prescaler in CxBTR: its bits are longer or shorter than the other nodes'."""
 
     mode = "bit_rate"
     meaning = "runs at another bit rate than its bus"
@@ -290,10 +290,10 @@ class WrongBitRate(ControllerFault):
 
 @mode
 class CutCable(ControllerFault):
-    """The cable between this controller and the other nodes is cut: each side hears and acknowledges only itself.
+    """The cable between this controller and the other nodes is cut: each side receives and acknowledges only itself.
 
     On a bus of three boards that is a cut of this board's stub. The record of the bus, its loads and counters are those
-    of the side that is left; `far` has the other side's.
+    of the remaining side; `far` has the other side's.
     """
 
     mode = "cut"
@@ -311,7 +311,7 @@ class CutCable(ControllerFault):
         self.attempts = self._attempts()
 
     def _lead_to(self, bus: Any, node: int, now_ns: int) -> None:
-        """The board's wires lead to a node of another piece of the cable."""
+        """Connect the board's wires to a node of another piece of the cable."""
         with reaching_into(self.robot, self.place.details["board"], now_ns):
             self.wires.connect_bus(self.controller, bus, node)
         wake_buses(self.robot, now_ns)

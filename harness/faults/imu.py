@@ -1,6 +1,6 @@
 """Faults of the inertial unit: another rate in its packets, with the right sum, or no packets.
 
-Values are those that the unit tells, about its axis x: backwards positive, in rad/s (robot.md C1.1).
+Values are those that the unit reports, about its axis x: backwards positive, in rad/s (robot.md C1.1).
 """
 
 import math
@@ -52,7 +52,7 @@ class PacketFault(Fault):
         while at < count:
             size = ACKNOWLEDGEMENT_BYTES if line.values[at] == SET_MODE else PACKET_BYTES
             if size == PACKET_BYTES and not self.keep_packet(line.values, at, line.times[at]):
-                for place in range(at, count - size):  # the rest moves up
+                for place in range(at, count - size):  # the remaining bytes move up
                     line.times[place], line.values[place] = line.times[place + size], line.values[place + size]
                 count -= size
                 line.count = count
@@ -60,11 +60,11 @@ class PacketFault(Fault):
                 at += size
 
     def keep_packet(self, values: Any, at: int, time_ns: int) -> bool:
-        """The packet of 31 bytes from `at` on, whose first one ends at `time_ns`, is changed; False: it is not sent."""
+        """The packet of 31 bytes from `at` on, the first ending at `time_ns`, may be changed; False: it is not sent."""
         return True
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """A packet tells the rate that the legs have, but for bias and noise. Six deviations: one in 5e8 is farther."""
+        """Whether a packet reports the legs' rate, except bias and noise. Six deviations: one in 5e8 is farther."""
         values = [int(value) for value in self.imu.bytes.values[: self.imu.bytes.count]]
         before, self.lean_rate = self.lean_rate, self.robot.plant.body.outer.rate
         if len(values) < PACKET_BYTES or values[-PACKET_BYTES] != self.imu.mode:
@@ -72,18 +72,18 @@ class PacketFault(Fault):
         rates = [self.imu.bias_rad_s - self.imu.rate_scale * rate for rate in (before, self.lean_rate)]
         room = 6.0 * self.imu.noise_rad_s + 1e-6
         if self.imu.lag_s > 0.0 or self.imu.filter_samples > 1 or self.imu.cross_x_from_z != 0.0:
-            rates = [self.imu.rate_x]  # of a unit that remembers, its own
+            rates = [self.imu.rate_x]  # a unit with memory: its own
         return bool(min(rates) - room <= rate_of(values[-PACKET_BYTES:]) <= max(rates) + room)
 
 
 def rate_of(values: Any, at: int = 0) -> float:
-    """The rate about x that the packet from `at` on tells, rad/s."""
+    """The rate about x in the packet from `at` on, rad/s."""
     a, b, c, d = values[at + RATE_X : at + RATE_X + 4]
     return float_of_word(a << 24 | b << 16 | c << 8 | d)
 
 
 def tell_rate(values: Any, at: int, rate_rad_s: float) -> None:
-    """Another rate about x in the packet from `at` on, and the sum that fits."""
+    """Write another rate about x into the packet from `at` on, and the matching sum."""
     word = word_of_float(rate_rad_s)
     high, low = at + PACKET_BYTES - 2, at + PACKET_BYTES - 1
     total = values[high] << 8 | values[low]
@@ -95,7 +95,7 @@ def tell_rate(values: Any, at: int, rate_rad_s: float) -> None:
 
 
 class SignalInPacket(PacketFault, SignalFault):
-    """A signal of harness/faults/signals.py in the place of the rate."""
+    """A signal of harness/faults/signals.py instead of the rate."""
 
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)

@@ -1,4 +1,4 @@
-"""Kinds of places at which faults sit: a mode says which it takes."""
+"""Kinds of places of faults: a mode lists those that it takes."""
 
 EDGES = "incremental encoder"
 WORD = "absolute encoder"
@@ -12,7 +12,7 @@ SUPPLY_VOLTAGE = "supply voltage"
 IMU = "inertial unit"
 CONVERTER = "external converter"
 INTERNAL_CONVERTER = "internal converter"
-BURST_CONVERTER = "burst converter"  # it converts by itself, nobody waits for it
+BURST_CONVERTER = "burst converter"  # it converts by itself, and no program waits for it
 MOTOR = "motor"
 BRIDGE = "bridge"
 CABLE = "cable"

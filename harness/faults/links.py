@@ -38,7 +38,7 @@ class LinkFault(Fault):
         self.count = 0
 
     def claims(self) -> tuple[str, ...]:
-        """Both ends' places are of one link."""
+        """The link: both ends' places share it."""
         return ("the link of router and main brain",)
 
     def begin(self, now_ns: int) -> None:
@@ -52,7 +52,7 @@ class LinkFault(Fault):
         return bool(self.link.exchanges > self.exchanges)
 
     def exchange(self, end_ns: int, to_slave: Any, to_master: Any) -> tuple[Any, Any]:
-        """What arrives on both sides of an exchange that is over at `end_ns`."""
+        """What arrives on both sides of an exchange that ends at `end_ns`."""
         self.count += 1
         if self.count % int(self.values["every"]) or self.random.uniform() >= self.values["share"]:
             return to_slave, to_master
@@ -60,7 +60,7 @@ class LinkFault(Fault):
         return self.changed(to_slave, to_master)
 
     def changed(self, to_slave: Any, to_master: Any) -> tuple[Any, Any]:
-        """What is done to an exchange that was picked."""
+        """Change an exchange that was picked."""
         raise NotImplementedError
 
 
@@ -68,7 +68,7 @@ class LinkFault(Fault):
 class FlippedBit(LinkFault):
     """A bit of a segment arrives inverted, so that its checksum is wrong: the receiver drops the whole segment.
 
-    The router passes over a segment that begins with a zero half-word, an empty one, without a look at its checksum.
+    The router skips a segment that begins with a zero half-word, an empty one, without checking its checksum.
     """
 
     mode = "checksum"
@@ -104,7 +104,7 @@ class FlippedBit(LinkFault):
 
 @mode
 class MissingExchange(LinkFault):
-    """An exchange that never completes at this end: no segment, no interrupt. The other end has its one."""
+    """An exchange that never completes at this end: no segment, no interrupt. The other end gets its own."""
 
     mode = "missing"
     meaning = "does not have the segment of an exchange"
@@ -115,20 +115,20 @@ class MissingExchange(LinkFault):
 
 
 class DeafLine:
-    """What hears a board's UART while its line is broken: nobody. `line`: who heard it before, and will again."""
+    """Replaces the receiver of a board's UART while its line is broken. `line`: the receiver before and after."""
 
     def __init__(self, line: Any, fault: Fault) -> None:
         self.line = line
         self.fault = fault
 
     def from_board(self, time: int, byte: int, count: int, data: Any) -> None:
-        """Lost."""
+        """Discard the bytes."""
         self.fault.note(time, max(count, 1))
 
 
 @mode
 class DropOut(Fault):
-    """A broken line: no byte arrives. At the inertial unit neither direction, at the computer what the robot sends."""
+    """A broken line: no byte arrives. Lost at the inertial unit: both directions; at the computer: the robot's."""
 
     mode = "drop_out"
     kinds = (SERIAL,)

@@ -13,7 +13,7 @@ HIGHEST_IDENTIFIER = 0x7FF  # standard frames, as the robot sends them
 
 @dataclasses.dataclass(frozen=True)
 class NameParameter(Parameter):
-    """A name that a mode takes. Whether its place has it, the mode finds out when it is armed."""
+    """A name that a mode takes. The mode checks when armed whether its place has it."""
 
     def checked(self, value: Any, where: str) -> Any:
         """`value` as text, or a UserError naming `where`."""
@@ -24,12 +24,12 @@ class NameParameter(Parameter):
 
 
 def name_parameter(name: str, default: Any, meaning: str, source: str) -> NameParameter:
-    """A parameter that is a name; `default` where none is given."""
+    """A parameter that is a name; `default` where it is not given."""
     return NameParameter(name, "name", default, 0.0, 0.0, meaning, source)
 
 
 def identifier_of(robot: Any, text: str, where: str) -> int:
-    """Identifier of the frame called `text`: a variable, a number, or "any" (-1). UserError for anything else."""
+    """Identifier of the frame called `text`: a variable, a number, or "any" (-1). UserError for other texts."""
     if text == ANY:
         return -1
     known = robot.names.ids
@@ -47,7 +47,7 @@ def identifier_of(robot: Any, text: str, where: str) -> int:
 
 
 def chosen(name: str, there: Any, what: str) -> str:
-    """`name`, which must be `there`; otherwise a UserError that says what there is."""
+    """Return `name`, which must be in `there`; otherwise a UserError that lists the known ones."""
     names = sorted(there)
     if name not in names:
         near = difflib.get_close_matches(name, names, 3)

@@ -21,7 +21,7 @@ def controllers(wires: Iterable[CanWire]) -> list[Place]:
 
 
 def buses(count: int) -> list[Place]:
-    """The buses of a machine that has so many."""
+    """The buses of a machine that has `count` buses."""
     return [
         Place(f"can{number}", BUS, f"the wire of CAN bus {number}", {"bus": number}) for number in range(1, count + 1)
     ]

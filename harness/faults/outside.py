@@ -1,7 +1,7 @@
-"""Faults on a bus outside that need nothing but frames: one more peer on its interface, who does not belong there.
+"""Faults on a bus outside that need only frames: another peer on its interface, which does not belong there.
 
-The peer opens the interface once more, as the robot's controllers have each opened it. What arbitration makes of its
-frames is up to the wire; an interface without one (SocketCAN's vcan, python-can's virtual) just puts them in between.
+The peer opens the interface again, as each of the robot's controllers has. The wire decides the arbitration of its
+frames; an interface without one (SocketCAN's vcan, python-can's virtual) just inserts them.
 """
 
 import collections
@@ -12,14 +12,14 @@ from ranger_sim.can_bus.frame import EIGHT_BYTES
 from ranger_sim.can_bus.tampering import INTRUDERS_ORDER
 from ranger_sim.foundation.events import CAN_REQUEST, FLAG_ERROR, EventQueue
 
-STEP_NS = 250_000  # of the plant, in which faults are asked once
-MOST_BEHIND = 64  # frames that are sent later than they were due; beyond that they are dropped (chosen by us)
+STEP_NS = 250_000  # of the plant, in which faults are called once
+MOST_BEHIND = 64  # frames that are sent late; beyond that they are dropped (chosen by us)
 
 Noted = Callable[[int, float], None]
 
 
 def external_bus(robot: Any, number: int) -> Any:
-    """What leads to bus 1 ... 4 where that is outside; None for an emulated one."""
+    """The connection to bus 1 ... 4 where that is outside; None for an emulated one."""
     for end in robot.polled:
         if getattr(end, "name", None) == f"can{number}" and hasattr(end, "add_peer"):
             return end
@@ -37,12 +37,12 @@ class OutsideIntruder:
         self.peer = external.add_peer(f"{external.name}, intruder", self.inbox, 1, INTRUDERS_ORDER)
 
     def step(self, now_ns: int) -> None:
-        """Once per step of the plant."""
+        """Act once per step of the plant."""
         self.inbox.clear()
         self.peer.flush(now_ns)
 
     def send(self, time_ns: int, low: int, high: int, flags: int = EIGHT_BYTES) -> bool:
-        """One frame; False where the interface does not take it now."""
+        """Send one frame; False where the interface does not accept it now."""
         if self.peer.waiting:
             return False
         self.peer.from_board(CAN_REQUEST, time_ns, 1, self.identifier, flags, low, high)
@@ -50,12 +50,12 @@ class OutsideIntruder:
         return True
 
     def leave(self) -> None:
-        """Off the bus."""
+        """Leave the bus."""
         self.external.remove_peer(self.peer)
 
 
 class OutsideBabbling(OutsideIntruder):
-    """Sends one frame every `period_ns`, or one behind another (0)."""
+    """Sends one frame every `period_ns`, or one after another (0)."""
 
     def __init__(self, external: Any, identifier: int, period_ns: int, noted: Noted) -> None:
         OutsideIntruder.__init__(self, external, identifier, noted)
@@ -72,16 +72,16 @@ class OutsideBabbling(OutsideIntruder):
 
 
 class OutsideDuplicate(OutsideIntruder):
-    """Behind each frame of `identifier` it sends one with the bits of `mask` inverted in its first word."""
+    """Sends, after each frame of `identifier`, one with the bits of `mask` inverted in its first word."""
 
     def __init__(self, external: Any, identifier: int, mask: int, noted: Noted) -> None:
         OutsideIntruder.__init__(self, external, identifier, noted)
         self.mask = mask
-        self.sent: collections.deque[tuple[int, int]] = collections.deque(maxlen=MOST_BEHIND)  # not heard back yet
+        self.sent: collections.deque[tuple[int, int]] = collections.deque(maxlen=MOST_BEHIND)  # not received back yet
         external.sinks.append(self.heard)
 
     def heard(self, time_ns: int, identifier: int, flags: int, low: int, high: int) -> None:
-        """A frame passed on the bus; its own are heard as well."""
+        """Handle a frame on the bus; its own are received as well."""
         if identifier != self.identifier or flags & FLAG_ERROR:
             return
         if (low, high) in self.sent:

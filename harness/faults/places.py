@@ -1,6 +1,6 @@
-"""Every place of the robot at which the faults of this package can sit, from the tables of harness/wiring/ranger.py.
+"""Every place of the robot for the faults of this package, from the tables of harness/wiring/ranger.py.
 
-A place is named by the board that hears it, or whose motor it belongs to, and by what it is there.
+A place is named by the board that receives its signal, or whose motor it belongs to, and by its function there.
 """
 
 from ranger_sim.harness.faults import network_places
@@ -30,7 +30,7 @@ from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.plant import wiring_points as point
 
-# What hangs on each encoder of the plant's list: name at its board, what it is, joint, edges of channel A per turn.
+# Each encoder of the plant's list: name at its board, what it is, joint, edges of channel A per turn.
 ENCODERS = {
     point.HIP_JOINT_EDGES: ("joint_encoder", "the incremental encoder of the hip joint, 4096 edges a turn"),
     point.HIP_MOTOR_EDGES: ("motor_encoder", "the incremental encoder of the hip motor, 384 edges a turn, gear 66"),
@@ -45,7 +45,7 @@ ENCODERS = {
     ),
     point.INNER_ANKLE_EDGES: ("joint_encoder", "the incremental encoder of the inner ankles, 4096 edges a turn"),
 }
-# A board's count after lost edges: what brings it back (robot.md N4.8).
+# What restores a board's count after lost edges (robot.md N4.8).
 KEPT_BY_THE_BOARD = {
     "MCH": {"motor_encoder": "the board's count, until its re-zeroing has drawn it back to the joint's: 5 % at 45 Hz"},
     "MCFO": {"motor_encoder": "the board's count, until its re-zeroing has: 20 % at 15 Hz, ankle flipped up at rest"},
@@ -77,7 +77,7 @@ ANKLES = ("MCFO", "MCFI")
 
 
 def sensors() -> list[Place]:
-    """On the wires between the plant's sensors and the boards."""
+    """Places on the wires between the plant's sensors and the boards."""
     places = []
     for wire in wiring.ENCODERS:
         name, what = ENCODERS[wire.encoder]
@@ -102,7 +102,7 @@ def sensors() -> list[Place]:
 
 
 def converters() -> list[Place]:
-    """In the analog-digital converters of the boards."""
+    """Places in the analog-digital converters of the boards."""
     places = []
     for board in wiring.MOTORS:
         details = {"board": board, "converter": "adc_external"}
@@ -115,7 +115,7 @@ def converters() -> list[Place]:
 
 
 def actuators() -> list[Place]:
-    """From the bridges to the joints."""
+    """Places from the bridges to the joints."""
     places = []
     for board, motor in wiring.MOTORS.items():
         name = MOTOR_WORDS[board]

@@ -17,8 +17,8 @@ from ranger_sim.harness.wiring import ranger as wiring
 BATTERY = "battery"
 SUPPLY = "board supply"
 RESET, OPERATING = 1, 0  # modes of a bus node
-# From its power, or from its reset, to the first instruction of a board's program; chosen by us as for a board that
-# comes back in a process of its own (harness/processes): supply and oscillator settle in about a millisecond.
+# From power-up or reset to the first instruction of a board's program; chosen by us as for a board that gets
+# a new process (harness/processes): supply and oscillator settle in about a millisecond.
 START_NS = 1_000_000
 
 CATALOGUE.add_places([Place("battery", BATTERY, "the packs that feed motors and electronics")])
@@ -28,7 +28,7 @@ CATALOGUE.add_places(
 
 
 class BatteryFault(Fault):
-    """Another voltage behind the same load; noted by what is taken from it at the currents that flow."""
+    """Another voltage behind the same load; measured by the voltage missing at the present currents."""
 
     kinds = (BATTERY,)
     needs = "the battery"
@@ -47,7 +47,7 @@ class BatteryFault(Fault):
             self.note(end_ns, taken)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """The voltage is that of the parameters, charge and current."""
+        """Whether the voltage is that of the parameters, charge and current."""
         battery = self.battery
         resistance_ohm = battery.parameters.pack_resistance_ohm / battery.parameters.packs
         charge_before = battery.charge + battery.current_A * (end_ns - start_ns) * 1e-9 * battery.per_As
@@ -56,7 +56,7 @@ class BatteryFault(Fault):
 
 
 def _open_circuit_V(battery: Any, charge: float) -> float:
-    """Voltage without load by the parameters, straight between the points of the cell's curve."""
+    """Voltage without load by the parameters, linear between the points of the cell's curve."""
     p = battery.parameters
     place = min(max(charge, 0.0) * (len(p.cell_volts) - 1), len(p.cell_volts) - 1.0)
     i = min(int(place), len(p.cell_volts) - 2)
@@ -100,7 +100,7 @@ class Sag(BatteryFault):
 
 @mode
 class PackLost(BatteryFault):
-    """Some packs lose contact: the others carry their current. At the end they are back with the charge they had."""
+    """Some packs lose contact: the others carry their current. At the end they return with the charge they had."""
 
     mode = "pack_lost"
     meaning = "loses packs: the others carry the current"
@@ -126,7 +126,7 @@ class PackLost(BatteryFault):
     def finish(self, now_ns: int) -> None:
         battery = self.battery
         battery.resistance_ohm, battery.per_As = self.usual
-        battery.charge = self.left * battery.charge + (1.0 - self.left) * self.charge_lost  # they even out
+        battery.charge = self.left * battery.charge + (1.0 - self.left) * self.charge_lost  # the packs equalise
         battery.open_voltage_V = battery.open_circuit_V(battery.charge)
 
     def healthy_V(self) -> float:
@@ -134,7 +134,7 @@ class PackLost(BatteryFault):
 
 
 class PowerlessBoard(Board):
-    """What stands in the place of a board without power: it takes what comes, and does nothing."""
+    """A substitute for a board without power: it discards its inputs, and does nothing."""
 
     def __init__(self, before: Any) -> None:
         Board.__init__(self, before.name)
@@ -142,18 +142,18 @@ class PowerlessBoard(Board):
         self.next_time = NEVER
         self.swing = before.watched()
         self.memory = before.memory
-        self.errors = getattr(before, "errors", None)  # what it had noted
+        self.errors = getattr(before, "errors", None)  # the errors that it had recorded
         self.slot_time = before.latest_slot()
         self.counted = before.counters()
-        self.log = before.scheduler.log  # of its activity, which the board that comes back goes on with
+        self.log = before.scheduler.log  # of its activity, which the board continues when it returns
         self.buffers: list[Any] = []
 
     def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
-        """Its pins are there, and nobody looks."""
+        """Ignore edges at its pins."""
         self.buffers.append(buffer)
 
     def advance(self, until: int) -> int:
-        """What came before `until` (ns) is lost."""
+        """Discard what arrived before `until` (ns)."""
         while self.inbox.head_time < until:
             self.inbox.take()
         for buffer in self.buffers:
@@ -163,29 +163,29 @@ class PowerlessBoard(Board):
         return NEVER
 
     def watched(self) -> int:
-        """As it was."""
+        """Unchanged."""
         return int(self.swing)
 
     def latest_slot(self) -> int:
-        """Of the board that lost its power."""
+        """That of the board that lost its power."""
         return int(self.slot_time)
 
     def activity(self) -> Any:
-        """Of the board that lost its power, and of the one that comes back."""
+        """That of the board that lost its power, and of the one that returns."""
         if self.log is None:
             self.log = ActivityLog()
         return self.log
 
     def counters(self) -> Any:
-        """Of the board that lost its power."""
+        """Those of the board that lost its power."""
         return self.counted
 
 
 class Restart(Fault):
-    """A board's program ends in the middle, and begins anew later on a board fresh from the shelf.
+    """A board's program ends in the middle, and starts again later on a new board.
 
-    What a power-up forgets is forgotten: all variables, the router's time, the main brain's data table. Crystal, wires,
-    bus schedule and swapped schedules of the profile stay; functions that a test put into its schedule do not.
+    All state that a power-up clears is cleared: all variables, the router's time, the main brain's data table. Crystal,
+    wires, bus schedule and swapped schedules of the profile stay; functions that a test put into its schedule do not.
     """
 
     unit = "boards"
@@ -200,7 +200,7 @@ class Restart(Fault):
         self.slots_before = 0
 
     def down_ns(self) -> int:
-        """So long it is without power or held in reset."""
+        """How long it is without power or held in reset."""
         raise NotImplementedError
 
     def begin(self, now_ns: int) -> None:
@@ -216,7 +216,7 @@ class Restart(Fault):
         self.note(now_ns, 1.0)
 
     def stop_motor(self, now_ns: int) -> None:
-        """What becomes of its bridge."""
+        """Set the state of its bridge."""
 
     def before(self, now_ns: int) -> None:
         if now_ns >= self.back_ns:
@@ -255,7 +255,7 @@ class Restart(Fault):
         wake_buses(robot, now_ns)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """Its new program runs slots, and its controllers take part."""
+        """Whether its new program runs slots, and its controllers take part."""
         board = self.robot.loop.board(self.name)
         return bool(
             board.latest_slot() > self.activated_ns
@@ -265,7 +265,7 @@ class Restart(Fault):
 
 @mode
 class BrownOut(Restart):
-    """A board's supply fails for a while: its processor stops, its bridge opens, its transceiver lets go of the bus."""
+    """A board's supply fails for a while: its processor stops, its bridge opens, its transceiver releases the bus."""
 
     mode = "brown_out"
     kinds = (SUPPLY,)
@@ -279,7 +279,7 @@ class BrownOut(Restart):
         return round(1e6 * self.values["off_ms"])
 
     def stop_motor(self, now_ns: int) -> None:
-        """The bridge's drivers have no supply: no transistor conducts from now on."""
+        """Open the bridge: its drivers have no supply, so no transistor conducts from now on."""
         motor = wiring.MOTORS.get(self.name)
         if motor is not None:
             drive = self.robot.plant.motors[motor].drive

@@ -1,6 +1,6 @@
 """Faults of a board's processor: time that a function takes, resets, crystal, interrupts, a full ring.
 
-Nothing here writes what firmware keeps: a function takes longer, a clock runs otherwise, a line asks again.
+No fault here writes firmware memory: a function takes longer, a clock runs differently, a line requests again.
 """
 
 from typing import Any, ClassVar
@@ -39,11 +39,11 @@ class ProcessorFault(Fault):
 
     @property
     def board(self) -> Any:
-        """The board that stands there now."""
+        """The board that is there now."""
         return self.robot.loop.board(self.name)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """A slot that began after the end is finished: the row before it was not cut off."""
+        """Whether a slot that began after the end is finished: the row before it was not cut off."""
         scheduler = getattr(self.board, "scheduler", None)  # a board without power has none
         return bool(scheduler is not None and scheduler.done and scheduler.slot_time > self.ended_ns)
 
@@ -60,11 +60,11 @@ class TaskFault(ProcessorFault):
         self.task = self.found(self.values["task"])
 
     def claims(self) -> tuple[str, ...]:
-        """One function of it."""
+        """One function of the board."""
         return (f"{self.place.name}, {self.task.name}",)
 
     def found(self, name: str) -> Any:
-        """The task of this name. UserError for one that is not there, or that calls others."""
+        """The task of this name. UserError for a missing one, or one that calls others."""
         tasks = [task for task in self.board.scheduler.schedule.all_tasks() if task.kind == NORMAL_TASK]
         chosen(name, [task.name for task in tasks], f"fault {self.place.name}:{self.mode}, task")
         return next(task for task in tasks if task.name == name)
@@ -72,7 +72,7 @@ class TaskFault(ProcessorFault):
 
 @mode
 class ExtraCycles(TaskFault):
-    """A function that takes longer than it is known to: another path through it, a slower memory."""
+    """A function that takes longer than its cost: another path through it, a slower memory."""
 
     mode = "extra_cycles"
     meaning = "takes more cycles in one function"
@@ -101,9 +101,9 @@ class ExtraCycles(TaskFault):
 
 
 class Hold(TaskFault):
-    """One call of a function that does not return before it is let go: the processor stays in it.
+    """One call of a function that does not return before it is released: the processor stays in it.
 
-    Interrupts are served all the while, slots pass, and their rows are dropped.
+    Interrupts are served meanwhile, slots pass, and their rows are dropped.
     """
 
     unit = "ns"
@@ -112,7 +112,7 @@ class Hold(TaskFault):
         self.held_since = -1
         self.kept_cost = self.task.cost
         self.calls = self.task.calls
-        # long enough to last until the step in which its call is noticed, and the one behind it
+        # long enough to last until the step in which its call is noticed, and the one after it
         self.reach_ns = 2 * self.robot.plant.step_ns
         with reaching_into(self.robot, self.name, now_ns) as board:
             self.task.cost = self.kept_cost + int(2 * self.reach_ns * board.cycles_per_ns)
@@ -145,7 +145,7 @@ class Hold(TaskFault):
 
 @mode
 class Stall(Hold):
-    """A function that waits for something that does not come, for so long or until the fault's end."""
+    """A function that waits for an event that does not come, for a given time or until the fault's end."""
 
     mode = "stall"
     meaning = "stays in one function, which returns late"
@@ -160,7 +160,7 @@ class Stall(Hold):
 
 @mode
 class FullRing(Hold):
-    """The task that empties a satellite's receive ring does not run until the ring is full and a frame finds no place.
+    """The task that empties a satellite's receive ring does not run until the ring is full and a frame does not fit.
 
     Then it goes on; with the quirk `full_receive_ring_kills`, as on the robot, the board never does (robot.md T4.1).
     """
@@ -204,7 +204,7 @@ class FullRing(Hold):
 class Reset(Restart):
     """The processor is reset, as by its watchdog or a glitch on its reset pin; its supply stays.
 
-    Its pins are inputs until its program sets them: the bridge's low sides are off, the watchdog line stands still.
+    Its pins are inputs until its program sets them: the bridge's low sides are off, the watchdog line stays constant.
     """
 
     mode = "reset"
@@ -225,8 +225,8 @@ class Reset(Restart):
 class CrystalOff(ProcessorFault):
     """The crystal runs at another rate: slots, timers, PWM, serial lines and cycles with it.
 
-    Its CAN controller runs on it as well. Up to a per cent its synchronisation makes up for that; beyond, the mode
-    bit_rate at the controller is what happens.
+    Its CAN controller runs on it as well. Up to a per cent its synchronisation compensates for that; beyond, use the
+    mode bit_rate at the controller.
     """
 
     mode = "crystal"
@@ -240,7 +240,7 @@ class CrystalOff(ProcessorFault):
     )  # fmt: skip
 
     def claims(self) -> tuple[str, ...]:
-        """Functions and interrupts go on beside it."""
+        """The crystal: functions and interrupts continue."""
         return (f"{self.place.name}, its crystal",)
 
     def begin(self, now_ns: int) -> None:
@@ -261,15 +261,15 @@ class CrystalOff(ProcessorFault):
             board.retune(bought.ppb + more_ppb, now_ns)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """It runs as it was bought."""
+        """Whether it runs at its own rate."""
         return bool(self.board.crystal.ppb == self.robot._stream(self.name)[0].ppb)
 
 
 @mode
 class StuckInterrupt(ProcessorFault):
-    """An interrupt line that stays asserted: as soon as a service ends it asks again.
+    """An interrupt line that stays asserted: as soon as a service ends it requests again.
 
-    What is served before it goes on; its own handler runs each time, and nothing that it comes before.
+    Interrupts of higher priority continue; its own handler runs each time, and those of lower priority do not.
     """
 
     mode = "stuck_interrupt"
@@ -299,7 +299,7 @@ class StuckInterrupt(ProcessorFault):
             board.request(self.source)
 
     def _serve(self, queue: Any) -> Any:
-        """The handler, and the line asks again."""
+        """Run the handler, and request again."""
         items = self.service(queue)
         if self.asking:
             self.note(self.chip.now, 1.0)

@@ -1,13 +1,13 @@
-"""What a fault did, held against the golden run: the same scenario without it.
+"""What a fault did, compared with the golden run: the same scenario without it.
 
 Terms. *Acted*: the value at the fault's place differed from the unfaulted one. *No effect*: it acted, and the firmware
-shows no difference: not in a frame on a bus, not in the main brain's variables, not in the boards' error counts (what a
-board keeps to itself and never sends, nobody sees). *Masked*: the firmware differs, the outcome does not. *Detected*:
+shows no difference: not in a frame on a bus, not in the main brain's variables, not in the boards' error counts (state
+that a board never sends is not visible). *Masked*: the firmware differs, the outcome does not. *Detected*:
 an error code, or its rate, that healthy walks do not have. *Invalid*: the fault never acted; that proves nothing.
 
 Healthy walks raise errors too, thousands of them. So an error detects a fault only if no healthy walk has its code, or
-if more of it came within a time than `RATE_FACTOR` times the most that any healthy walk had within a time of that
-length, and `RATE_MORE` on top (`Healthy`). How often that alone would cry wolf is counted (`false_alarms`).
+if more of it occurred within a time than `RATE_FACTOR` times the most that any healthy walk had within a time of that
+length, and `RATE_MORE` on top (`Healthy`). `false_alarms` counts how often that rule alone gives a false alarm.
 """
 
 import dataclasses
@@ -21,12 +21,12 @@ from ranger_sim.harness.faults.evidence import Record
 from ranger_sim.harness.names import Names
 
 NS_PER_MS = 1e6
-# A code that healthy walks have detects a fault when it comes twice as often as in the worst of them, and five times
+# A code that healthy walks have detects a fault when it occurs twice as often as in the worst of them, and five times
 # more: chosen by us, because one healthy walk's bursts of MC_INTEG_SATUR are half as long again as those of two others;
-# every campaign counts how often this still cries wolf.
+# every campaign counts how often this still gives false alarms.
 RATE_FACTOR = 2.0
 RATE_MORE = 5
-# Counts at which rates are looked at: each of the first ones, then a tenth further each time.
+# Counts at which rates are checked: each of the first ones, then a tenth further each time.
 EACH_COUNT_TO = 32
 COUNT_GROWTH = 1.1
 
@@ -47,7 +47,7 @@ class Difference:
 
 @dataclasses.dataclass(frozen=True)
 class Detection:
-    """An error that tells of the fault. `rate`: healthy walks have the code too, but never so often."""
+    """An error that reveals the fault. `rate`: healthy walks have the code too, but less often."""
 
     board: str
     code: str
@@ -67,9 +67,9 @@ class Reaction:
 
 @dataclasses.dataclass(frozen=True)
 class Proof:
-    """All of it. Times are ns; `*_ms` count from the fault's activation. None: it did not happen.
+    """The whole result. Times are ns; `*_ms` count from the fault's activation. None: it did not happen.
 
-    reaction: the first machine that is in another state than golden at that instant; after small differences that is
+    reaction: the first machine that is in another state than golden at the same time; after small differences that is
     soon a mere shift in time. unusual: the first change of state that no healthy walk has.
     """
 
@@ -85,7 +85,7 @@ class Proof:
 
     @property
     def detected(self) -> Detection | None:
-        """The first error that tells of the fault."""
+        """The first error that reveals the fault."""
         return self.detections[0] if self.detections else None
 
     def after_ms(self, what: Difference | Detection | Reaction | None) -> float | None:
@@ -94,7 +94,7 @@ class Proof:
 
     @property
     def detection_ms(self) -> float | None:
-        """Activation to the first error that tells of it."""
+        """Activation to the first error that reveals it."""
         return self.after_ms(self.detected)
 
     @property
@@ -108,7 +108,7 @@ class Proof:
         return None if self.fell_ns is None else (self.fell_ns - self.activated_ns) / NS_PER_MS
 
     def summary(self) -> dict[str, Any]:
-        """As `walk --proof` keeps it: names, and ms after the activation; None for what did not happen."""
+        """As `walk --proof` stores it: names, and ms after the activation; None for what did not happen."""
         first, told, reacted = self.first_firmware, self.detected, self.reaction
         return {
             "first_difference": first and {"where": first.where, "name": first.name, "after_ms": self.after_ms(first)},
@@ -122,9 +122,9 @@ class Proof:
 
 
 def prove(golden: Record, faulty: Record, activated_ns: int, acted: bool, healthy: "Healthy | None" = None) -> Proof:
-    """Hold the faulty run against the golden one. Both begin at one instant, before the fault; golden ends no earlier.
+    """Compare the faulty run with the golden one. Both begin at one time, before the fault; golden ends no earlier.
 
-    healthy: what healthy walks raise; without it the golden run and the master table say what is normal.
+    healthy: what healthy walks raise; without it the golden run and the master table define what is normal.
     """
     normal = healthy if healthy is not None else Healthy.of([golden], normal_per_s(golden.names))
     firmware = [
@@ -146,13 +146,13 @@ def prove(golden: Record, faulty: Record, activated_ns: int, acted: bool, health
 
 
 def normal_per_s(names: Names) -> dict[Key, float]:
-    """How many errors a second are normal, by board and number: the master table's column."""
+    """The normal errors per second by board and number, from the master table's column."""
     rates = names.normal_per_s.items()
     return {(board, code): rate for code, boards in rates for board, rate in boards.items()}
 
 
 def earliest(differences: Iterable[Difference]) -> Difference | None:
-    """The first of them; at one instant the one that is named first."""
+    """The first of them; of those at one time the one listed first."""
     return min(differences, key=lambda each: each.time_ns, default=None)
 
 
@@ -160,14 +160,14 @@ def earliest(differences: Iterable[Difference]) -> Difference | None:
 
 
 def first_other_row(golden: np.ndarray, faulty: np.ndarray) -> int | None:
-    """Index of the first row that differs; None when the shorter one begins the longer one."""
+    """Index of the first row that differs; None when the shorter is a prefix of the longer."""
     common = min(len(golden), len(faulty))
     differs = np.flatnonzero((golden[:common] != faulty[:common]).any(axis=1))
     return int(differs[0]) if len(differs) else None
 
 
 def frame_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
-    """The first frame of each bus that is another one, or came at another time, until the faulty run's end."""
+    """The first frame of each bus that differs in content or time, until the faulty run's end."""
     for bus, rows in faulty.frames.items():
         # a frame under way at the end is in the stream of the run that has decided on it already
         reference, rows = (each[each[:, 0] <= faulty.end_ns] for each in (golden.frames[bus], rows))
@@ -191,7 +191,7 @@ def frame_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
 
 
 def frame_value(names: Names, number: int, row: Any) -> float | None:
-    """The variable's value in a frame, None for what is no variable."""
+    """The variable's value in a frame, None for what is not a variable."""
     return float(names.value(number, (int(row[1]) >> 12) & 0xFFFFFFFF)) if number in names.types else None
 
 
@@ -207,7 +207,7 @@ def word_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
 
 
 def error_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
-    """The first error that came in one of the runs and not in the other."""
+    """The first error that occurred in one run and not in the other."""
     reference = golden.errors[golden.errors[:, 0] < faulty.end_ns]
     rows = faulty.errors[faulty.errors[:, 0] < faulty.end_ns]
     place = first_other_row(reference, rows)
@@ -215,7 +215,7 @@ def error_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
         if len(reference) == len(rows):
             return
         place = min(len(reference), len(rows))
-    # at one instant rows are in order of board and code: the lower one is missing in the other run
+    # rows of one time are in order of board and code: the lower one is missing in the other run
     row = min((run[place] for run in (reference, rows) if place < len(run)), key=lambda each: tuple(each[:3]))
     name = f"{faulty.boards[int(row[1])]} {faulty.names.errors.get(int(row[2]), int(row[2]))}"
     yield Difference("errors", name, int(row[0]), None, None)
@@ -234,7 +234,7 @@ def body_differences(golden: Record, faulty: Record) -> Iterable[Difference]:
 
 
 def reaction(golden: Record, faulty: Record) -> Reaction | None:
-    """The first machine whose state is not golden's at that instant."""
+    """The first machine whose state is not golden's at that time."""
     common = min(len(golden.words), len(faulty.words))
     found = None
     for machine in faulty.machines:
@@ -256,7 +256,7 @@ class Healthy:
     """What walks without a fault raise.
 
     counts: numbers of errors at which rates are known; spans: {(board, code): the shortest time (ns) in which any
-    healthy walk had so many, one per count, largest number where none had}. changes: {machine: {(from, to)}}.
+    healthy walk had that number, one per count, largest number where none had}. changes: {machine: {(from, to)}}.
     """
 
     def __init__(
@@ -271,7 +271,7 @@ class Healthy:
 
     @classmethod
     def of(cls, records: Sequence[Record], per_s: dict[Key, float] | None = None) -> "Healthy":
-        """From runs without a fault. `per_s`: errors of which so many a second are known to be normal besides."""
+        """From runs without a fault. `per_s`: further errors, and how many of each per second are normal."""
         spans: dict[Key, list[int]] = {}
         changes: dict[str, set[tuple[int, int]]] = {machine: set() for each in records for machine in each.machines}
         for record in records:
@@ -287,7 +287,7 @@ class Healthy:
     def most(self, key: Key, duration_ns: int) -> int:
         """The most errors of this kind that any healthy walk had within this time.
 
-        Below the next count that is looked at; beyond the last one that any of them reached it is that one.
+        Below the next count that is checked; beyond the last count that any of them reached, that one.
         """
         spans = self.spans.get(key)
         normal = int(self.per_s.get(key, 0.0) * duration_ns * 1e-9)
@@ -331,7 +331,7 @@ class Healthy:
         return found
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON can carry it."""
+        """As plain types for JSON."""
         return {
             "spans": [[board, code, spans] for (board, code), spans in self.spans.items()],
             "changes": {machine: sorted(map(list, seen)) for machine, seen in self.changes.items()},
@@ -339,12 +339,12 @@ class Healthy:
 
     @classmethod
     def from_dict(cls, found: dict[str, Any]) -> "Healthy":
-        """The same from what `as_dict` gave."""
+        """The same from the result of `as_dict`."""
         changes = {machine: {(a, b) for a, b in seen} for machine, seen in found["changes"].items()}
         return cls({(board, code): spans for board, code, spans in found["spans"]}, changes)
 
     def merged(self, other: "Healthy") -> "Healthy":
-        """What either has seen."""
+        """What either has recorded."""
         spans = {key: list(each) for key, each in self.spans.items()}
         for key, here in other.spans.items():
             known = spans.get(key, [])
@@ -358,7 +358,7 @@ class Healthy:
 
 
 def all_looked_at() -> Iterator[int]:
-    """The counts at which rates are looked at: each of the first, then ever fewer."""
+    """The counts at which rates are checked: each of the first, then increasingly spaced."""
     count = 0
     while True:
         count = count + 1 if count < EACH_COUNT_TO else int(count * COUNT_GROWTH)
@@ -388,7 +388,7 @@ def event_times(record: Record) -> dict[Key, np.ndarray]:
 
 
 def shortest_spans(times: np.ndarray) -> list[int]:
-    """For each count that is looked at: the shortest time from one error to the one that makes it so many."""
+    """For each checked count: the shortest time from one error to the one that completes the count."""
     return [int((times[count - 1 :] - times[: len(times) - count + 1]).min()) for count in looked_at_below(len(times))]
 
 
@@ -413,7 +413,7 @@ THERMAL_S = 10.0
 
 @dataclasses.dataclass(frozen=True)
 class Gait:
-    """A walk between two instants. None where too few steps were made (fewer than two)."""
+    """A walk between two times. None where it made fewer than two steps."""
 
     steps: int
     step_length_m: float | None
@@ -479,7 +479,7 @@ def thermal_state(current: np.ndarray, time: np.ndarray) -> float:
 
 
 def false_alarms(records: Sequence[Record], starts_ns: Sequence[int]) -> tuple[int, int, list[Detection]]:
-    """(how many, of how many, which): healthy walks judged by the other ones as if a fault had begun at each start."""
+    """(false alarms, trials, which): healthy walks judged by the other ones as if a fault began at each start."""
     alarms: list[Detection] = []
     count = 0
     for number, record in enumerate(records):

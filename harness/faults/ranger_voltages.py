@@ -37,7 +37,7 @@ DIFFERENTIAL = (kinds.MOTOR_CURRENT, kinds.BATTERY_CURRENT)
 
 
 class RangerVoltageFault(VoltageFault):
-    """As any machine's, but that the steering's currents keep inside a range."""
+    """As for any machine, except that the steering's currents stay inside a range."""
 
     def check_range(self) -> None:
         if self.signal_class is not signals.Saturation or self.place.details["board"] != STEERING_BOARD:

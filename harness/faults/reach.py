@@ -1,4 +1,4 @@
-"""How a fault reaches boards and controllers of a robot between two steps of the plant."""
+"""Access of a fault to boards and controllers of a robot between two steps of the plant."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 def emulated(robot: Any, name: str, where: str) -> Any:
-    """The board `name`, emulated in this process. UserError, naming `where`, when it runs anywhere else."""
+    """The board `name`, emulated in this process. UserError, naming `where`, when it runs elsewhere."""
     board = robot.loop.board(name)
     if not isinstance(board, Microcontroller):
         in_c = name in getattr(robot, "firmware", ())
@@ -22,17 +22,17 @@ def emulated(robot: Any, name: str, where: str) -> Any:
 
 @contextmanager
 def reaching_into(robot: Any, name: str, now_ns: int) -> Iterator[Any]:
-    """The board `name`, run to `now_ns`; behind this it is due at once, because anything may have been done to it.
+    """The board `name`, run to `now_ns`; after this it is due at once, because the fault may have changed it.
 
-    Some boards are left alone while they only hear (harness/lockstep.py), so they are brought up to date first: what
-    is done to them must not depend on when others looked at them.
+    Some boards are left alone while they only receive (harness/lockstep.py), so they are brought up to date first: a
+    change to them must not depend on when their state was read.
     """
     loop = robot.loop
     place = loop.place(name)
     board = loop.boards[place]
     board.advance(now_ns)
     yield board
-    board = loop.boards[place]  # perhaps another one
+    board = loop.boards[place]  # it may have been replaced
     board.next_time = min(board.next_time, now_ns)
     loop.due[place] = loop.came[place] = now_ns
     loop.wires[place].silent_until = 0
@@ -58,6 +58,6 @@ def bus_of(robot: Any, number: int, where: str) -> Any:
 
 
 def wake_buses(robot: Any, now_ns: int) -> None:
-    """Buses are asked again what they have to decide: something was done to one of them."""
+    """Let buses decide again, because one of them was changed."""
     due = robot.loop.due
     due[len(due) - 1] = min(due[len(due) - 1], now_ns)

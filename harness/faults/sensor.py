@@ -1,7 +1,7 @@
-"""What the faults of sensors share: what a sensor measures, how far it can be wrong, and the modes made of signals.
+"""Common parts of sensor faults: what a sensor measures, how far it can be wrong, and the modes made of signals.
 
-The same signals (harness/faults/signals.py) act on edges, words, voltages and packets. One table says which parameters
-each takes; their defaults and limits follow from what is measured, so that an offset of a current is amperes and that
+The same signals (harness/faults/signals.py) act on edges, words, voltages and packets. One table lists the parameters
+of each; their defaults and limits follow from what is measured, so that an offset of a current is amperes and that
 of an encoder counts.
 """
 
@@ -17,7 +17,7 @@ from ranger_sim.harness.faults.fault import Fault, Parameter
 @dataclasses.dataclass(frozen=True)
 class Quantity:
     """What a sensor measures, in `unit`. `typical`: an error that matters in walking; `limit`: beyond it an error means
-    nothing; `clip_low`, `clip_high`: a range that walking leaves; `open_value`: what an open wire reads.
+    nothing; `clip_low`, `clip_high`: a range that walking leaves; `open_value`: the reading of an open wire.
     """
 
     unit: str
@@ -30,7 +30,7 @@ class Quantity:
 
 
 class SignalFault(Fault):
-    """A signal in the place of what a sensor shows."""
+    """A signal instead of a sensor's value."""
 
     signal_class: ClassVar[type[signals.Signal]]
 
@@ -58,7 +58,7 @@ def number(
 
 
 def lasting(meaning: str, length_ms: float, pause_ms: float) -> tuple[Parameter, ...]:
-    """How long something lasts and how long it pauses."""
+    """Parameters for a duration and a pause."""
     chosen = "chosen by us: some slots of a board, some times per step"
     return (
         Parameter("length_ms", "ms", length_ms, 0.25, 1e6, f"how long {meaning} lasts", chosen),
@@ -75,18 +75,18 @@ def lasting(meaning: str, length_ms: float, pause_ms: float) -> tuple[Parameter,
 
 
 def stuck(q: Quantity) -> tuple[Parameter, ...]:
-    """It may stand at a given level."""
+    """The parameter for a given level."""
     return (number(q, "level", math.nan, -q.limit, q.limit, "where it stands; none given: as it is"),)
 
 
 def scaled(q: Quantity) -> tuple[Parameter, ...]:
-    """A factor."""
+    """The parameter for a factor."""
     chosen = "chosen by us: a tenth too large; beyond the limits another fault is meant"
     return (Parameter("factor", "1", 1.1, -10.0, 10.0, "what it is multiplied by", chosen),)
 
 
 def delayed(q: Quantity) -> tuple[Parameter, ...]:
-    """A time."""
+    """The parameter for a time."""
     chosen = "chosen by us: ten slots of a motor board, a third of a robot's reaction to a strike"
     return (Parameter("delay_ms", "ms", 5.0, 0.25, 1e4, "how late it shows", chosen),)
 

@@ -1,7 +1,7 @@
-"""How a value is falsified, whatever it is a value of: counts of an encoder, volts at a pin, a rate in a packet.
+"""How a value is falsified, whatever it represents: counts of an encoder, volts at a pin, a rate in a packet.
 
-A signal takes the true value at an instant and gives the one that is shown in its place. It knows neither the sensor
-nor the robot; `harness/faults/values.py` and `edges.py` bring it to the wire. All are asked in order of time.
+A signal takes the true value at a time and returns the one shown instead. It depends neither on the sensor
+nor on the robot; `harness/faults/values.py` and `edges.py` bring it to the wire. Calls are in order of time.
 """
 
 from collections import deque
@@ -13,9 +13,9 @@ NS_PER_S = 1_000_000_000
 
 
 class Signal:
-    """What is shown instead of a value. `begin` comes first, with the true value at the instant (ns) it starts.
+    """What is shown instead of a value. `begin` comes first, with the true value at the time (ns) it starts.
 
-    silent: nothing at all is shown at present, so that what was shown last stands, or the packet stays away.
+    silent: nothing at all is shown at present, so that the value shown last remains, or the packet is missing.
     """
 
     def __init__(self, stream: RandomStream, **parameters: float) -> None:
@@ -25,17 +25,17 @@ class Signal:
         self.start_ns = 0
 
     def begin(self, value: float, now_ns: int) -> None:
-        """The fault starts here."""
+        """Start the fault."""
         self.start_value = value
         self.start_ns = now_ns
 
     def shown(self, value: float, now_ns: int) -> float:
-        """What stands in the place of the true `value` at `now_ns`."""
+        """The value shown instead of the true `value` at `now_ns`."""
         raise NotImplementedError
 
 
 class Stuck(Signal):
-    """The value at the start stands, or `level` if it is given."""
+    """The value at the start remains, or `level` if it is given."""
 
     def shown(self, value: float, now_ns: int) -> float:
         level = self.parameters["level"]
@@ -50,7 +50,7 @@ class Offset(Signal):
 
 
 class Drift(Signal):
-    """An error that grows from nothing, in proportion to the time."""
+    """An error that grows from 0, in proportion to the time."""
 
     def shown(self, value: float, now_ns: int) -> float:
         return value + self.parameters["rate"] * (now_ns - self.start_ns) / NS_PER_S
@@ -64,7 +64,7 @@ class Scale(Signal):
 
 
 class ScaleFromStart(Signal):
-    """What the value moves from the start on, times a factor: of a sensor that has no zero of its own."""
+    """The value's change since the start, times a factor: for a sensor without its own zero."""
 
     def shown(self, value: float, now_ns: int) -> float:
         return self.start_value + (value - self.start_value) * self.parameters["factor"]
@@ -95,7 +95,7 @@ class Noise(Signal):
 
 
 class Random(Signal):
-    """What begins at random and lasts: the mean pause before it is drawn anew each time (exponential)."""
+    """A disturbance with random starts and a duration: each pause before it is drawn anew (exponential)."""
 
     def begin(self, value: float, now_ns: int) -> None:
         super().begin(value, now_ns)
@@ -103,7 +103,7 @@ class Random(Signal):
         self.next_ns = now_ns  # the first one comes at once, so that a short fault acts
 
     def on(self, now_ns: int) -> bool:
-        """Whether it lasts at `now_ns`."""
+        """Whether it is on at `now_ns`."""
         if now_ns < self.until_ns:
             return True
         if now_ns >= self.next_ns:
@@ -122,14 +122,14 @@ class Spike(Random):
 
 
 class DropOut(Random):
-    """What an open wire reads for a while, again and again."""
+    """The reading of an open wire for a while, again and again."""
 
     def shown(self, value: float, now_ns: int) -> float:
         return self.parameters["level"] if self.on(now_ns) else value
 
 
 class Chatter(Random):
-    """Between two levels for a while, changing at every sample with a chance of a half, again and again."""
+    """Between two levels for a while, changing at every sample with probability 0.5, again and again."""
 
     def shown(self, value: float, now_ns: int) -> float:
         if not self.on(now_ns):
@@ -138,7 +138,7 @@ class Chatter(Random):
 
 
 class Delay(Signal):
-    """The value of some time ago; that of the start until so much time has passed."""
+    """The value of some time ago; until that much time has passed, the value at the start."""
 
     def begin(self, value: float, now_ns: int) -> None:
         super().begin(value, now_ns)
@@ -161,7 +161,7 @@ class Quantisation(Signal):
 
 
 class Saturation(Signal):
-    """Nothing below the one limit, nothing above the other."""
+    """The value clipped to a lower and an upper limit."""
 
     def shown(self, value: float, now_ns: int) -> float:
         return min(max(value, self.parameters["low"]), self.parameters["high"])

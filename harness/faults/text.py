@@ -1,4 +1,4 @@
-"""A fault as it is typed: PLACE:MODE[,name=value ...][@START[..END]].
+"""A fault as typed: PLACE:MODE[,name=value ...][@START[..END]].
 
 MCH.joint_encoder:stuck@step 12..step 14
 MCH.joint_encoder:stuck@step 12..+50 ms
@@ -13,7 +13,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 class Typed(NamedTuple):
-    """The parts of the text; conditions as text, None when they are not there."""
+    """The parts of the text; conditions as text, None when they are missing."""
 
     place: str
     mode: str
@@ -23,7 +23,7 @@ class Typed(NamedTuple):
 
 
 def parse(text: str) -> Typed:
-    """The parts of a typed fault. UserError with the form when it does not read like one."""
+    """The parts of a typed fault. UserError with the form for other text."""
     what, _, period = text.partition("@")
     place, colon, rest = what.partition(":")
     mode, *pairs = (part.strip() for part in rest.split(","))

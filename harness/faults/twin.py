@@ -1,8 +1,8 @@
 """The golden run of a live robot: a forked process that is the robot as it was before the fault was armed.
 
-It sleeps until somebody asks for a proof, then walks on without the fault to where the robot is now and gives its
-record back. So it is right also when something was done to the robot before (a function replaced, another fault); what
-comes from outside after the fault was armed (a key, a parameter, a second fault) it does not get, and shows as a
+It sleeps until a proof is requested, then walks on without the fault to the robot's present time and returns its
+record. So it is right also when the robot was changed before (a function replaced, another fault); it does not get
+input from outside after the fault was armed (a key, a parameter, a second fault), which then shows as a
 difference.
 """
 
@@ -22,7 +22,7 @@ LENGTH_BYTES = 8
 
 
 class Twin:
-    """Of `robot`, a `harness.ranger.Ranger`, from now on. UserError for one that is not alone in this process."""
+    """Twin of `robot`, a `harness.ranger.Ranger`, from now on. UserError for one not wholly in this process."""
 
     def __init__(self, robot: Any) -> None:
         if robot.polled:
@@ -62,10 +62,10 @@ class Twin:
             os.waitpid(self.process, 0)
 
     def _be_the_twin(self, asked: int, answering: int) -> None:
-        """Walk to wherever it is asked, and leave without any of the parent's clean-up."""
+        """Walk to each requested time, and leave without any of the parent's clean-up."""
         try:
             robot, evidence = self.robot, self.evidence
-            # what else listens to the robot writes into the parent's files; faults that were armed before stay
+            # other watchers of the robot write into the parent's files; faults that were armed before stay
             robot.loop.watchers[:] = [each for each in robot.loop.watchers if isinstance(each, Fault)]
             robot.loop.watchers.append(evidence.watch)
             evidence.alone()
@@ -80,7 +80,7 @@ class Twin:
 
 
 def _read(pipe: int, length: int) -> bytes:
-    """So many bytes; UserError when the other end is gone."""
+    """Read `length` bytes; UserError when the other end is gone."""
     parts = bytearray()
     while len(parts) < length:
         part = os.read(pipe, min(1 << 20, length - len(parts)))
@@ -91,7 +91,7 @@ def _read(pipe: int, length: int) -> bytes:
 
 
 def _write(pipe: int, content: bytes) -> None:
-    """All of it."""
+    """Write all of `content`."""
     view = memoryview(content)
     while view:
         view = view[os.write(pipe, view) :]

@@ -1,17 +1,17 @@
 """Faults of analog inputs: another voltage at the converter's pin than the sensor gives.
 
-A pin's voltage runs straight over a step of the plant. Values are told in what the sensor measures and go through the
-sensor's line to the pin, as the plant has it (`Plant.analog_line`).
+A pin's voltage is a straight line over a step of the plant. Values are in the unit of what the sensor measures and go
+through the sensor's line to the pin, as in the plant (`Plant.analog_line`).
 """
 
 from ranger_sim.harness.faults.sensor import SignalFault
 
-# of NoiseSource's normal numbers (plant/sensors/noise.py); a plant with wider noise says a wider one
+# of NoiseSource's normal numbers (plant/sensors/noise.py); a plant with wider noise sets a wider limit
 MOST_DEVIATIONS = 3.7
 
 
 class VoltageFault(SignalFault):
-    """A signal in the place of what the sensor on one analog input measures. A machine makes modes of it for what its
+    """A signal instead of what the sensor on one analog input measures. A machine makes modes of it for what its
     sensors measure: `mode_classes(VoltageFault, kind, quantity)` of sensor.py.
     """
 
@@ -24,7 +24,7 @@ class VoltageFault(SignalFault):
         self.shown_end_V = 0.0
 
     def check_range(self) -> None:
-        """UserError for limits that the sensor never comes to."""
+        """UserError for limits that the sensor never reaches."""
 
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)
@@ -48,7 +48,7 @@ class VoltageFault(SignalFault):
         return (volts - self.zero_V) / self.slope_V
 
     def _instead(self, volts: float, now_ns: int) -> float:
-        """The voltage that stands in the place of the sensor's."""
+        """The voltage that replaces the sensor's."""
         true = self.value(volts)
         shown = self.signal.shown(true, now_ns)
         if shown == true:
@@ -57,7 +57,7 @@ class VoltageFault(SignalFault):
         return self.zero_V + self.slope_V * shown
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """The voltage is that of what the plant has now, but for the sensor's noise."""
+        """Whether the voltage matches the plant's present state, except the sensor's noise."""
         plant, place = self.robot.plant, self.voltage
         if self.started:
             plant.analog_start[place] = self.true_end_V

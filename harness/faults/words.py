@@ -1,6 +1,6 @@
-"""Faults of the absolute encoders: the 13-bit word that a board's SPI clocks in is another one.
+"""Faults of the absolute encoders: another 13-bit word for a board's SPI to read.
 
-A word stands for a step of the plant, 250 us. The values of parameters count in the joint's sense from the joint's
+A word holds for a step of the plant, 250 us. The values of parameters count in the joint's sense from the joint's
 angle 0, so that an offset of 100 shows a joint that is 100 x 2 pi / 8192 rad farther ahead on every board.
 """
 
@@ -32,7 +32,7 @@ def signed(counts: int) -> int:
 
 
 class WordFault(Fault):
-    """A fault of one absolute encoder's word. `encoder`: that of the plant; `true`: the word that it holds out."""
+    """A fault of one absolute encoder's word. `encoder`: that of the plant; `true`: the word that it shows."""
 
     unit = COUNTS.unit
 
@@ -42,7 +42,7 @@ class WordFault(Fault):
         self.encoder: Any = (plant.hip_word, plant.outer_word, plant.inner_word)[self.word]
 
     def joint_rad(self) -> float:
-        """Angle now, which this encoder measures."""
+        """The present angle, which this encoder measures."""
         return float(self.robot.plant.word_rad(self.word))
 
     def counts(self, word: int) -> int:
@@ -50,7 +50,7 @@ class WordFault(Fault):
         return int(self.encoder.sign) * signed(word - int(self.encoder.zero))
 
     def word_of(self, counts: int) -> int:
-        """The word of so many counts."""
+        """The word of `counts`."""
         return (int(self.encoder.zero) + int(self.encoder.sign) * counts) % COUNTS_PER_TURN
 
     def begin(self, now_ns: int) -> None:
@@ -60,32 +60,32 @@ class WordFault(Fault):
         self._hold_out(now_ns)
 
     def begin_in_word(self, now_ns: int) -> None:
-        """The encoder holds out `true`; nothing has been changed yet."""
+        """Start with the encoder's word `true`, not changed yet."""
 
     def after(self, start_ns: int, end_ns: int) -> None:
         self.true = self.robot.plant.words[self.word]
         self._hold_out(end_ns)
 
     def _hold_out(self, now_ns: int) -> None:
-        """The other word, in place of the true one, from `now_ns` on."""
+        """Show the other word, instead of the true one, from `now_ns` on."""
         shown = self.instead(now_ns)
         if shown != self.true:
             self._put(shown)
             self.note(now_ns, signed(self.counts(shown) - self.counts(self.true)))
 
     def _put(self, word: int) -> None:
-        """This word is held out."""
+        """Show this word."""
         self.robot.plant.words[self.word] = word
 
     def instead(self, now_ns: int) -> int:
-        """The word that is held out in place of `true`."""
+        """The word that is shown instead of `true`."""
         raise NotImplementedError
 
     def finish(self, now_ns: int) -> None:
         self._put(self.true)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """The word is that of the joint's angle, but for the encoder's noise."""
+        """Whether the word is that of the joint's angle, except the encoder's noise."""
         encoder = self.encoder
         x = encoder.scale * self.joint_rad() + encoder.offset_rad
         if encoder.lag_s > 0.0:
@@ -98,7 +98,7 @@ class WordFault(Fault):
 
 
 class SignalInWord(WordFault, SignalFault):
-    """A signal of harness/faults/signals.py in the place of the counts."""
+    """A signal of harness/faults/signals.py instead of the counts."""
 
     def begin_in_word(self, now_ns: int) -> None:
         self.signal = self.new_signal()
@@ -114,7 +114,7 @@ for each in mode_classes(SignalInWord, WORD, COUNTS, without=("drop_out",)):
 
 @mode
 class WordDropOut(WordFault):
-    """The data line hangs free for a while, pulled low or high."""
+    """The data line floats for a while, pulled low or high."""
 
     mode = "drop_out"
     kinds = (WORD,)

@@ -50,7 +50,7 @@ class Push(WorldFault):
         self.body.set_slope(self.floor.slope_rad)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """Gravity alone acts, along the floor as its slope says."""
+        """Whether only gravity acts, along the floor by its slope."""
         p = self.body.parameters
         return bool(self.body.gx == p.gravity_m_per_s2 * math.sin(self.floor.slope_rad))
 
@@ -91,7 +91,7 @@ class Slope(WorldFault):
 
 @mode
 class StepInFloor(WorldFault):
-    """From the next foothold on everything lies higher, until the fault ends: a threshold, a kerb."""
+    """From the next foothold on all is higher, until the fault ends: a threshold, a kerb."""
 
     mode = "step"
     kinds = (FLOOR,)
@@ -122,13 +122,13 @@ class StepInFloor(WorldFault):
         self.last_high = self.floor.foothold
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
-        """A foothold has been taken at the height of the floor again, or none ever was at the step's."""
+        """Whether a foothold is at the height of the floor again, or none ever was at the step's."""
         return bool(self.floor.foothold > self.last_high or not self.acted)
 
 
 @mode
 class SlipperyFloor(WorldFault):
-    """Another friction under both feet. It acts while a foot has load: what the floor can hold is another force."""
+    """Another friction under both feet. It acts while a foot has load: the floor can then hold another force."""
 
     mode = "slippery"
     kinds = (FLOOR,)
@@ -154,7 +154,7 @@ class SlipperyFloor(WorldFault):
         self.body.sole.mu = self.values["friction"]
 
     def before(self, now_ns: int) -> None:
-        """What the floor can hold is less, or more, than it would be, by the load of the feet: only under load."""
+        """Record, under load only, how much less or more the floor can hold at the feet's load."""
         load_N = self.body.outer.Fy + self.body.inner.Fy
         if load_N > 0.0 and self.body.sole.mu != self.usual:
             self.note(now_ns, (self.body.sole.mu - self.usual) * load_N)

@@ -1,1 +1,1 @@
-"""A running robot shown whole to programs of this machine: what its log would keep, as it happens (FEED.md)."""
+"""The live feed of a running robot to programs of this machine: what its log would keep (FEED.md)."""

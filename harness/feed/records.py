@@ -1,4 +1,4 @@
-"""The feed on the wire: records over a stream, from the robot to who looks. FEED.md describes it for other languages.
+"""The feed on the wire: records over a stream, from the robot to viewers. FEED.md describes it for other languages.
 
 A record is `length` (unsigned 32 bits, of what follows), `type` (one byte), body. All numbers are little-endian.
 """
@@ -12,17 +12,17 @@ VERSION = 1
 PREFIX = "\0ranger-sim-feed/"
 RECORD_LIMIT = 1 << 24  # bytes of type and body; chosen by us: a second of every stream of the robot is below 4 MB
 
-HELLO = 1  # JSON: who it is, and what the streams hold
+HELLO = 1  # JSON: the robot's name, and what the streams hold
 ROWS = 2  # number of the stream (one byte), then its rows
 GAP = 3  # JSON: {stream: rows that were left out here}, because too much was waiting
-STATE = 4  # JSON: what is in no stream
+STATE = 4  # JSON: what no stream holds
 SLOTS = 5  # number of the board (one byte), then its slots: three 64-bit whole numbers each
 
 HEAD = struct.Struct("<IB")
 
 
 def address(name: str) -> str:
-    """The abstract address of robot `name`; it has no file, so nothing remains of it."""
+    """The abstract address of robot `name`; it has no file, so nothing of it remains."""
     return PREFIX + name
 
 
@@ -37,7 +37,7 @@ def text_record(kind: int, content: Any) -> bytes:
 
 
 def taken(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """(type, body) of every whole record at the head of `buffer`, which loses it. ValueError for what is none."""
+    """Take (type, body) of every whole record from the head of `buffer`. ValueError for an invalid record."""
     at = 0
     try:
         while len(buffer) - at >= HEAD.size:

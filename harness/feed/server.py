@@ -1,7 +1,6 @@
-"""The feed's door, in the process that passes the robot's time. Who looks says nothing, and changes nothing.
+"""The feed's endpoint, in the process that passes the robot's time. Viewers send nothing, and change nothing.
 
-A viewer that is slow is shown with gaps. One that has gaps when another viewer comes and all places are taken makes
-room for it.
+A slow viewer is shown gaps. When all places are taken and another viewer connects, one with gaps gives up its place.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from ranger_sim.harness.faults.power import PowerlessBoard
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.records.summary import energy
 
-LOOK_NS = 20_000_000  # virtual time between two looks: 50 pictures a second at real time
+LOOK_NS = 20_000_000  # virtual time between two polls: 50 pictures a second at real time
 STATE_NS = 100_000_000
 SLOT_BYTES = 24
 
@@ -26,7 +25,7 @@ SLOT_BYTES = 24
 class FeedServer(Door[Peer]):
     """Shows `robot` under `name`. Give it to `robot.attach`. UserError when the name is taken.
 
-    While nobody looks, it costs a look for connections every 20 ms of the robot's time.
+    Without viewers, it costs one poll for connections every 20 ms of the robot's time.
     """
 
     def __init__(self, robot: Any, name: str) -> None:
@@ -42,10 +41,10 @@ class FeedServer(Door[Peer]):
         self.robot = robot
         self.name = name
         self.streams = list(robot.recorder.streams())
-        self.left_out: dict[int, Counter[str]] = {}  # by peer, since it was told
-        self.greeting = b""  # the first record, while somebody looks
+        self.left_out: dict[int, Counter[str]] = {}  # by peer, since the last GAP record to it
+        self.greeting = b""  # the first record, while there are viewers
         self.next_state_ns = 0
-        self.boards: dict[str, Any] = {}  # those that tell their slots
+        self.boards: dict[str, Any] = {}  # those that report their slots
         self.slots_shown: dict[str, int] = {}
         self.totals = {"viewers_seen": 0, "rows_left_out": 0}
         for number, stream in enumerate(self.streams):
@@ -63,7 +62,7 @@ class FeedServer(Door[Peer]):
         return take
 
     def _offer(self, peer: Peer, record: bytes, stream: str, rows: int) -> None:
-        """A record that nobody asked for: left out while too much waits for this peer."""
+        """Send an unrequested record; it is left out while too much waits for this peer."""
         if peer.ending:
             return
         missed = self.left_out[id(peer)]
@@ -77,7 +76,7 @@ class FeedServer(Door[Peer]):
         peer.outgoing += record
 
     def poll(self, now_ns: int) -> int:
-        """New viewers in, what happened out; returns the latest instant for the next poll, ns."""
+        """Accept new viewers and send them what happened; returns the latest time for the next poll, ns."""
         self.look(now_ns)
         if self.peers:
             self.robot.logbook.flush()
@@ -91,7 +90,7 @@ class FeedServer(Door[Peer]):
         return now_ns + LOOK_NS
 
     def _show_slots(self) -> None:
-        """What the boards' processes have kept of their slots since the last look."""
+        """Send the slots that the boards' processes have kept since the last poll."""
         for number, (name, board) in enumerate(self.boards.items()):
             rows, self.slots_shown[name], missed = board.slots_since(self.slots_shown[name])
             record = records.record(records.SLOTS, bytes([number]) + rows)
@@ -102,7 +101,7 @@ class FeedServer(Door[Peer]):
                     self._offer(peer, record, f"slots of {name}", len(rows) // SLOT_BYTES)
 
     def state(self, now_ns: int) -> dict[str, Any]:
-        """What is in no stream: the panel of the user interface board, faults, how far it walked."""
+        """What no stream holds: the panel of the user interface board, faults, distance walked."""
         robot, outside, unseen = self.robot, self._outside(), why_unseen(self.robot)
         return {
             "time_ns": now_ns,
@@ -118,11 +117,11 @@ class FeedServer(Door[Peer]):
         }
 
     def _outside(self) -> dict[str, Any]:
-        """{bus: its end at a real one} of those that are not emulated (can_bus/edge/external_bus.py)."""
+        """{bus: its connection to a real one} of buses that are not emulated (can_bus/edge/external_bus.py)."""
         return {end.name: end for end in self.robot.polled if hasattr(end, "bit_rate")}
 
     def hello(self) -> dict[str, Any]:
-        """Who it is, and what the streams hold."""
+        """The robot's name, and what the streams hold."""
         robot, outside = self.robot, self._outside()
         return {
             "version": records.VERSION,
@@ -158,7 +157,7 @@ class FeedServer(Door[Peer]):
 
     def _welcome(self, connection: socket.socket) -> Peer:
         peer = Peer(SocketStream(connection))
-        if not self.peers:  # they have got processes of their own by now; what nobody looked at is nobody's
+        if not self.peers:  # boards have separate processes by now; unseen slots are dropped
             there = {name: self.robot.loop.board(name) for name in self.robot.boards}
             self.boards = {name: board for name, board in there.items() if hasattr(board, "slots_since")}
             self.slots_shown = {name: board.slots_since(0)[1] for name, board in self.boards.items()}
@@ -166,17 +165,17 @@ class FeedServer(Door[Peer]):
         self.left_out[id(peer)] = Counter()
         self.robot.loop.sampler.words = self.robot.recorder.words  # also of a robot that keeps no log
         self.totals["viewers_seen"] += 1
-        if not self.greeting:  # putting it together takes half a millisecond
+        if not self.greeting:  # building it takes half a millisecond
             self.greeting = records.text_record(records.HELLO, self.hello())
         peer.outgoing += self.greeting
         return peer
 
     def _takes_part(self, peer: Peer) -> bool:
-        """Whoever looks keeps its place, as long as it takes what it is shown."""
+        """A viewer keeps its place as long as it reads what it is sent."""
         return not self.left_out.get(id(peer))
 
     def _take(self, peer: Peer) -> bool:
-        """Nothing may be said here: requests have a door of their own (`ranger-sim ctl`)."""
+        """Accept no input: requests have their own endpoint (`ranger-sim ctl`)."""
         if peer.incoming:
             self.send_away(peer, MALFORMED)
         return False
@@ -187,13 +186,13 @@ class FeedServer(Door[Peer]):
             self.robot.loop.sampler.words = None
 
     def counters(self) -> dict[str, int]:
-        """Whole numbers by name: viewers now and seen, rows left out, and who was sent away, by reason."""
+        """Whole numbers by name: viewers now and seen, rows left out, and peers sent away, by reason."""
         away = {f"sent_away_{reason}": self.sent_away[reason] for reason in REASONS}
         return {"viewers": len(self.peers), **self.totals, **away}
 
 
 def why_unseen(robot: Any) -> str:
-    """Why nobody here can know what the front panel shows, in a sentence; empty where it is known."""
+    """Why the front panel's state is unknown here, in a sentence; empty where it is known."""
     board, profile = robot.loop.board("UI"), robot.profile
     if profile is not None and "UI" in profile.external():
         return "The user interface board is outside: its own display, lights and buzzer show what it drives."

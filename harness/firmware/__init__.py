@@ -1,1 +1,1 @@
-"""Boards that run firmware from elsewhere: in C, as an image of the chip, and started anew in a board's place."""
+"""Boards that run other firmware: in C, as an image of the chip, and restarted in place of a board."""

@@ -1,4 +1,4 @@
-"""Doors for debuggers at boards of a machine that run machine code."""
+"""Endpoints for debuggers at boards of a machine that run machine code."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
@@ -8,7 +8,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 class Place(NamedTuple):
-    """Where the debugger of `board` comes in."""
+    """The address at which the debugger of `board` connects."""
 
     board: str
     host: str
@@ -16,7 +16,7 @@ class Place(NamedTuple):
 
 
 def placed(text: str) -> Place:
-    """`MCH=3333` or `MCH=192.168.1.2:3333`; UserError for what does not read so."""
+    """`MCH=3333` or `MCH=192.168.1.2:3333`; UserError for other forms."""
     board, _, where = text.partition("=")
     host, _, port = where.rpartition(":")
     if not board or not port.isdecimal():
@@ -27,9 +27,9 @@ def placed(text: str) -> Place:
 def open_doors(
     boards: Mapping[str, Any], wanted: Iterable[str], allow_network: bool = False, ends: Callable[[], bool] = never
 ) -> list[GdbServer]:
-    """A door for each of `wanted` ("MCH=3333"), whose boards have a processor of their own.
+    """A debugger endpoint for each of `wanted` ("MCH=3333"), whose boards have their own processor.
 
-    UserError for a board that has none or is named twice, and for a port that cannot be had.
+    UserError for a board that has none or is named twice, and for a port that is not available.
     """
     doors: list[GdbServer] = []
     try:
@@ -52,6 +52,6 @@ def open_doors(
 
 
 def close_doors(doors: Iterable[GdbServer]) -> None:
-    """Debuggers are sent home."""
+    """Close the endpoints and disconnect debuggers."""
     for door in doors:
         door.close()

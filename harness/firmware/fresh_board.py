@@ -1,4 +1,4 @@
-"""A board that takes the place of one that is gone: same wires, its own program from the start."""
+"""A board that replaces one that is gone: same wires, its own program from the start."""
 
 from typing import Any
 
@@ -11,8 +11,8 @@ Message = tuple[Any, ...]
 def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> Any:
     """A new board `name` at the sensors of `robot`; gets its power at `power_up_ns`.
 
-    What a power-up forgets is forgotten: the router's time begins at 0, the main brain has its parameter set again.
-    record: memory in which a program in C leaves where it was when it ended this process.
+    A power-up clears its state: the router's time begins at 0, the main brain has its parameter set again.
+    record: memory in which a program in C leaves its position when it ends this process.
     What its program puts out while it starts waits in its outbox (`first_outputs`).
     """
     board = robot.new_board(name, power_up_ns, record)
@@ -27,7 +27,7 @@ def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> 
 
 
 def first_outputs(board: Any) -> list[Message]:
-    """What a board has put out since it was made, out of the outbox that it was made with."""
+    """The outputs of a board since it was made, from its first outbox."""
     out = board.outbox
     said = []
     while out.take():

@@ -1,4 +1,4 @@
-"""Boards of the robot that can run a firmware image: what hangs on their chips."""
+"""Boards of the robot that can run a firmware image: the devices on their chips."""
 
 import os
 import pathlib
@@ -19,14 +19,14 @@ SEQUENCES = {
     "MCSI": steering.SEQUENCE,
 }
 # The router exchanges a segment every 200 us by its own crystal, 30 ppm off at most; its program feeds the words, so
-# the last of them is some us early or late. Nobody may start an exchange earlier than the loop looks ahead
+# the last of them is some us early or late. No exchange may start earlier than the loop looks ahead
 # (harness/lockstep.py): one that would be early waits.
 LEAST_INTERVAL_NS = 199_980
 BOARDS = (*SEQUENCES, "UI", "CSR")
 
 
 def hardware_of(board: str) -> BoardHardware:
-    """What hangs on the chip of a board of the robot."""
+    """The devices on the chip of a board of the robot."""
     if board in SEQUENCES:
         switches = tuple(motor_board.PINS[name] for name in ("limit_switch_left", "limit_switch_right"))
         return BoardHardware(
@@ -53,14 +53,14 @@ def hardware_of(board: str) -> BoardHardware:
 
 
 def known(board: str) -> str:
-    """A board that can run an image."""
+    """Return `board`, which must be able to run an image."""
     if board not in BOARDS:
         raise UserError(f"image for board {board!r}: boards that can run a firmware image are {', '.join(BOARDS)}")
     return board
 
 
 def placed(text: str) -> tuple[str, str]:
-    """Board and file of `MCH=FILE`; UserError for what does not read so."""
+    """Board and file of `MCH=FILE`; UserError for other forms."""
     board, equals, path = text.partition("=")
     if not equals or not path:
         raise UserError(f"image {text!r}: BOARD=FILE is expected, as in MCH=B2A_Hip_Motor_Controller.axf")
@@ -68,7 +68,7 @@ def placed(text: str) -> tuple[str, str]:
 
 
 def loaded(wanted: Mapping[str, Image | str | os.PathLike]) -> dict[str, Image]:
-    """The image of each board, files read. UserError for a board that takes none, and for a file that is none."""
+    """The image of each board, files read. UserError for a board that takes no image, and for a file that is none."""
     return {
         known(board): each if isinstance(each, Image) else read(pathlib.Path(each)) for board, each in wanted.items()
     }

@@ -1,4 +1,4 @@
-"""Boards of the robot that can have firmware in C: what hangs on their chips, and compiling it with the table."""
+"""Boards of the robot that can have firmware in C: the devices on their chips, and compiling it with the table."""
 
 import functools
 import os
@@ -39,7 +39,7 @@ PLACES = {
 
 
 def hardware_of(board: str) -> Hardware:
-    """What hangs on the chip of a board of the robot, as on the emulated one."""
+    """The devices on the chip of a board of the robot, as on the emulated one."""
     place = PLACES[board]
     if not place.sequence:
         return Hardware(hz=place.table.CLOCK_HZ, external=None, spi={}, panel=FrontPanel)
@@ -89,7 +89,7 @@ def table_version() -> int:
 
 
 def placed(text: str) -> tuple[str, str]:
-    """Board and folder of `MCH=DIR`; UserError for what does not read so."""
+    """Board and folder of `MCH=DIR`; UserError for other forms."""
     board, equals, folder = text.partition("=")
     if not equals or not folder:
         raise UserError(f"firmware {text!r}: BOARD=DIR is expected, as in MCH=examples/hip_in_c")

@@ -38,11 +38,11 @@ class Firmware:
 
     @property
     def program(self) -> sanitizers.Program:
-        """Whose findings are looked for."""
+        """The program whose findings are searched."""
         return sanitizers.Program(self.library, self.folder)
 
     def ran(self) -> list[counting.FileCounts]:
-        """Which lines of it ran, as far as boards have written that."""
+        """The lines of it that ran, as far as boards have written them."""
         if not self.coverage or self.counts is None:
             return []
         return counting.read(self.library, self.folder, self.counts)
@@ -53,8 +53,8 @@ def build(
 ) -> Firmware:
     """Compile a folder of firmware, with the generated C of the tables that it names, unless it is up to date.
 
-    The manifest's `master` says where that C is; without it, it is in `table`. UserError when it is not that of the
-    master files as they are now.
+    The manifest's `master` gives the place of that C; without it, it is in `table`. UserError when it was not made from
+    the present master files.
     """
     manifest = manifests.load(folder)
     place = place_of_tables(manifest, table)
@@ -89,7 +89,7 @@ def table_sources(manifest: manifests.Manifest, place: pathlib.Path) -> compilin
 
 
 def fresh_c(master: pathlib.Path) -> pathlib.Path:
-    """The generated C below a folder of master files. UserError when it was made of another state of them."""
+    """The generated C below a folder of master files. UserError when it was made from another version of them."""
     from ranger_sim.datatable import generate
     from ranger_sim.datatable.loader import load_table
 

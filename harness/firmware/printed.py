@@ -1,6 +1,6 @@
-"""What programs in C print: kept out of this process's standard output, and passed on by board.
+"""Output of programs in C: kept out of this process's standard output, and passed on by board.
 
-Descriptors 1 and 2 of a board's process are a file without a name; the process that passes the robot's time reads it.
+Descriptors 1 and 2 of a board's process are an unnamed file; the process that passes the robot's time reads it.
 A program in that process itself has descriptor 1 only while it runs.
 """
 
@@ -15,7 +15,7 @@ from typing import IO
 from ranger_sim.foundation.user_error import printable
 
 LINE_BUFFERED = 1  # _IOLBF of stdio.h, glibc
-LONGEST_LINE = 4096  # bytes of a line that is shown; what is longer is shown in parts. Chosen by us
+LONGEST_LINE = 4096  # bytes of a line that is shown; a longer line is shown in parts. Chosen by us
 READ_BYTES = 1 << 16
 
 OUT, ERR = 1, 2
@@ -26,12 +26,12 @@ def _libc() -> ctypes.CDLL:
 
 
 def _flush() -> None:
-    """What programs in C have printed so far leaves the buffers of stdio."""
+    """Flush the stdio buffers of programs in C."""
     _libc().fflush(None)
 
 
 def _buffer_lines() -> None:
-    """From now on programs in C print line by line, as on a terminal: what a killed process had printed is kept."""
+    """Let programs in C print line by line, as on a terminal: the output of a killed process is kept."""
     with contextlib.suppress(ValueError):  # a C library that has no such name
         stream = ctypes.c_void_p.in_dll(_libc(), "stdout")
         _libc().setvbuf(stream, None, LINE_BUFFERED, 0)
@@ -40,7 +40,7 @@ def _buffer_lines() -> None:
 class Printed:
     """The outputs of a robot's programs in C. Give it to `Ranger(printed=...)`, and close it after the robot.
 
-    show(line): is called with `BOARD: text` for each line. keep(board, data): where set, it takes all bytes instead.
+    show(line): called with `BOARD: text` for each line. keep(board, data): where set, it takes all bytes instead.
     """
 
     def __init__(self, show: Callable[[str], None]) -> None:
@@ -51,9 +51,9 @@ class Printed:
         self.begun: dict[str, bytes] = {}  # lines without an end so far
 
     def lead(self, board: str) -> None:
-        """This process is the board's from now on: what a program prints in it is the board's output.
+        """Make this process the board's from now on: a program's output in it is the board's output.
 
-        What Python prints on standard error still goes where it went.
+        Python's output on standard error still goes to its previous target.
         """
         sys.stderr = os.fdopen(os.dup(ERR), "w", buffering=1, errors="backslashreplace")
         for number in (OUT, ERR):
@@ -62,7 +62,7 @@ class Printed:
 
     @contextlib.contextmanager
     def during(self, board: str) -> Iterator[None]:
-        """Inside, what programs in C print in this process is the output of `board`."""
+        """Within it, output of programs in C in this process counts as output of `board`."""
         file = self._file(board)
         _flush()
         previous = os.dup(OUT)
@@ -95,7 +95,7 @@ class Printed:
         self.begun.clear()
 
     def close(self) -> None:
-        """Give the files back."""
+        """Close the files."""
         for file in self.files.values():
             file.close()
         self.files.clear()

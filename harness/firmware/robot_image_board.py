@@ -1,4 +1,4 @@
-"""A board of the robot that runs a firmware image. Apart from image_boards.py: who has none loads no processor."""
+"""A board of the robot that runs a firmware image. Separate from image_boards.py: other walks load no processor."""
 
 from typing import Any
 
@@ -14,9 +14,9 @@ TABLES: dict[str, Any] = {"MCH": mch, "MCFO": mcfo, "MCFI": mcfi, "MCSI": mcsi, 
 
 
 class RobotImageBoard(ImageBoard):
-    """Board `name` of the robot with a firmware image, in the place of the emulated one.
+    """Board `name` of the robot with a firmware image, instead of the emulated one.
 
-    What its program notes is not known here: errors are those that it sends.
+    Errors that its program only records are unknown here: its errors are those that it sends.
     """
 
     def __init__(self, name: str, image: Image, crystal: Any, power_up_ns: int) -> None:
@@ -34,7 +34,7 @@ class RobotImageBoard(ImageBoard):
         return self.converter.adc
 
     def counters(self) -> object:
-        """What the board counted; its program's own queues are not known."""
+        """The board's counters; its program's own queues are not known."""
         return RangerCounters(
             hz=self.hz,
             unclaimed=self.unclaimed,

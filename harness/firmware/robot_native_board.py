@@ -1,4 +1,4 @@
-"""A board of the robot whose firmware is C. Apart from native_boards.py: a walk without such a board needs no cffi."""
+"""A board of the robot whose firmware is C. Separate from native_boards.py: other walks need no cffi."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from ranger_sim.harness.firmware.table_board import TableBoard
 
 
 class RobotNativeBoard(TableBoard):
-    """Board `name` of the robot with a firmware in C, in the place of the emulated one."""
+    """Board `name` of the robot with a firmware in C, instead of the emulated one."""
 
     def __init__(self, name: str, firmware: Firmware, crystal: Any, power_up_ns: int, record: Any = None) -> None:
         table = PLACES[name].table
@@ -24,7 +24,7 @@ class RobotNativeBoard(TableBoard):
 
     @property
     def errors(self) -> ErrorModule:
-        """How often its program noted each error, where it says so (`firmware_error_totals`); else never."""
+        """How often its program recorded each error, where it reports that (`firmware_error_totals`); otherwise 0."""
         self.module.totals = self.error_totals(len(self.module.totals))
         return self.module
 
@@ -45,7 +45,7 @@ class RobotNativeBoard(TableBoard):
         return devices[0]
 
     def counters(self) -> object:
-        """What the board counted; its program's own queues are not known."""
+        """The board's counters; its program's own queues are not known."""
         return RangerCounters(
             hz=self.hz,
             unclaimed=self.unclaimed,

@@ -1,4 +1,4 @@
-"""A board with firmware in C and variables of a master table. Apart from native_firmware.py: it loads cffi."""
+"""A board with firmware in C and variables of a master table. Separate from native_firmware.py: it loads cffi."""
 
 import dataclasses
 from typing import Any
@@ -10,10 +10,10 @@ from ranger_sim.harness.firmware.native_firmware import Firmware, table_version
 
 
 class TableBoard(NativeBoard):
-    """Board `name` with `firmware` from `power_up_ns` (ns) on; its CAN controller `controller` hangs on a bus.
+    """Board `name` with `firmware` from `power_up_ns` (ns) on; its CAN controller `controller` is on a bus.
 
-    UserError for a program that was compiled with another state of the table, or does not start its controller.
-    hardware: what hangs on its chip, where the manifest does not say. record: as of NativeBoard.
+    UserError for a program that was compiled with another version of the table, or does not start its controller.
+    hardware: devices on its chip, where the manifest does not list them. record: as of NativeBoard.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class TableBoard(NativeBoard):
         given = firmware.manifest.hardware
         if given is None:
             given = hardware
-        elif hardware is not None:  # a manifest cannot say what a person sees of the board
+        elif hardware is not None:  # a manifest cannot describe what a person sees of the board
             given = dataclasses.replace(given, panel=hardware.panel)
         NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, given, record)
         wanted = table_version(firmware.table) if version is None else version

@@ -1,1 +1,1 @@
-"""A machine of which a part is outside: profiles, buses on interfaces, real boards, serial lines, slower schedules."""
+"""A machine with a part outside: profiles, buses on interfaces, real boards, serial lines, slower schedules."""

@@ -1,7 +1,7 @@
-"""Named bus schedules: which variables a robot on slower buses sends less often, as data.
+"""Named bus schedules: the variables that a robot on slower buses sends less often, as data.
 
 A schedule is a file `profiles/schedules/NAME.toml`. It changes no firmware: each board's own table is laid out over
-several passes with what is not due left out, and the main brain's link gets the list of what may leave when.
+several passes without what is not due, and the main brain's link gets the list of what may leave when.
 
     [every]            variable = n: only every n-th of its own turns. A turn is a pass through the rows for what stands
                        in a board's rows, a slot of the main brain (2 ms) for a command
@@ -9,10 +9,10 @@ several passes with what is not due left out, and the main brain's link gets the
     commands_in_turn   n: of the commands that [every] does not name, one leaves in every n-th slot of the main brain,
                        in turn. 0: each leaves in the slot in which it was written
 
-What is sent in every n-th pass is spread over the passes: what stands in row r goes out in the passes p with
-p mod n = r mod n, so that a board's frames do not follow each other more closely than they have to.
+What is sent in every n-th pass is spread over the passes: the variables of row r are sent in the passes p with
+p mod n = r mod n, so that a board's frames follow each other no more closely than necessary.
 
-`streams` says what a bus then carries, in the terms of the response-time analysis.
+`streams` returns what a bus then carries, in the terms of the response-time analysis.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ranger_sim.datatable.model import Board, Table, Variable
 from ranger_sim.firmware_sim.scheduler import Occasional
 from ranger_sim.foundation.user_error import UserError
 
-MOST_TURNS = 1000  # turns to the next sending; with more a variable is as good as not sent (chosen by us)
+MOST_TURNS = 1000  # turns to the next sending; with more a variable is practically not sent (chosen by us)
 MOST_ROWS = 10_000  # rows of a table laid out over its passes (chosen by us)
 
 # What the bounds assume of release times. Crystals: 30 ppm each (firmware_sim/clock.py).
@@ -45,9 +45,9 @@ FRAMES_PER_EXCHANGE = 6
 # How much a main-brain slot varies before it sends, and the router before it has routed: chosen by us, above what the
 # costs of boards/main_brain/board.py and boards/can_router.py make of twenty frames and a slot of the router.
 COMMAND_VARIATION_NS = 200_000
-# What a command that the schedule does not name adds without `commands_in_turn`. Boards that are told something in
+# What a command that the schedule does not name adds without `commands_in_turn`. Boards that receive something in
 # every slot (the motors) get at most one other command per slot: the modes change one thing at a time. Of the other
-# boards (display, lights) each command comes at most so often, all of them perhaps in one slot: the fastest is
+# boards (display, lights) each command comes at most this often, all of them perhaps in one slot: the fastest is
 # ERROR_LCD, once per pass of the main brain's rows, 22 ms. The first slot of all, which sends every command once, is
 # not covered.
 ON_DEMAND_MS = Fraction(20)
@@ -58,7 +58,7 @@ OTHER = "(other commands)"
 
 @dataclasses.dataclass(frozen=True)
 class BusSchedule:
-    """One named schedule. `every`: variable -> n; `occasional`: board -> n; see the head of this file."""
+    """One named schedule. `every`: variable -> n; `occasional`: board -> n; see this module's docstring."""
 
     name: str
     title: str
@@ -68,13 +68,13 @@ class BusSchedule:
     commands_in_turn: int
 
     def turns(self, variable: str) -> int:
-        """n: it is sent in every n-th of its turns."""
+        """The n for which it is sent in every n-th of its turns."""
         return self.every.get(variable, 1)
 
 
 @dataclasses.dataclass(frozen=True)
 class Stream:
-    """What one place of a schedule sends: a message of the analysis, and the variables that take turns in it."""
+    """One entry of a schedule: a message of the analysis, and the variables that take turns in it."""
 
     message: Message
     variables: tuple[str, ...]
@@ -94,8 +94,8 @@ def command_variables(table: Table) -> tuple[Variable, ...]:
 
 @dataclasses.dataclass(frozen=True)
 class Commands:
-    """The main brain's commands by how they leave: in every n-th slot; one in every `turn_every` slots, in turn; in the
-    slot in which they are written."""
+    """The main brain's commands by their departure: in every n-th slot; one in every `turn_every` slots, in turn; in
+    the slot in which they are written."""
 
     regular: tuple[tuple[Variable, int], ...]
     in_turn: tuple[Variable, ...]
@@ -121,7 +121,7 @@ def sort_commands(table: Table, schedules: Mapping[str, BusSchedule]) -> Command
 
 
 def schedule_of_board(schedules: Mapping[str, BusSchedule], board: Board) -> BusSchedule:
-    """The schedule of the one bus that a satellite hangs on. `schedules`: by bus, can1 ... can4."""
+    """The schedule of the one bus that a satellite is on. `schedules`: by bus, can1 ... can4."""
     return schedules[board.buses[0].lower()]
 
 
@@ -129,7 +129,7 @@ def schedule_of_board(schedules: Mapping[str, BusSchedule], board: Board) -> Bus
 
 
 def passes_of(board: Board, schedule: BusSchedule) -> int:
-    """After how many passes through its rows a board's sending repeats."""
+    """The number of passes through its rows after which a board's sending repeats."""
     turns = [schedule.turns(name) for row in board.rows for name in row]
     return math.lcm(schedule.occasional.get(board.name, 1), *turns)
 
@@ -151,7 +151,7 @@ def thinned_rows(board: Board, rows: list, schedule: BusSchedule) -> list:
 
 
 def apply(board: Any, schedules: Mapping[str, BusSchedule], table: Table | None = None) -> None:
-    """Give an emulated board the schedules of its buses, by name: after it is built, before time passes."""
+    """Apply to an emulated board the schedules of its buses, by name: after it is built, before time passes."""
     table = table if table is not None else robots_table()
     description = table.board(board.name)
     if description.role == "main brain":
@@ -194,11 +194,11 @@ def _stream(board: str, title: str, variables: list[Variable], period_ms: Fracti
 
 
 def streams(table: Table, bus: str, schedules: Mapping[str, BusSchedule], absent: tuple[str, ...] = ()) -> list[Stream]:
-    """Everything that travels on `bus` (can1 ... can4), by schedule; of `absent` boards nothing.
+    """All traffic on `bus` (can1 ... can4), by schedule; without that of `absent` boards.
 
     Satellites: a row's variables once per pass or every n-th, anywhere in their slots; the occasional list as one
     stream. Router: TIMESTAMP, and the main brain's commands. Those that the schedule names come in every n-th of its
-    slots; of the others one every so many slots with `commands_in_turn`, else as it says at ON_DEMAND_MS.
+    slots; the others one per `commands_in_turn` slots where that is set, otherwise as described at ON_DEMAND_MS.
     """
     schedule = schedules[bus]
     found: list[Stream] = []
@@ -216,7 +216,7 @@ def streams(table: Table, bus: str, schedules: Mapping[str, BusSchedule], absent
 
 
 def _satellite_streams(table: Table, board: Board, schedule: BusSchedule) -> list[Stream]:
-    """Each slot sends what stands in its row, so the frames of a board come one after the other: a train."""
+    """Each slot sends the variables of its row, so the frames of a board come one after the other: a train."""
     slot_ns = board.slot_us * 1000
     pass_ms = Fraction(board.slot_us * len(board.rows), 1000)
     common = {"jitter_ns": slot_ns, "queue": board.name}  # anywhere in its slot
@@ -242,7 +242,7 @@ def _satellite_streams(table: Table, board: Board, schedule: BusSchedule) -> lis
 def _command_streams(
     table: Table, bus: str, schedules: Mapping[str, BusSchedule], router: str, slot_ms: Fraction
 ) -> list[Stream]:
-    """What the main brain sends to one bus: all of a slot leaves together, in the order of identifiers."""
+    """What the main brain sends to one bus: a slot's frames leave together, in the order of identifiers."""
     commands = sort_commands(table, schedules)
 
     def here(variables: Sequence[Variable]) -> list[Variable]:
@@ -274,7 +274,7 @@ def _command_streams(
 
 @dataclasses.dataclass(frozen=True)
 class BusBounds:
-    """The analysis of one bus: streams with their bounds in the same order, and frames waiting at most by queue."""
+    """The analysis of one bus: streams with their bounds in the same order, and the most frames waiting by queue."""
 
     bus: str
     bit_rate: int
@@ -291,10 +291,10 @@ class BusBounds:
 def bounds_of(table: Table, bus: str, bit_rate: int, found: list[Stream]) -> BusBounds:
     """Bounds of the streams of one bus.
 
-    A satellite puts what waits into its two hardware buffers once per slot (boards/modules/can_link.py). When more than
-    two frames wait, both buffers may fall empty before that: for each two frames beyond them the queue stands still for
-    up to a slot. How many can wait follows from the bounds, so this is repeated until it no longer grows (or until the
-    queue is late beyond every deadline).
+    A satellite moves waiting frames into its two hardware buffers once per slot (boards/modules/can_link.py). When more
+    than two frames wait, both buffers may be empty before that: for each two frames beyond them the queue stops for up
+    to a slot. The number that can wait follows from the bounds, so this is repeated until it no longer grows (or until
+    the queue is late beyond every deadline).
     """
     satellites = {board.name: board.slot_us * 1000 for board in table.with_role("satellite")}
     pauses = dict.fromkeys(satellites, 0)

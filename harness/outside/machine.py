@@ -1,11 +1,11 @@
-"""A machine of which a part is outside: buses on interfaces of python-can, boards that are real or run elsewhere.
+"""A machine with a part outside: buses on interfaces of python-can, boards that are real or run elsewhere.
 
     servo = new()
     put_outside(servo, load(HERE / "control_outside.toml", table=load_table(TABLE)))
     servo.until("angle_rad > 1", within="5 s")
 
-Boards that run here are in this process. Virtual time is released by the wall clock, at `speed`; while nobody passes
-time it stands still, and frames from outside wait in the interface.
+Boards that run here are in this process. Virtual time is released by the wall clock, at `speed`; while no caller passes
+time it stops, and frames from outside wait in the interface.
 """
 
 from typing import Any
@@ -15,12 +15,12 @@ from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 
-SLICE_NS = 500_000  # virtual time between two looks at the wall clock: one slot of a motor board, as in `up`
+SLICE_NS = 500_000  # virtual time between two readings of the wall clock: one slot of a motor board, as in `up`
 RESET = 1  # mode of a bus node
 
 
 class Elsewhere(Board):
-    """Stands for board `built`, which is outside or absent: it does nothing."""
+    """Substitute for board `built`, which is outside or absent: it does nothing."""
 
     def __init__(self, built: Any) -> None:
         Board.__init__(self, built.name)
@@ -29,21 +29,21 @@ class Elsewhere(Board):
         self.built = built
 
     def advance(self, until: int) -> int:
-        """Nothing happens; what comes is lost."""
+        """Do nothing; inputs are lost."""
         self.inbox.clear()
         self.next_time = NEVER
         return NEVER
 
     def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
-        """Edges at its pins are lost."""
+        """Discard edges at its pins."""
 
     def counters(self) -> Any:
-        """Nothing is counted."""
+        """Return empty counters."""
         return self.built.counters()
 
 
 def leave_out(machine: Any, name: str) -> None:
-    """Board `name` is not run here, and is on no emulated bus."""
+    """Take board `name` out: it does not run here, and is not on an emulated bus."""
     machine.loop.replace(Elsewhere(machine.boards[name]))
     wires = machine.loop.wires[machine.loop.place(name)]
     for bus, node in zip(wires.buses, wires.nodes, strict=True):
@@ -52,7 +52,7 @@ def leave_out(machine: Any, name: str) -> None:
 
 
 class Pace:
-    """Holds a machine's time back to the wall clock's; `speed`: virtual seconds per second."""
+    """Slows a machine's time down to the wall clock's; `speed`: virtual seconds per second."""
 
     def __init__(self, machine: Any, speed: float) -> None:
         if not 1e-4 <= speed <= 1000.0:
@@ -63,13 +63,13 @@ class Pace:
         self.begun_s = 0.0
 
     def begin(self, now_ns: int) -> None:
-        """Time passes from now on."""
+        """Start passing time."""
         self.begun_ns, self.begun_s = now_ns, wallclock.monotonic_s()
 
     def release(self, now_ns: int) -> int:
-        """Wait until the wall clock has come to `now_ns`; returns until when the machine may run then.
+        """Wait until the wall clock reaches `now_ns`; returns the time up to which the machine may then run.
 
-        What comes from outside meanwhile is read at once.
+        Input from outside meanwhile is read at once.
         """
         due_s = self.begun_s + (now_ns - self.begun_ns) * 1e-9 / self.speed
         numbers = [number for end in self.machine.polled for number in end.filenos()]
@@ -80,7 +80,7 @@ class Pace:
 
 
 def put_outside(machine: Any, profile: Any, speed: float = 1.0) -> None:
-    """Do with a fresh machine what a profile (profile.py) says: its buses on interfaces, its boards elsewhere.
+    """Apply a profile (profile.py) to a new machine: its buses on interfaces, its boards elsewhere.
 
     UserError when an interface cannot be opened.
     """

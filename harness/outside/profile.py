@@ -10,7 +10,7 @@
     schedule = "1mbit"                 schedules/1mbit.toml beside this file or shipped; "full": as the firmware sends
     options = { receive_own_messages = false }   further arguments of python-can's Bus
 
-A profile passes whole or not at all; whatever is wrong is named together: file, key, value and the rule broken.
+A profile passes whole or not at all; all mistakes are reported together: file, key, value and the rule broken.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ STATES = (EMULATED, EXTERNAL, ABSENT)
 BUSES = ("can1", "can2", "can3", "can4")
 # Below, a frame of 8 bytes takes longer than the robot's slots can wait (chosen by us); above, no controller follows.
 LOWEST_BIT_RATE, HIGHEST_BIT_RATE = 10_000, 8_000_000
-# ISO 11898-1 classic CAN, and what python-can's bit timings allow. Interfaces of software alone have no bit rate.
+# ISO 11898-1 classic CAN, and what python-can's bit timings allow. Software-only interfaces have no bit rate.
 ADAPTER_BIT_RATE = 1_000_000
 SOFTWARE_INTERFACES = ("ranger_sim", "virtual", "udp_multicast")
 WITHOUT_CAN = (
@@ -87,7 +87,7 @@ class BusProfile:
     options: Mapping[str, Any]
 
     def python_can(self) -> dict[str, Any] | None:
-        """Arguments of `can.Bus`, or None for an emulated bus. The bit rate is given where the interface sets it."""
+        """Arguments of `can.Bus`, or None for an emulated bus. The bit rate is included where the interface sets it."""
         if self.interface is None:
             return None
         found: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
@@ -98,7 +98,7 @@ class BusProfile:
 
 @dataclasses.dataclass(frozen=True)
 class Profile:
-    """A checked profile: every board and every bus of the machine are in it."""
+    """A checked profile, with every board and every bus of the machine."""
 
     name: str
     path: str
@@ -119,7 +119,7 @@ class Profile:
         return self._boards(EXTERNAL)
 
     def absent(self) -> tuple[str, ...]:
-        """Boards that are not there."""
+        """Boards that are missing."""
         return self._boards(ABSENT)
 
     def schedules(self) -> dict[str, BusSchedule]:
@@ -128,14 +128,14 @@ class Profile:
 
 
 class _Reader:
-    """Reads one file and collects its faults; every wrong key is told, never raised."""
+    """Reads one file and collects its faults; every wrong key is reported, never raised."""
 
     def __init__(self, file: str, faults: list[ProfileFault]) -> None:
         self.file = file
         self.faults = faults
 
     def fault(self, key: str, value: object, rule: str) -> None:
-        """Note a fault; `value` None: there is none to show."""
+        """Record a fault; `value` None: nothing to show."""
         shown = "" if value is None else _shown(value)
         self.faults.append(ProfileFault(self.file, _plain(key), shown, rule))
 
@@ -149,7 +149,7 @@ class _Reader:
             return None
 
     def only(self, table: Mapping[str, Any], allowed: tuple[str, ...], place: str) -> None:
-        """A fault for each key that is not allowed."""
+        """Record a fault for each key that is not allowed."""
         for key in table:
             if key not in allowed:
                 self.fault(_dotted(place, key), table[key], f"unknown key; allowed are {', '.join(allowed)}")
@@ -163,7 +163,7 @@ class _Reader:
         return default
 
     def table(self, table: Mapping[str, Any], key: str, place: str = "") -> dict[str, Any]:
-        """A table under a key, empty where there is none."""
+        """A table under a key, empty where it is missing."""
         value = table.get(key, {})
         if isinstance(value, dict):
             return value
@@ -197,13 +197,13 @@ def _dotted(place: str, key: str) -> str:
 
 
 def available_schedules(folder: pathlib.Path | None = None) -> tuple[str, ...]:
-    """Names of the schedules shipped, and of those beside a profile in `folder`."""
+    """Names of the schedules shipped, and of those next to a profile in `folder`."""
     folders = [FOLDER / SCHEDULES] + ([folder / SCHEDULES] if folder else [])
     return tuple(sorted({path.stem for each in folders for path in each.glob("*.toml")}))
 
 
 def _schedule(name: str, folder: pathlib.Path, table: Table, faults: list[ProfileFault]) -> BusSchedule:
-    """The schedule of that name, which exists; its faults are added."""
+    """The schedule of that name, which exists; adds its faults to `faults`."""
     path = folder / SCHEDULES / f"{name}.toml"
     if not path.is_file():
         path = FOLDER / SCHEDULES / f"{name}.toml"
@@ -263,7 +263,7 @@ def available() -> tuple[str, ...]:
 
 @functools.cache
 def default() -> Profile:
-    """The robot as it is: every board emulated, its own bit rate, every board sending as its firmware does."""
+    """The real robot's profile: every board emulated, its own bit rate, every board sending as its firmware does."""
     table = robots_table()
     schedule = full_schedule()
     buses = {name: BusProfile(name, None, None, table.bit_rates[name.upper()], FULL, schedule, {}) for name in BUSES}
@@ -287,7 +287,7 @@ def load(
     """The profile `name` of those shipped, or the file at that path when it ends in .toml.
 
     ProfileError names all its faults. `interfaces` gives python-can's interface names, asked when a bus names one.
-    table: of a machine of one's own, whose boards and buses it is about; a schedule it cannot have.
+    table: of a user's machine, whose boards and buses the profile describes; it cannot have a schedule.
     """
     text = str(name)
     if not text.endswith(".toml") and text not in available():
@@ -395,12 +395,12 @@ def _buses(
 
 
 def _without_rate(interface: str, channel: str) -> bool:
-    """True for interfaces of software alone, where a bit rate means nothing."""
+    """True for software-only interfaces, where a bit rate means nothing."""
     return interface in SOFTWARE_INTERFACES or (interface == "socketcan" and channel.startswith(("vcan", "vxcan")))
 
 
 def _together(reader: _Reader, boards: Mapping[str, str], buses: Mapping[str, BusProfile], table: Table) -> None:
-    """What only shows when boards and buses are seen together."""
+    """Check the combination of boards and buses."""
     if table.with_role(ROUTER):
         _with_router(reader, boards, table)
     for name, state in boards.items():
@@ -422,7 +422,7 @@ def _together(reader: _Reader, boards: Mapping[str, str], buses: Mapping[str, Bu
 
 
 def _with_router(reader: _Reader, boards: Mapping[str, str], table: Table) -> None:
-    """Main brain and router are outside together, or not at all."""
+    """Check that main brain and router are outside together, or not at all."""
     brain, router = table.with_role("main brain")[0].name, table.with_role("router")[0].name
     if EXTERNAL in (boards[brain], boards[router]) and boards[brain] != boards[router]:
         external = brain if boards[brain] == EXTERNAL else router

@@ -1,8 +1,8 @@
-"""Sends what absent boards would send, so that those that are there have what they need at the right rates.
+"""Sends the frames of absent boards, so that the others receive what they need at the right rates.
 
-Each variable comes with its period (the bus schedule's numbers included) and its value: the table's initial one until
-`set` gives another. Without the router its TIMESTAMP comes from here as well, and the commands of the main brain: once
-each at the start and then as the schedule has them, those that it does not name once a second.
+Each variable has its period (the bus schedule's numbers included) and its value: the table's initial one until
+`set` changes it. Without the router this module also sends its TIMESTAMP, and the commands of the main brain: once
+each at the start and then by the schedule; those that the schedule does not name once a second.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.outside.supervision import SYNC, expected_periods
 
 DATA_8 = 8  # flags of a data frame of eight bytes
-SPREAD_NS = 137_000  # between first sendings, so that not everything comes at once; chosen by us: longer than a frame
+SPREAD_NS = 137_000  # between first sendings, so that frames do not come all at once; chosen by us: longer than a frame
 ON_DEMAND_NS = 1_000_000_000  # chosen by us: a board that is switched on later has every command within a second
 
 
@@ -48,7 +48,7 @@ class RestBus:
             sync = self.table.variable(SYNC)
             for bus in profile.buses:
                 self._add(sync, bus, int((sync.period_ms or Fraction(1)) * 1_000_000))
-            # alone the main brain reaches nobody (see harness/outside/profile.py), so both are absent
+            # without the router the main brain reaches no board (see harness/outside/profile.py), so both are absent
             slot_ns = brain.slot_us * 1000
             for variable in command_variables(self.table):
                 for bus, schedule in schedules.items():
@@ -58,7 +58,7 @@ class RestBus:
                         self._add(variable, bus, period)
 
     def _is_needed(self, variable: Variable, absent: tuple[str, ...]) -> bool:
-        """True when somebody that is there subscribes to it."""
+        """True when a present board subscribes to it."""
         return any(name not in absent and self.table.board(name).firmware for name in variable.subscribers)
 
     def _add(self, variable: Variable, bus: str, period_ns: int) -> None:

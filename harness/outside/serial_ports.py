@@ -1,9 +1,9 @@
 """Ends of the robot's serial lines: a pseudo-terminal, or a real port opened by pyserial.
 
 An end is a plain object without threads. The loop that owns the robot calls `poll(now_ns)` between two of its steps:
-bytes that came in are stamped and handed to the board, bytes that the board has finished sending go out. Nothing here
-blocks, and nothing a client does raises. What comes in comes when the wall clock says so: from then on a run is not
-reproducible, and `asynchronous` says so. What goes out changes nothing.
+bytes that have arrived are stamped and passed to the board, bytes that the board has finished sending go out. A poll
+never blocks, and nothing that a client does raises. Input arrives by the wall clock: from then on a run is not
+reproducible, and `asynchronous` says so. Output changes nothing.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from ranger_sim.harness.wiring import ranger as wiring
 if TYPE_CHECKING:
     from ranger_sim.harness.ranger import Ranger
 
-POLL_NS = 1_000_000  # between two looks at a port: half a slot of the main brain
-AHEAD_NS = 20_000_000  # bytes read at once last at most so long on the robot's side; the rest waits in the port
+POLL_NS = 1_000_000  # between two polls of a port: half a slot of the main brain
+AHEAD_NS = 20_000_000  # bytes read at once last at most this long on the robot's side; the rest waits in the port
 ORDER = STAGE_PINS * 256 + 192
 GROUP = 8  # bytes that travel as one message
 
@@ -41,20 +41,20 @@ class Port(Protocol):
     path: str
 
     def read(self, limit: int) -> bytes:
-        """At most `limit` bytes that are there; OSError when the port is gone."""
+        """Read at most `limit` available bytes; OSError when the port is gone."""
 
     def write(self, data: bytes) -> int:
-        """How many of the bytes were taken; OSError when the port is gone."""
+        """Write bytes; returns how many were accepted; OSError when the port is gone."""
 
     def filenos(self) -> list[int]:
-        """What to select on for reading."""
+        """The file descriptors to select on for reading."""
 
     def close(self) -> None:
-        """Give it back."""
+        """Close it."""
 
 
 class PtyPort:
-    """A pseudo-terminal, raw. Clients come and go; without one at most the kernel's few kilobytes wait."""
+    """A pseudo-terminal, raw. Clients may connect and leave; without one at most the kernel's few kilobytes wait."""
 
     def __init__(self) -> None:
         self.terminal = Terminal()
@@ -74,7 +74,7 @@ class PtyPort:
 
 
 class RealPort:
-    """A serial port of this machine, or whatever pyserial opens for a URL. `flow_control`: RTS/CTS."""
+    """A serial port of this machine, or what pyserial opens for a URL. `flow_control`: RTS/CTS."""
 
     def __init__(self, name: str, baud: int, flow_control: bool = False) -> None:
         import serial
@@ -113,14 +113,14 @@ class RealPort:
 
 
 def hung_up(number: int) -> bool:
-    """True when the other side of a terminal is gone: reading it then only looks as if nothing came."""
+    """True when the other side of a terminal is gone: reading it then looks like silence."""
     watch = select.poll()
     watch.register(number, select.POLLIN)
     return any(events & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, events in watch.poll(0))
 
 
 def reason_of(error: Exception) -> str:
-    """The operating system's words, where it has some."""
+    """The operating system's message, where it has one."""
     if isinstance(error, OSError) and error.errno is not None:
         return os.strerror(error.errno)
     return str(error)
@@ -132,7 +132,7 @@ def open_port(name: str, baud: int = DAQ_BAUD, flow_control: bool = False) -> Po
 
 
 class Dropouts:
-    """When the radio is silent: seeded, in virtual time.
+    """Times at which the radio is silent: seeded, in virtual time.
 
     The robot's Bluetooth logs (robot.md C6.1, C6.2) have gaps of 50 to 180 ms; one of 93 s has about 25
     of them, one every 3.7 s. Uniform lengths and exponential distances are chosen by us.
@@ -152,7 +152,7 @@ class Dropouts:
         return round(-1e9 * self.MEAN_DISTANCE_S * math.log(1.0 - self.stream.uniform()))
 
     def advance(self, now_ns: int) -> bool:
-        """Pass at most one switch that is due; True when there was one."""
+        """Make at most one switch that is due; True when there was one."""
         if now_ns < self.switch_ns:
             return False
         self.silent = not self.silent
@@ -174,7 +174,7 @@ class SerialLine:
 
     push: called as `EventQueue.push`: time, order, kind and up to five numbers of a message to the board.
     byte_ns: how long a byte takes on the line. With `dropouts` the radio is silent at times: with a `cts_pin` the board
-    is held by flow control and what waits goes out later, without one the bytes of that time are lost.
+    is held by flow control and waiting bytes go out later; without one the bytes of that time are lost.
     """
 
     def __init__(
@@ -193,26 +193,26 @@ class SerialLine:
         self.dropouts = dropouts
         self.cts_pin = cts_pin
         self.outgoing: collections.deque[tuple[int, bytes]] = collections.deque()  # (end of the last byte, bytes)
-        self.rest = b""  # of a piece that the port took in part: it goes first, so that pieces stay whole
+        self.rest = b""  # of a piece that the port accepted in part: it goes first, so that pieces stay whole
         self.line_free_ns = 0
         self.asynchronous = False
         self.gone = ""  # why the port does not work any more
         self.closed = False
         self.bytes_in = 0
         self.bytes_out = 0
-        self.bytes_lost = 0  # the port was full: nobody reads
+        self.bytes_lost = 0  # the port was full: no client reads
         self.bytes_unheard = 0  # sent while the radio was silent, without flow control
 
     # --- from the board ---------------------------------------------------------------------------------
 
     def from_board(self, time_ns: int, byte: int, count: int, data: bytes | None) -> None:
-        """What a UART_OUTPUT brought: one byte, or `count` in `data`."""
+        """Take a UART_OUTPUT: one byte, or `count` in `data`."""
         self.outgoing.append((time_ns, bytes((byte & 255,)) if count == 0 or data is None else data))
 
     # --- polled -----------------------------------------------------------------------------------------
 
     def poll(self, now_ns: int) -> int:
-        """Bytes in, bytes out; returns the virtual instant at which to look again."""
+        """Move bytes in and out; returns the virtual time of the next poll."""
         wish = now_ns + POLL_NS
         if self.dropouts is not None:
             while self.dropouts.advance(now_ns):
@@ -232,7 +232,7 @@ class SerialLine:
         return wish
 
     def _take_in(self, now_ns: int) -> None:
-        """What the port has, as far as it fits on the line in the next milliseconds."""
+        """Read from the port what fits on the line in the next milliseconds."""
         start = max(self.line_free_ns, now_ns)
         data = self.port.read(min((now_ns + AHEAD_NS - start) // self.byte_ns, LIMITS["serial"].read_bytes))
         if not data:
@@ -248,7 +248,7 @@ class SerialLine:
         self.line_free_ns = start
 
     def _put_out(self, now_ns: int, silent: bool) -> None:
-        """What the board has finished sending by now. A piece is taken whole or lost whole."""
+        """Write what the board has finished sending. A piece is accepted whole or lost whole."""
         if silent and self.cts_pin >= 0:
             return  # the module keeps it; the board sends no more
         if self.rest:
@@ -274,7 +274,7 @@ class SerialLine:
         return taken
 
     def filenos(self) -> list[int]:
-        """What to select on while waiting for the wall clock."""
+        """The file descriptors to select on while waiting for the wall clock."""
         return [] if self.gone or self.closed else self.port.filenos()
 
     def counters(self) -> dict[str, int]:
@@ -288,18 +288,18 @@ class SerialLine:
         }
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         if not self.closed:
             self.closed = True
             self.port.close()
 
 
 class ImuOffer:
-    """The plant's inertial unit on a port, beside its own board: a real host hears it and may command it."""
+    """The plant's inertial unit on a port, in addition to its board: a real host reads and may command it."""
 
     def __init__(self, imu: Any, port: Port) -> None:
         self.imu = imu
-        # what the unit sends goes the way of a board's bytes; what the host sends goes to the unit
+        # the unit's output is handled like a board's bytes; the host's bytes go to the unit
         byte_ns = 10_000_000_000 // imu.baud
         self.line = SerialLine(self._to_unit, 0, port, byte_ns)
 
@@ -310,7 +310,7 @@ class ImuOffer:
             self.imu.receive_byte(time_ns, byte)
 
     def bytes_sent(self, times: Any, values: Any, count: int) -> None:
-        """The unit sent `count` bytes: their ends in ns, and themselves."""
+        """Take `count` bytes of the unit: their end times in ns, and values."""
         if count:
             self.line.from_board(int(times[count - 1]), 0, count, bytes(values[i] for i in range(count)))
 

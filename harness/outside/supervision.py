@@ -1,12 +1,12 @@
-"""What an external board should send, held against what it does send.
+"""What an external board should send, compared with what it does send.
 
-The master table says which variables a board publishes, in which range, and (with the bus schedule) how often. A frame
-carries the network time its board heard last; TIMESTAMP frames on the same bus say what that was. Everything is judged
-in the time that is given with the frames: with slowed-down time in the robot's own.
+The master table lists the variables that a board publishes, their ranges, and (with the bus schedule) how often. A
+frame carries the network time its board received last; TIMESTAMP frames on the same bus contain that time. All checks
+use the time that is given with the frames: when time is slowed down, the robot's own.
 
     missing        not seen for MISSING_PERIODS periods (or not at all since the start)
     late           a gap longer than a period and its tolerance
-    out of range   a value outside the table's minimum and maximum, or no number
+    out of range   a value outside the table's minimum and maximum, or not a number
     stale stamp    a frame stamped with a network time older than STALE_MS
     malformed      not a data frame of eight bytes with an 11-bit identifier
     unexpected     a variable that the board publishes but its schedule never sends
@@ -30,8 +30,8 @@ from ranger_sim.harness.outside.profile import Profile
 
 SYNC = "TIMESTAMP"
 # Chosen by us. A gap: a period, two slots of jitter, and what a busy bus and an adapter's driver may add. Missing:
-# three frames in a row did not come, which no jitter explains. Stale: satellites take the time every ms, and a frame
-# waits some ms at most. Doubled: so many frames come within three quarters of the time that they should take.
+# three frames in a row did not arrive, which no jitter explains. Stale: satellites take the time every ms, and a frame
+# waits some ms at most. Doubled: this many frames come within three quarters of the time that they should take.
 GAP_NS = 5_000_000
 MISSING_PERIODS = 3
 STALE_MS = 20
@@ -41,7 +41,7 @@ KINDS = ("missing", "late", "out of range", "stale stamp", "malformed", "unexpec
 
 @dataclasses.dataclass
 class Watched:
-    """One variable of an external board: what is expected, and what came. Times in ns; `period_ns` 0: on demand."""
+    """One variable of an external board: what is expected, and what arrived. Times in ns; `period_ns` 0: on demand."""
 
     variable: Variable
     bus: str
@@ -58,7 +58,7 @@ class Watched:
 def expected_periods(board: Board, schedule: BusSchedule) -> dict[str, tuple[Fraction, Fraction]]:
     """(mean period, longest regular gap) in ms of every variable that a board's schedule sends.
 
-    A variable that stands in a row and in the occasional list comes at the row's gaps at the longest.
+    The longest gaps of a variable in both a row and the occasional list are the row's.
     """
     found: dict[str, tuple[Fraction, Fraction]] = {}
     slot = Fraction(board.slot_us, 1000)
@@ -92,7 +92,7 @@ class Watch:
         self.boards: dict[str, list[Watched]] = {}
         self.watched: dict[tuple[str, int], tuple[str, Watched]] = {}
         self.sync_id = table.variable(SYNC).id
-        self.sync_ms: dict[str, int] = {}  # network time heard last, by bus
+        self.sync_ms: dict[str, int] = {}  # network time received last, by bus
         schedules = profile.schedules()
         for name in profile.external():
             board = table.board(name)
@@ -113,7 +113,7 @@ class Watch:
             self._watch(board.name, variable, bus, int(gap * 1_000_000))
 
     def _expect_of_router(self, board: Board, table: Table) -> None:
-        """TIMESTAMP on every bus, and the commands that it passes on."""
+        """Expect TIMESTAMP on every bus, and the commands that the router passes on."""
         for variable in table.variables:
             for bus in variable.buses:
                 if not bus.startswith("CAN"):
@@ -128,10 +128,10 @@ class Watch:
         self.boards[board].append(one)
         self.watched[bus, variable.id] = (board, one)
 
-    # ---- what comes
+    # ---- arrivals
 
     def frame(self, time_ns: int, bus: str, identifier: int, flags: int, lo: int, hi: int) -> None:
-        """A frame seen on a bus (every one, also our own: the network time is among them); flags as FLAG_*."""
+        """Check a frame on a bus (every one, also our own: they include the network time); flags as FLAG_*."""
         self.now_ns = max(self.now_ns, time_ns)
         if flags & FLAG_ERROR or flags & FLAG_EXTENDED:
             return
@@ -148,7 +148,7 @@ class Watch:
             return
         self._judge_rhythm(one, time_ns)
         self._judge_value(one, lo)
-        # an error word carries the instant at which the error was noted, a command the main brain's view of the time
+        # an error word carries the time at which the error was recorded, a command the main brain's view of the time
         own_stamp = one.variable.publisher == found[0] and not one.variable.is_error_word and identifier != self.sync_id
         if own_stamp and bus in self.sync_ms:
             age = (self.sync_ms[bus] - hi) & 0xFFFFFFFF
@@ -186,7 +186,7 @@ class Watch:
             self._note(one, "out of range", f"{value:g} is outside {allowed}")
 
     def check(self, now_ns: int) -> None:
-        """Notice what does not come; call it every 10 ms or so."""
+        """Check for frames that are missing; call it every 10 ms or so."""
         self.now_ns = max(self.now_ns, now_ns)
         for _, one in self.watched.values():
             if one.period_ns == 0 or one.missing:
@@ -202,7 +202,7 @@ class Watch:
         one.last_fault = f"{kind}: {text}"
         self.faults += 1
 
-    # ---- what is told
+    # ---- reports
 
     def report(self) -> dict[str, Any]:
         """By board: frames seen, variables expected and seen, counts of faults, and every variable with a fault."""

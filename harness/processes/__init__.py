@@ -1,5 +1,5 @@
-"""The robot as operating-system processes: one per board, one for the plant, one that looks after them.
+"""The robot as operating-system processes: one per board, one for the plant, one that supervises them.
 
-README.md here says how they talk. The board and plant classes are those of the lockstep: a board process runs
-`Microcontroller.advance`, the plant process runs `harness.lockstep.Lockstep`.
+README.md here describes how they communicate. The board and plant classes are those of the lockstep: a board process
+runs `Microcontroller.advance`, the plant process runs `harness.lockstep.Lockstep`.
 """

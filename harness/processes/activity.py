@@ -1,7 +1,7 @@
-"""The activity log of a board in a process of its own: kept there, fetched over the channel when somebody reads.
+"""The activity log of a board in a separate process: kept there, fetched over the channel when a reader requests it.
 
-An answer is a head of two whole numbers (rows given up for newer ones since the last answer, bytes that are left) and
-rows as firmware_sim/activity.py has them.
+An answer is a head of two whole numbers (rows discarded for newer ones since the last answer, bytes that are left) and
+rows as in firmware_sim/activity.py.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from ranger_sim.harness.processes.places import COMMAND_ACTIVITY, KEEP_NS
 
 HEAD_BYTES = 16
 ROW_BYTES = 8 * ACTIVITY_COLUMNS
-MOST_BYTES = 256 * 1024 * 1024  # kept for who has not asked yet (chosen by us: a minute of a motor board that walks)
+MOST_BYTES = 256 * 1024 * 1024  # kept for later readers (chosen by us: a minute of a motor board that walks)
 ANSWER_BYTES = 4096 * ROW_BYTES  # of one answer: some hundred messages of the channel
 
 Sink = Callable[[int, bytes], None]
 
 
 class ActivityStore:
-    """In the board's process: the rows that nobody has fetched yet. The log is there from the first question on.
+    """In the board's process: the rows not fetched yet. The log exists from the first request on.
 
-    Of them the last `words[KEEP_NS]` (ns), or what MOST_BYTES hold. A log that the board had before its process was
-    forked is the plant's to read: its sinks are in another memory now.
+    It keeps their last `words[KEEP_NS]` (ns), or what MOST_BYTES hold. A log that the board had before its process was
+    forked is read by the plant: its sinks are in that process's memory.
     """
 
     def __init__(self, board: Any, words: Any) -> None:
@@ -46,7 +46,7 @@ class ActivityStore:
         self.board.activity().add_sink(self.take)
 
     def take(self, time_ns: int, rows: bytes) -> None:
-        """Keep rows; the oldest go when there are too many, or when they are too old."""
+        """Keep rows; drop the oldest when there are too many, or when they are too old."""
         self.blocks.append((time_ns, rows))
         self.kept += len(rows)
         oldest_ns = time_ns - self.words[KEEP_NS] if self.words[KEEP_NS] else 0
@@ -76,18 +76,18 @@ class ActivityStore:
 
 
 class RemoteActivity:
-    """In the plant's process: like an ActivityLog of the board, for who reads it. `lost`: rows given up unread."""
+    """In the plant's process: like an ActivityLog of the board, for its readers. `lost`: rows discarded unread."""
 
     def __init__(self, remote: Any, words: Any, before: Any) -> None:
         self.remote = remote
         self.words = words
-        self.sinks: list[Sink] = [] if before is None else before.sinks  # who read the board's log before it moved out
+        self.sinks: list[Sink] = [] if before is None else before.sinks  # readers of the log before it moved out
         self.lost = 0
         self.keep_ns = 0 if before is None else before.keep_ns
 
     @property
     def keep_ns(self) -> int:
-        """How much the board keeps until somebody asks; 0: all that there is room for."""
+        """How much the board keeps for the next reader, ns; 0: all that fits."""
         return int(self.words[KEEP_NS])
 
     @keep_ns.setter
@@ -100,7 +100,7 @@ class RemoteActivity:
         self.sinks.append(sink)
 
     def flush(self) -> None:
-        """Fetch what the board has written, and hand it over; nothing from a board that is gone."""
+        """Fetch what the board has written, and pass it on; nothing from a board that is gone."""
         left = 1
         while left:
             answer = self.remote.notes_of(COMMAND_ACTIVITY, NOTE_ACTIVITY)

@@ -1,9 +1,9 @@
-"""Some boards of a robot, or all, each in a process of its own; the rest of the robot is in this one and passes time.
+"""Some boards of a robot, or all, each in a separate process; the rest of the robot is in this one and passes time.
 
 It is the lockstep of this folder without a supervisor: virtual time, the same bytes as in one process. The processes
-begin when time first passes, so that something may be done to the boards before. A further process watches them
-(guard.py): a board that is gone or gives no answer is not waited for. They end with `close`, or with this process,
-however that ends.
+start when time first passes, so that the boards may be changed before. A further process watches them
+(guard.py): a board that is gone or does not answer is not waited for. They end with `close`, or with this process,
+in whatever way that ends.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ RESET = 1  # mode of a bus node
 class Apart:
     """The boards `names` of the wired, never run `robot`, each in its process.
 
-    `deaths`: of each that has ended by itself, in their order: {"board", "time_s", "how" its process ended, "why"}, the
-    last as far as its program or what it left says so.
+    `deaths`: for each that has ended by itself, in order: {"board", "time_s", "how" its process ended, "why"}, the
+    last as far as its program or its records report it.
     """
 
     def __init__(self, robot: Any, names: tuple[str, ...]) -> None:
@@ -66,7 +66,7 @@ class Apart:
         }
         for name, remote in self.remotes.items():
             loop.replace(remote)
-            robot.boards[name].apart = True  # it will not run here
+            robot.boards[name].apart = True  # it does not run here
         loop.watchers.append(Undertaker(self))
 
     def _board(self, name: str, stage: tuple[Any, Any]) -> Callable[[], int]:
@@ -86,7 +86,7 @@ class Apart:
             os.sched_setaffinity(0, allowed)
 
     def bury(self) -> None:
-        """Boards that went away are off their buses; their pins stay, so that the watchdogs of bridges run out."""
+        """Take lost boards off their buses; their pins stay, so that the watchdogs of bridges expire."""
         for name, remote in self.remotes.items():
             if remote.gone and name in self.children and not self.ended:
                 code = os.waitstatus_to_exitcode(os.waitpid(self.children.pop(name), 0)[1])
@@ -100,7 +100,7 @@ class Apart:
                         bus.set_mode(wires.nodes[controller], RESET, loop.time)
 
     def _where(self, name: str) -> str:
-        """Where its program in C was when it ended its process; empty when it did not."""
+        """The position of its program in C when it ended its process; empty when it did not."""
         block = self.blocks[name]
         if name in self.robot.firmware and block.words[places.CRASH]:
             firmware = self.robot.firmware[name]
@@ -109,11 +109,11 @@ class Apart:
         return ""
 
     def asking(self, names: tuple[str, ...]) -> StepWatch:
-        """What fetches the counters of these boards before each step, as long as it watches."""
+        """A watch that fetches the counters of these boards before each step."""
         return Asking(self, names)
 
     def fetch_counters(self, names: tuple[str, ...] | None = None) -> None:
-        """Bring boards to the present instant and ask them what they counted."""
+        """Bring boards to the present time and fetch their counters."""
         for name in names if names is not None else self.names:
             if name in self.remotes and not self.ended:
                 self.remotes[name].catch_up(self.robot.loop.time)
@@ -121,7 +121,7 @@ class Apart:
         self.bury()
 
     def dismiss(self) -> None:
-        """Let all processes end by themselves, each with what it has to write; wait for that."""
+        """Let all processes finish writing and end by themselves; wait for that."""
         for name, remote in self.remotes.items():
             if name in self.children and not remote.gone:
                 remote.catch_up(self.robot.loop.time)
@@ -136,7 +136,7 @@ class Apart:
             os.waitpid(process, 0)
 
     def close(self) -> None:
-        """End all processes; they are gone after this."""
+        """End all processes."""
         if self.ended:
             return
         self.ended = True
@@ -153,7 +153,7 @@ class Apart:
 
 
 class Undertaker(StepWatch):
-    """Before each step it looks for boards that are gone: so when they leave their buses depends on virtual time."""
+    """Checks before each step for boards that are gone, so that they leave their buses by virtual time."""
 
     def __init__(self, apart: Apart) -> None:
         StepWatch.__init__(self)
@@ -164,7 +164,7 @@ class Undertaker(StepWatch):
 
 
 class Asking(StepWatch):
-    """Before each step it fetches what these boards have counted."""
+    """Fetches these boards' counters before each step."""
 
     def __init__(self, apart: Apart, names: tuple[str, ...]) -> None:
         StepWatch.__init__(self)
@@ -176,14 +176,14 @@ class Asking(StepWatch):
 
 
 def processor_for_this_worker() -> int:
-    """The processor for a robot of processes; workers of pytest-xdist get different ones, as far as there are."""
+    """The processor for a robot of processes; workers of pytest-xdist get different ones, as far as possible."""
     allowed = sorted(os.sched_getaffinity(0), reverse=True)
     number = os.environ.get("PYTEST_XDIST_WORKER", "").removeprefix("gw")
     return allowed[int(number) % len(allowed) if number.isdecimal() else 0]
 
 
 def fork(body: Callable[[], int]) -> int:
-    """A process that runs `body`, leaves with what that returns, and does not outlive this one; its number."""
+    """Fork a process that exits with the result of `body` and does not outlive this one; returns its number."""
     parent = os.getpid()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -199,7 +199,7 @@ def _live(parent: int, body: Callable[[], int]) -> NoReturn:
     code = board_process.FAILED
     try:
         kernel.die_with_parent(parent)
-        gc.freeze()  # what lies about in the parent's program is not for this process to finalize
+        gc.freeze()  # this process must not finalize the parent's objects
         code = body()
     except BaseException as error:  # noqa: BLE001  (a child must never return into the parent's program)
         print(f"ranger-sim: {type(error).__name__}: {error}", file=sys.stderr, flush=True)

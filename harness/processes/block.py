@@ -1,7 +1,7 @@
-"""The memory that the processes share. All of it is anonymous: it is gone with the processes.
+"""The memory that the processes share. All of it is anonymous: it disappears with the processes.
 
 One block per board, written by its board process, the plant process and the supervisor; one stage, written by the
-plant process, where all boards see what the sensors show. places.py says where every word stands.
+plant process, with the sensors' values for all boards. places.py has the place of every word.
 """
 
 import mmap
@@ -79,7 +79,7 @@ class Block:
         return self.words[TABLE : TABLE + self.table_words]
 
     def fault(self) -> str:
-        """What the board process left to be said about its end."""
+        """The board process's message about its end."""
         length = max(0, min(self.words[FAULT_TEXT], 8 * (FAULT_WORDS - 1)))
         text = self.words[FAULT_TEXT + 1 : FAULT_TEXT + FAULT_WORDS].tobytes()[:length]
         return text.decode("utf-8", "replace")

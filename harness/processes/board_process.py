@@ -1,4 +1,4 @@
-"""What runs in the process of one board."""
+"""The process of one board."""
 
 import os
 import sys
@@ -22,10 +22,10 @@ FAILED = 4  # exit code: the board's program raised
 
 
 class Hold:
-    """What the other processes are told while a debugger has the board: it does not hang, and the pace waits for it.
+    """Reports to the other processes that a debugger has the board: it does not hang, and the pace waits for it.
 
-    The pace is set on by who held it: whoever else writes it, the plant's process, waits for this board's answer. Of
-    several that were held at once each sets it on by what the others have not.
+    The process that held the board moves the pace on: its only other writer, the plant's process, waits for this
+    board's answer. Of several boards held at once each moves it on by the time that the others have not covered.
     """
 
     def __init__(self, block: Block, stage: tuple) -> None:
@@ -34,7 +34,7 @@ class Hold:
         self.since_ns = 0
 
     def stands(self, stands: bool) -> None:
-        """The board begins or ends to wait for a debugger."""
+        """Note that the board begins or ends to wait for a debugger."""
         now_ns = wallclock.monotonic_ns()
         if stands:
             self.since_ns = now_ns
@@ -44,17 +44,17 @@ class Hold:
         self.words[places.HELD] = int(stands)
 
     def ends(self) -> bool:
-        """The run is to end."""
+        """Whether the run is to end."""
         return bool(self.words[places.LET_GO])
 
 
 def serve(
     robot: Any, name: str, block: Block, stage: tuple, settings: Settings, fresh: bool, door: GdbServer | None = None
 ) -> int:
-    """Run board `name` of the wired, never run `robot` until told to stop; returns the exit code.
+    """Run board `name` of the wired, never run `robot` until ordered to stop; returns the exit code.
 
-    fresh: not the board that was built with the robot but a new one, powered up when the plant's process says.
-    door: where a debugger of this board comes in; the board that was built waits for one.
+    fresh: not the board that was built with the robot but a new one, powered up when the plant's process orders it.
+    door: the endpoint for a debugger of this board; the board that was built waits for one.
     """
     kernel.begin_process(f"ranger-{name}", settings)
     place = wiring.BOARDS.index(name)
@@ -101,7 +101,7 @@ def serve(
             door.close()
             if away := told(door.sent_away):
                 print(f"gdb for {name}: {away}", file=sys.stderr, flush=True)
-    except BaseException as error:  # noqa: BLE001  (whatever a program on a board raises is said by the supervisor)
+    except BaseException as error:  # noqa: BLE001  (the supervisor reports any error of a board's program)
         where = traceback.extract_tb(error.__traceback__)[-1:]
         place_text = f" ({os.path.basename(where[0].filename)}:{where[0].lineno})" if where else ""
         block.leave_fault(f"{type(error).__name__}: {error}{place_text}")

@@ -1,11 +1,11 @@
 """The stamped channel between two processes: turns, bells and mailboxes in anonymous shared memory.
 
-A board process and the plant process share one block of 64-bit words. They take turns: the plant writes messages
-and the instant up to which the board is to run, and rings; the board runs, writes what it put out, and rings back.
+A board process and the plant process share one block of 64-bit words. They take turns: the plant writes messages and
+the time up to which the board is to run, and rings; the board runs, writes its outputs, and rings back.
 As each side empties the other's mailbox in its turn, a mailbox is filled from its first slot in every turn.
 
 Words of the block (`Channel` in harness/processes/block.py): header, plant's words, board's words, supervisor's
-words, lateness, data table, the two mailboxes. README.md beside this file has the tables.
+words, lateness, data table, the two mailboxes. README.md in this folder has the tables.
 
 A message is `SLOT_WORDS` words, and whole further slots when it carries an object:
     0       kind | version << 8 | payload words << 16 | number of the message << 32 (24 bits)
@@ -14,7 +14,7 @@ A message is `SLOT_WORDS` words, and whole further slots when it carries an obje
     9       0
     10      0
     11      check over all the other words of the message, payload included
-Whatever does not read as such a message is counted, named and skipped (`Mailbox.damaged`, `last_damage`): a
+Anything that is not such a message is counted, named and skipped (`Mailbox.damaged`, `last_damage`): a
 damaged message never reaches a chip and never ends a process.
 """
 
@@ -40,7 +40,7 @@ from ranger_sim.harness.processes.shared_words import load, mix, pause, post, st
 
 VERSION: Final = 1
 SLOT_WORDS: Final = 12
-# where the parts of a message stand in its first slot
+# the places of a message's parts in its first slot
 STAMP_WORD: Final = 1
 ORDER_WORD: Final = 2
 FIELDS_WORD: Final = 3  # and the five after it
@@ -57,7 +57,7 @@ PAYLOAD_MASK: Final = 0xFFFF
 NUMBER_SHIFT: Final = 32
 NUMBER_MASK: Final = 0xFFFFFF
 LAST_STANDARD_ID: Final = 0x7FF
-FARTHEST_NS: Final = 1_000_000_000  # between a stamp and the instant of its turn
+FARTHEST_NS: Final = 1_000_000_000  # between a stamp and the time of its turn
 
 # What can be wrong with a message; FIELD_WRONG + i: field i is out of range.
 OF_UNKNOWN_KIND: Final = 1
@@ -82,9 +82,9 @@ FAULTS = {
 
 @cython.cclass
 class Bell:
-    """One process rings, the other waits: a count in shared memory, and an eventfd for who sleeps.
+    """One process rings, the other waits: a count in shared memory, and an eventfd for a sleeping waiter.
 
-    `count`, `sleeper`: places of the two words. The bell of a process that is gone is rung by the supervisor.
+    `count`, `sleeper`: places of the two words. The supervisor rings the bell of a process that is gone.
     """
 
     words: cython.longlong[::1]
@@ -102,7 +102,7 @@ class Bell:
 
     @cython.ccall
     def ring(self) -> cython.void:
-        """One more; wakes the other side if it sleeps."""
+        """Ring once more; wakes the other side if it sleeps."""
         self.rung += 1
         store(self.words, self.count, self.rung)
         if not cython.compiled or load(self.words, self.sleeper) != 0:
@@ -111,7 +111,7 @@ class Bell:
     @cython.ccall
     @cython.exceptval(check=False)
     def wait(self, count: cython.longlong) -> cython.bint:
-        """Sleep until the bell was rung `count` times; False when it was rung from a third side meanwhile."""
+        """Sleep until the bell was rung `count` times; False when it was rung by a third process meanwhile."""
         if load(self.words, self.count) == count:
             return True
         store(self.words, self.sleeper, 1)
@@ -125,7 +125,7 @@ class Bell:
 class Mailbox:
     """Messages one way. `first`: place of its first word; `used_word`: place of the number of slots in use.
 
-    `name` stands in what is said about damage. `direction`: of the kinds that may stand in it (kinds.py).
+    `name` is used in reports of damage. `direction`: of the kinds that may be in it (kinds.py).
     """
 
     words: cython.longlong[::1]
@@ -154,7 +154,7 @@ class Mailbox:
         self.slots = slots
         self.used_word = used_word
         self.direction = direction
-        self.until = 0  # instant of the turn (ns): stamps lie near it
+        self.until = 0  # time of the turn (ns): stamps are near it
         self.sequence = 0
         self.used = 0
         self.at = 0
@@ -199,13 +199,13 @@ class Mailbox:
 
     @cython.ccall
     def send(self) -> cython.void:
-        """Close what was put: the other side may read it once the bell rings."""
+        """Complete what was put: the other side may read it once the bell rings."""
         self.words[self.used_word] = self.used
         self.used = 0
 
     @cython.cfunc
     def _write_payload(self, kind: cython.longlong, ref: object, at: cython.longlong) -> cython.longlong:
-        """The object of a message as words from `at` on; returns how many."""
+        """Write the object of a message as words from `at` on; returns how many."""
         i: cython.longlong
         segment: SspSegment
         if isinstance(ref, SspSegment):
@@ -224,7 +224,7 @@ class Mailbox:
     # --- reading ------------------------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Look at what the other side sent."""
+        """Start reading what the other side sent."""
         used = self.words[self.used_word]
         self.at = 0
         self.kinds = 0
@@ -299,7 +299,7 @@ class Mailbox:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _check(self, at: cython.longlong, payload: cython.longlong) -> cython.longlong:
-        """The check of the message at word `at`."""
+        """The check word of the message at word `at`."""
         i: cython.longlong
         sum: cython.longlong = 1
         for i in range(CHECK_WORD):
@@ -311,7 +311,7 @@ class Mailbox:
     @cython.cfunc
     @cython.exceptval(check=False)
     def _fault(self, at: cython.longlong) -> cython.longlong:
-        """What is wrong with the message at word `at`; 0 when nothing is."""
+        """The fault of the message at word `at`; 0 for none."""
         head: cython.longlong = self.words[at]
         kind: cython.longlong = head & KIND_MASK
         payload: cython.longlong = head >> PAYLOAD_SHIFT & PAYLOAD_MASK
@@ -357,7 +357,7 @@ class Mailbox:
         return 0
 
     def explain(self, at, fault) -> str:
-        """The fault of the message at word `at`, in words."""
+        """Text for the fault of the message at word `at`."""
         number = self.words[at] & KIND_MASK
         kind = KINDS.get(number)
         name = kind.name if kind is not None else f"kind {number}"
@@ -369,7 +369,7 @@ class Mailbox:
         return f"{name}: {FAULTS[fault]}"
 
     def _damage(self, text) -> None:
-        """Count what was not readable, and keep the words for it."""
+        """Count an unreadable message, and keep its description."""
         self.damaged += 1
         self.last_damage = f"channel {self.name}, message {self.sequence}: {text}"
 

@@ -15,12 +15,12 @@ LONGEST_ANSWER = 1 << 20  # bytes; a status has below 10,000
 
 
 def address(name: str) -> str:
-    """The abstract address of robot `name`; it has no file, so nothing remains of it."""
+    """The abstract address of robot `name`; it has no file, so nothing of it remains."""
     return f"\0ranger-sim-ctl/{name}"
 
 
 class Client(Peer):
-    """A connection. Of each, one request is under way at a time, so that answers come in the order of requests."""
+    """A connection. It has one request in progress at a time, so that answers are in the order of requests."""
 
     def __init__(self, connection: socket.socket, number: int) -> None:
         super().__init__(SocketStream(connection))
@@ -28,9 +28,9 @@ class Client(Peer):
 
 
 class ControlServer(Door[Client]):
-    """The supervisor's end: `obey(number of the client, request)` hears every request that is admitted.
+    """The supervisor's endpoint: `obey(number of the client, request)` receives every admitted request.
 
-    What is not admitted (`requests.py`) is answered with its fault, and goes no further.
+    The answer to a request that is not admitted (`requests.py`) is its fault; it goes no further.
     """
 
     def __init__(self, name: str, obey: Callable[[int, Request], None]) -> None:
@@ -54,14 +54,14 @@ class ControlServer(Door[Client]):
         return client
 
     def _takes_part(self, peer: Client) -> bool:
-        """Who waits for an answer keeps its place."""
+        """A client that waits for an answer keeps its place."""
         return peer.waits
 
     def _apology(self, reason: str) -> bytes:
         return line_of({"error": f"this client {REASONS[reason]}"})
 
     def _take(self, peer: Client) -> bool:
-        """The next request, if its line has ended."""
+        """Take the next request, if its line has ended."""
         end = peer.incoming.find(b"\n")
         if end < 0:
             return False
@@ -81,12 +81,12 @@ class ControlServer(Door[Client]):
         self.clients.pop(peer.number, None)
 
     def poll(self) -> None:
-        """What has come, as far as the limits allow; answers that wait for a reader."""
+        """Read what has arrived, as far as the limits allow; send waiting answers."""
         self.look(0)
         self.write()
 
     def answer(self, number: int, content: dict) -> None:
-        """One line to a client, which may have left."""
+        """Send one line to a client, which may have left."""
         client = self.clients.get(number)
         if client is not None:
             client.waits = False
@@ -99,12 +99,12 @@ class ControlServer(Door[Client]):
 
 
 def line_of(content: dict) -> bytes:
-    """An answer as it is sent."""
+    """An answer as sent."""
     return (json.dumps(content) + "\n").encode()
 
 
 def ask(name: str, request: dict) -> Any:
-    """Send a request to robot `name` and return its answer; UserError when there is none or it says no."""
+    """Send a request to robot `name` and return its answer; UserError when it does not answer or refuses."""
     try:
         link = connected(address(name), f"the robot named {name}", ANSWER_S)
     except OSError:

@@ -1,6 +1,6 @@
 """The loop of a board process: wait for a turn, run the board, answer.
 
-Everything about the board is `Microcontroller.advance`; here is only what brings its inputs and takes its outputs.
+The board itself is all in `Microcontroller.advance`; this module only brings its inputs and takes its outputs.
 """
 
 import json
@@ -76,7 +76,7 @@ from ranger_sim.harness.wiring.ranger import HEAR_IN_SLOTS
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.stage import Audience
 
-# Kinds that wait for a task of a board that hears in its slots: edges, frames, bytes and buffers that come free.
+# Kinds that wait for a task of a board that receives in its slots: edges, frames, bytes and freed buffers.
 SLOT_KINDS = 1 << PIN_EDGE | 1 << CAN_RX | 1 << CAN_TX_DONE | 1 << UART_BYTE
 LONGEST_TURN_NS = 1_000_000_000
 ERRORS_EVERY = 1023  # turns; a mask. Some ten times a second
@@ -121,7 +121,7 @@ class Endpoint:
         self.stage, self.stage_doubles = stage
         self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
         self.answer = Bell(shared.words, ANSWERED, PLANT_SLEEPS, shared.answer_descriptor)
-        # a board that takes another one's place goes on where that one's turns ended
+        # a board that replaces another one continues where that one's turns ended
         self.turns = shared.words[ANSWERED]
         self.answer.rung = shared.words[ANSWERED]
         self.to_board = Mailbox(shared.words, f"to {board.name}", shared.to_board_first, SLOTS, ASK_USED, TO_BOARD)
@@ -144,7 +144,7 @@ class Endpoint:
     @cython.ccall
     @cython.exceptval(check=True)
     def serve(self) -> cython.void:
-        """Until told to stop."""
+        """Serve until ordered to stop."""
         command: cython.longlong
         while True:
             self.turns += 1
@@ -168,7 +168,7 @@ class Endpoint:
     @cython.cfunc
     @cython.exceptval(check=True)
     def _advance(self) -> cython.void:
-        """Take in what came, and run; step after step of the plant, as its sensors showed them."""
+        """Read the inputs, and run step after step of the plant with its sensors' values."""
         until: cython.longlong = self.block[UNTIL]
         rows: cython.longlong = self.block[ROWS]
         start: cython.longlong
@@ -197,7 +197,7 @@ class Endpoint:
 
     @cython.cfunc
     def _run_to(self, until: cython.longlong) -> None:
-        """Run the board, and note how late its slots are."""
+        """Run the board, and record how late its slots are."""
         board: Microcontroller = self.board
         if board.next_time < until or board.inbox.head_time < until:
             board.advance(until)
@@ -206,7 +206,7 @@ class Endpoint:
     @cython.cfunc
     @cython.exceptval(check=True)
     def _keep_slots(self) -> cython.void:
-        """The latest slots into the ring: of most calls none, or one that has begun and ended."""
+        """Copy the latest slots into the ring: in most calls none, or one that has begun and ended."""
         scheduler: SlotScheduler = self.board.scheduler
         begun: cython.bint = scheduler.slot_count != self.slots_seen
         closed: cython.longlong = scheduler.total_slot_cycles - self.cycles_seen
@@ -233,7 +233,7 @@ class Endpoint:
     @cython.cfunc
     @cython.exceptval(-2, check=True)
     def _late(self) -> cython.longlong:
-        """A slot has begun: hold its instant against the wall clock; ns, -1 where no pace is kept."""
+        """Compare the start of a slot with the wall clock; ns, -1 where no pace is kept."""
         due: cython.longlong
         late: cython.longlong
         place: cython.longlong
@@ -255,7 +255,7 @@ class Endpoint:
 
     @cython.cfunc
     def _put_out(self) -> cython.bint:
-        """What the board put out goes into the mailbox; True when more is left than fits."""
+        """Put the board's outputs into the mailbox; True when more is left than fits."""
         out: EventQueue = self.out
         while True:
             if self.from_board.used + LONGEST > self.from_board.slots:
@@ -274,7 +274,7 @@ class Endpoint:
 
     @cython.cfunc
     def _show(self) -> None:
-        """The words that the plant's process and the supervisor look at."""
+        """Update the words that the plant's process and the supervisor read."""
         board: Microcontroller = self.board
         self.block[NEXT_TIME] = board.next_time
         # more than the mailbox held goes out in the next turn, whatever that turn is
@@ -293,13 +293,13 @@ class Endpoint:
             self.block[ERRORS] = sum(self.board.errors.totals)
 
     def broke_its_promise(self) -> None:
-        """An output before the instant that the last answer named: the plant has gone on without it."""
+        """Report an output before the time promised in the last answer: the plant has continued without it."""
         out = self.out
         kind = KINDS[out.kind].name if out.kind in KINDS else f"kind {out.kind}"
         raise RuntimeError(f"{kind} put out at {out.time} ns, but nothing was to come before {self.promised} ns")
 
     def obey(self) -> None:
-        """Messages that are for this process."""
+        """Handle messages that are for this process."""
         for kind, _time, _order, a, b, *_rest in self.to_board.notes:
             if kind == SET_WORD:
                 self.board.store.set_word(a, b, self.board.time.ms)

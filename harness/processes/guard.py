@@ -1,7 +1,7 @@
-"""Watches the processes of boards for the one that passes the robot's time: it waits for none that gives no answer.
+"""Watches the processes of boards for the one that passes the robot's time, so that it waits for none that hangs.
 
-A process gives a sign of life with every turn that it ends. One that owes an answer for the deadline is asked where its
-program is (a program in C says so with its end, crash.py), then killed, and the reason is left in its block.
+A process shows that it is alive with every turn that it ends. One that owes an answer for the deadline is asked for its
+program's position (a program in C reports it when it ends, crash.py), then killed; its block keeps the reason.
 """
 
 import dataclasses
@@ -15,7 +15,7 @@ from ranger_sim.foundation import descriptors
 from ranger_sim.harness.processes import kernel, places
 
 DEADLINE_S = 10.0  # a turn takes some microseconds; the rest is for a busy machine
-LOOKS = 10  # in a deadline, each after a wait: a machine that was suspended costs one of them
+LOOKS = 10  # checks in a deadline, each after a wait: a suspended machine costs one of them
 TRACED = "t"  # state of a process that a debugger holds
 STOPPED = ("T", TRACED)
 
@@ -29,7 +29,7 @@ def is_awaited(block: Any) -> bool:
 
 @dataclasses.dataclass
 class Watched:
-    """What was last seen of a board's process: its turn, for how many looks, and its processor time then."""
+    """The last state of a board's process: its turn, for how many checks, and its processor time then."""
 
     turn: tuple[int, int] = (-1, -1)
     looks: int = 0
@@ -40,7 +40,7 @@ class Watched:
 class Guard:
     """Watches the processes `numbers`, each by its pidfd in `watches`; the parent process is the one that waits.
 
-    deadline_s: without a sign of life, s; 0: for ever, for who debugs a program. in_c: boards with a program in C.
+    deadline_s: without a sign of life, s; 0: for ever, for debugging a program. in_c: boards with a program in C.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Guard:
         self.seen = {name: Watched() for name in blocks}
 
     def watch(self) -> int:
-        """Until all have ended; the exit code of the process that does this."""
+        """Watch until all have ended; returns the exit code of the watching process."""
         while self.watches:
             ready, _ = descriptors.wait(list(self.watches), [], (self.deadline_s or DEADLINE_S) / LOOKS)
             for descriptor in ready:
@@ -81,7 +81,7 @@ class Guard:
         state = kernel.state_of(process)
         used_s = kernel.processor_time_s(process) - seen.used_s
         if state == TRACED or (state == "R" and used_s < self.deadline_s / 2):
-            return  # a debugger has it, or the machine is busy with others
+            return  # a debugger has it, or the machine is busy with other processes
         seen.looks += 1
         if seen.looks < LOOKS:
             return
@@ -90,12 +90,12 @@ class Guard:
         if seen.was_asked or name not in self.in_c or turn[0] == turn[1]:
             os.kill(process, signal.SIGKILL)
         else:
-            seen.was_asked, seen.looks = True, LOOKS - 1  # killed with the next look
+            seen.was_asked, seen.looks = True, LOOKS - 1  # killed at the next check
             os.kill(process, crash.ASKED)
             os.kill(process, signal.SIGCONT)
 
     def cause(self, turn: tuple[int, int], state: str) -> str:
-        """Why it is killed."""
+        """The reason for killing it."""
         if turn[0] == turn[1]:
             return f"its answers no longer arrive (descriptors of its process are closed) for {self.deadline_s:g} s"
         what = "its process was stopped (SIGSTOP)" if state in STOPPED else "no answer"

@@ -1,5 +1,5 @@
-"""What a running robot does for the boards that its profile has elsewhere: it speaks for the absent ones and watches
-the external ones. One more end of wires that the plant's process polls.
+"""A running robot's work for the boards that its profile has elsewhere: it sends for the absent ones and monitors
+the external ones. It is another external connection that the plant's process polls.
 """
 
 import collections
@@ -12,7 +12,7 @@ from ranger_sim.harness.outside.rest_bus import RestBus
 from ranger_sim.harness.outside.supervision import Watch
 from ranger_sim.harness.wiring import ranger as wiring
 
-CHECK_NS = 10_000_000  # between two looks for what has not come
+CHECK_NS = 10_000_000  # between two checks for missing frames
 CONTROLLER = 1
 MOST_WAITING = 100  # frames per bus that wait for a free buffer; more are lost and counted (chosen by us)
 
@@ -28,14 +28,14 @@ class RestNode:
         self.lost = 0
 
     def offer(self, identifier: int, flags: int, lo: int, hi: int) -> None:
-        """A frame to be sent as soon as there is a buffer."""
+        """Queue a frame to be sent as soon as a buffer is free."""
         if len(self.waiting) >= MOST_WAITING:
             self.lost += 1
             return
         self.waiting.append((identifier, flags, lo, hi))
 
     def poll(self, now_ns: int) -> None:
-        """Take back the buffers whose frames are through, and fill them."""
+        """Take back the buffers whose frames are sent, and fill them."""
         while self.inbox.head_time <= now_ns and self.inbox.take():
             if self.inbox.kind == CAN_TX_DONE:
                 self.free.append(self.inbox.b)
@@ -44,7 +44,7 @@ class RestNode:
 
 
 class HardwareInTheLoop:
-    """`poll`, `filenos`, `counters` as of every end. `watch` and `rest` are open to reports."""
+    """`poll`, `filenos`, `counters` as of every external connection. `watch` and `rest` are public for reports."""
 
     def __init__(self, robot: Any, profile: Profile, outside: list[Any]) -> None:
         self.watch = Watch(profile, robot.start_ns)
@@ -52,7 +52,7 @@ class HardwareInTheLoop:
         self.nodes: dict[str, RestNode] = {}
         self.next_check_ns = robot.start_ns
         external = {bus.name: bus for bus in outside}
-        order = STAGE_BUS * 256 + 16 * len(wiring.BOARDS)  # behind every board
+        order = STAGE_BUS * 256 + 16 * len(wiring.BOARDS)  # after every board
         for bus in robot.buses:
             if bus.name in external and profile.external():
                 external[bus.name].sinks.append(self._hear(bus.name))
@@ -88,7 +88,7 @@ class HardwareInTheLoop:
         return request
 
     def poll(self, now_ns: int) -> int:
-        """Frames of absent boards out, external boards judged; returns when it wants to be polled next."""
+        """Send frames of absent boards, and check external boards; returns the time of the next poll, ns."""
         for _time, bus, identifier, flags, lo, hi in self.rest.due(now_ns):
             self.nodes[bus].offer(identifier, flags, lo, hi)
         busy = False
@@ -102,11 +102,11 @@ class HardwareInTheLoop:
         return min(soon, max(self.rest.next_time, now_ns))
 
     def filenos(self) -> list[int]:
-        """Nothing to select on."""
+        """Return an empty list: nothing to select on."""
         return []
 
     def counters(self) -> dict[str, int]:
-        """For the live view."""
+        """Counters for the live view."""
         return {
             "faults_of_external_boards": self.watch.faults,
             "rest_bus_frames": self.rest.frames,

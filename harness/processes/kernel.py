@@ -9,7 +9,7 @@ from ranger_sim.harness.processes.settings import Settings
 PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_TIMERSLACK = 1, 15, 29  # linux/prctl.h
 ADDR_NO_RANDOMIZE = 0x0040000  # sys/personality.h
 MCL_CURRENT, MCL_FUTURE = 1, 2  # sys/mman.h
-FIFO_PRIORITY = 20  # of 99: above everything ordinary, below what keeps the machine alive; chosen by us
+FIFO_PRIORITY = 20  # of 99: above all ordinary processes, below those that the machine needs; chosen by us
 PARENT_GONE = 3  # exit code of a child whose parent was dead before it could ask for the signal
 
 
@@ -18,14 +18,14 @@ def _libc() -> ctypes.CDLL:
 
 
 def die_with_parent(parent: int) -> None:
-    """The kernel kills this process when `parent` (a process id) ends, however it ends; at once if it has ended."""
+    """Let the kernel kill this process when `parent` (a process id) ends in any way; at once if it has ended."""
     _libc().prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it died before the call above: nobody would send the signal
+    if os.getppid() != parent:  # it died before the call above: the kernel would not send the signal
         os._exit(PARENT_GONE)
 
 
 def fix_addresses() -> None:
-    """Programs that this process starts are not loaded to random addresses; where that may not be said, they are.
+    """Load programs that this process starts to fixed addresses, where the kernel permits it.
 
     The address sanitizer of gcc 12 and 13 does not start where the kernel spreads addresses widely.
     """
@@ -33,23 +33,23 @@ def fix_addresses() -> None:
 
 
 def name_process(name: str) -> None:
-    """The name that `ps` and `top` show (15 bytes)."""
+    """Set the name that `ps` and `top` show (15 bytes)."""
     _libc().prctl(PR_SET_NAME, name.encode()[:15], 0, 0, 0)
 
 
 def sharp_timers() -> None:
-    """Timers of this process fire within 1 ns instead of 50 us of slack (as far as the kernel can)."""
+    """Let timers of this process fire within 1 ns instead of 50 us of slack (as far as the kernel can)."""
     _libc().prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
 def leave_signals_to_the_supervisor() -> None:
-    """What Ctrl-C and the like send to a whole group: the supervisor decides when it is over."""
+    """Ignore the signals that Ctrl-C and the like send to a whole group: the supervisor decides on the end."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
 
 
 def begin_process(name: str, settings: Settings) -> None:
-    """What every process of the robot does first: its name, its timers, its processor, its place in the schedule."""
+    """Set up a process of the robot: its name, its timers, its processor, its scheduling."""
     name_process(name)
     sharp_timers()
     leave_signals_to_the_supervisor()
@@ -61,7 +61,7 @@ def begin_process(name: str, settings: Settings) -> None:
 
 
 def stay_on(processor: int | None) -> None:
-    """Run on this processor only; None: wherever the kernel likes."""
+    """Run on this processor only; None: any processor."""
     if processor is not None:
         os.sched_setaffinity(0, {processor})
 
@@ -84,7 +84,7 @@ def real_time_scheduling() -> str:
 
 
 def be_ordinary() -> None:
-    """Give real-time scheduling back and run wherever there is room: for writing files."""
+    """Give real-time scheduling back and run on any processor: for writing files."""
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     os.sched_setaffinity(0, range(os.cpu_count() or 1))
 

@@ -1,6 +1,6 @@
-"""What may travel in the channel between the processes: every kind of message with the range of each field.
+"""The kinds of message in the channel between the processes, with the range of each field.
 
-This table is the one place to extend when a new kind comes; `PAYLOADS` names the kinds that carry an object (`ref`),
+Extend only this table for a new kind; `PAYLOADS` lists the kinds that carry an object (`ref`),
 whose codec is in `Mailbox` (channel.py). Meanings of the fields: foundation/events.py.
 """
 
@@ -18,7 +18,7 @@ IDENTIFIER = (0, 0x1FFFFFFF)
 # Kinds between the processes only: no chip sees them.
 NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, or of activity.py here, cut into parts)
 SET_WORD = 65  # a number of the variable, b its word: written into the board's data table
-NOTE_COUNTERS = 1  # what the board counted, for summary and report
+NOTE_COUNTERS = 1  # the board's counters, for summary and report
 NOTE_FAULT = 2  # why a board process ends
 NOTE_ACTIVITY = 3  # rows of its activity log
 
@@ -54,7 +54,7 @@ PAYLOADS = {
     events.SSP_SEGMENT: SSP_WORDS,
     events.SSP_START: SSP_WORDS,
     events.SSP_LOAD: SSP_WORDS,
-    events.UART_OUTPUT: NOTE_WORDS,  # bytes of a whole transfer; one byte alone carries none
+    events.UART_OUTPUT: NOTE_WORDS,  # bytes of a whole transfer; a single byte carries none
     NOTE: NOTE_WORDS,
 }
 OPTIONAL = (events.UART_OUTPUT,)  # kinds that may come without their payload

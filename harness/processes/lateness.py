@@ -1,4 +1,4 @@
-"""How late slots are: a histogram in shared memory, fine for short times and never full.
+"""The lateness of slots: a histogram in shared memory, fine for short times and never full.
 
 Bins: 64 of 1 us each up to 64 us; from there 64 per doubling (1.6 % and less), to 2^26 us. All in whole us.
 """
@@ -29,7 +29,7 @@ def upper_edge_us(number: int) -> int:
 
 
 def quantile_us(bins: Any, share: float) -> int | None:
-    """The time (us) that `share` of the slots did not exceed, by the upper edge of its bin; None without slots."""
+    """The lateness (us) that `share` of the slots did not exceed, by the upper edge of its bin; None without slots."""
     total = sum(bins)
     if not total:
         return None

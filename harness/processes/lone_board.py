@@ -1,6 +1,6 @@
-"""A board in a process of its own without a plant: its turns are given by hand. For tests and the damaged channel.
+"""A board in a separate process without a plant: the caller gives its turns. For tests and the damaged channel.
 
-Nobody supervises it, so who waits for its answer watches its process as well, and no wait is without a limit.
+It has no supervisor, so the waiting caller watches its process as well, and every wait has a limit.
 """
 
 import gc
@@ -36,7 +36,7 @@ class LoneBoard:
             code = board_process.FAILED
             try:
                 kernel.die_with_parent(parent)
-                gc.freeze()  # what lies about in the parent's program is not for this process to finalize
+                gc.freeze()  # this process must not finalize the parent's objects
                 code = board_process.serve(robot, name, self.block, stage, Settings(real_time=False), False)
             finally:
                 os._exit(code)
@@ -59,7 +59,7 @@ class LoneBoard:
             self._hangs("no answer")
 
     def end(self) -> int:
-        """Tell its process to end, and return the exit code; UserError when it does not end."""
+        """Order its process to end, and return the exit code; UserError when it does not end."""
         if self.code is None:
             self._ring(places.COMMAND_STOP, 0)
             if not descriptors.wait([self.watch], [], self.patience_s)[0]:
@@ -67,7 +67,7 @@ class LoneBoard:
         return self._reap()
 
     def close(self) -> None:
-        """Whatever became of it, it is gone after this."""
+        """End its process in any state, and release the channel."""
         if self.code is None:
             os.kill(self.process, signal.SIGKILL)
         self._reap()
@@ -77,7 +77,7 @@ class LoneBoard:
     def _ring(self, command: int, until: int) -> None:
         self.words[places.COMMAND] = command
         self.words[places.UNTIL] = until
-        self.words[places.PLANT_SLEEPS] = 1  # said before it is asked, so that every answer is posted
+        self.words[places.PLANT_SLEEPS] = 1  # set before it is asked, so that every answer is posted
         self.ask.ring()
 
     def _hangs(self, missing: str) -> None:

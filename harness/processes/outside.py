@@ -6,10 +6,10 @@ from ranger_sim.foundation.events import STAGE_BUS
 
 
 def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
-    """Every controller of `boards` on bus `external.name` is unplugged from the emulated bus and gets a peer instead.
+    """Unplug every controller of `boards` on bus `external.name` from the emulated bus, and give it a peer instead.
 
-    `external`: an object with add_peer, poll, sinks (can_bus.edge.external_bus.ExternalBus). `openers`: {board: what
-    opens its peer}, for those that have a place of their own. UserError when an interface cannot be opened. Its
+    `external`: an object with add_peer, poll, sinks (can_bus.edge.external_bus.ExternalBus). `openers`: {board: opener
+    of its peer}, for those that have their own place. UserError when an interface cannot be opened. Its
     frames go into the robot's record like those of an emulated bus.
     """
     loop = robot.loop

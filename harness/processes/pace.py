@@ -1,7 +1,7 @@
 """Virtual time released by the wall clock.
 
-A slice of virtual time may be run as soon as the wall clock has reached its beginning. Falling behind changes
-nothing but the lateness: the run goes on as fast as it can until it has caught up. What a run computes never depends
+A slice of virtual time may run as soon as the wall clock has reached its beginning. Falling behind changes
+only the lateness: the run goes on as fast as it can until it has caught up. The results of a run never depend
 on the pace.
 """
 
@@ -12,7 +12,7 @@ from ranger_sim.harness.processes import places
 
 
 class Pace:
-    """`speed`: virtual seconds per wall-clock second; None as fast as it goes. The boards read it from the stage."""
+    """`speed`: virtual seconds per wall-clock second; None as fast as possible. The boards read it from the stage."""
 
     def __init__(self, words: Any, doubles: Any, speed: float | None) -> None:
         self.words = words
@@ -20,7 +20,7 @@ class Pace:
         self.speed = speed
 
     def start(self, time_ns: int) -> None:
-        """The wall clock of now belongs to virtual time `time_ns`: at the start, and after a pause."""
+        """Set the present wall clock as that of virtual time `time_ns`: at the start, and after a pause."""
         self.words[places.PACE_TIME_NS] = time_ns
         self.words[places.PACE_WALL_NS] = self.words[places.PACE_BEGUN_NS] = wallclock.monotonic_ns()
         if self.speed is not None:

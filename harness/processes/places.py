@@ -1,13 +1,13 @@
-"""Where every word stands in the memory that the processes share (block.py makes it), and what may stand in some.
+"""The place of every word in the memory that the processes share (block.py makes it), and the ranges of some.
 
-Every word is a signed 64-bit integer in the machine's order; doubles stand in the same words.
+Every word is a signed 64-bit integer in the machine's byte order; doubles occupy the same words.
 """
 
 from typing import Final
 
 import cython  # noqa: F401  (compiled: its constants are C constants for other modules)
 
-SLOTS: Final = 1024  # of each mailbox: forty times what a turn of the default scenario needs at most
+SLOTS: Final = 1024  # of each mailbox: forty times the most that a turn of the default scenario needs
 
 # --- a board's block: header
 MAGIC_WORD: Final = 0
@@ -19,37 +19,35 @@ TABLE_WORD: Final = 4
 ASKED: Final = 16  # how often the plant has rung
 BOARD_SLEEPS: Final = 17
 COMMAND: Final = 18  # one of the COMMAND_* below
-UNTIL: Final = 19  # ns: run everything before this instant
+UNTIL: Final = 19  # ns: run everything before this time
 ASK_USED: Final = 20  # slots in use of the mailbox to the board
 ROWS: Final = 21  # rows of the stage that were written so far
 POWER_UP: Final = 22  # ns: when a restarted board gets its power
-KEEP_NS: Final = (
-    23  # how much of its activity the board keeps for who has not asked yet; 0: as much as there is room for
-)
+KEEP_NS: Final = 23  # how much of its activity the board keeps for later readers; 0: as much as fits
 # the board's words
 ANSWERED: Final = 32  # how often the board has rung
 PLANT_SLEEPS: Final = 33
 RESULT: Final = 34  # one of the RESULT_* below
 NEXT_TIME: Final = 35  # ns: `next_time` of the board
-NEXT_OUTPUT: Final = 36  # ns: before this instant it puts nothing out, whatever comes in of a kind that can wait
+NEXT_OUTPUT: Final = 36  # ns: before this time it puts nothing out, whatever inputs arrive of a kind that can wait
 ANSWER_USED: Final = 37  # slots in use of the mailbox from the board
 WATCHED: Final = 38  # `watched` of the board: of the main brain, the swing leg
 SLOT_TIME: Final = 39  # ns: start of the latest slot
 SLOT_COUNT: Final = 40
 OVERRUNS: Final = 41
 MAX_SLOT_CYCLES: Final = 42
-ERRORS: Final = 43  # errors that the board noted, all names together
+ERRORS: Final = 43  # errors that the board recorded, all names together
 DAMAGED: Final = 44  # messages to the board that were not readable
-REACHED: Final = 45  # ns: the instant up to which it has run
+REACHED: Final = 45  # ns: the time up to which it has run
 LATE_MAX: Final = 46  # ns
 LATE_COUNT: Final = 47
 TURNS: Final = 48
 URGENT: Final = 49  # message kinds (bits) that the board may answer at once
-HELD: Final = 50  # 1 while a debugger has the board, or is waited for: it keeps its turn and does not hang
+HELD: Final = 50  # 1 while a debugger has the board, or is awaited: it keeps its turn and does not hang
 RING_ROWS: Final = 51  # slots that were written into the ring so far; the latest may not have ended yet
 # the supervisor's words
 LET_GO: Final = 55  # 1: the run is to end, debuggers have to let the board go
-FATE: Final = 56  # ALIVE or GONE: nobody will answer
+FATE: Final = 56  # ALIVE or GONE: no process will answer
 ALIVE: Final = 0
 GONE: Final = 1
 # where a program in C was when a signal ended its process: firmware_sim/native/crash.py
@@ -62,8 +60,8 @@ LATENESS: Final = 128  # see lateness.py
 LATENESS_WORDS: Final = 1344
 TABLE: Final = 1472  # LATENESS + LATENESS_WORDS: the main brain's data table, then the two mailboxes
 
-# behind both mailboxes: a ring of the latest slots, a row each
-RING: Final = 512  # a quarter of a second of the fastest board; who looks comes 50 times a second of the robot
+# after both mailboxes: a ring of the latest slots, a row each
+RING: Final = 512  # a quarter of a second of the fastest board; readers poll 50 times a second of the robot
 RING_ROW: Final = 3
 RING_START: Final = 0  # ns: when its tick was due
 RING_CYCLES: Final = 1  # to the end of its last task; 0 as long as it has not ended
@@ -83,8 +81,8 @@ PACED: Final = 3  # 1 when virtual time follows the wall clock
 PACE_WALL_NS: Final = 4  # monotonic clock when virtual time was PACE_TIME_NS
 PACE_TIME_NS: Final = 5
 PACE_WALL_PER_TIME: Final = 6  # a double: 1 / speed
-PACE_BEGUN_NS: Final = 7  # monotonic clock when the pace last began anew, or was set on because a debugger held a board
-HEARTBEAT_NS: Final = 8  # monotonic clock when the plant process last went round its loop
+PACE_BEGUN_NS: Final = 7  # monotonic clock when the pace last restarted, or a debugger that held a board moved it on
+HEARTBEAT_NS: Final = 8  # monotonic clock when the plant process last ran its loop
 STAGE_FIRST: Final = 64
 STAGE_RING: Final = 64
 ROW_START: Final = 0
@@ -98,11 +96,11 @@ MOST_VOLTAGES: Final = 32
 
 # --- payloads of messages, in words
 SSP_WORDS: Final = 32  # 31 half-words of a segment, and how many are used:
-SSP_USED: Final = 31  # the place of that
+SSP_USED: Final = 31  # the place of that number
 NOTE_WORDS: Final = 256  # 2 KB: a length in bytes and the bytes
 
 # --- the row of a kind in kinds.limits()
-DIRECTION: Final = 0  # TO_BOARD, FROM_BOARD, or -1 for no kind
+DIRECTION: Final = 0  # TO_BOARD, FROM_BOARD, or -1 for an unknown kind
 LEAST_PAYLOAD: Final = 1  # words
 MOST_PAYLOAD: Final = 2
 RANGES: Final = 3  # least and largest of field a, of b ... of f

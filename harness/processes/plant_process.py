@@ -1,4 +1,4 @@
-"""What runs in the plant's process: the lockstep, released by the wall clock, with boards that live elsewhere."""
+"""The plant's process: the lockstep, released by the wall clock, with boards in other processes."""
 
 import json
 import socket
@@ -19,17 +19,17 @@ from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.scenario import StopRule
 from ranger_sim.harness.wiring import ranger as wiring
 
-SLICE_S = 0.0005  # virtual time between two looks at the wall clock: one slot of a motor board
+SLICE_S = 0.0005  # virtual time between two readings of the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep
 STATUS_S = 0.1  # wall clock between two reports to the supervisor
-NAP_S = 0.002  # after something outside was served, before it is looked at again while virtual time waits
-LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process lives
-ORDERS_LIMIT = 64  # keys and parameters at one instant of the robot's time: a paused robot keeps them; chosen by us
+NAP_S = 0.002  # after serving an external connection, before polling it again while virtual time waits
+LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process is alive
+ORDERS_LIMIT = 64  # keys and parameters at one time of the robot: a paused robot keeps them; chosen by us
 KEY_HOLD_NS = 200_000_000  # a firm press
 MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
-MOST_TOLD = 10  # faults that gave way, in one status; chosen by us: a status stays short
-POWER_UP_NS = 1_000_000  # from a restarted process being there to its board's power
+MOST_TOLD = 10  # superseded faults in one status; chosen by us: a status stays short
+POWER_UP_NS = 1_000_000  # from the start of a restarted process to its board's power
 
 
 class PlantRun:
@@ -50,7 +50,7 @@ class PlantRun:
         self.gave_way: dict[int, str] = {}  # by the fault's number
         robot.deaths = self.deaths
         if robot.printed is not None:
-            robot.printed.show = lambda line: self.tell(printed=line)  # the terminal is the supervisor's
+            robot.printed.show = lambda line: self.tell(printed=line)  # the supervisor owns the terminal
         self.next_status_s = 0.0
         self.orders = 0  # that changed the robot at `orders_ns` of its time
         self.orders_ns = -1
@@ -64,7 +64,7 @@ class PlantRun:
         for remote in self.remotes.values():
             loop.replace(remote)
         for name, remote in self.remotes.items():
-            if name not in settings.boards:  # it has no process: another one stands outside in its place, or none
+            if name not in settings.boards:  # it has no process: it is outside, or absent
                 remote.leave()
                 self.mourned.add(name)
                 self.unplug(name)
@@ -72,10 +72,10 @@ class PlantRun:
     # --- passing time -------------------------------------------------------------------------------------
 
     def run(self, stop: StopRule) -> None:
-        """Until the stop rule, a fall, or the supervisor says so; pausing stops virtual time."""
+        """Run until the stop rule, a fall or the supervisor ends it; pausing stops virtual time."""
         robot = self.robot
         slice_s = FAST_SLICE_S if self.settings.speed is None else SLICE_S
-        if robot.run(stop, slice_s):  # the first slice when all processes are there, whenever that is
+        if robot.run(stop, slice_s):  # the first slice starts when all processes are ready
             return
         self.pace.start(robot.loop.time)
         while not self.stopping:
@@ -90,7 +90,7 @@ class PlantRun:
             self.bury()
 
     def wait(self, seconds: float) -> None:
-        """Sleep so long (not at all when not above 0), but hear the supervisor and what leads outside meanwhile."""
+        """Sleep (not at all when not above 0), and serve the supervisor and external connections meanwhile."""
         now = wallclock.monotonic_s()
         end = now + seconds
         self.stage_words[places.HEARTBEAT_NS] = wallclock.monotonic_ns()
@@ -109,7 +109,7 @@ class PlantRun:
             now = wallclock.monotonic_s()
             if writable or ready or left_over:
                 self.robot.poll_now()
-                # what an end cannot take in at this instant of virtual time stays there: no spinning on it
+                # what a connection cannot accept at this virtual time stays there: no busy loop on it
                 if descriptors.wait(read[:1], [], min(NAP_S, end - now))[0]:
                     self.hear()
                     return
@@ -123,17 +123,17 @@ class PlantRun:
     # --- the supervisor -----------------------------------------------------------------------------------
 
     def tell(self, **content: Any) -> None:
-        """Send a dictionary; while the supervisor is busy a status may get lost, nothing else."""
+        """Send a dictionary; while the supervisor is busy a status may be lost, but nothing more."""
         data = json.dumps(content).encode()
         try:
             self.link.send(data, socket.MSG_DONTWAIT if "status" in content else 0)
         except BlockingIOError:
             pass
-        except OSError:  # nobody looks after us any more, and the kernel is about to end this process
+        except OSError:  # the supervisor has ended, and the kernel is about to end this process
             self.stopping = True
 
     def hear(self) -> None:
-        """Everything the supervisor has sent."""
+        """Read everything the supervisor has sent."""
         while True:
             try:
                 data = self.link.recv(65536, socket.MSG_DONTWAIT)
@@ -147,7 +147,7 @@ class PlantRun:
             self.obey(json.loads(data))
 
     def obey(self, order: dict) -> None:
-        """One order; an order that cannot be carried out is answered with its reason."""
+        """Carry out one order; the reply to one that cannot be carried out is the reason."""
         robot, what = self.robot, order["do"]
         if robot.loop.time != self.orders_ns:
             self.orders_ns, self.orders = robot.loop.time, 0
@@ -185,11 +185,11 @@ class PlantRun:
             self.tell(**answer)
 
     def set_parameter(self, name: str, word: int) -> None:
-        """Write a parameter into the main brain's table at this instant; the supervisor's door has checked it."""
+        """Write a parameter into the main brain's table now; the supervisor's endpoint has checked it."""
         self.remotes["MB"].send(SET_WORD, self.robot.loop.time, all_variables.ID_OF[name], word)
 
     def arm(self, text: str) -> None:
-        """Arm a fault that the supervisor's door has admitted. UserError where it cannot act on this robot."""
+        """Arm a fault that the supervisor's endpoint has admitted. UserError where it cannot act on this robot."""
         if len(self.robot.faults) > MOST_FAULTS:
             raise UserError(f"fault: {MOST_FAULTS + 1} faults of one run are enough")
         fault = CATALOGUE.typed(text)
@@ -204,7 +204,7 @@ class PlantRun:
         faults[which].stop()
 
     def look_at_faults(self) -> None:
-        """Tell of a fault that was asked for and gave way to another since the last look: it never begins."""
+        """Report a requested fault that another has superseded since the last poll: it never begins."""
         for number, fault in enumerate(self.robot.faults):
             if fault.gave_way_ns >= 0 and number not in self.gave_way:
                 at_s = (fault.gave_way_ns - self.robot.start_ns) * 1e-9
@@ -246,12 +246,12 @@ class PlantRun:
     # --- boards that are gone -----------------------------------------------------------------------------
 
     def nodes_of(self, name: str) -> list:
-        """(bus, node) of every controller of a board."""
+        """Return (bus, node) of every controller of a board."""
         wires = self.robot.loop.wires[self.robot.loop.place(name)]
         return [(bus, wires.nodes[controller]) for controller, bus in enumerate(wires.buses) if bus is not None]
 
     def bury(self) -> None:
-        """A board that went away is off its buses; its pins stay as they were, so its watchdog line stands still."""
+        """Take lost boards off their buses; their pins keep their levels, so their watchdog lines stay constant."""
         for name, remote in self.remotes.items():
             if remote.gone and name not in self.mourned:
                 self.mourned.add(name)
@@ -265,14 +265,14 @@ class PlantRun:
             bus.set_mode(node, RESET, self.robot.loop.time)
 
     def make_room(self, name: str) -> None:
-        """The old process of a board has ended: set its channel back for a new one."""
+        """Reset the channel of a board whose old process has ended, for a new one."""
         remote = self.remotes[name]
         remote.leave()
         self.bury()
         remote.reset_channel()
 
     def revive(self, name: str) -> None:
-        """The board has a process again: it gets its power a millisecond from now."""
+        """Power up a board that has a process again, a millisecond from now."""
         remote = self.remotes[name]
         power_up_ns = self.robot.loop.time + POWER_UP_NS
         self.blocks[name].words[places.POWER_UP] = power_up_ns
@@ -286,7 +286,7 @@ class PlantRun:
     # --- the end ------------------------------------------------------------------------------------------
 
     def collect(self) -> None:
-        """Bring every board to the plant's instant, fetch what it counted, and let its process end."""
+        """Bring every board to the plant's time, fetch its counters, and let its process end."""
         if self.robot.polled:
             self.robot.poll_now()
         for end in self.robot.polled:
@@ -301,7 +301,7 @@ class PlantRun:
 
 
 def sent_away(ends: list) -> dict[str, dict[str, int]]:
-    """Clients that were sent away, by door and reason."""
+    """Clients that were sent away, by endpoint and reason."""
     found: dict[str, dict[str, int]] = {}
     for end in ends:
         for reason, count in getattr(end, "sent_away", {}).items():
@@ -320,9 +320,9 @@ def serve(
     begin: Callable[[Any], None],
     finish: Callable[[Any, "PlantRun", bool], int],
 ) -> int:
-    """The whole life of the plant's process; returns its exit code: that of `finish`.
+    """Run the plant's process from start to end; returns its exit code: that of `finish`.
 
-    `begin(robot)` opens what leads outside, in the process that will use it; its UserError ends the run with code 2.
+    `begin(robot)` opens external connections in the process that will use them; its UserError ends the run with code 2.
     """
     kernel.begin_process("ranger-plant", settings)
     run = PlantRun(robot, blocks, stage, settings, link)
@@ -340,7 +340,7 @@ def serve(
     kernel.be_ordinary()
     run.tell(over=True, status=run.status())
     link.setblocking(True)
-    while True:  # the terminal is the supervisor's until it says so
+    while True:  # the supervisor owns the terminal until it releases it
         data = link.recv(65536)
         if not data or json.loads(data)["do"] == "finish":
             break

@@ -1,12 +1,11 @@
-"""A board that runs in a process of its own, as the lockstep of the plant process sees it.
+"""A board that runs in a separate process, as the lockstep of the plant's process sees it.
 
 Its inbox is that of the board that this process built but does not run: what is pushed into it goes through the
-channel when the board is next asked to run. What the board put out comes back onto the wires. `begin(until)` posts the
+channel when the board is next asked to run. The board's outputs come back onto the wires. `begin(until)` posts the
 request, so that all boards of a window run at the same time; `advance(until)` waits for the answer.
 
-A board is asked only when that can matter. With each answer it says before which instant it puts nothing out;
-until then it is left alone, unless something comes in that may make it answer at once (`urgent_kinds`). It then runs
-the missed time later, and reads its sensors from the stage's rows of that time.
+A board is asked only when that can matter. Each answer states a time before which it puts nothing out; before that it
+is left alone, unless an input arrives that may make it answer at once (`urgent_kinds`). It then runs
 """
 
 import json
@@ -57,16 +56,16 @@ from ranger_sim.harness.processes.shared_words import load
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.stage import Stage
 
-MOST_WAITING: Final = 200  # messages that a board left alone lets wait: some two thirds of its queue
+MOST_WAITING: Final = 200  # messages that may wait for a board that is left alone: some two thirds of its queue
 
 
 @cython.cclass
 class RemoteBoard(Board):
-    """Stands for the board `built`, which was built in this process; `shared`: the block of its own process.
+    """A proxy of the board `built`, which was built in this process; `shared`: the block of its own process.
 
-    Inputs other than messages and edges stand on the `stage`. `urgent`: message kinds (bits) that cannot wait.
+    Inputs other than messages and edges are on the `stage`. `urgent`: message kinds (bits) that cannot wait.
 
-    `follows_steps`: the plant's process reads what this board shows (the main brain's table and swing leg) after
+    `follows_steps`: the plant's process reads this board's state (the main brain's table and swing leg) after
     every step of the plant, so it is up to date by then.
     """
 
@@ -116,7 +115,7 @@ class RemoteBoard(Board):
         )
         self.stage = stage
         self.place = place
-        self.urgent = EVERY_KIND  # until the board has said which
+        self.urgent = EVERY_KIND  # until the board has reported which
         self.follows_steps = follows_steps
         self.posted = False
         self.gone = False
@@ -125,11 +124,11 @@ class RemoteBoard(Board):
         self.reached = 0
 
     def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
-        """Edges of `buffer` go to `pin` of the board, each with the level of `partner_pin`; tell by `edges_came`."""
+        """Send edges of `buffer` to `pin` of the board with the level of `partner_pin`; `edges_came` reports them."""
         self.lines.append(EdgeLine(buffer, pin, partner_pin))
 
     def edges_came(self) -> cython.longlong:
-        """Make messages of the edges that have come: the board cannot see the sensors' buffers."""
+        """Turn new edges into messages: the board cannot see the sensors' buffers."""
         line: EdgeLine
         for line in self.lines:
             while line.find_next() < NEVER:
@@ -148,11 +147,11 @@ class RemoteBoard(Board):
         return self.edge_time
 
     def stop_at(self, time: cython.longlong) -> cython.longlong:
-        """It has run already when its outputs arrive: it stops where it was told. Returns that."""
+        """Return where it stops, as requested: it has already run when its outputs arrive."""
         return self.horizon
 
     def watched(self) -> cython.longlong:
-        """What `watched` of the board in its process was at the end of its latest turn."""
+        """The value of `watched` of the board in its process at the end of its latest turn."""
         return self.watched_number
 
     def latest_slot(self) -> cython.longlong:
@@ -176,7 +175,7 @@ class RemoteBoard(Board):
         self._post(COMMAND_ADVANCE, until)
 
     def advance(self, until: cython.longlong) -> cython.longlong:
-        """What the board put out before `until` comes into the outbox; returns the instant of its next event."""
+        """Move the board's outputs before `until` into the outbox; returns the time of its next event."""
         self.horizon = until
         if not self.posted:
             self.begin(until)
@@ -187,7 +186,7 @@ class RemoteBoard(Board):
         return self.next_time
 
     def catch_up(self, until) -> None:
-        """Bring a board that was left alone up to `until` (ns): before anybody looks at it."""
+        """Bring a board that was left alone up to `until` (ns): before its state is read."""
         if self.gone or self.reached >= until:
             return
         self.stage.update()
@@ -195,17 +194,17 @@ class RemoteBoard(Board):
         self._collect()
 
     def command(self, command) -> None:
-        """One turn with another command; what the board answers lies in the notes of `from_board`."""
+        """Run one turn with another command; the board's answer is in the notes of `from_board`."""
         if not self.gone:
             self._post(command, self.reached)
             self._collect()
 
     def leave(self) -> None:
-        """It has no process any more: nothing is asked, and what comes for it is lost."""
+        """Note that it has no process any more: nothing is asked, and its inputs are lost."""
         self.gone = True
 
     def reset_channel(self) -> None:
-        """Set the channel back for a new process: no turn is open, both mailboxes are empty."""
+        """Reset the channel for a new process: no turn is open, both mailboxes are empty."""
         self.posted = False
         self.block[ASKED] = self.block[ANSWERED] = self.ask.rung
         self.block[ASK_USED] = self.block[ANSWER_USED] = 0
@@ -213,20 +212,20 @@ class RemoteBoard(Board):
         self.to_board.used = 0
 
     def come_back(self, now, power_up_ns) -> None:
-        """It has a process again, which has run until `now` (ns), and gets its power at `power_up_ns`."""
+        """Note that it has a process again, which has run until `now` (ns), and powers up at `power_up_ns`."""
         self.gone = False
         self.next_time = power_up_ns
         self.silent_until = 0
         self.reached = now
 
     def fetch_counters(self) -> None:
-        """Ask the board for what it counted; `counters` says it from then on."""
+        """Ask the board for its counters; `counters` returns them from then on."""
         told = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
         if not self.gone:
             self.counted = from_dict(json.loads(told))
 
     def notes_of(self, command, what) -> bytes:
-        """One turn with `command`; the bytes that the board's notes of the kind `what` then bring."""
+        """Run one turn with `command`; returns the bytes of the board's notes of the kind `what`."""
         self.from_board.notes.clear()
         self.command(command)
         parts = [note for note in self.from_board.notes if note[0] == NOTE and note[3] == what]
@@ -240,10 +239,10 @@ class RemoteBoard(Board):
     def slots_since(self, row) -> tuple:
         """Slots that have ended, from number `row` on: (bytes of RING_ROW words each, number of the next, missed ones).
 
-        They are as the board's process has written them; nothing is asked of it.
+        The board's process has written them; reading them asks nothing of it.
         """
         end = max(self.block[RING_ROWS] - 1, row)  # the latest may not have ended
-        first = max(row, end - RING + 2)  # of a full ring the oldest may be written over at any moment
+        first = max(row, end - RING + 2)  # the oldest of a full ring may be overwritten at any moment
         words = memoryview(self.block)[self.ring_first : self.ring_first + RING * RING_ROW]
         head, tail = RING_ROW * (first % RING), RING_ROW * (end % RING)
         if first == end:
@@ -253,7 +252,7 @@ class RemoteBoard(Board):
         return words[head:].tobytes() + words[:tail].tobytes(), end, first - row
 
     def counters(self) -> object:
-        """What the board counted, as it was fetched last; only its last slot where it was gone by then."""
+        """The board's counters, as last fetched; only its last slot where it had ended by then."""
         if self.counted is not None:
             return self.counted
         return replace(
@@ -261,14 +260,14 @@ class RemoteBoard(Board):
         )
 
     def dismiss(self) -> None:
-        """Tell the board's process to end; nothing is answered."""
+        """Order the board's process to end; there is no answer."""
         if not self.gone:
             self._ring(COMMAND_STOP, self.reached)
             self.posted = False
             self.gone = True
 
     def send(self, kind, time, a, b) -> None:
-        """A message of our own kind to the board, in the next turn."""
+        """Send the board a message of a kind private to the processes, in the next turn."""
         if self.gone:
             raise UserError(f"{self.name} is gone")
         self.inbox.push(time, 0, kind, a, b)
@@ -294,7 +293,7 @@ class RemoteBoard(Board):
     @cython.cfunc
     @cython.exceptval(check=True)
     def _post(self, command: cython.longlong, until: cython.longlong) -> cython.void:
-        """Write what has come for the board, and the instant, and ring."""
+        """Write the board's inputs and the time, and ring."""
         while self.inbox.head_time < until and command == COMMAND_ADVANCE:
             self.to_board.until = until
             if self.to_board.used + LONGEST > self.to_board.slots:
@@ -309,7 +308,7 @@ class RemoteBoard(Board):
 
     @cython.cfunc
     def _ring(self, command: cython.longlong, until: cython.longlong) -> None:
-        """Hand the turn over."""
+        """Pass the turn on."""
         self.to_board.send()
         self.block[COMMAND] = command
         self.block[UNTIL] = until
@@ -321,12 +320,12 @@ class RemoteBoard(Board):
 
     @cython.cfunc
     def _collect(self) -> cython.bint:
-        """Wait for the answer and take it; False when the board is gone."""
+        """Wait for the answer and read it; False when the board is gone."""
         more: cython.bint = True
         self.posted = False
         while more:
             while True:
-                if load(self.block, FATE) != ALIVE:  # looked at before every sleep, as its ring wakes only once
+                if load(self.block, FATE) != ALIVE:  # checked before every sleep, because its ring wakes only once
                     self.gone = True
                     self.inbox.clear()
                     return False

@@ -1,6 +1,6 @@
-"""What may be asked of a running robot: REQUESTS is the model, `admitted` the only way in.
+"""The requests to a running robot: REQUESTS is the model, `admitted` the only way in.
 
-A request is a line with a JSON object: `do`, and the fields of that request, no others. Whatever is not so is a
+A request is a line with a JSON object: `do`, and exactly the fields of that request. Any other line is a
 UserError of one line that names the fault; nothing of it reaches the robot.
 """
 
@@ -20,14 +20,14 @@ from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.wiring import ranger as wiring
 
 KEYS = 6  # of the robot's panel: 0 ... 5
-MOST_FAULTS = 255  # of one run, by request; chosen by us: each that waits is looked at in every step of the body
+MOST_FAULTS = 255  # of one run, by request; chosen by us: each that waits is checked in every step of the body
 
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """An admitted request; of the fields those count that its kind has. word: the value as the robot keeps it.
+    """An admitted request; only the fields of its kind count. word: the value as the robot stores it.
 
-    fault: as it is typed after --fault. which: of the faults, in the order in which they were armed, from 0.
+    fault: as typed after --fault. which: of the faults, in the order in which they were armed, from 0.
     stick: of the radio, -1 (left) to 1.
     """
 
@@ -67,7 +67,7 @@ def _fault(value: Any) -> str:
 
 
 def can_be_armed(fault: Fault) -> Fault:
-    """The fault, if the body's process can arm it. UserError for one that waits for what another process counts."""
+    """The fault, if the body's process can arm it. UserError for one that waits for a counter of another process."""
     for each in (fault.start, fault.end):
         if isinstance(each, ErrorNoted):
             raise UserError(
@@ -110,7 +110,7 @@ REQUESTS: dict[str, dict[str, Callable[[Any], Any]]] = {
 
 
 def admitted(line: bytes) -> Request:
-    """The request in a line. UserError, of one line, for everything that is none."""
+    """The request in a line. UserError, of one line, for any other line."""
     content = _object(line)
     what = content.pop("do", None)
     fields = REQUESTS.get(what) if isinstance(what, str) else None

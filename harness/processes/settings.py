@@ -1,4 +1,4 @@
-"""How a robot of processes is to be run."""
+"""Settings of a robot of processes."""
 
 import dataclasses
 import os
@@ -12,13 +12,13 @@ SLOWEST, FASTEST = 1e-4, 1000.0  # times real time; chosen by us
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
-    """speed: virtual seconds per wall-clock second, None as fast as it goes. restart: what to do with dead boards.
+    """speed: virtual seconds per wall-clock second, None as fast as possible. restart: what to do with dead boards.
 
-    real_time: ask for SCHED_FIFO and locked memory. name: under which the running robot is found.
-    processor: the one that plant and boards share, None for all. They take turns, so they would mostly wait for each
-    other on several as well; waking a process there costs ten times as much (a turn in a virtual machine: 3 us on
+    real_time: ask for SCHED_FIFO and locked memory. name: by which clients find the running robot.
+    processor: the one that plant and boards share, None for all. They take turns, so on several they would mostly wait
+    for each other too; waking a process there costs ten times as much (a turn in a virtual machine: 3 us on
     one processor, 30 to 140 us between two; benchmarks/2026-11-21-processes.json).
-    boards: those that get a process; the others stand outside as real hardware, or nowhere.
+    boards: those that get a process; the others are outside as real hardware, or absent.
     """
 
     speed: float | None = 1.0
@@ -43,10 +43,10 @@ class Settings:
 
     @property
     def wants_fifo(self) -> bool:
-        """Without a pace there is nothing to be in time for, and the machine belongs to others as well."""
+        """Whether it needs SCHED_FIFO: not without a pace, because then it has no deadline to meet."""
         return self.real_time and self.speed is not None
 
 
 def one_processor() -> int:
-    """The processor that a robot takes when nobody says which: the last one this process may use."""
+    """The default processor of a robot: the last one this process may use."""
     return max(os.sched_getaffinity(0))

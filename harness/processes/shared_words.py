@@ -1,9 +1,9 @@
 """Shared words and bells between processes.
 
-Interpreted, the functions below are used; compiled modules use those of the same names in shared_words.pxd.
+Interpreted modules use the functions below; compiled modules use those of the same names in shared_words.pxd.
 
 Between processes a plain store and load need an order. The compiled ones are sequentially consistent; here every
-`post` and `pause` is a system call, which is never left out in this mode (`Bell`) and orders what surrounds it.
+`post` and `pause` is a system call, which is never left out in this mode (`Bell`) and orders the accesses around it.
 """
 
 import os

@@ -1,6 +1,6 @@
-"""What the sensors show, from the plant's process to the boards': one row of shared memory per step of the plant.
+"""The sensors' values, from the plant's process to the boards': one row of shared memory per step of the plant.
 
-The last 64 rows (8 ms) stay, so a board may be behind the plant and still read what its sensors showed then.
+The last 64 rows (8 ms) stay, so a board may be behind the plant and still read its sensors' values of that time.
 """
 
 import array
@@ -27,7 +27,7 @@ from ranger_sim.plant.ranger import RangerPlant
 
 @cython.cclass
 class Stage:
-    """The plant's side. `step_times`: start and end of the step that is shown (ns), as the lockstep keeps them.
+    """The plant's side. `step_times`: start and end of the step that is shown (ns), as in the lockstep.
 
     `wires`: of the digital sensors, in the order of the rows' words.
     """
@@ -121,7 +121,7 @@ class Audience:
 
     @cython.ccall
     def show(self, row: cython.longlong) -> cython.void:
-        """From now on the board's pins show this row."""
+        """Let the board's pins show this row from now on."""
         at: cython.longlong = STAGE_FIRST + (row % STAGE_RING) * ROW_SIZE
         i: cython.longlong
         self.step_times[0] = self.words[at + ROW_START]

@@ -1,4 +1,4 @@
-"""The process the user starts: makes the others, notices what becomes of them, and is the last to leave.
+"""The process the user starts: it makes the others, monitors them, and ends last.
 
 It builds the robot once and never runs it. Every other process is a fork of it: the plant's process takes the robot
 over, a board's process one of its boards; a restarted board is a fork as well. When the supervisor dies, however it
@@ -33,10 +33,10 @@ from ranger_sim.harness.scenario import StopRule
 from ranger_sim.harness.wiring import ranger as wiring
 
 PLANT = "plant"
-LOOK_S = 0.2  # between two looks at boards and screen
-ASK_S = 0.005  # between two looks at requests, however many there are: who asks without end gets no more than that
-HANG_S = 1.0  # a board that keeps its turn so long is looked at; named well within 2 s
-RESTART_LIMIT = 5  # per board with --restart on-failure, so that a board that cannot live does not keep us busy
+LOOK_S = 0.2  # between two polls of boards and updates of the screen
+ASK_S = 0.005  # between two polls of requests, however many there are: it limits a client that never stops
+HANG_S = 1.0  # a board that keeps its turn this long is checked, and named well within 2 s
+RESTART_LIMIT = 5  # per board with --restart on-failure, so that a broken board does not keep us busy
 
 RUNNING, STOPPED, GONE, RESTARTING, ELSEWHERE = "running", "stopped", "gone", "restarting", "elsewhere"
 
@@ -45,18 +45,18 @@ class View:
     """What the supervisor shows; tools/ has one for a terminal and one for a pipe."""
 
     def show(self, state: dict) -> None:
-        """The state of the run, some times a second."""
+        """The state of the run, a few times a second."""
 
     def say(self, text: str) -> None:
-        """Something happened: one line."""
+        """Report an event in one line."""
 
     def close(self) -> None:
-        """Leave the terminal to others."""
+        """Release the terminal."""
 
 
 @dataclasses.dataclass
 class Child:
-    """A process of the robot. `turn`: the turn it had when last looked at, since `turn_since_s`."""
+    """A process of the robot. `turn`: the turn it had at the last poll, since `turn_since_s`."""
 
     name: str
     process: int
@@ -64,14 +64,14 @@ class Child:
     turn: int = -1
     turn_since_s: float = 0.0
     turn_cpu_s: float = 0.0
-    was_asked: bool = False  # where it is while it keeps its turn: a program in C says so with its end
+    was_asked: bool = False  # for its position while it keeps its turn: a program in C reports it when it ends
 
 
 class Supervisor:
     """Runs `robot` as processes.
 
-    Called in the plant's process: `begin(robot)` before time passes, to open what leads outside, and
-    `finish(robot, run, interrupted)` at the end; what that returns is the exit code.
+    The plant's process calls `begin(robot)` before time passes, to open external connections, and
+    `finish(robot, run, interrupted)` at the end; the exit code is what that returns.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Supervisor:
     ) -> None:
         self.robot = robot
         self.doors = {door.board.name: door for door in doors}  # of debuggers; each is its board's process's
-        self.held: set[str] = set()  # boards that a debugger has, as far as it was said
+        self.held: set[str] = set()  # boards that a debugger has, as far as reported
         self.begin = begin
         self.settings = settings
         self.stop_rule = stop
@@ -94,7 +94,7 @@ class Supervisor:
         self.view = view
         self.control = ControlServer(settings.name, self.obey)
         self.next_ask_s = self.next_look_s = 0.0
-        self.sent_away: dict[str, dict[str, int]] = {}  # clients by door and reason, as far as it was said
+        self.sent_away: dict[str, dict[str, int]] = {}  # clients by endpoint and reason, as far as reported
         self.stage = new_stage()
         self.blocks = {
             name: Block(name, place, words_shown(robot.boards[name])) for place, name in enumerate(wiring.BOARDS)
@@ -104,7 +104,7 @@ class Supervisor:
         self.wakeup_read, self.wakeup_write = socket.socketpair()
         self.signals: list[int] = []
         self.interrupts = 0
-        self.ending = False  # the plant's process has said that it is over
+        self.ending = False  # the plant's process has reported the end
         self.status: dict = {}
         self.restarts: dict[str, int] = {}
         self.exit_code: int | None = None
@@ -120,7 +120,7 @@ class Supervisor:
         sys.stdout.flush()
         sys.stderr.flush()
         with warnings.catch_warnings():
-            # numerical libraries keep threads for matrices; nothing of ours uses them, in no process
+            # numerical libraries keep threads for matrices; no process of ours uses them
             warnings.simplefilter("ignore", DeprecationWarning)
             process = os.fork()
         if process:
@@ -147,7 +147,7 @@ class Supervisor:
             os._exit(code)
 
     def start_board(self, name: str, fresh: bool = False) -> None:
-        """A process for a board: for the one that was built, or for one fresh from the shelf."""
+        """Start a process for a board: for the one that was built, or for a new, unwired one."""
         block = self.blocks[name]
 
         def body() -> int:
@@ -164,7 +164,7 @@ class Supervisor:
         self.fork(name, body)
 
     def close_doors(self) -> None:
-        """In a process that has nothing to do with them."""
+        """Close the endpoints in a process that does not use them."""
         for door in self.doors.values():
             door.close()
         self.doors.clear()
@@ -191,12 +191,12 @@ class Supervisor:
     # --- the life of a run --------------------------------------------------------------------------------
 
     def describe(self) -> str:
-        """The pace, and what was obtained of the kernel."""
+        """The pace, and what the kernel granted."""
         pace = "as fast as it goes" if self.settings.speed is None else f"{self.settings.speed:g} x real time"
         return f"{pace}; {self.scheduling}"
 
     def run(self) -> int:
-        """Start everything, look after it, and return the exit code."""
+        """Start everything, supervise it, and return the exit code."""
         with self.signals_noted():
             try:
                 for name in self.settings.boards:
@@ -213,7 +213,7 @@ class Supervisor:
         return self.exit_code
 
     def close(self) -> None:
-        """Close what leads to clients and children; the children have ended."""
+        """Close the connections to clients and children; the children have ended."""
         self.control.close()
         for each in (self.link, self.plant_link, self.wakeup_read, self.wakeup_write):
             each.close()
@@ -223,7 +223,7 @@ class Supervisor:
 
     @contextlib.contextmanager
     def signals_noted(self) -> Iterator[None]:
-        """Signals wake the loop and are handled there; also those that whoever started us had blocked."""
+        """Signals wake the loop and are handled there; also those that the parent process had blocked."""
 
         def note(number: int, _frame: Any) -> None:
             self.signals.append(number)
@@ -243,7 +243,7 @@ class Supervisor:
                 signal.signal(number, handler)
 
     def try_scheduling(self) -> str:
-        """What the children will get of real-time scheduling and locked memory, found out in one that ends at once."""
+        """Real-time scheduling and locked memory that the children will get, tried in one that ends at once."""
         if not self.settings.real_time:
             return "ordinary scheduling, memory not locked (as asked for)"
         read, write = os.pipe()
@@ -263,7 +263,7 @@ class Supervisor:
         return f"{scheduling}, {memory}, on {place}"
 
     def turn(self) -> None:
-        """Wait for something to happen, or a fifth of a second, and see to it."""
+        """Wait for an event, or a fifth of a second, and handle it."""
         read, write = [self.wakeup_read.fileno(), self.link.fileno()], []
         patience_s = LOOK_S
         if (wait_s := self.next_ask_s - wallclock.monotonic_s()) > 0.0:
@@ -276,7 +276,7 @@ class Supervisor:
                 while self.wakeup_read.recv(4096):
                     pass
         signals, self.signals = self.signals, []
-        self.hear_plant()  # before the news of children: what they were told comes first
+        self.hear_plant()  # before the ends of children: the plant's process may have ordered them
         if signal.SIGCHLD in signals:
             self.reap()
         if any(number != signal.SIGCHLD for number in signals):
@@ -290,7 +290,7 @@ class Supervisor:
             self.look()
 
     def interrupt(self) -> None:
-        """Ctrl-C: once to stop and finish the files, twice to break off."""
+        """Ctrl-C: once to stop and finish the files, twice to abort."""
         self.interrupts += 1
         if self.interrupts > 1:
             self.view.say("broken off: no files are finished")
@@ -304,13 +304,13 @@ class Supervisor:
                 os.kill(child.process, signal.SIGCONT)  # it has to finish as well
 
     def order(self, content: dict, listening: bool = False) -> bool:
-        """Tell the plant's process something; False when it is gone, or has left hundreds of orders unread.
+        """Send the plant's process an order; False when it is gone, or has left hundreds of orders unread.
 
-        Without waiting, unless it is known to be listening: it may hang, and we are the one that notices.
+        It does not wait, unless the process is known to be reading: it may hang, and the supervisor must notice that.
         """
         try:
             self.link.send(json.dumps(content).encode(), 0 if listening else socket.MSG_DONTWAIT)
-        except OSError:  # `reap` has the news
+        except OSError:  # `reap` handles it
             return False
         return True
 
@@ -336,7 +336,7 @@ class Supervisor:
                 self.robot.printed.show(news["printed"])
             if "failed" in news:
                 self.failure, self.ending = news["failed"], True
-            if "collecting" in news:  # from here on boards end because they are told to
+            if "collecting" in news:  # from here on boards end because they are ordered to
                 self.ending = True
             if "over" in news:
                 self.look()
@@ -344,7 +344,7 @@ class Supervisor:
                 self.order({"do": "finish"}, listening=True)
 
     def answered(self, news: dict) -> None:
-        """The plant's process has carried out an order, or says why not."""
+        """Handle the plant's reply to an order: carried out, or why not."""
         number = news["answer"]
         if isinstance(number, str):  # a restart: "restart MCH"
             name = number.partition(" ")[2]
@@ -357,7 +357,7 @@ class Supervisor:
     # --- what becomes of the processes --------------------------------------------------------------------
 
     def reap(self) -> None:
-        """Take note of every child that ended, was stopped or goes on."""
+        """Note every child that ended, stopped or continued."""
         while True:
             try:
                 process, status = os.waitpid(-1, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
@@ -365,7 +365,7 @@ class Supervisor:
                 return
             if process == 0:
                 return
-            self.hear_plant()  # it may have told this child to end since we last listened
+            self.hear_plant()  # it may have ordered this child to end since the last read
             child = next((each for each in self.children.values() if each.process == process), None)
             if child is None:
                 continue
@@ -379,7 +379,7 @@ class Supervisor:
                 self.ended(child, os.waitstatus_to_exitcode(status))
 
     def ended(self, child: Child, code: int) -> None:
-        """A child is no more."""
+        """Handle the end of a child."""
         before, child.state = child.state, GONE
         if child.name == PLANT:
             self.plant_ended(child, code)
@@ -405,7 +405,7 @@ class Supervisor:
                 self.make_room(child)
 
     def why_ended(self, name: str) -> str:
-        """What its board process left to be said, or where its program in C was; kept for the summary."""
+        """The last report of its board process, or where its program in C was; kept for the summary."""
         block = self.blocks[name]
         if name in self.robot.firmware and block.words[places.CRASH]:
             record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS].tolist()
@@ -419,7 +419,7 @@ class Supervisor:
         self.order({"do": "make_room", "board": child.name, "number": f"restart {child.name}"})
 
     def plant_ended(self, child: Child, code: int) -> None:
-        """The run is over, as it should be or not."""
+        """Handle the end of the run, normal or not."""
         if self.ending and code >= 0:
             self.exit_code = code
             return
@@ -428,7 +428,7 @@ class Supervisor:
         self.exit_code = 1
 
     def look(self) -> None:
-        """Find boards that keep their turn too long, and show how things are."""
+        """Find boards that keep their turn too long, and show the state."""
         now = wallclock.monotonic_s()
         for name, block in self.blocks.items():
             child = self.children.get(name)
@@ -449,7 +449,7 @@ class Supervisor:
                 continue
             used_s = kernel.processor_time_s(child.process) - child.turn_cpu_s
             if kernel.state_of(child.process) == "R" and used_s < HANG_S / 2:
-                continue  # it would like to, but the machine is busy with others
+                continue  # it is ready to run, but the machine is busy with other processes
             self.view.say(
                 f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s, "
                 f"{used_s:.1f} s of them computing; it is killed"
@@ -466,7 +466,7 @@ class Supervisor:
             self.view.show(self.state())
 
     def is_held(self, name: str, words: Any) -> bool:
-        """A debugger has the board, or is waited for; said when that begins."""
+        """Whether a debugger has the board, or is awaited; reported when that begins."""
         if not words[places.HELD]:
             self.held.discard(name)
             return False
@@ -476,7 +476,7 @@ class Supervisor:
         return True
 
     def say_who_was_sent_away(self) -> None:
-        """A line when a door begins to send clients away for a reason; how many it were is told at the end."""
+        """Print a line when an endpoint first sends clients away for a reason; the total is reported at the end."""
         doors = {**self.status.get("sent_away", {}), "control": dict(self.control.sent_away)}
         for door, counts in doors.items():
             said = self.sent_away.setdefault(door, {})
@@ -485,7 +485,7 @@ class Supervisor:
             said.update(counts)
 
     def look_at_plant(self, plant: Child, now: float) -> None:
-        """Name the plant's process when it makes no progress although no board keeps it waiting."""
+        """Report the plant's process when it makes no progress although no board delays it."""
         progress = self.stage[0][places.HEARTBEAT_NS]
         waits = any(
             words[places.ASKED] != words[places.ANSWERED] for words in (each.words for each in self.blocks.values())
@@ -524,7 +524,7 @@ class Supervisor:
         }
 
     def obey(self, number: int, request: Request) -> None:
-        """An admitted request of `ranger-sim ctl`; answered at once, or when the plant's process has answered."""
+        """Carry out an admitted request of `ranger-sim ctl`; the reply comes at once, or after the plant's."""
         if request.do == "status":
             self.control.answer(number, self.state())
         elif request.do == "restart":
@@ -537,7 +537,7 @@ class Supervisor:
                 self.control.answer(number, {"error": f"{request.do}: the body's process takes no orders now"})
 
     def restart(self, number: int, board: str) -> None:
-        """A fresh process for a board."""
+        """Start a new process for a board."""
         child = self.children.get(board)
         if child is None:
             self.control.answer(number, {"error": f"restart: {board} has no process here"})
@@ -552,7 +552,7 @@ class Supervisor:
             self.control.answer(number, {"restarting": child.name})
 
     def kill_all(self) -> None:
-        """Whatever still lives."""
+        """Kill all processes that still run."""
         for child in self.children.values():
             if child.state != GONE:
                 with contextlib.suppress(ProcessLookupError):
@@ -564,6 +564,6 @@ class Supervisor:
 
 
 def check_platform() -> None:
-    """UserError where processes of this kind cannot be had."""
+    """UserError on a platform without processes of this kind."""
     if not sys.platform.startswith("linux"):
         raise UserError("up: boards as processes need Linux (eventfd, abstract sockets); `walk` runs everywhere")

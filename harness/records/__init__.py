@@ -1,1 +1,1 @@
-"""What a run keeps and what is told of it: trace, log book, samples, and the figures of its summary."""
+"""The records and reports of a run: trace, log book, samples, and the figures of its summary."""

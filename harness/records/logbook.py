@@ -1,4 +1,4 @@
-"""What a run keeps for its files: nothing, the last seconds, or everything (spooled to disk)."""
+"""The records that a run keeps for its files: none, the last seconds, or all (spooled to disk)."""
 
 import collections
 import tempfile
@@ -16,7 +16,7 @@ READ_ROWS = 4096  # of a spooled stream at a time
 
 
 def decoded(rows: Any) -> dict:
-    """Frames of rows of a frame stream (foundation/row_stream.py): dict of arrays, as `Logbook.frames` has them."""
+    """Frames of rows of a frame stream (foundation/row_stream.py): dict of arrays, as in `Logbook.frames`."""
     first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
     return {
         "time_ns": first,
@@ -32,7 +32,7 @@ class Logbook:
     """Blocks of the recorder's streams.
 
     mode: "none" keeps nothing, "window" the last `window_s` seconds in memory, "full" everything in
-    unnamed temporary files (so that nothing is left behind whatever happens to the process).
+    unnamed temporary files (so that nothing is left behind however the process ends).
     """
 
     def __init__(self, recorder: Recorder, mode: str, window_s: float = WINDOW_S) -> None:
@@ -74,7 +74,7 @@ class Logbook:
         return write
 
     def listen(self, name: str, taker: Callable[[Any], None]) -> None:
-        """From now on `taker` gets the rows of a stream as well, block by block, as they are recorded."""
+        """Pass the rows of a stream to `taker` as well from now on, block by block, as they are recorded."""
         stream, kept = self.streams[name], self.streams[name].sink
 
         def both(last_time_ns: int, block: bytes) -> None:
@@ -85,7 +85,7 @@ class Logbook:
         stream.sink = both
 
     def flush(self) -> None:
-        """Hand over what waits in the streams' blocks."""
+        """Pass on what waits in the streams' blocks."""
         for stream in self.streams.values():
             stream.flush()
 
@@ -112,7 +112,7 @@ class Logbook:
 
     @property
     def reach_ns(self) -> int:
-        """How far back it has what passed, ns."""
+        """How far back its records reach, ns."""
         return {"none": 0, "window": self.window_ns}.get(self.mode, NEVER)
 
     @property
@@ -139,7 +139,7 @@ class Logbook:
     def frames(self) -> dict:
         """Frames seen on the buses: dict of arrays time_ns, bus (0..3), identifier, flags, word0, word1.
 
-        In order of time; at one instant the lower bus comes first.
+        In order of time; at one time the lower bus comes first.
         """
         rows = np.concatenate([self._rows(f"can{number}") for number in range(1, self.buses + 1)])
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
@@ -157,6 +157,6 @@ class Logbook:
         return rows[:, 0], rows[:, 1:]
 
     def close(self) -> None:
-        """Give the spool files back."""
+        """Close the spool files."""
         for spool in self.spools.values():
             spool.close()

@@ -1,4 +1,4 @@
-"""What a run kept, as arrays for reports and files. Times are s since power-up."""
+"""The records of a run, as arrays for reports and files. Times are s since power-up."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -72,7 +72,7 @@ class Recorded:
         return (time_ns - self.robot.start_ns) * 1e-9
 
     def variables(self) -> Iterator[Any]:
-        """Yield a Series for every variable that was ever written, at the instants when it changed."""
+        """Yield a Series for every variable that was ever written, at the times when it changed."""
         time_s = self._seconds(self.word_times_ns)
         descriptions = {row.id: row.description for row in datatable.load().variables}
         for number, name in all_variables.NAMES.items():

@@ -26,12 +26,12 @@ class Recorder:
         self.words = RowStream("q", word_columns + 1, False)
 
     def streams(self) -> dict:
-        """Every stream by its name; the frames of bus 1 are can1."""
+        """Every stream by its name; those of bus 1's frames are can1."""
         frames = {f"can{number}": stream for number, stream in enumerate(self.frames, start=1)}
         return {**frames, "samples": self.samples, "words": self.words}
 
     def trace_digest(self):
-        """BLAKE2b-256 (hex) over the frames of every bus and the samples so far; what is pending is flushed first."""
+        """BLAKE2b-256 (hex) over the frames of every bus and the samples so far; pending rows are flushed first."""
         total = hashlib.blake2b(b"ranger-sim trace 3\n", digest_size=DIGEST_BYTES)
         for stream in (*self.frames, self.samples):
             stream.flush()

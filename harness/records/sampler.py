@@ -40,7 +40,7 @@ class Sampler:
 
     @cython.ccall
     def take(self, now: cython.longlong) -> None:
-        """One row of each stream, at `now` (ns)."""
+        """Add one row to each stream, at `now` (ns)."""
         stream: RowStream = self.samples
         at: cython.longlong = stream.used
         i: cython.longlong

@@ -1,4 +1,4 @@
-"""How long after the body's heel strikes the main brain notices them: from the strike to the slot that does."""
+"""The delay of the main brain in noticing the body's heel strikes: from the strike to the slot that does."""
 
 import math
 
@@ -14,7 +14,7 @@ from ranger_sim.plant.ranger import RangerPlant
 class StrikeWatch(StepEnd):
     """`board`: the main brain, of which the swing leg can be watched (`Board.watched`).
 
-    `count` strikes were noticed; `missed`: steps of which no flip of the swing leg told; `unmatched`: flips without a
+    `count` strikes were noticed; `missed`: steps without a flip of the swing leg; `unmatched`: flips without a
     new strike. `sum_ms`, `squares_ms2`: of the delays.
     """
 
@@ -42,7 +42,7 @@ class StrikeWatch(StepEnd):
         self.squares_ms2 = 0.0
 
     def look(self) -> object:
-        """Once per step of the plant: has the main brain flipped the swing leg?"""
+        """Check, once per step of the plant, whether the main brain has flipped the swing leg."""
         board: Board = self.board
         leg: cython.longlong = board.watched()
         if leg != self.swing_leg:
@@ -52,7 +52,7 @@ class StrikeWatch(StepEnd):
 
     @cython.cfunc
     def _notice(self) -> cython.void:
-        """It has: how long after the body's strike did that slot begin?"""
+        """Record how long after the body's strike the slot of that flip began."""
         plant: RangerPlant = self.plant
         delay_ms: cython.double
         if plant.steps == 0:

@@ -17,7 +17,7 @@ SKIPPED_STEPS = 5  # the start is left out of means
 def of(robot: Any) -> dict:
     """Everything `--json` prints; units are in the names. Means leave out the first 5 steps.
 
-    None where there is no such number: a mean of no step, a deviation of fewer than two, a power of no time.
+    None for an undefined number: a mean of no step, a deviation of fewer than two, a power of no time.
     """
     plant = robot.plant
     record = plant.record
@@ -86,9 +86,9 @@ def motor_powers(robot: Any) -> dict:
 
 
 def energy(robot: Any) -> dict:
-    """What each consumer took from the battery since the robot was let go, Wh; as for the powers nothing is credited.
+    """What each consumer took from the battery since the robot was let go, Wh; returned energy is not credited.
 
-    A motor's part has its losses in it: winding, brushes, bridge, friction.
+    A motor's part includes its losses: winding, brushes, bridge, friction.
     """
     parts = {motor.name: (motor.drawn_J - motor.drawn_before_J) / JOULES_PER_WH for motor in robot.plant.motors}
     parts["electronics"] = robot.plant.electronics_power_W * robot.walked_s / JOULES_PER_WH
@@ -112,7 +112,7 @@ def battery(robot: Any) -> dict:
 
 
 def oddities(plant: Any) -> dict:
-    """What the model met that a textbook gait has not; each is a count or a worst value of the walk.
+    """Events of the model that a textbook gait does not have; each is a count or a worst value of the walk.
 
     None where nothing was measured: no step, or strikes that last (contact "compliant") and have no impulse.
     """
@@ -140,7 +140,7 @@ def oddities(plant: Any) -> dict:
 
 
 def slots(counters: RangerCounters) -> dict:
-    """How one board kept its slots; interrupts included."""
+    """Timing of one board's slots; interrupts included."""
     kept = counters.slots
     return {
         "count": kept.count,
@@ -151,12 +151,12 @@ def slots(counters: RangerCounters) -> dict:
 
 
 def errors(counters: RangerCounters) -> dict:
-    """Errors the board itself noted, by name."""
+    """Errors that the board itself recorded, by name."""
     return {name: counters.errors[code] for code, name in error_table.NAMES.items() if counters.errors[code]}
 
 
 def firmware(robot: Any, board: str) -> dict:
-    """What became of a board's program in C, what was found in it, and what of it ran."""
+    """The end of a board's program in C, the findings in it, and its coverage."""
     made = robot.firmware[board]
     death = next((each for each in robot.deaths if each["board"] == board), None)
     if not robot.loop.board(board).apart:
@@ -173,19 +173,19 @@ def firmware(robot: Any, board: str) -> dict:
 
 
 def cause_of(death: dict) -> str | None:
-    """What ended a board's process, as far as it is known."""
+    """The cause of the end of a board's process, as far as known."""
     return death["why"] or (f"its process {death['how']}" if "how" in death else None)
 
 
 def found_in(robot: Any, board: str) -> list[Any]:
-    """Of a source that several boards run the first one tells."""
+    """The findings in a board's program; of boards with the same source, the first reports them."""
     folder = robot.firmware[board].folder
     first = next(name for name, each in robot.firmware.items() if each.folder == folder)
     return robot.firmware[board].findings() if first == board else []
 
 
 def ran(made: Any, is_whole: bool) -> dict:
-    """How much of a program in C ran; None for all figures where nobody counted."""
+    """How much of a program in C ran; None for all figures where coverage was not counted."""
     files = [each.figures(made.folder) for each in made.ran()]
     sums = {key: sum(each[key] for each in files) if made.coverage else None for key in COVERAGE}
     return {**sums, "whole": is_whole if made.coverage else None, "files": files}

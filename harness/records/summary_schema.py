@@ -1,7 +1,7 @@
-"""What stands in `summary.json`: each figure's place, type, unit and meaning, and when it is null.
+"""The content of `summary.json`: each figure's place, type, unit and meaning, and when it is null.
 
-One table. From it come the JSON Schema (`ranger-sim summary-schema`) and the tables of docs/summary.md; a test holds
-the summaries of walks to it, key by key.
+One table. The JSON Schema (`ranger-sim summary-schema`) and the tables of docs/summary.md are made from it; a test
+compares the summaries of walks with it, key by key.
 """
 
 import dataclasses
@@ -80,7 +80,7 @@ FIGURES = (
     Figure("heel_strike_delay_ms.count", COUNT, "", "strikes that were noticed"),
     Figure("heel_strike_delay_ms.unmatched", COUNT, "", "flips of the swing leg without a new strike"),
     Figure("heel_strike_delay_ms.missed", COUNT, "", "strikes of which no flip told"),
-    # what a textbook gait has not
+    # not in a textbook gait
     Figure("oddities.contact", TEXT, "", "how feet meet the floor: coulomb, sticking, unilateral or compliant"),
     Figure("oddities.touches", COUNT, "", "times that a foot met the floor"),
     Figure("oddities.lift_offs", COUNT, "", "times that a foot left it, other than in the strike of the other one"),
@@ -243,7 +243,7 @@ JSON_TYPES: dict[str, dict[str, Any]] = {
 
 
 def json_schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of `summary.json`; `unit` is a keyword of ours beside the standard ones."""
+    """The JSON Schema (draft 2020-12) of `summary.json`; `unit` is our own keyword in addition to the standard ones."""
     top = branch()
     for figure in FIGURES:
         at = top
@@ -264,7 +264,7 @@ def branch() -> dict[str, Any]:
 
 
 def leaf(figure: Figure) -> dict[str, Any]:
-    """What is said of one figure."""
+    """The schema of one figure."""
     told: dict[str, Any] = dict(JSON_TYPES[figure.kind])
     told["description"] = figure.meaning + (f"; null: {figure.null}" if figure.null else "")
     if figure.null:
@@ -275,7 +275,7 @@ def leaf(figure: Figure) -> dict[str, Any]:
 
 
 def below(at: dict[str, Any], key: str) -> dict[str, Any]:
-    """The object under a key, made when it is not there."""
+    """The object under a key, made when it is missing."""
     if key.startswith("{"):
         if not at["additionalProperties"]:
             at["additionalProperties"] = branch()
@@ -289,7 +289,7 @@ def below(at: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def put(at: dict[str, Any], key: str, what: dict[str, Any]) -> None:
-    """`what` under a key that has to be there, or under every name."""
+    """Put `what` under a required key, or under every name."""
     if key.startswith("{"):
         at["additionalProperties"] = what
         return

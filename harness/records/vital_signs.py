@@ -1,4 +1,4 @@
-"""How the buses and boards of any machine fare: traffic of a bus, and whether a board still works."""
+"""The health of buses and boards of any machine: traffic of a bus, and whether a board still works."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +9,7 @@ from ranger_sim.firmware_sim.counters import BoardCounters
 def can(machine: Any, bus: Any, counters: Mapping[str, BoardCounters]) -> dict:
     """Traffic of one bus; loads as fractions 0-1 with stuff bits and intermission.
 
-    lost: frames accepted for sending that a listening node did not get, on the wire or in its receive buffers.
+    lost: frames accepted for sending that a receiving node did not get, on the wire or in its receive buffers.
     queue_full: frames that a full transmit ring of a board did not accept.
     """
     now = machine.loop.time
@@ -27,6 +27,6 @@ def can(machine: Any, bus: Any, counters: Mapping[str, BoardCounters]) -> dict:
 
 
 def alive(machine: Any, counters: BoardCounters) -> bool:
-    """True when the board finished a slot's work lately: a program that hangs has slots that begin, and no others."""
+    """True when the board finished a slot's work lately: a program that hangs only has slots that begin."""
     silent_ns = machine.loop.time - counters.slots.finished_ns
     return machine.loop.time - machine.start_ns < 20_000_000 or silent_ns < 20 * counters.slots.slot_ns

@@ -1,4 +1,4 @@
-"""One board alone on the table, or one bus alone: pins, voltages, words and buses are driven by the test.
+"""A single board, or a single bus, on the bench: pins, voltages, words and buses are driven by the test.
 
     board = BoardAlone("MCH")
     board.word("absolute_encoder", 4590)
@@ -6,8 +6,8 @@
     board.run_for("20 ms")
     assert board.can(1).received("MCH_ANGLE")[-1].value == 0.0
 
-The board is that of the robot, in virtual time; its buses are real to the bit, with one node of the test's on each,
-which acknowledges. Nothing else is there: a sensor that is not set shows 0.
+The board is that of the robot, in virtual time; its buses are simulated to the bit, each with one node of the test,
+which acknowledges. Nothing more is connected: a sensor that is not set shows 0.
 """
 
 from __future__ import annotations
@@ -60,20 +60,20 @@ from ranger_sim.harness.testing.links import Link, link_of
 from ranger_sim.harness.testing.wire import Wire
 from ranger_sim.harness.wiring import ranger as wiring
 
-# Everybody runs at most so many bits ahead of a bus: a frame without data has passed its receivers after 41 bits or
-# more, so nothing reaches anybody in its past.
+# A board or node runs at most this many bits ahead of a bus: a frame without data has passed its receivers after
+# 41 bits or more, so nothing arrives in a receiver's past.
 AHEAD_BITS = 36
 DATA_8 = 8  # flags of a data frame of eight bytes
 SYNC_NS = 1_000_000  # the router sends the network time every ms (robot.md N1.4)
 SYNC_ID = all_variables.ID_OF["TIMESTAMP"]
 BUFFERS = (1, 2, 3)
-NODE_ORDER = STAGE_BUS * 256 + 128  # behind every board of the robot
+NODE_ORDER = STAGE_BUS * 256 + 128  # after every board of the robot
 FIRST_ORDER = STAGE_BUS * 256
 SECOND_NS = 1_000_000_000
 
 
 class Node:
-    """A node of the test's on a bus: sends in the order it is told, hears everything that others send."""
+    """A node of the test on a bus: sends in the order of the calls, receives everything that others send."""
 
     def __init__(self, bench: Bench, bus: Bus, name: str) -> None:
         self.bench = bench
@@ -82,7 +82,7 @@ class Node:
         self.inbox: EventQueue = EventQueue()
         self.number = bus.add_node(name, self.inbox, 1, NODE_ORDER + len(bus.nodes))
         self.free = list(BUFFERS)
-        self.due: list[tuple[int, int, int, int, int, int]] = []  # instant, count, identifier, flags, words
+        self.due: list[tuple[int, int, int, int, int, int]] = []  # time, count, identifier, flags, words
         self.offered = 0
         self.heard: list[Frame] = []
 
@@ -94,9 +94,9 @@ class Node:
         at: Duration = "0 s",
         extended: bool = False,
     ) -> None:
-        """Send a variable of the table, or bytes under an identifier of any other kind, `at` so long from now.
+        """Send a variable of the table, or bytes under any other identifier, `at` this long from now.
 
-        `stamp_ms`: its time word; the network time if it is not given.
+        `stamp_ms`: its time word; default: the network time.
         """
         identifier = RANGER.identifier(what)
         due_ns = self.bench.now + duration_ns(at, "at")
@@ -116,18 +116,18 @@ class Node:
         self.send_words(due_ns, identifier, flags, *words)
 
     def send_words(self, due_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
-        """Ask for a frame at an instant of the bench's time (ns)."""
+        """Request a frame at a time of the bench (ns)."""
         self.offered += 1
         heapq.heappush(self.due, (due_ns, self.offered, identifier, flags, lo, hi))
 
     @property
     def next_time(self) -> int:
-        """When it has something to do next (ns): what has come, or to send as far as a buffer is free."""
+        """When it next has something to do (ns): frames to read, or to send while a buffer is free."""
         sends = max(self.due[0][0], self.bench.now) if self.due and self.free else NEVER
         return min(sends, self.inbox.head_time)
 
     def poll(self, now_ns: int) -> None:
-        """Hear what has come by now, and hand over what is due."""
+        """Receive frames that have arrived, and send those that are due."""
         while self.inbox.head_time <= now_ns and self.inbox.take():
             queue = self.inbox
             if queue.kind == CAN_TX_DONE:
@@ -150,14 +150,14 @@ class Node:
         self.heard.clear()
 
     def wait_for(self, what: str | int, within: Duration = "100 ms") -> Frame:
-        """Pass time until the next frame of a variable has come; AssertionError when it has not `within` this time."""
+        """Pass time until the next frame of a variable arrives; AssertionError if none does `within` this time."""
         before = len(self.received(what))
         self.bench.until(lambda: len(self.received(what)) > before, within, f"a frame {what} on {self.bus.name}")
         return self.received(what)[before]
 
 
 class Bench:
-    """Passes time on buses and whatever the test lets happen. `now`: virtual time, ns."""
+    """Passes time on buses and runs the test's calls. `now`: virtual time, ns."""
 
     def __init__(self, buses: dict[str, int]) -> None:
         self.now = 0
@@ -168,7 +168,7 @@ class Bench:
         self.observed = Observed(FrameKeeper(streams, RANGER))
         self.window_ns = AHEAD_BITS * SECOND_NS // max([BUS_BIT_RATE, *buses.values()])
         self.nodes: list[Node] = []
-        self.calls: list[tuple[int, int, int, Callable[[float], Any]]] = []  # instant, count, period, function
+        self.calls: list[tuple[int, int, int, Callable[[float], Any]]] = []  # time, count, period, function
         self.called = 0
 
     @property
@@ -178,7 +178,7 @@ class Bench:
 
     @property
     def figures(self) -> list[Figure]:
-        """What was measured with a limit."""
+        """Measurements that have a limit."""
         return self.observed.figures
 
     def wire(self, bus: str | None = None, since_s: float | None = None) -> Wire:
@@ -186,22 +186,22 @@ class Bench:
         return Wire(self.observed, bus if bus is not None else next(iter(self.buses)), since_s, self.time_s)
 
     def every(self, period: Duration, function: Callable[[float], Any]) -> None:
-        """Call `function(time_s)` now and then every `period`: a model of what hangs on the board."""
+        """Call `function(time_s)` now and then every `period`: a model of what is connected to the board."""
         self.call_at(self.now, function, duration_ns(period, "every"))
 
     def call_at(self, time_ns: int, function: Callable[[float], Any], period_ns: int = 0) -> None:
-        """Call `function(time_s)` at an instant, and again every `period_ns` if that is above 0."""
+        """Call `function(time_s)` at a time, and again every `period_ns` if that is above 0."""
         self.called += 1
         heapq.heappush(self.calls, (time_ns, self.called, period_ns, function))
 
     def run_for(self, duration: Duration) -> None:
-        """Pass so much virtual time: "20 ms", or a number of seconds."""
+        """Pass this much virtual time: "20 ms", or a number of seconds."""
         self.run_to(self.now + duration_ns(duration, "run_for"))
 
     def until(self, condition: Callable[[], Any], within: Duration = "1 s", what: str = "") -> float:
-        """Pass time until `condition()` is true; the virtual time then, s. Looked at every 36 bits of the bus.
+        """Pass time until `condition()` is true; returns the virtual time then, s. Checked every 36 bits of the bus.
 
-        ConditionNotMetError, an AssertionError, when it is not `within` this time.
+        ConditionNotMetError, an AssertionError, when it is not true `within` this time.
         """
         __tracebackhide__ = True
         begun, end = self.now, self.now + duration_ns(within, "until: within")
@@ -213,7 +213,7 @@ class Bench:
         return self.time_s
 
     def run_to(self, end: int) -> None:
-        """Pass time to an instant (ns)."""
+        """Pass time to `end` (ns)."""
         while self.now < end:
             while self.calls and self.calls[0][0] <= self.now:
                 time_ns, count, period_ns, function = heapq.heappop(self.calls)
@@ -225,7 +225,7 @@ class Bench:
                     bus.advance(self.now)
             for node in self.nodes:
                 node.poll(self.now)
-            # a call or a node has its turn at its instant; the board may run beyond what it does itself
+            # a call or a node runs at its time; the board may run beyond its own events
             begins = min([self.calls[0][0] if self.calls else NEVER, *(node.next_time for node in self.nodes)])
             first = min([begins, self.board_due(), *(bus.next_time for bus in self.buses.values())])
             if self.now < first:
@@ -242,15 +242,15 @@ class Bench:
             node.poll(end)
 
     def board_due(self) -> int:
-        """When the board has something to do (ns); there is none here."""
+        """When the board has something to do (ns); here there is not a board."""
         return NEVER
 
     def advance_board(self, until: int) -> None:
-        """Let the board run."""
+        """Run the board."""
 
 
 class BusAlone(Bench):
-    """A bus with nodes of the test's: `a = bus.node("a")`; `a.send("MCH_ANGLE", 0.5)`; `bus.run_for("1 ms")`.
+    """A bus with nodes of the test: `a = bus.node("a")`; `a.send("MCH_ANGLE", 0.5)`; `bus.run_for("1 ms")`.
 
     `bus`: the bus itself, with counters and disturbances (can_bus/bus.py).
     """
@@ -260,7 +260,7 @@ class BusAlone(Bench):
         self.bus: Bus = self.buses[name]
 
     def node(self, name: str) -> Node:
-        """One more node."""
+        """Add a node."""
         self.nodes.append(Node(self, self.bus, name))
         return self.nodes[-1]
 
@@ -280,19 +280,19 @@ class Pin:
         return int(self.bench.chip.pins[self.number])
 
     def set(self, level: int, at: Duration = "0 s") -> None:
-        """Drive it to 0 or 1, `at` so long from now."""
+        """Drive it to 0 or 1, `at` this long from now."""
         time_ns = self.bench.now + duration_ns(at, "at")
         self.bench.chip.inbox.push(time_ns, ORDER_PINS, PIN_EDGE, self.number, 1 if level else 0, -1, 0)
 
     def pulse(self, width: Duration, at: Duration = "0 s") -> None:
-        """High for so long."""
+        """Drive it high for `width`."""
         begin = duration_ns(at, "at")
         self.set(1, f"{begin} ns")
         self.set(0, f"{begin + duration_ns(width, 'pulse')} ns")
 
 
 class Encoder:
-    """An incremental encoder on two pins of the board: channel A gives edges, B says which way."""
+    """An incremental encoder on two pins of the board: channel A gives edges, B the direction."""
 
     def __init__(self, bench: BoardAlone, pin_a: int, pin_b: int) -> None:
         self.bench = bench
@@ -301,7 +301,7 @@ class Encoder:
         bench.chip.listen_to_edges(self.buffer, pin_a, pin_b)
 
     def turn(self, edges: int, period: Duration, forward: bool = True) -> None:
-        """So many edges from now on, one each `period`; pass the time afterwards. Call it again when they are over."""
+        """Send `edges` edges from now on, one per `period`; pass the time afterwards, then call it again."""
         if self.buffer.read == self.buffer.count:
             self.buffer.clear()
         time_ns, period_ns = self.bench.now, duration_ns(period, "turn: period")
@@ -313,13 +313,13 @@ class Encoder:
 
 
 class Outputs(Outbox):
-    """Takes what the board puts out: frames to its buses, the rest to where the test looks."""
+    """Receives the board's outputs: frames go to its buses, the rest to logs that the test reads."""
 
     def __init__(self, bench: BoardAlone) -> None:
         self.bench = bench
 
     def push(self, time, order, kind, a=0, b=0, c=0, d=0, e=0, f=0, ref=None):  # type: ignore[no-untyped-def]
-        """One stamped message of the board; 0, as the compiled caller wants a number."""
+        """Take one stamped message of the board; returns 0, because the compiled caller needs a number."""
         bench = self.bench
         if kind == CAN_REQUEST:
             bench.buses_of[a][0].request(bench.buses_of[a][1], b, time, c, d, e, f)
@@ -339,10 +339,10 @@ class Outputs(Outbox):
 
 
 class BoardAlone(Bench):
-    """Board `name` of the robot, alone. `chip` is the board itself: everything of it may be looked at.
+    """Board `name` of the robot without the others. `chip` is the board itself: all of it may be inspected.
 
-    quirks: switches of the firmware; bit_rate of its buses; network_time: the router's time comes every ms, as the
-    board is used to; crystal_ppb: how far its clock is off; firmware: a folder of C that the board runs, in this
+    quirks: switches of the firmware; bit_rate of its buses; network_time: the router's time arrives every ms, as on the
+    robot; crystal_ppb: the error of its clock; firmware: a folder of C that the board runs, in this
     process; function names for `replace` are those of its schedule.
     """
 
@@ -387,7 +387,7 @@ class BoardAlone(Bench):
             self.call_at(SYNC_NS, self._send_time, SYNC_NS)
 
     def _board_in_c(self, firmware: Firmware, crystal: Crystal) -> Any:
-        """The board with a program in C, which was tried in another process before."""
+        """The board with a program in C, first tried in another process."""
         from ranger_sim.harness.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
         name = self.name
@@ -401,10 +401,10 @@ class BoardAlone(Bench):
         board.leave_record_in(*crash.record_of(name, firmware.library, firmware.folder))
         return board
 
-    # --- driving it ---------------------------------------------------------------------------------------
+    # --- inputs ------------------------------------------------------------------------------------------
 
     def pin(self, name: str) -> Pin:
-        """A digital pin, as harness/wiring/ranger.py names it: `board.pin("limit_switch_left").set(1)`."""
+        """A digital pin, named as in harness/wiring/ranger.py: `board.pin("limit_switch_left").set(1)`."""
         pins = wiring.PINS.get(self.name, {})
         pin = Pin(self, name, self._place("pin", name, pins))
         pin.log = self.pin_log[pin.number]
@@ -416,7 +416,7 @@ class BoardAlone(Bench):
         self.chip.analog.set_pair(place, self.now, volts, self.now + 1, volts)
 
     def word(self, name: str, value: int) -> None:
-        """What a digital sensor holds out: `board.word("absolute_encoder", 4590)`."""
+        """Set a digital sensor's word: `board.word("absolute_encoder", 4590)`."""
         registers = {
             each.register: wiring.WORD_REGISTERS[each.register] for each in wiring.WORDS if each.board == self.name
         }
@@ -441,16 +441,16 @@ class BoardAlone(Bench):
         return self.node_on[name]
 
     def uart(self, number: int, data: bytes, byte_time: Duration = "21714 ns") -> None:
-        """Bytes to a UART from now on, each taking so long (10 bits at 460,526 baud)."""
+        """Send bytes to a UART from now on, each taking `byte_time` (10 bits at 460,526 baud)."""
         time_ns = self.now
         for byte in data:
             time_ns += duration_ns(byte_time, "byte_time")
             self.chip.inbox.push(time_ns, ORDER_PINS, UART_BYTE, number, byte, 0, 0, 0)
 
     def replay(self, frames: Iterable[Frame]) -> int:
-        """Send what others sent in a recording, at its pace from now on; how many frames that are.
+        """Send what others sent in a recording, at its pace from now on; returns the number of frames.
 
-        `frames`: of replay.read_log. What the board itself publishes is left out, as it sends that again. The frames
+        `frames`: of replay.read_log. The board's own publications are left out, because it sends them again. The frames
         must be of buses that the board is on.
         """
         from ranger_sim.harness.testing.replay import into_board
@@ -461,7 +461,7 @@ class BoardAlone(Bench):
         """Put your own function in a schedule entry; it declares its cost in cycles."""
         self.chip.scheduler.replace(task, function, cost=cost, limit=limit)
 
-    # --- looking at it ------------------------------------------------------------------------------------
+    # --- outputs -----------------------------------------------------------------------------------------
 
     @property
     def duty(self) -> float:
@@ -469,14 +469,14 @@ class BoardAlone(Bench):
         return self.pwm_log[-1][1] if self.pwm_log else 0.0
 
     def errors(self) -> dict[str, int]:
-        """How often it noted each error, by name."""
+        """How often it recorded each error, by name."""
         from ranger_sim.harness.records.summary import errors
 
         return errors(self.chip.counters())
 
     @property
     def overruns(self) -> int:
-        """Slots that took longer than they may."""
+        """The number of slots that took longer than allowed."""
         return int(self.chip.counters().slots.overruns)
 
     # --- inside -------------------------------------------------------------------------------------------

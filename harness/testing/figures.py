@@ -1,4 +1,4 @@
-"""What a test measured, with its limit: for messages and for JUnit properties."""
+"""Measurements of a test, with their limits: for messages and for JUnit properties."""
 
 import dataclasses
 from typing import Any
@@ -13,12 +13,12 @@ class Figure:
     limit: str
 
     def text(self) -> str:
-        """As one value: measured, and the limit behind it."""
+        """As one value: measured, and the limit after it."""
         return f"{self.measured} (limit {self.limit})" if self.limit else self.measured
 
 
 class Observed:
-    """What harness.testing keeps beside a robot: the last frames, what was measured on them, perhaps a timeline."""
+    """Records of harness.testing for a robot: the last frames, measurements on them, perhaps a timeline."""
 
     def __init__(self, keeper: Any) -> None:
         self.keeper = keeper
@@ -26,5 +26,5 @@ class Observed:
         self.timeline: Any = None  # a harness.timeline.Timeline
 
     def note(self, name: str, measured: str, limit: str = "") -> None:
-        """Keep a figure."""
+        """Record a figure."""
         self.figures.append(Figure(name, measured, limit))

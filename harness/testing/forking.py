@@ -1,9 +1,9 @@
 """A test in a forked process: it has its own copy of everything that was warmed up before, and leaves nothing behind.
 
 Both processes run pytest's own protocol, each phase with the hooks of every plugin. The child has the test: function
-fixtures, body and their tear-down. The parent has three stand-ins on the item (`setup`, `runtest`, `teardown`), each of
-which lets the child run one phase, waits, and raises what was raised there. So whatever plugins do around a phase acts
-on the test in the child, and on its report in the parent: reruns, time limits, records of outcomes.
+fixtures, body and their tear-down. The parent has three substitutes on the item (`setup`, `runtest`, `teardown`), each
+of which lets the child run one phase, waits, and raises what was raised there. So all that plugins do around a phase
+acts on the test in the child, and on its report in the parent: reruns, time limits, records of outcomes.
 
 The parent takes over the child's reports, warnings and properties. Fixtures of a wider scope are set up and torn down
 in the parent. A child that dies is a failed phase whose message names the signal.
@@ -49,7 +49,7 @@ def possible(config: pytest.Config) -> bool:
 
 
 class Pickler(pickle.Pickler):
-    """pytest's outcomes (skip, fail, xfail) say that they are of `builtins`, where pickle does not find them."""
+    """pytest's outcomes (skip, fail, xfail) claim the module `builtins`, where pickle does not find them."""
 
     def reducer_override(self, value: Any) -> Any:
         name = getattr(value, "__name__", "")
@@ -71,7 +71,7 @@ def pickled(value: Any) -> bytes:
 
 
 class Channel:
-    """Messages between the two processes, each a pickle behind its length."""
+    """Messages between the two processes, each a pickle after its length."""
 
     def __init__(self, end: socket.socket, process: int = 0) -> None:
         self.end = end
@@ -85,13 +85,13 @@ class Channel:
                 self.watched.append(self.death)
 
     def send(self, message: Any) -> None:
-        """Nothing where the other side is gone."""
+        """Send a message; does nothing where the other side is gone."""
         data = pickled(message)
         with contextlib.suppress(OSError):
             self.end.sendall(len(data).to_bytes(HEAD) + data)
 
     def receive(self, within_s: float | None = None) -> Any:
-        """The next message; None when the other side has ended, or after `within_s`."""
+        """Return the next message; None when the other side has ended, or after `within_s`."""
         __tracebackhide__ = True
         end = None if within_s is None else wallclock.monotonic_s() + within_s
         while True:
@@ -121,7 +121,7 @@ class Channel:
 
 
 class ForkedTest:
-    """The stand-ins of a test in the parent, for one attempt at it.
+    """The substitutes of a test in the parent, for one attempt at it.
 
     `prepare` is called directly before the process is forked; where it returns False the test runs in the parent.
     """
@@ -136,11 +136,11 @@ class ForkedTest:
             setattr(item, place, getattr(self, place))
 
     def withdraw(self) -> None:
-        """The item has its own methods again."""
+        """Give the item its own methods back."""
         for place in PLACES:
             self.item.__dict__.pop(place, None)
 
-    # ---- in the place of the item's own
+    # ---- instead of the item's own
 
     def setup(self) -> None:
         __tracebackhide__ = True
@@ -193,9 +193,9 @@ class ForkedTest:
     def adopt(
         self, reply: dict[str, Any] | None, when: str, reason: BaseException | None = None
     ) -> BaseException | None:
-        """Take over what the child sent of a phase; returns what was raised in it.
+        """Take over the child's data of a phase; returns what was raised in it.
 
-        reason: the parent interrupted the phase with this; the child's report counts where it is about the same.
+        reason: the exception by which the parent interrupted the phase; the child's report counts if it matches.
         """
         if reply is None:
             return None
@@ -223,7 +223,7 @@ class ForkedTest:
         return report
 
     def close(self) -> None:
-        """The child is gone after this."""
+        """End the child."""
         if self.child is not None:
             self.child.end()
 
@@ -265,13 +265,13 @@ class Child:
         self.channel = Channel(ours, self.process)
 
     def phase(self, when: str) -> dict[str, Any] | None:
-        """What the child sends of a phase; None when it ends in it."""
+        """Run a phase; returns what the child sends, None when it ends in it."""
         __tracebackhide__ = True
         self.channel.send(when)
         return self._reply(None)
 
     def interrupted(self, reason: BaseException) -> dict[str, Any] | None:
-        """What it sends of its phase when `reason` is raised there; None, and it is gone, when that takes too long."""
+        """Raise `reason` in its phase; returns what it sends, None after ending it when that takes too long."""
         self.channel.send({"raise": sendable(reason)})
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.process, signal.SIGINT)
@@ -302,7 +302,7 @@ class Child:
         self.end()
 
     def end(self) -> None:
-        """Wait for its end: behind its last phase, or because no other one is asked for."""
+        """Wait for its end: after its last phase, or because no other one is requested."""
         if self.status is None:
             self.channel.send(END)
             self.channel.close()
@@ -310,7 +310,7 @@ class Child:
 
 
 def set_up_wider_fixtures(item: pytest.Item) -> None:
-    """In the parent: the fixtures of a wider scope that a test asks for, as they serve other tests as well."""
+    """Set up in the parent the requested fixtures of a wider scope, because other tests use them as well."""
     known = getattr(getattr(item, "_fixtureinfo", None), "name2fixturedefs", {})
     for name in getattr(item, "fixturenames", ()):
         if name in known and known[name][-1].scope != "function":
@@ -323,7 +323,7 @@ def error_of(reply: dict[str, Any]) -> BaseException | None:
         return None
     try:
         error = pickle.loads(reply["error"])  # noqa: S301  (it comes from our own child)
-    except Exception:  # a class that cannot be made of what it prints
+    except Exception:  # a class that cannot be made from its text
         error = None
     if isinstance(error, BaseException):
         return error
@@ -334,7 +334,7 @@ def error_of(reply: dict[str, Any]) -> BaseException | None:
 
 
 def stop_as(session: pytest.Session, wanted: tuple[bool | str, bool | str]) -> None:
-    """Stop the session where the other process has reason to."""
+    """Stop the session where the other process requests it."""
     shouldfail, shouldstop = wanted
     if shouldfail and not session.shouldfail:
         session.shouldfail = shouldfail
@@ -362,9 +362,9 @@ def serve(test: ForkedTest, channel: Channel) -> None:
     item = test.item
     item.stash[CHILD] = True
     test.withdraw()
-    gc.freeze()  # what the parent made is not for this process to finalize
+    gc.freeze()  # this process must not finalize the parent's objects
     stack = item.session._setupstate.stack
-    stack.pop(item)  # it is set up here, in a phase of its own
+    stack.pop(item)  # it is set up here, in its own phase
     for finalizers, _ in stack.values():
         finalizers.clear()  # the parent tears down what it has set up
     forward_reports(item, channel)
@@ -390,7 +390,7 @@ def serve(test: ForkedTest, channel: Channel) -> None:
 
 
 def run_phase(item: pytest.Item, when: Any, interruptible: Interruptible) -> dict[str, Any]:
-    """A phase with the hooks of all plugins, and what became of it."""
+    """Run a phase with the hooks of all plugins; returns its result."""
     hook, config = item.ihook, item.config
     run = getattr(hook, f"pytest_runtest_{when}")
     more = {"nextitem": None} if when == "teardown" else {}
@@ -412,9 +412,9 @@ def run_phase(item: pytest.Item, when: Any, interruptible: Interruptible) -> dic
 
 
 class Interruptible:
-    """SIGINT interrupts what runs here, and nothing else: a reply that is made is not for the parent to break off.
+    """Lets SIGINT interrupt what runs within it, and nothing more: the parent must not interrupt a reply in progress.
 
-    What it raises is the parent's reason, where that sent one: a time limit is exceeded at the line that takes so long.
+    It raises the parent's reason, where that sent one: a time limit is exceeded at the line that takes so long.
     """
 
     def __init__(self, channel: Channel) -> None:
@@ -439,7 +439,7 @@ class Interruptible:
 
 
 def forward_reports(item: pytest.Item, channel: Channel) -> None:
-    """A report that is logged while a phase runs (of a subtest) is logged by the parent."""
+    """Let the parent log reports that are logged while a phase runs (of a subtest)."""
     manager: Any = item.config.pluginmanager
     session = item.session
     execute = manager._inner_hookexec
@@ -455,7 +455,7 @@ def forward_reports(item: pytest.Item, channel: Channel) -> None:
 
 
 def sendable(value: Any, instead: Any = None) -> Any:
-    """`value`, or something else where it cannot be sent."""
+    """`value`, or `instead` where it cannot be sent."""
     try:
         pickled(value)
     except Exception:
@@ -464,7 +464,7 @@ def sendable(value: Any, instead: Any = None) -> Any:
 
 
 def sendable_report(report: Any) -> Any:
-    """`report` without what plugins attached to it that cannot be sent."""
+    """`report` without attachments of plugins that cannot be sent."""
     copied = copy.copy(report)
     copied.longrepr = sendable(report.longrepr, report.longreprtext)
     copied.user_properties = [(name, sendable(value, str(value))) for name, value in report.user_properties]
@@ -475,7 +475,7 @@ def sendable_report(report: Any) -> Any:
 
 
 def save_coverage() -> None:
-    """If coverage is measured, what was measured in this process."""
+    """Save this process's coverage, if coverage is measured."""
     module = sys.modules.get("coverage")
     measuring = module.Coverage.current() if module is not None else None
     if measuring is not None:

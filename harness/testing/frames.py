@@ -1,4 +1,4 @@
-"""Frames as tests read them, and what keeps the last of them while a robot or a board runs."""
+"""Frames for tests, and a keeper of the last of them while a robot or a board runs."""
 
 import collections
 import functools
@@ -10,11 +10,11 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.names import Names
 
 WINDOW_S = 20.0  # how much is kept: some 30 steps of a walk, 16 MB for all four buses (chosen by us)
-ROW = 3  # numbers per frame in a stream: foundation/row_stream.py says which
+ROW = 3  # numbers per frame in a stream: see foundation/row_stream.py
 
 
 class Words(NamedTuple):
-    """What a frame is made of; `time_ns` is when receivers had it, counted as the machine counts."""
+    """The parts of a frame; `time_ns` is when receivers had it, in the machine's time."""
 
     time_ns: int
     bus: str
@@ -36,12 +36,12 @@ class Frame(Words):
 
     @property
     def time_s(self) -> float:
-        """When, in s."""
+        """Its time, s."""
         return self.time_ns * 1e-9
 
     @property
     def value(self) -> float:
-        """The value word as the table's type reads it; of an identifier without one, as it is."""
+        """The value word as the table's type reads it; unchanged for an identifier without one."""
         return self.names.value(self.identifier, self.lo)
 
     @property
@@ -51,7 +51,7 @@ class Frame(Words):
 
     @property
     def is_error(self) -> bool:
-        """An error frame of the bus: not a frame of anybody."""
+        """Whether it is an error frame of the bus, which has no sender."""
         return bool(self.flags & FLAG_ERROR)
 
     def text(self) -> str:
@@ -66,14 +66,14 @@ class Frame(Words):
 
 @functools.cache
 def frame_type(names: Names) -> type[Frame]:
-    """Frames that are called by these names."""
+    """The class of frames with these names."""
     return type("Frame", (Frame,), {"names": names, "__doc__": Frame.__doc__})
 
 
 class FrameKeeper:
     """Keeps the frames of the last `window_s` that pass through `streams`: {bus: its FrameStream}.
 
-    `from_ns`: since when they are kept, by bus; above 0 for a keeper that was made when time had passed already.
+    `from_ns`: since when they are kept, by bus; above 0 for a keeper made after time had passed.
     """
 
     def __init__(self, streams: dict[str, Any], names: Names, window_s: float = WINDOW_S, from_ns: int = 0) -> None:
@@ -102,14 +102,14 @@ class FrameKeeper:
         return keep
 
     def add_earlier(self, bus: str, block: bytes) -> None:
-        """Frames of a bus from before the keeper was made, in their order."""
+        """Add frames of a bus from before the keeper was made, in their order."""
         if block:
             self.blocks[bus].append((memoryview(block).cast("q")[-ROW], block))
 
     def check(self, bus: str, since_ns: int | None = None) -> None:
-        """UserError where frames are asked for that are not kept: those since then, or, None, any of a late keeper."""
+        """UserError for requested frames that are not kept: those since `since_ns`, or, None, any of a late keeper."""
         if bus not in self.streams:
-            return  # `frames` says it
+            return  # `frames` reports it
         self.streams[bus].flush()
         begin_ns = self.from_ns[bus]
         if since_ns is None and self.late_ns and not self.blocks[bus] or since_ns is not None and since_ns < begin_ns:

@@ -1,9 +1,9 @@
-"""Looks for what no healthy robot does: overruns, lost frames, bus errors, bus-off, errors beyond the normal, a fall.
+"""Checks for what no healthy robot does: overruns, lost frames, bus errors, bus-off, errors beyond the normal, a fall.
 
-A fault that a test has injected and that never acted is told as well: what the test saw proves nothing about it.
+It also reports an injected fault that never acted: what the test saw proves nothing about that fault.
 
-Normal is what the columns normal_per_s and normal_at_start of the master table's errors.csv say. A test may expect what
-is not normal; what it expects and does not come is a fault as well.
+The columns normal_per_s and normal_at_start of the master table's errors.csv define what is normal. A test may expect
+what is not normal; an expected event that does not occur is a fault as well.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ from ranger_sim.harness.names import Names, meant
 from ranger_sim.harness.normal_errors import most_normal
 from ranger_sim.harness.records import vital_signs
 
-# What else a board notes when something that the test expects happens.
+# Further errors of a board when an event that the test expects occurs.
 OF_OVERRUNS = ("ASCHED_DNF", "SCHED_SLOT_NEAR_LIMIT", "SCHED_TASK_LIMIT")
 OF_BUS_ERRORS = re.compile(r"CAN\d_(BUS_RX|BUS_TX|ERR_WARN|ERR_PASS|TX_BUSOFF)")
 OF_BUS_OFF = re.compile(r"CAN\d_\w+")
@@ -31,8 +31,8 @@ class Expected:
     """What a test expects beyond the normal, and fails without.
 
     errors: names of the table, or "MCH:AE_SPIKE" for one board. overruns, lost_frames, bus_errors, bus_off, dead: True
-    (at least one), a number (exactly so many), or the name of the board or bus that has them. fall: it falls.
-    idle_faults: injected faults that do not act, as the others; a name is place and mode.
+    (at least one), a number (exactly that many), or the name of the board or bus that has them. fall: it falls.
+    idle_faults: injected faults that do not act, in the same form; a name is place and mode.
     """
 
     errors: tuple[str, ...] = ()
@@ -45,7 +45,7 @@ class Expected:
     idle_faults: Amount = False
 
     def check(self, names: Names, boards: Iterable[str]) -> None:
-        """UserError for an error that the table has not, and for a board that is none of the machine's."""
+        """UserError for an error that is not in the table, and for a board that the machine does not have."""
         for text in self.errors:
             board, _, name = text.rpartition(":")
             if name not in names.codes:
@@ -56,18 +56,18 @@ class Expected:
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """Everything that is counted, at one instant."""
+    """All counts at one time."""
 
     time_ns: int
     boards: Mapping[str, ProgramCounters]
-    lost: Mapping[str, int]  # by bus: frames that a listening node did not get
+    lost: Mapping[str, int]  # by bus: frames that a receiving node did not get
     bus_errors: Mapping[str, int]  # by bus
     flushed: Mapping[str, int]  # by board: frames that waited when it went bus-off
     off: tuple[str, ...]  # boards with a controller that is bus-off now
 
 
 def look(robot: Any) -> Seen:
-    """Count."""
+    """Take the counts."""
     boards = robot.counters()
     lost, errors = {}, {}
     flushed: dict[str, int] = {}
@@ -87,9 +87,9 @@ def look(robot: Any) -> Seen:
 
 
 class Health:
-    """Watches `robot` from now on; `faults` says what happened since, and begins anew.
+    """Monitors `robot` from now on; `faults` returns what happened since, and starts again.
 
-    from_power_up: what has happened since power-up counts as well, and what comes once after it is normal.
+    from_power_up: events since power-up count as well, and errors that are normal once after it are accepted.
     """
 
     def __init__(self, robot: Any, from_power_up: bool = False) -> None:
@@ -97,10 +97,10 @@ class Health:
         whole = from_power_up or robot.loop.time <= robot.start_ns
         self.before: Seen | None = None if whole else look(robot)
         self.had_fallen = bool(robot.ended) and not whole
-        self.judged_faults = 0 if whole else len(robot.faults)  # injected before this watching began
+        self.judged_faults = 0 if whole else len(robot.faults)  # injected before monitoring began
 
     def faults(self, expected: Expected | None = None) -> list[str]:
-        """What was not to be expected and happened, or was expected and did not; a line for each."""
+        """A line for each unexpected event, and for each expected one that did not occur."""
         wanted = expected if expected is not None else Expected()
         wanted.check(self.robot.names, self.robot.boards)
         now, before = look(self.robot), self.before
@@ -159,7 +159,7 @@ class Health:
         )
 
     def _bus_off(self, now: Seen, before: Seen | None) -> dict[str, int]:
-        """Boards that are bus-off, or were: their error module tells it, or frames were thrown away."""
+        """Boards that are bus-off, or were: their error module reports it, or frames were discarded."""
         found = since(now.flushed, before.flushed if before is not None else {})
         for name, board in now.boards.items():
             for code, total in enumerate(board.errors):
@@ -174,7 +174,7 @@ class Health:
         return {name: 0 if vital_signs.alive(self.robot, board) else 1 for name, board in now.boards.items()}
 
     def _idle(self) -> dict[str, int]:
-        """How many of the faults that were injected since then have not acted, by place; but for those called off."""
+        """How many faults injected since then have not acted, by place; without cancelled ones."""
         idle: dict[str, int] = {}
         for fault in self.robot.faults[self.judged_faults :]:
             called_off = fault.stop_wanted and fault.activated_ns < 0
@@ -194,7 +194,7 @@ class Health:
 
 
 def excused(wanted: Expected, board: str, name: str) -> bool:
-    """Whether an error belongs to something else that the test expects."""
+    """Whether an error follows from another event that the test expects."""
     if wanted.overruns and name in OF_OVERRUNS:
         return not isinstance(wanted.overruns, str) or wanted.overruns == board
     if wanted.bus_off and OF_BUS_OFF.fullmatch(name):
@@ -208,9 +208,9 @@ def since(now: Mapping[str, int], before: Mapping[str, int]) -> dict[str, int]:
 
 
 def amount(what: str, wanted: Amount, found: Mapping[str, int], may_be: bool = False) -> list[str]:
-    """Lines for what is there and was not wanted, or wanted and is not there; `found`: how many, by board or bus.
+    """Lines for unexpected counts, and for missing expected ones; `found`: how many, by board or bus.
 
-    may_be: it follows from something else that the test expects.
+    may_be: it follows from another event that the test expects.
     """
     there = {name: count for name, count in found.items() if count}
     told = ", ".join(f"{name} {count}" for name, count in there.items())

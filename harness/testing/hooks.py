@@ -1,4 +1,4 @@
-"""What a project's conftest.py tells the plugin."""
+"""The hooks by which a project's conftest.py configures the plugin."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import pytest
 
 @pytest.hookspec(firstresult=True)
 def pytest_machine(wanted: dict[str, Any]) -> Any:
-    """The machine of the fixture `machine`, fresh: a `harness.machine.Machine`.
+    """The machine of the fixture `machine`, newly made: a `harness.machine.Machine`.
 
     wanted: the keywords of the mark `machine`, and the seed.
 

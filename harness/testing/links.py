@@ -1,4 +1,4 @@
-"""The other end of the serial link, for router or main brain alone: exchanges every 200 us, as on the robot."""
+"""The other end of the serial link, for a single router or main brain: exchanges every 200 us, as on the robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DATA_8 = 8
 
 
 class Link:
-    """What the test is to the board over the link. `heard`: frames of the board, stamped when they were whole here."""
+    """The test's end of the link. `heard`: frames of the board, stamped when they were complete here."""
 
     def __init__(self, bench: BoardAlone) -> None:
         self.bench = bench
@@ -28,7 +28,7 @@ class Link:
         self.errors: list[int] = []  # codes that this end would report
 
     def send(self, what: str | int, value: float, stamp_ms: int | None = None) -> None:
-        """Send a variable with the next exchange that has room."""
+        """Send a variable with the next exchange that has space."""
         identifier = RANGER.identifier(what)
         stamp = self.bench.now // 1_000_000 if stamp_ms is None else stamp_ms
         self.send_words(identifier, word_of_value(all_variables.TYPES[identifier], value), stamp & 0xFFFFFFFF)
@@ -39,24 +39,24 @@ class Link:
         return [frame for frame in self.heard if wanted is None or frame.identifier == wanted]
 
     def note(self, time_ns: int, identifier: int, lo: int, hi: int) -> None:
-        """A frame of the board has come."""
+        """Take a frame of the board."""
         self.heard.append(frame_type(RANGER)(time_ns, "link", identifier, DATA_8, lo, hi))
 
     def send_words(self, identifier: int, lo: int, hi: int) -> None:
-        """Send a frame as it is."""
+        """Send a frame unchanged."""
         raise NotImplementedError
 
     def from_board(self, kind: int, time_ns: int, segment: Any) -> None:
-        """The board starts an exchange, or puts up its next segment."""
+        """Handle the board's start of an exchange, or its next segment."""
         raise NotImplementedError
 
     def deliver(self, time_ns: int, segment: Any) -> None:
-        """A segment is whole at the board at `time_ns`."""
+        """Deliver a segment, complete at the board at `time_ns`."""
         self.bench.chip.inbox.push(time_ns, ORDER_INTERRUPTS, SSP_SEGMENT, 0, 0, 0, 0, 0, 0, segment)
 
 
 class BrainsEnd(Link):
-    """The test stands in for the main brain; the router is the master and exchanges when it likes."""
+    """The test replaces the main brain; the router is the master and starts the exchanges."""
 
     def __init__(self, bench: BoardAlone) -> None:
         Link.__init__(self, bench)
@@ -76,7 +76,7 @@ class BrainsEnd(Link):
 
 
 class RoutersEnd(Link):
-    """The test stands in for the router: an exchange every 200 us."""
+    """The test replaces the router: an exchange every 200 us."""
 
     def __init__(self, bench: BoardAlone) -> None:
         Link.__init__(self, bench)

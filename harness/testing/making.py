@@ -1,4 +1,4 @@
-"""A machine for a test, as it was ordered: fresh or warmed up, observed from power-up, perhaps with a timeline."""
+"""Makes the machine that a test ordered: new or warmed up, observed from power-up, perhaps with a timeline."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ranger_sim.harness.testing.backends import SIM
 from ranger_sim.harness.testing.wire import observe
 
 TRACED_S = 10.0  # how much of a machine's last time its timeline keeps: some 16 steps of a robot that walks
-WARM_UP_LIMIT = "1 h"  # of virtual time: the warm-up of a test is told to have failed after it
+WARM_UP_LIMIT = "1 h"  # of virtual time: the warm-up of a test fails after it
 OTHERS = ("warmed_up", "trace")
 
 
 class Order(Protocol):
-    """What machine is wanted. Equal orders give equal machines, so one that is warmed up can serve for another."""
+    """The description of a machine. Equal orders give equal machines, so a warmed-up one can serve for another."""
 
     @property
     def seed(self) -> int: ...
@@ -34,10 +34,10 @@ class Order(Protocol):
         """The machine at power-up."""
 
     def told(self) -> str:
-        """What it was made of, in a line of a report."""
+        """Its settings, in a line of a report."""
 
     def arguments(self) -> list[str]:
-        """Options of pytest that give it again."""
+        """Options of pytest that reproduce it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +82,7 @@ def machine_order(make: Callable[..., Any], wanted: Mapping[str, Any]) -> Machin
 
 
 def made(order: Order) -> Any:
-    """The machine that was ordered, warmed up."""
+    """The ordered machine, warmed up."""
     machine = order.fresh()
     observed = observe(machine)
     if order.trace:

@@ -1,7 +1,7 @@
 """The robot of the backends `vcan` and `hardware`: buses outside, virtual time released by the wall clock.
 
-Boards that run here are in this process. While the test does something else than passing time, virtual time stands
-still, and frames from outside wait in the interface.
+Boards that run here are in this process. While the test does not pass time, virtual time
+stops, and frames from outside wait in the interface.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ class OutsideRobot(Ranger):
             self.elsewhere = HardwareInTheLoop(self, profile, self.outside)
 
     def summary(self) -> dict:
-        """As of a robot inside; boards that are elsewhere have not failed."""
+        """The summary of any robot; boards that are elsewhere have not failed."""
         found = Ranger.summary(self)
         found["failed_boards"] = [name for name in found["failed_boards"] if name in self.here]
         return found
 
 
 def vcan_buses() -> dict[str, dict[str, Any]]:
-    """can1 ... can4 on vcan0 ... vcan3; MissingError where there are none."""
+    """can1 ... can4 on vcan0 ... vcan3; MissingError where they are missing."""
     names = [f"vcan{number}" for number in range(4)]
     lacks = [name for name in names if not Path("/sys/class/net", name).exists()]
     if not hasattr(socket, "AF_CAN") or lacks:
@@ -74,7 +74,7 @@ def vcan_buses() -> dict[str, dict[str, Any]]:
 
 
 def buses_of_profile(profile: Profile | None) -> dict[str, dict[str, Any]]:
-    """The buses that a profile puts on interfaces; UserError when there is no profile, or it has none of them."""
+    """The buses that a profile puts on interfaces; UserError without a profile, or for one without such buses."""
     if profile is None:
         raise UserError("backend hardware: a profile says what is real: --ranger-profile my.toml")
     found = {name: keywords for name, bus in profile.buses.items() if (keywords := bus.python_can()) is not None}

@@ -1,6 +1,6 @@
 """The pytest plugin: fixtures `ranger`, `machine`, `board`, `can_bus`, markers, options, reports; see docs/testing.md.
 
-Everybody's pytest imports this module, so it imports nothing of the robot before a fixture needs it.
+Every pytest run imports this module, so it imports nothing of the robot before a fixture needs it.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from ranger_sim.harness.testing.health import Expected, Health
     from ranger_sim.harness.testing.making import Order
 
-FIXTURES = ("ranger", "machine")  # that give a whole machine, watched
+FIXTURES = ("ranger", "machine")  # that give a whole machine, monitored
 SCOPES = ("function", "class", "module", "package", "session")
-MOST_KEPT = 8  # warmed-up robots that wait to be branched, some 30 MB each; chosen by us
+MOST_KEPT = 8  # warmed-up robots kept for branching, some 30 MB each; chosen by us
 LAST_FRAMES = 12  # in the report of a failure
 LAST_ERRORS = 8
 COUNTS = "RANGER_SIM_COUNTS"  # variable of the environment: the folder of what ran, as long as the tests run
@@ -71,13 +71,13 @@ class Watched:
 
 
 class WarmedUp:
-    """Robots of this process that have been warmed up once, to be branched by forking. None of them ever runs on."""
+    """Robots of this process that have been warmed up once, to be branched by forking. They never run on."""
 
     def __init__(self) -> None:
         self.kept: dict[Order, Machine] = {}
 
     def prepare(self, order: Order) -> bool:
-        """Have the robot of `order`; False when it cannot be had: the test will say why when it makes its own."""
+        """Make the robot of `order`; False when that fails: the test reports why when it makes its own."""
         from ranger_sim.foundation.user_error import UserError
         from ranger_sim.harness.testing.making import made
 
@@ -98,15 +98,15 @@ ALONE = pytest.StashKey[Any]()
 TOLD = pytest.StashKey[dict[Any, int]]()
 ROBOTS = pytest.StashKey[list[Watched]]()
 BRANCH = pytest.StashKey[bool]()
-FORKED: pytest.StashKey[ForkedTest] = pytest.StashKey()  # of a test that runs in a process of its own, in the parent
-SHELTERED = pytest.StashKey[bool]()  # in a process of its own, in which programs in C run as well
+FORKED: pytest.StashKey[ForkedTest] = pytest.StashKey()  # of a test that runs in its own process, in the parent
+SHELTERED = pytest.StashKey[bool]()  # in its own process, in which programs in C run as well
 
 
 # --- options ----------------------------------------------------------------------------------------------
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Each option has a twin in the environment; the command line comes first."""
+    """Add the options; each has an environment variable, which the command line overrides."""
     group = parser.getgroup("ranger-sim", "emulated Ranger robot")
     for name, (variable, default, text) in OPTIONS.items():
         group.addoption(
@@ -118,21 +118,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def option(config: pytest.Config, name: str) -> str:
-    """What was asked for: on the command line, in the environment, or the default."""
+    """The value on the command line, in the environment, or the default."""
     variable, default, _ = OPTIONS[name]
     given = config.getoption(f"ranger_{name}", None)
     return given if given is not None else os.environ.get(variable) or default
 
 
 def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
-    """What a conftest.py can say."""
+    """Add the hooks that a conftest.py may implement."""
     from ranger_sim.harness.testing import hooks
 
     pluginmanager.add_hookspecs(hooks)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Markers, and options that can be wrong."""
+    """Register markers, and check options."""
     for marker in MARKERS:
         config.addinivalue_line("markers", marker)
     config.stash[WARMED_UP] = WarmedUp()
@@ -154,7 +154,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
-    """With --ranger-sanitize the tests run in a process that can hold sanitizers: the same command once more."""
+    """With --ranger-sanitize, run the same command again in a process that can hold sanitizers."""
     if option(config, "sanitize") != "yes" or config.option.help:
         return None
     from ranger_sim.firmware_sim.native import sanitizers
@@ -180,7 +180,7 @@ def pytest_cmdline_main(config: pytest.Config) -> int | None:
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """How much of the firmware in C ran in all tests."""
+    """Print how much of the firmware in C ran in all tests."""
     if COUNTING not in config.stash:
         return
     from ranger_sim.firmware_sim.native import coverage
@@ -199,7 +199,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Give back what was kept."""
+    """Release what was kept."""
     for robot in config.stash[WARMED_UP].kept.values() if WARMED_UP in config.stash else ():
         robot.close()
     if COUNTING in config.stash:
@@ -213,7 +213,7 @@ def scope_of(fixture_name: str, config: pytest.Config) -> str:
 
 
 def order_for(node: Any, config: pytest.Config, fixture: str = "ranger") -> Order:
-    """The machine that a test (or module, or class) asks for by its marks and the options. UserError for a wrong mark.
+    """The machine that a test (module, class) requests by its marks and the options. UserError for a wrong mark.
 
     fixture: `ranger`, or `machine`, the project's own.
     """
@@ -267,10 +267,10 @@ class Maker:
 
 
 def wants_shelter(item: pytest.Item) -> bool:
-    """Whether a test has a board that runs C, in a fixture of its own.
+    """Whether a test has a board that runs C, in its own fixture.
 
-    The program is in the test's process then, where its memory, tasks and faults are within reach; and as that process
-    is the test's alone, a crash ends this test and no other.
+    The program is then in the test's process, where its memory, tasks and faults are within reach; and because that
+    process is the test's only, a crash ends this test and no other.
     """
     if option(item.config, "fork") == "no" or option(item.config, "scope") != "function":
         return False
@@ -282,7 +282,7 @@ def wants_shelter(item: pytest.Item) -> bool:
 
 
 def wants_branch(item: pytest.Item) -> str:
-    """The fixture whose machine is a branch of one that other tests have as well; empty: none."""
+    """The fixture whose machine is a branch of one shared with other tests; empty: none."""
     if option(item.config, "fork") == "no" or option(item.config, "scope") != "function":
         return ""
     for fixture in FIXTURES:
@@ -292,13 +292,13 @@ def wants_branch(item: pytest.Item) -> str:
             try:
                 return fixture if order_for(item, item.config, fixture).branches else ""
             except UserError:
-                return ""  # the fixture says it
+                return ""  # the fixture reports it
     return ""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip what the backend cannot carry; a mark that a robot of a wider scope could not heed is a mistake."""
+    """Skip what the backend does not support; refuse a mark that a robot of a wider scope cannot apply."""
     scope = option(item.config, "scope")
     if scope != "function" and any(mark.name in ("ranger", "machine", "board", "can_bus") for mark in item.own_markers):
         pytest.fail(f"the fixtures have the scope {scope}: their marks belong there (pytestmark = ...)", pytrace=False)
@@ -327,7 +327,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def fork(item: pytest.Item) -> None:
-    """A test of a warmed-up robot runs in a branch of it: a forked process; one of firmware in C in one of its own."""
+    """Run a test of a warmed-up robot in a forked branch of it; one of firmware in C in its own process."""
     shelter, fixture = wants_shelter(item), wants_branch(item)
     if not shelter and not fixture:
         return
@@ -356,7 +356,7 @@ def backend_of(item: pytest.Item) -> str:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
-    """After the test's body its robots are looked at: what no healthy robot does fails the test."""
+    """Check a test's robots after its body: what no healthy robot does fails the test."""
     try:
         result = yield
     except Exception as error:
@@ -382,12 +382,12 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
 
 
 def uses_ranger(item: pytest.Item) -> bool:
-    """Whether it is about the robot that is ours."""
+    """Whether the test is about Ranger."""
     return "ranger" in getattr(item, "fixturenames", ())
 
 
 def new_findings(item: pytest.Item) -> list[Any]:
-    """What sanitizers have found in firmware in C since they were asked last."""
+    """What sanitizers have found in firmware in C since the last call."""
     firmware = {
         each.library: each for watched in robots_of(item) for each in getattr(watched.robot, "firmware", {}).values()
     }
@@ -421,7 +421,7 @@ def robots_of(item: pytest.Item) -> list[Watched]:
 
 
 def cut_traceback(error: Exception) -> None:
-    """A mistake in a call of ours is shown where the test made it, without the way through our rooms."""
+    """Show a mistake in a call of ours where the test made it, without the frames of our packages."""
     from ranger_sim import loading
     from ranger_sim.foundation.user_error import UserError
 
@@ -439,14 +439,14 @@ def cut_traceback(error: Exception) -> None:
 
 
 def is_missing(error: Exception) -> bool:
-    """Whether a test met something that its backend has not."""
+    """Whether a test used something that its backend does not have."""
     from ranger_sim.harness.testing.backends import MissingError
 
     return isinstance(error, MissingError)
 
 
 def expected_of(item: pytest.Item) -> Expected:
-    """What the marks of a test say that must happen. UserError for a wrong mark."""
+    """What must happen by the marks of a test. UserError for a wrong mark."""
     import dataclasses
 
     from ranger_sim.foundation.user_error import UserError
@@ -467,9 +467,9 @@ def expected_of(item: pytest.Item) -> Expected:
 
 
 class Reports:
-    """A plugin of its own, as a module has one function for each hook: reports of forked tests.
+    """A separate plugin, because a module has one function for each hook: reports of forked tests.
 
-    What the test's process reported comes before what pytest would make of the outcome here.
+    The reports of the test's process come before what pytest would make of the outcome here.
     """
 
     @pytest.hookimpl(tryfirst=True)
@@ -478,14 +478,14 @@ class Reports:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Plugins have added what they know in both processes."""
+        """Remove duplicates: plugins have added their data in both processes."""
         if vars(report).pop("forked", False):
             report.sections = list(dict.fromkeys(report.sections))
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
-    """A report about a robot says what it ran with; that of a failure also how it comes again, and what came last."""
+    """Add a robot's settings to its report; to that of a failure also how to repeat it, and its last events."""
     robots = robots_of(item) if call.when == "call" else []
     item.user_properties += [pair for watched in robots for pair in properties(watched)]
     report: pytest.TestReport = yield
@@ -496,7 +496,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 
 def properties(watched: Watched) -> list[tuple[str, object]]:
-    """What JUnit XML shows of a robot."""
+    """A robot's properties for JUnit XML."""
     from ranger_sim import __version__, loading
 
     found: list[tuple[str, object]] = [
@@ -510,7 +510,7 @@ def properties(watched: Watched) -> list[tuple[str, object]]:
 
 
 def description(item: pytest.Item, watched: Watched) -> str:
-    """Seed, command, what came last, and the trace, for a person who reads of a failure."""
+    """Seed, command, last events, and the trace, for the reader of a failure."""
     robot, order = watched.robot, watched.order
     command = ["pytest", item.nodeid, *order.arguments()]
     where = robot.whereabouts().replace(", in ", ", ")
@@ -527,7 +527,7 @@ def description(item: pytest.Item, watched: Watched) -> str:
 
 
 def last_errors(robot: Machine) -> list[str]:
-    """The error frames that came last, those of errors that are normal on their board left out."""
+    """The last error frames, without those of errors that are normal on their board."""
     names, keeper = robot.names, robot.observed.keeper
     numbers = names.error_variables()
     frames = sorted(frame for bus in keeper.streams for frame in keeper.frames(bus, numbers))
@@ -536,7 +536,7 @@ def last_errors(robot: Machine) -> list[str]:
 
 
 def trace_of(item: pytest.Item, watched: Watched) -> list[str]:
-    """The last seconds of a failed test as a timeline, where that is asked for: its path, or why there is none."""
+    """The last seconds of a failed test as a timeline, where requested: its path, or why it is missing."""
     timeline = watched.robot.observed.timeline
     if timeline is None:
         return []
@@ -557,18 +557,18 @@ def trace_of(item: pytest.Item, watched: Watched) -> list[str]:
 
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
 def ranger(request: pytest.FixtureRequest) -> Iterator[Ranger]:
-    """A robot as the mark `ranger` says: fresh, or warmed up. It is looked at for its health after each test."""
+    """A robot by the mark `ranger`: new, or warmed up. Its health is checked after each test."""
     yield from watched_machine(request, "ranger")
 
 
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
 def machine(request: pytest.FixtureRequest) -> Iterator[Machine]:
-    """The project's own machine, as its conftest.py makes it and the mark `machine` says; looked at as the robot is."""
+    """The project's own machine, made by its conftest.py and the mark `machine`; checked as the robot is."""
     yield from watched_machine(request, "machine")
 
 
 def watched_machine(request: pytest.FixtureRequest, fixture: str) -> Iterator[Any]:
-    """What a fixture gives, and what happens to it afterwards."""
+    """The machine of a fixture, with what follows after the test."""
     from ranger_sim.foundation.user_error import UserError
     from ranger_sim.harness.testing.backends import MissingError
     from ranger_sim.harness.testing.health import Health
@@ -599,7 +599,7 @@ def watched_machine(request: pytest.FixtureRequest, fixture: str) -> Iterator[An
 
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
 def board(request: pytest.FixtureRequest) -> Iterator[BoardAlone]:
-    """One board alone, as the mark `board` says: `@pytest.mark.board("MCH")`."""
+    """A single board, by the mark `board`: `@pytest.mark.board("MCH")`."""
     from ranger_sim.foundation.user_error import UserError
 
     mark = request.node.get_closest_marker("board")
@@ -631,7 +631,7 @@ def board_alone(mark: pytest.Mark, config: pytest.Config) -> BoardAlone:
 
 @pytest.fixture(scope=scope_of)  # type: ignore[arg-type]
 def can_bus(request: pytest.FixtureRequest) -> Iterator[BusAlone]:
-    """One bus alone, with nodes of the test's own: `can_bus.node("a")`."""
+    """A single bus with the test's own nodes: `can_bus.node("a")`."""
     from ranger_sim.foundation.user_error import UserError
     from ranger_sim.harness.testing.bench import BusAlone
 

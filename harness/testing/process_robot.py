@@ -1,4 +1,4 @@
-"""The robot of the backend `processes`: every board a process of its own, this one has body, buses and the test.
+"""The robot of the backend `processes`: every board has its own process, this one has body, buses and the test.
 
 A board that is lost ends the test (harness/processes/apart.py).
 """
@@ -21,7 +21,7 @@ class BoardLostError(AssertionError):
 
 
 class ProcessRobot(Ranger):
-    """Like Ranger; what a board has in its memory is out of reach, except for the main brain's data table."""
+    """Like Ranger; a board's memory is not accessible, except for the main brain's data table."""
 
     backend = PROCESSES
 
@@ -46,7 +46,7 @@ class ProcessRobot(Ranger):
         return done
 
     def board(self, name: str) -> Any:
-        """The board as it was built, before time passes; afterwards it is in another process: MissingError."""
+        """The built board, before time passes; MissingError afterwards, because it is in another process."""
         if self.processes is not None:
             raise MissingError(
                 f"backend processes has no board memory: {name} runs in a process of its own; "

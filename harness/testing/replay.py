@@ -1,4 +1,4 @@
-"""A recorded log into one board: what the others sent comes again, at its pace, and the board answers anew.
+"""Replays a recorded log into one board: the others' frames come at their pace, and the board answers anew.
 
 board = BoardAlone("MCH")
 board.replay(read_log("runs/walk"))       # the folder of a walk; a candump file; .mf4, .asc, .blf, .trc ...
@@ -20,7 +20,7 @@ from ranger_sim.harness.testing.frames import Frame, frame_type
 if TYPE_CHECKING:
     from ranger_sim.harness.testing.bench import BoardAlone
 
-LOST = 0.01  # of a recording's frames: with more lost it is another traffic
+LOST = 0.01  # of a recording's frames: with more lost the traffic is different
 
 
 def read_log(path: str | pathlib.Path, bus: str | None = None) -> list[Frame]:
@@ -51,7 +51,7 @@ def read_log(path: str | pathlib.Path, bus: str | None = None) -> list[Frame]:
 
 
 def into_board(board: BoardAlone, frames: Iterable[Frame]) -> int:
-    """Give the test's nodes every frame that the board did not send itself; how many they are."""
+    """Give the test's nodes every frame that the board did not send itself; returns their number."""
     own = set(board.chip.table.SEND)
     given = 0
     first_ns: int | None = None
@@ -68,7 +68,7 @@ def into_board(board: BoardAlone, frames: Iterable[Frame]) -> int:
         if first_ns is None:
             first_ns = frame.time_ns
         node = board.node_on[frame.bus]
-        # receivers are to have it at its stamp, a bit before its end; the first one begins now
+        # receivers should have it at its stamp, a bit before its end; the first one begins now
         bits = frame_bits(frame.identifier, frame.flags, frame.lo, frame.hi) - 1
         length_ns = bits * 1_000_000_000 // node.bus.bitrate
         due_ns = board.now + frame.time_ns - first_ns

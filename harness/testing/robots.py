@@ -28,7 +28,7 @@ from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, 
 from ranger_sim.harness.testing.health import Expected, Health
 from ranger_sim.harness.testing.making import made
 
-ABOUT = "firmware.json"  # beside counts: whose they are
+ABOUT = "firmware.json"  # next to counts: their firmware
 SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
 OTHERS = (
     "quirks", "profile", "warmed_up", "backend", "speed", "log", "trace",
@@ -38,9 +38,9 @@ OTHERS = (
 
 @dataclasses.dataclass(frozen=True)
 class Order:
-    """What robot is wanted. Equal orders give equal robots, so one that has been warmed up can serve for another.
+    """The description of a robot. Equal orders give equal robots, so one that has been warmed up can serve for another.
 
-    warmed_up: a condition of harness/conditions.py that holds before the test begins; empty for a fresh robot.
+    warmed_up: a condition of harness/conditions.py that holds before the test begins; empty for a new robot.
     speed: virtual seconds per second where time is released by the wall clock.
     """
 
@@ -53,13 +53,13 @@ class Order:
     log: str = "none"
     trace: bool = False  # keep a timeline (`robot.observed.timeline`)
     firmware: tuple[tuple[str, str], ...] = ()  # (board, folder) of those that run C
-    in_process: bool | None = None  # their programs run in the test's process; None: whoever makes the robot says
+    in_process: bool | None = None  # their programs run in the test's process; None: the maker of the robot decides
     sanitize: bool = False  # compiled with sanitizers
     counts: str = ""  # compiled for coverage, which goes to this folder
 
     @property
     def seed(self) -> int:
-        """Of the scenario."""
+        """Seed of the scenario."""
         return self.scenario.seed
 
     @property
@@ -68,12 +68,12 @@ class Order:
         return bool(self.warmed_up) and not self.firmware and self.backend == SIM and self.log != "full"
 
     def told(self) -> str:
-        """What it was made of, in a line of a report."""
+        """Its settings, in a line of a report."""
         scenario = self.scenario
         return f"seed {scenario.seed}, controller {scenario.controller}, body {scenario.body}, backend {self.backend}"
 
     def arguments(self) -> list[str]:
-        """Options of pytest that give it again."""
+        """Options of pytest that reproduce it."""
         chosen = ["--ranger-seed", str(self.seed), "--ranger-backend", self.backend]
         return chosen + (["--ranger-profile", self.profile] if self.profile else [])
 
@@ -96,7 +96,7 @@ class Order:
 
 
 def built(folder: str | os.PathLike, sanitize: bool = False, counts: str = "") -> Firmware:
-    """A folder of firmware in C, compiled as a test wants it."""
+    """A folder of firmware in C, compiled for a test."""
     firmware = native_boards.build(pathlib.Path(folder), sanitize, bool(counts))
     if not counts:
         return firmware
@@ -109,7 +109,7 @@ def built(folder: str | os.PathLike, sanitize: bool = False, counts: str = "") -
 
 
 def counted(counts: pathlib.Path) -> list[FileCounts]:
-    """Which lines of firmware ran in all the tests that had `counts` as their folder."""
+    """The lines of firmware that ran in all the tests that had `counts` as their folder."""
     found = []
     for about in sorted(counts.glob(f"*/{ABOUT}")):
         told = json.loads(about.read_text(encoding="utf-8"))
@@ -118,7 +118,7 @@ def counted(counts: pathlib.Path) -> list[FileCounts]:
 
 
 def order_of(wanted: Mapping[str, Any]) -> Order:
-    """The order in keywords: fields of Scenario, and those above. UserError for a keyword that is none."""
+    """The order in keywords: fields of Scenario, and those above. UserError for an unknown keyword."""
     unknown = [name for name in wanted if name not in (*SCENARIO_FIELDS, *OTHERS)]
     if unknown:
         allowed = ", ".join((*SCENARIO_FIELDS, *OTHERS))
@@ -137,19 +137,19 @@ def order_of(wanted: Mapping[str, Any]) -> Order:
 def new_robot(**wanted: Any) -> Ranger:
     """A robot: `new_robot(seed=3, controller="robust", backend="processes", warmed_up="step 3")`. Close it when done.
 
-    Its frames are kept from power-up (`robot.wire`). MissingError when this machine cannot carry the backend.
+    Its frames are kept from power-up (`robot.wire`). MissingError when this machine does not support the backend.
     """
     return robot_of(order_of(wanted))
 
 
 def robot_of(order: Order) -> Ranger:
-    """The robot that was ordered, warmed up."""
+    """The ordered robot, warmed up."""
     robot: Ranger = made(order)
     return robot
 
 
 def assert_healthy(robot: Ranger, **expected: Any) -> None:
-    """AssertionError when something happened since power-up that no healthy robot does; `expected` as in `Expected`."""
+    """AssertionError for an event since power-up that no healthy robot has; `expected` as in `Expected`."""
     faults = Health(robot, from_power_up=True).faults(Expected(**expected))
     if faults:
         raise AssertionError("\n".join(["the robot is not healthy:", *(f"  {line}" for line in faults)]))

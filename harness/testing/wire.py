@@ -1,6 +1,6 @@
-"""Timing on the wire: how regularly frames come, and how long after a cause its effect, as assertions.
+"""Timing on the wire: how regularly frames come, and the time from a cause to its effect, as assertions.
 
-It holds on every backend, because it needs nothing but frames with the instants at which receivers had them. On real
+It works on every backend, because it needs only frames with the times at which receivers had them. On real
 hardware it is the slot test, together with the EXECUTION_TIME variables that every board publishes.
 
     ranger.wire("can1").assert_period("MCH_ANGLE", "2 ms", jitter="100 us")
@@ -34,7 +34,7 @@ class Intervals:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of intervals."""
         return len(self.pairs)
 
     @property
@@ -54,11 +54,11 @@ class Intervals:
 
     @property
     def jitter(self) -> float:
-        """How far the one farthest from the mean is from it."""
+        """The largest distance of an interval from the mean."""
         return max(self.max - self.mean, self.mean - self.min)
 
     def text(self) -> str:
-        """In one line."""
+        """The intervals in one line."""
         return (
             f"{self.count} intervals, least {duration_text(self.min)}, mean {duration_text(self.mean)}, "
             f"most {duration_text(self.max)}"
@@ -68,8 +68,8 @@ class Intervals:
 class Wire:
     """Frames on bus `bus` from `since_s` on; None: all that are kept (the last 20 s; frames.py).
 
-    UserError where none can be there: frames since a time before they were kept, or none yet in a machine that passed
-    time before it was asked for them. What is asserted is noted in `observed.figures`, for reports.
+    UserError where no frames can be kept: since a time before the keeping began, or in a machine that passed
+    time before the first request. Assertions are recorded in `observed.figures`, for reports.
     """
 
     def __init__(self, observed: Observed, bus: str, since_s: float | None = None, now_s: float = 0.0) -> None:
@@ -78,7 +78,7 @@ class Wire:
         self.since_s = since_s
         self.now_s = now_s
         self.keeper = observed.keeper
-        self.keeper.frames(bus, set())  # a bus that is not there is told now
+        self.keeper.frames(bus, set())  # an unknown bus is reported now
 
     def frames(self, *names: str | int) -> list[Frame]:
         """Frames of these variables (or identifiers), in their order; without a name, all."""
@@ -98,7 +98,7 @@ class Wire:
         return Intervals(f"{name} on {self.bus}", list(zip(frames, frames[1:], strict=False)))
 
     def assert_period(self, name: str | int, period: Duration, jitter: Duration = "0 us") -> Intervals:
-        """Every interval between frames of a variable is `period`, give or take `jitter`."""
+        """Assert that every interval between frames of a variable is `period` plus or minus `jitter`."""
         __tracebackhide__ = True
         wanted, allowed = duration_ns(period, "period"), duration_ns(jitter, "jitter")
         found = self.period(name)
@@ -136,9 +136,9 @@ class Wire:
         return Intervals(f"{cause} to {effect} on {self.bus}", pairs)
 
     def assert_latency(self, cause: str | int, effect: str | int, at_most: Duration, **conditions: Any) -> Intervals:
-        """After each frame of `cause` comes one of `effect` within `at_most`; `conditions` as of `latency`.
+        """Assert that one of `effect` follows each frame of `cause` within `at_most`; `conditions` as of `latency`.
 
-        A cause to which no effect has come is a miss if more than `at_most` has passed since.
+        A cause without an effect is a miss if more than `at_most` has passed since.
         """
         __tracebackhide__ = True
         allowed = duration_ns(at_most, "at_most")
@@ -157,7 +157,7 @@ class Wire:
     # --- values -------------------------------------------------------------------------------------------
 
     def assert_execution_time(self, board: str, at_most: Duration) -> float:
-        """The longest slot that `board` itself measured and sent is not longer; returns it in s."""
+        """Assert that the longest slot that `board` measured and sent is not longer; returns it in s."""
         __tracebackhide__ = True
         allowed = duration_ns(at_most, "at_most")
         known = self.keeper.names.ids
@@ -203,7 +203,7 @@ class Wire:
 
 
 def observe(robot: Any) -> Observed:
-    """What is kept with `robot`; from the first call on its frames are kept, and before it those of its log."""
+    """Records kept with `robot`; its frames are kept from the first call on, before it those of its log."""
     if robot.observed is None:
         streams = {bus.name: stream for bus, stream in zip(robot.buses, robot.recorder.frames, strict=True)}
         now_ns, log = robot.loop.time, robot.logbook

@@ -1,4 +1,4 @@
-"""One timeline of a run: slots, interrupts, frames and their ways, signals, states, faults and the body."""
+"""One timeline of a run: slots, interrupts, frames and their paths, signals, states, faults and the body."""
 
 from ranger_sim.harness.timeline.timeline import Timeline
 

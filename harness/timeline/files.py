@@ -1,4 +1,4 @@
-"""Which formats a timeline can be written in, by the suffix of the file."""
+"""The formats of a timeline's file, by its suffix."""
 
 import importlib
 import pathlib
@@ -17,7 +17,7 @@ FORMATS: dict[str, Callable[[Events, IO[bytes], str], None]] = {
     ".mcap": mcap_file.write,
 }
 
-# what each writer needs of what may not be installed
+# the optional library of each writer
 LIBRARIES = {
     ".pftrace": perfetto_file.SCHEMA,
     ".perfetto-trace": perfetto_file.SCHEMA,
@@ -27,14 +27,14 @@ LIBRARIES = {
 
 
 def format_of(path: pathlib.Path) -> Callable[[Events, IO[bytes], str], None]:
-    """What writes such a file. UserError for a suffix that means nothing here."""
+    """The writer of such a file. UserError for an unknown suffix."""
     if path.suffix not in FORMATS:
         raise UserError(f"trace {path}: suffix {path.suffix!r} is no format; there are {', '.join(FORMATS)}")
     return FORMATS[path.suffix]
 
 
 def check_target(path: pathlib.Path) -> None:
-    """Before a run: the suffix is known, what writes it is installed, and a file can be written there."""
+    """Check before a run: the suffix is known, its writer is installed, and a file can be written there."""
     format_of(path)
     importlib.import_module(LIBRARIES[path.suffix])
     if path.is_dir():
@@ -47,7 +47,7 @@ def check_target(path: pathlib.Path) -> None:
 
 
 def write(events: Events, path: pathlib.Path, title: str) -> None:
-    """The timeline into `path`, whole or not at all."""
+    """Write the timeline into `path`, whole or not at all."""
     writer = format_of(path)
     check_target(path)
     try:

@@ -1,16 +1,16 @@
-"""Flows: from the function that publishes to its frame, to the interrupt and the function that take it up.
+"""Flows: from the function that publishes to its frame, to the interrupt and the function that handles it.
 
 An arrow joins two slices. How each pair is found:
 
-- function -> frame: the function had the processor at the instant of the request. A task takes effect at its start, so
-  its start is that instant; else it is the interrupt, or the turn of the main loop, that ran then.
-- frame -> interrupt: the one that was asked for when the frame was heard. Where a frame met an interrupt that waited
-  already, its own is asked for later: it is the last such frame before. A frame that was lost has no arrow.
-- interrupt -> function: the next start of the task that empties the ring, where that board listens to the identifier.
-- through the router and over the serial link: the same identifier and both words, at the first time after they came in.
-- the main brain's function of a segment: the latest one that began before that segment was put up for sending.
+- function -> frame: the function that had the processor when the frame was requested. A task takes effect at its start,
+  so its start is that time; otherwise it is the interrupt, or the turn of the main loop, that ran then.
+- frame -> interrupt: the one requested when the frame was received. Where a frame met an interrupt that was pending
+  already, its own is requested later: it is the last such frame before. A lost frame has no arrow.
+- interrupt -> function: the next start of the task that empties the ring, where that board accepts the identifier.
+- through the router and over the serial link: the same identifier and both words, at the first time after arrival.
+- the main brain's function of a segment: the latest one that began before that segment was queued for sending.
 
-What cannot be found so has no arrow.
+A pair that these rules do not find has no arrow.
 """
 
 import itertools
@@ -33,7 +33,7 @@ IDENTIFIER_MASK = 0x7FF  # of a half-word's header on the link
 # Longest way through the router: two full transmit rings at 36 us a frame take less (chosen by us).
 LONGEST_WAY_NS = 20_000_000
 LONGEST_SERVICE_NS = 1_000_000  # from a frame to its interrupt (chosen by us: the firmware's are below 100 us)
-ROUNDING_NS = 2  # both instants are rounded to whole ns, one of them twice
+ROUNDING_NS = 2  # both times are rounded to whole ns, one of them twice
 
 
 class FlowBook:
@@ -43,7 +43,7 @@ class FlowBook:
         self.last = 0
 
     def connect(self, source: Slices, source_rows: np.ndarray, target: Slices, target_rows: np.ndarray) -> None:
-        """An arrow from source_rows[i] to target_rows[i]; a pair with a negative row has none."""
+        """An arrow from source_rows[i] to target_rows[i]; pairs with a negative row get none."""
         both = (source_rows >= 0) & (target_rows >= 0)
         source_rows, target_rows = source_rows[both], target_rows[both]
         numbers = np.arange(self.last + 1, self.last + 1 + len(source_rows), dtype=np.int64)
@@ -53,7 +53,7 @@ class FlowBook:
 
 
 def add_ends(slices: Slices, rows: np.ndarray, numbers: np.ndarray, ends: int) -> None:
-    """Flows `numbers` pass the slices `rows`, or end there."""
+    """Let flows `numbers` pass the slices `rows`, or end there."""
     slices.flow_at = np.concatenate([slices.flow_at, rows])
     slices.flow_id = np.concatenate([slices.flow_id, numbers])
     slices.flow_ends = np.concatenate([slices.flow_ends, np.full(len(rows), ends, dtype=np.int64)])
@@ -65,7 +65,7 @@ def connect_all(
     """Write every arrow that can be found into the slices."""
     book = FlowBook()
     buses = list(buses)
-    came_in: list[Passing] = []  # frames as the router got them: from its buses, and from the link
+    came_in: list[Passing] = []  # frames as the router received them: from its buses, and from the link
     for bus, hears in zip(buses, hearers(), strict=True):
         publish(book, bus, processors)
         for board, controller in hears:
@@ -76,7 +76,7 @@ def connect_all(
                 came_in.append(Passing(processors[board].fast, rows, interrupt, bus))
             else:
                 link = getattr(robot.boards[board], "can", None)
-                if link is not None:  # else nobody knows what its program listens to
+                if link is not None:  # else the identifiers that its program accepts are unknown
                     deliver(book, bus, link.receivers, rows, interrupt, processors[board])
     if ROUTER in processors and MAIN_BRAIN in processors:
         exchanges.connect(book, processors[ROUTER], processors[MAIN_BRAIN], came_in, buses)
@@ -88,7 +88,7 @@ def hearers() -> list[list[tuple[str, int]]]:
 
 
 def publish(book: FlowBook, bus: BusFrames, processors: Mapping[str, Processor]) -> None:
-    """Who asked for each frame."""
+    """Connect each frame with what requested it."""
     for node, name in enumerate(bus.nodes):
         if name not in processors:
             continue
@@ -117,7 +117,7 @@ def asking(processor: Processor, asked_ns: np.ndarray) -> list[tuple[Slices, np.
 
 
 def containing(slices: Slices, time_ns: np.ndarray) -> np.ndarray:
-    """The slice that goes on at each instant, its both ends included; -1 for none."""
+    """The slice that contains each time, both ends included; -1 for none."""
     if len(slices) == 0:
         return np.full(len(time_ns), -1, dtype=np.int64)
     rows = np.searchsorted(slices.start_ns, time_ns, side="right") - 1
@@ -128,7 +128,7 @@ def containing(slices: Slices, time_ns: np.ndarray) -> np.ndarray:
 def receive(
     book: FlowBook, bus: BusFrames, board: str, controller: int, processor: Processor
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(frames that came from others, the receive interrupt of each or -1); for the router those are fast ones."""
+    """(frames of other nodes, the receive interrupt of each or -1); for the router those are fast interrupts."""
     rows = np.flatnonzero((bus.sender != bus.nodes.index(board)) & ~bus.is_error)
     fast = board == ROUTER
     slices = processor.fast if fast else processor.services
@@ -143,9 +143,9 @@ def receive(
 
 
 def paired(came_ns: np.ndarray, asked_ns: np.ndarray, longest_ns: int) -> np.ndarray:
-    """For each frame, heard at `came_ns`, the place of its interrupt among those asked for at `asked_ns`; -1 for none.
+    """For each frame, received at `came_ns`, the index of its interrupt of those requested at `asked_ns`; -1 for none.
 
-    Both in order of time. An interrupt belongs to the frame that was heard at its request, be it with the tolerance of
+    Both in order of time. An interrupt belongs to the frame received at its request, within the tolerance of
     a rounded bit; those left over, from the last one on, to the latest frame left over before them, in `longest_ns`.
     """
     found = np.full(len(came_ns), -1, dtype=np.int64)
@@ -165,7 +165,7 @@ def paired(came_ns: np.ndarray, asked_ns: np.ndarray, longest_ns: int) -> np.nda
 
 
 def next_start(at: np.ndarray, starts_ns: np.ndarray, after_ns: np.ndarray) -> np.ndarray:
-    """The first slice of `at` that begins after each instant; -1 for none."""
+    """The first slice of `at` that begins after each time; -1 for none."""
     place = np.searchsorted(starts_ns, after_ns, side="right")
     found = np.full(len(after_ns), -1, dtype=np.int64)
     there = place < len(at)
@@ -203,7 +203,7 @@ def contents(source: Any) -> np.ndarray:
 
 
 class Direction:
-    """One direction of the link: an exchange is a slice, `exchange` says in which one each frame went."""
+    """One direction of the link: an exchange is a slice; `exchange` is the one of each frame."""
 
     def __init__(self, track: str, rows: np.ndarray, zero_ns: int) -> None:
         start, first, exchange, count = np.unique(
@@ -218,7 +218,7 @@ class Direction:
 
 
 class Exchanges:
-    """The serial link between router and main brain; `rows`: as SspWire notes them. Empty exchanges are not shown."""
+    """The serial link between router and main brain; `rows`: as SspWire records them. Empty exchanges are not shown."""
 
     def __init__(self, rows: np.ndarray, zero_ns: int) -> None:
         from_slave = rows[:, 1] == 1
@@ -228,7 +228,7 @@ class Exchanges:
     def connect(
         self, book: FlowBook, router: Processor, main_brain: Processor, came_in: list[Passing], buses: list[BusFrames]
     ) -> None:
-        """Arrows into the link, through it, and from the router on."""
+        """Write the arrows into the link, through it, and on from the router."""
         down, up = self.to_main_brain, self.to_router
         self._end(book, down, main_brain, LINK_RECEIVE_TASK)
         self._send(book, up, main_brain)
@@ -250,7 +250,7 @@ class Exchanges:
             book.connect(passing.slices, *once(passing.rows, turn, router.turns))
 
     def _end(self, book: FlowBook, direction: Direction, processor: Processor, task: str) -> None:
-        """From each exchange to the interrupt at its end, and to the task that reads it."""
+        """Connect each exchange to the interrupt at its end, and to the task that reads it."""
         at, starts = processor.fast.starts_of(LINK_INTERRUPT)
         interrupt = next_start(at, starts, direction.slices.end_ns - 1)
         book.connect(direction.slices, np.arange(len(direction.slices)), processor.fast, interrupt)
@@ -260,7 +260,7 @@ class Exchanges:
         book.connect(processor.fast, interrupt, processor.tasks, reading)
 
     def _send(self, book: FlowBook, direction: Direction, processor: Processor) -> None:
-        """From the task that packed a segment to its exchange: it was put up in an interrupt before that one."""
+        """Connect the task that packed a segment to its exchange: an earlier interrupt had queued the segment."""
         _, put_up = processor.fast.starts_of(LINK_INTERRUPT)
         before = np.searchsorted(put_up, direction.slices.start_ns, side="left") - 1
         at, starts = processor.tasks.starts_of(LINK_SEND_TASK)
@@ -278,7 +278,7 @@ def first_after(passing: Passing, content: np.ndarray, time_ns: np.ndarray) -> n
         return found
     number = numbered(np.concatenate([passing.content, content]))
     _, moment = np.unique(np.concatenate([passing.time_ns, time_ns]), return_inverse=True)
-    # one whole number of both, of which an earlier moment is the lower one
+    # one integer of both, lower for an earlier moment
     keys = number << 32 | moment.reshape(-1)
     wanted, offered = number[: len(found)], number[len(found) :]
     order = np.argsort(keys[len(found) :], kind="stable")
@@ -300,7 +300,7 @@ def numbered(content: np.ndarray) -> np.ndarray:
 
 
 def once(rows: np.ndarray, targets: np.ndarray, slices: Slices) -> tuple[np.ndarray, Slices, np.ndarray]:
-    """Pairs without repetition, as `connect` takes them: several frames may go the same way."""
+    """Pairs without repetition, as `connect` takes them: several frames may have the same pair."""
     both = (rows >= 0) & (targets >= 0)
     pairs = np.unique(rows[both] << 32 | targets[both])
     return pairs >> 32, slices, pairs & 0xFFFFFFFF

@@ -1,4 +1,4 @@
-"""Frames as slices: on each bus what was sent, and what each transmit buffer waited for it."""
+"""Frames as slices: those sent on each bus, and the wait in each transmit buffer."""
 
 from typing import Any
 
@@ -26,9 +26,9 @@ NUMPY_TYPES = {"f32": np.float32, "i32": np.int32, "u32": np.uint32}
 
 
 class BusFrames:
-    """The frames of one bus, in the order of their starts: `slices`, and columns that flows are found by.
+    """The frames of one bus, in the order of their starts: `slices`, and columns for finding flows.
 
-    `sender`: the node's number, -1 for nobody. `heard_ns`: when receivers had it, a bit before its end.
+    `sender`: the node's number, -1 for none. `heard_ns`: when receivers had it, a bit before its end.
     """
 
     def __init__(self, bus: Any, rows: np.ndarray, zero_ns: int) -> None:
@@ -65,11 +65,11 @@ class BusFrames:
         )
 
     def node_name(self, node: int) -> str:
-        """Who node number `node` is."""
+        """The name of node number `node`."""
         return self.nodes[node] if 0 <= node < len(self.nodes) else ""
 
     def _values(self) -> np.ndarray:
-        """What each frame says, by the type that the master table gives its variable; of an error frame its field."""
+        """The value of each frame, by its variable's type in the master table; of an error frame its field."""
         word = (self.low & 0xFFFFFFFF).astype(np.uint32)
         values = word.astype(np.float64)
         for kind, numpy_type in NUMPY_TYPES.items():
@@ -79,7 +79,7 @@ class BusFrames:
         return values
 
     def waits(self) -> list[Slices]:
-        """For each transmit buffer: from the request of a frame to its start. Below a bit's time nothing waited."""
+        """For each transmit buffer: from the request of a frame to its start. Below a bit's time is not a wait."""
         found = []
         for node, name in enumerate(self.nodes):
             for buffer in range(1, 4):
@@ -99,7 +99,7 @@ class BusFrames:
 
 
 def frame_name(identifier: int, flags: int) -> str:
-    """What stands on a frame: the variable's name, or the identifier of a frame that is none."""
+    """The label of a frame: the variable's name, or the identifier of a frame that is not a variable."""
     name = all_variables.NAMES.get(identifier) if not flags & FLAG_EXTENDED else None
     text = name if name is not None else f"{identifier:X}"
     return f"error frame: {text}" if flags & FLAG_ERROR else text

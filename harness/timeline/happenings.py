@@ -1,4 +1,4 @@
-"""What happens at one moment: steps, a fall, the life of faults."""
+"""Events at one moment: steps, a fall, the stamps of faults."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ STAMPS = ("armed", "activated", "acted", "ended", "cleared")
 
 
 def happenings(robot: Any) -> list[Instants]:
-    """Tracks of instants: the steps, and the faults if there were any."""
+    """Tracks of instants: the steps, and the faults, if any."""
     found = [Instants(("Steps",), steps(robot))]
     if robot.faults:
         found.append(Instants(("Faults",), faults(robot)))
@@ -37,7 +37,7 @@ def steps(robot: Any) -> list[Instant]:
 
 
 def faults(robot: Any) -> list[Instant]:
-    """Every stamp of every fault that came to be."""
+    """Every stamp of every fault that occurred."""
     events = []
     for fault in robot.faults:
         text = fault.text()

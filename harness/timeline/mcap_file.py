@@ -1,4 +1,4 @@
-"""Writes body and signals of a timeline as MCAP, for Foxglove and PlotJuggler: protobuf messages, one topic a group.
+"""Writes body and signals of a timeline as MCAP, for Foxglove and PlotJuggler: protobuf messages, one topic per group.
 
 `/body` and `/variables/MCH` ... A message has every quantity of its group as a double, by name; units are in the names
 of the body's, and in the channel's metadata of all. Time is virtual, from the start of the run.
@@ -18,7 +18,7 @@ LOG_LEVELS = {"UNKNOWN": 0, "DEBUG": 1, "INFO": 2, "WARNING": 3, "ERROR": 4, "FA
 
 
 def write(events: Events, file: IO[bytes], title: str) -> None:
-    """The whole timeline into `file`; `title` is kept as metadata. The same timeline gives the same bytes."""
+    """Write the whole timeline into `file`; `title` is kept as metadata. The same timeline gives the same bytes."""
     writer = importlib.import_module("mcap.writer").Writer(file)
     writer.start(profile="", library="ranger-sim")
     writer.add_metadata("run", {"title": title})
@@ -41,7 +41,7 @@ def write(events: Events, file: IO[bytes], title: str) -> None:
 
 
 def message_type(name: str, fields: list[str]) -> tuple[Any, bytes]:
-    """(class of a message of doubles, the description of it that MCAP keeps)."""
+    """(class of a message of doubles, its description for MCAP)."""
     descriptor_pb2 = importlib.import_module("google.protobuf.descriptor_pb2")
     pool = importlib.import_module("google.protobuf.descriptor_pool").DescriptorPool()
     described = descriptor_pb2.FileDescriptorProto(name=f"{PACKAGE}/{name}.proto", package=PACKAGE, syntax="proto3")
@@ -76,7 +76,7 @@ def rows(message_class: Any, counters: list[Counter]) -> list[tuple[int, bytes]]
 
 
 def log_messages(writer: Any, events: Events) -> list[tuple[int, int, bytes]]:
-    """(ns, channel, message) of everything that happened at one moment; the channel is there only if something did."""
+    """(ns, channel, message) of every event at one moment; the channel exists only if it has an event."""
     if not any(instants.events for instants in events.instants):
         return []
     log_class, descriptors = log_type()
@@ -97,14 +97,14 @@ def log_messages(writer: Any, events: Events) -> list[tuple[int, int, bytes]]:
 
 
 def level_of(path: tuple[str, ...], name: str) -> int:
-    """How serious: a fall is an error, faults and overruns warn, steps inform."""
+    """The log level: a fall is an error, faults and overruns warn, steps inform."""
     if path == ("Steps",):
         return LOG_LEVELS["ERROR"] if name.startswith("fell") else LOG_LEVELS["INFO"]
     return LOG_LEVELS["WARNING"]
 
 
 def log_type() -> tuple[Any, bytes]:
-    """(class of `foxglove.Log`, the description of it with what it needs), field by field as Foxglove published it."""
+    """(class of `foxglove.Log`, its description with its dependencies), field by field as Foxglove published it."""
     descriptor_pb2 = importlib.import_module("google.protobuf.descriptor_pb2")
     kinds = descriptor_pb2.FieldDescriptorProto
     stamp = descriptor_pb2.FileDescriptorProto()

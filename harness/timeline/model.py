@@ -18,7 +18,7 @@ def no_numbers() -> np.ndarray:
 class Slices:
     """What happens on one track: slice i lasts from start_ns[i] to end_ns[i] and is called names[name[i]].
 
-    path: the names of the groups above it and its own. In order of their starts, none begins before the last one's
+    path: the names of the groups above it and its own. In order of their starts; none begins before the last one's
     end. `inside`: slices that lie within these, one level down. `notes`: more numbers of each slice, by name with
     unit. `labels`: texts by name, one for each of `names`.
     """
@@ -40,7 +40,7 @@ class Slices:
         return len(self.start_ns)
 
     def starts_of(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """(indices, starts) of the slices of one name; empty when there is none."""
+        """(indices, starts) of the slices of one name; empty for an unused name."""
         if name not in self.names:
             return no_numbers(), no_numbers()
         at = np.flatnonzero(self.name == self.names.index(name))
@@ -49,7 +49,7 @@ class Slices:
 
 @dataclasses.dataclass
 class Counter:
-    """A number over time: it is values[i] from time_ns[i] on. unit: "" for none."""
+    """A number over time: it is values[i] from time_ns[i] on. unit: "" without one."""
 
     path: tuple[str, ...]
     unit: str
@@ -60,7 +60,7 @@ class Counter:
 
 @dataclasses.dataclass
 class Instant:
-    """Something that happened at one moment; `notes`: more about it, texts and numbers."""
+    """An event at one moment; `notes`: more about it, texts and numbers."""
 
     time_ns: int
     name: str
@@ -77,7 +77,7 @@ class Instants:
 
 @dataclasses.dataclass
 class Events:
-    """A whole timeline. Tracks stand in the order in which a reader wants to see them."""
+    """A whole timeline. Tracks are in the order in which a reader wants to see them."""
 
     begin_ns: int
     end_ns: int
@@ -88,14 +88,14 @@ class Events:
     pins: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = dataclasses.field(default_factory=dict)
 
     def track(self, *path: str) -> Slices:
-        """The slices of this path. KeyError when there are none."""
+        """The slices of this path. KeyError for an unknown path."""
         for slices in self.slices:
             if slices.path == path:
                 return slices
         raise KeyError(path)
 
     def counter(self, *path: str) -> Counter:
-        """The counter of this path. KeyError when there is none."""
+        """The counter of this path. KeyError for an unknown path."""
         for counter in self.counters:
             if counter.path == path:
                 return counter
@@ -103,7 +103,7 @@ class Events:
 
 
 def changes(time_ns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Only the rows in which the value is new: the first one, and each that differs from the one before."""
+    """Only the rows in which the value changes: the first one, and each that differs from the one before."""
     if len(values) == 0:
         return time_ns, values
     new = np.empty(len(values), dtype=bool)

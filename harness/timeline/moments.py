@@ -1,4 +1,4 @@
-"""The instant of a trace that matters most: where a fault acted, where the robot fell, or its last step."""
+"""The most important time of a trace: where a fault acted, where the robot fell, or its last step."""
 
 import dataclasses
 import pathlib
@@ -6,13 +6,13 @@ import pathlib
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timeline import perfetto_reader
 
-# what is looked for, in this order: the first of a kind, but of steps the last
+# searched in this order: the first of a kind, but of steps the last
 FIRST = (("acted: ", "Faults"), ("activated: ", "Faults"), ("fell", "Steps"))
 
 
 @dataclasses.dataclass(frozen=True)
 class Moment:
-    """`time_ns` since the run began, and what is there; begin_ns ... end_ns: the whole trace."""
+    """`time_ns` since the run began, and the event there; begin_ns ... end_ns: the whole trace."""
 
     time_ns: int
     text: str
@@ -21,7 +21,7 @@ class Moment:
 
 
 def find(path: pathlib.Path, asked_ns: int | None) -> Moment:
-    """The instant asked for, or the one that matters most. UserError for one that the trace does not have."""
+    """The requested time, or the most important one. UserError for one that the trace does not have."""
     begin_ns, end_ns, instants = perfetto_reader.read_instants(path)
     if asked_ns is not None:
         if not begin_ns <= asked_ns <= end_ns:

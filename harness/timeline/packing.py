@@ -1,10 +1,10 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below lies in a template, in the room made for a record, or counts the rows that are given)
-"""Packets of a trace, many of one kind: the package makes one of each kind, here its numbers are filled in.
+# (every index below lies in a template, in the space reserved for a record, or counts the rows that are given)
+"""Packets of a trace, many of one kind: the `perfetto` package makes one of each kind, this module fills in numbers.
 
 A packet is a template, bytes as `perfetto`'s own classes serialise them, in which some numbers of eight bytes
-(doubles and flow identifiers are of fixed length in protobuf) are replaced, and behind which its time stamp stands.
-The order of fields in a message is free, so that is a packet as any other.
+(doubles and flow identifiers have fixed length in protobuf) are replaced, and after which its time stamp follows.
+The order of fields in a message is free, so the result is a regular packet.
 """
 
 import struct
@@ -38,9 +38,9 @@ def varint(value: int) -> bytes:
 @cython.final
 @cython.cclass
 class PacketPacker:
-    """Packets one behind the other, in `buffer` up to `used`.
+    """Packets one after another, in `buffer` up to `used`.
 
-    `write`: takes the bytes whenever more than `flush_bytes` have come together.
+    `write`: takes the bytes when more than `flush_bytes` have accumulated.
     """
 
     write: object
@@ -60,7 +60,7 @@ class PacketPacker:
         self.write = write
         self.flush_bytes = flush_bytes
         self.templates = []
-        self.holes = []  # of each template: where its numbers stand
+        self.holes = []  # of each template: the places of its numbers
         self.longest = 0
         self.buffer = bytearray(1)
         self.used = 0
@@ -74,7 +74,7 @@ class PacketPacker:
         return len(self.templates) - 1
 
     def _lay(self) -> None:
-        """All templates behind one another, and their holes: from text_begins[n] and hole_begins[n] on."""
+        """Concatenate all templates, and their holes: from text_begins[n] and hole_begins[n] on."""
         self.laid = len(self.templates)
         self.text = bytearray(b"".join(self.templates) + b"\0")
         self.text_begins = integers(self.laid + 1)
@@ -98,9 +98,9 @@ class PacketPacker:
         values: cython.longlong[::1],
         firsts: cython.longlong[::1],
     ) -> None:
-        """Packets of `kinds` (templates) at `times` (ns); packet i has its numbers in `values` from firsts[i] on.
+        """Write packets of `kinds` (templates) at `times` (ns); packet i has its numbers in `values` from firsts[i] on.
 
-        `values` are the eight bytes of each number, taken for a whole number.
+        `values` are the eight bytes of each number, taken as an integer.
         """
         i: cython.longlong
         j: cython.longlong
@@ -159,7 +159,7 @@ class PacketPacker:
                 self.flush()
 
     def _put_interpreted(self, times, kinds, values, firsts) -> None:
-        """The same, with what is quick in Python."""
+        """The same, by means that are fast in Python."""
         parts = []
         for time, kind, first in zip(times, kinds, firsts, strict=True):
             packet = self.templates[kind]
@@ -172,7 +172,7 @@ class PacketPacker:
         self.write(b"".join(parts))
 
     def flush(self) -> None:
-        """Hand over what has come together."""
+        """Write what has accumulated."""
         if self.used:
             used = self.used
             self.used = 0
@@ -190,7 +190,7 @@ def nested(
     """Fill `order` with begins and ends of two rows of slices, so that the inner ones lie within the outer ones.
 
     An entry is 4 x the row + OUTER_BEGINS ... INNER_ENDS; returns how many there are. An inner slice belongs to the
-    outer one in which it starts, or at whose end, if that is no start of the next.
+    outer one in which it starts, or at whose end, if that is not the start of the next.
     """
     place: cython.longlong = 0
     outer: cython.longlong
@@ -225,7 +225,7 @@ def nested(
 def index_packets(data: cython.const[cython.uchar][::1], rows: cython.longlong[::1]) -> cython.longlong:
     """Find the packets of a trace; `rows` takes of each its begin, its end and its time stamp (ns; -1: none).
 
-    Returns how many there are, those beyond the length of `rows` too; -1 when `data` is no row of packets.
+    Returns how many there are, those beyond the length of `rows` too; -1 when `data` is not a sequence of packets.
     """
     at: cython.longlong = 0
     end: cython.longlong
@@ -256,7 +256,7 @@ def index_packets(data: cython.const[cython.uchar][::1], rows: cython.longlong[:
                 time = take_varint(data, cursor, end) if tag == TIMESTAMP_TAG else time
                 if tag != TIMESTAMP_TAG:
                     take_varint(data, cursor, end)
-            elif tag & 7 == 2:  # a length and so many bytes
+            elif tag & 7 == 2:  # a length and that many bytes
                 place = take_varint(data, cursor, end)
                 if place < 0:
                     return -1
@@ -284,7 +284,7 @@ def index_packets(data: cython.const[cython.uchar][::1], rows: cython.longlong[:
 def take_varint(
     data: cython.const[cython.uchar][::1], cursor: cython.p_longlong, end: cython.longlong
 ) -> cython.longlong:
-    """The number of variable length at cursor[0], which moves behind it; -1 when it does not end before `end`."""
+    """The number of variable length at cursor[0], which moves past it; -1 when it does not end before `end`."""
     at: cython.longlong = cursor[0]
     value: cython.longlong = 0
     shift: cython.longlong = 0

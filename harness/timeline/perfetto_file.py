@@ -1,8 +1,8 @@
-"""Writes a timeline as a Perfetto trace: what https://ui.perfetto.dev and trace_processor read.
+"""Writes a timeline as a Perfetto trace, for https://ui.perfetto.dev and trace_processor.
 
-Every packet is made by the `perfetto` package's own classes: those of which there are few as they are, those of which
-there are many as a template whose numbers `packing.py` fills in. A track's packets stand in the order of their
-effect; tracks follow one another, which readers sort by time. The same timeline gives the same bytes.
+Every packet is made by the `perfetto` package's own classes: rare kinds directly, frequent kinds as a template whose
+numbers `packing.py` fills in. A track's packets are in the order of their
+effect; tracks follow one another, and readers sort them by time. The same timeline gives the same bytes.
 """
 
 import importlib
@@ -27,12 +27,12 @@ def library() -> Any:
 
 
 def write(events: Events, file: IO[bytes], title: str) -> None:
-    """The whole timeline into `file`; `title` tells of the run and stands at the root of the tracks."""
+    """Write the whole timeline into `file`; `title` describes the run and is the root of the tracks."""
     Writer(library(), file).write(events, title)
 
 
 class Writer:
-    """One trace on its way into a file. Tracks and names get their numbers in the order in which they come."""
+    """Writes one trace into a file. Tracks and names are numbered in order of appearance."""
 
     def __init__(self, schema: Any, file: IO[bytes]) -> None:
         self.schema = schema
@@ -45,7 +45,7 @@ class Writer:
         self.ranks = itertools.count(1)
 
     def write(self, events: Events, title: str) -> None:
-        """Descriptors and names first, then slices, counters and instants."""
+        """Write descriptors and names first, then slices, counters and instants."""
         self._number_names(events)
         self._write_names()
         self.groups[()] = self._describe((ROOT_NAME,), 0, description=title)
@@ -90,7 +90,7 @@ class Writer:
         self._write_packet(packet)
 
     def _describe(self, path: tuple[str, ...], parent: int, unit: str | None = None, description: str = "") -> int:
-        """A track's descriptor; unit: of a counter. Returns its number."""
+        """Write a track's descriptor; unit: of a counter. Returns its number."""
         self.last_track += 1
         packet = self._packet()
         track = packet.track_descriptor
@@ -118,12 +118,12 @@ class Writer:
     # --- templates ------------------------------------------------------------------------------------------
 
     def _template(self, packet: Any, hole_count: int) -> int:
-        """A template out of a packet in which the numbers to come are `mark(0)`, `mark(1)` ..."""
+        """Make a template of a packet in which the numbers to fill in are `mark(0)`, `mark(1)` ..."""
         text = packet.SerializeToString()
         return self.packer.template(text, [text.index(mark(hole)) for hole in range(hole_count)])
 
     def _begin(self, track: int, slices: Slices, name: int, flows: int, flow_ends: int) -> int:
-        """Template of a slice's begin: its notes, then so many flows that go on, then so many that end."""
+        """Template of a slice's begin: its notes, then `flows` flows that continue, then `flow_ends` that end."""
         packet = self._packet()
         event = packet.track_event
         event.type = self.schema.TrackEvent.TYPE_SLICE_BEGIN
@@ -251,7 +251,7 @@ class Writer:
 
 
 def mark(hole: int) -> bytes:
-    """Eight bytes that stand in a template for its number `hole`; a finite double, and found nowhere else."""
+    """Eight bytes that mark number `hole` in a template; a finite double that occurs nowhere else."""
     return struct.pack("<HHHH", 0xA51F, hole, 0xC3E7, 0x2B5D)
 
 
@@ -267,5 +267,5 @@ def as_number(eight_bytes: bytes) -> int:
 
 
 def column(values: np.ndarray) -> Any:
-    """As compiled loops take it: whole numbers of 64 bits in a row; the array itself where it is that."""
+    """As compiled loops take it: contiguous 64-bit integers; the array itself where it already is."""
     return np.ascontiguousarray(values, dtype=np.int64)

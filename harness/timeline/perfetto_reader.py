@@ -13,7 +13,7 @@ from ranger_sim.harness.timeline.packing import index_packets
 from ranger_sim.harness.timeline.perfetto_file import library
 
 INSTANT_TYPE = b"\x48\x03"  # field 9 of a TrackEvent, its type: an instant
-PACKETS_AT_ONCE = 1 << 22  # room for the index of so many packets, 100 MB; a longer trace is indexed once more
+PACKETS_AT_ONCE = 1 << 22  # length of the packet index, 100 MB; a longer trace is indexed again
 
 
 @dataclasses.dataclass
@@ -31,7 +31,7 @@ class ReadSlice:
 
 @dataclasses.dataclass
 class ReadTrack:
-    """A track with what lies on it. Counters: time_ns and values; instants are slices without a length."""
+    """A track with its contents. Counters: time_ns and values; instants are slices without a length."""
 
     number: int
     name: str
@@ -62,7 +62,7 @@ class ReadTrace:
         return tuple(names)
 
     def find(self, *path: str) -> ReadTrack:
-        """The track of this path. KeyError when there is none."""
+        """The track of this path. KeyError when it is missing."""
         for track in self.tracks.values():
             if self.path(track) == path:
                 return track
@@ -70,9 +70,9 @@ class ReadTrace:
 
 
 def read(path: pathlib.Path, begin_ns: int | None = None, end_ns: int | None = None) -> ReadTrace:
-    """The trace, or what happened from begin_ns to end_ns in it. UserError for what is no such file.
+    """The trace, or its part from begin_ns to end_ns. UserError for a file that is not such a trace.
 
-    A slice of which only one end lies in that time has the other at the edge.
+    A slice with only one end in that time gets its other end at the edge.
     """
     schema = library()
     data = contents(path)
@@ -93,7 +93,7 @@ def read(path: pathlib.Path, begin_ns: int | None = None, end_ns: int | None = N
 
 
 def read_instants(path: pathlib.Path) -> tuple[int, int, dict[str, list[ReadSlice]]]:
-    """(begin and end of the trace in ns, instants by the path of their track); slices and counters are passed over."""
+    """(begin and end of the trace in ns, instants by the path of their track); slices and counters are skipped."""
     schema = library()
     data = contents(path)
     index = index_of(path, data)
@@ -109,7 +109,7 @@ def read_instants(path: pathlib.Path) -> tuple[int, int, dict[str, list[ReadSlic
 
 
 def take(path: pathlib.Path, reader: "Reader", schema: Any, packet: bytes) -> None:
-    """One packet of the file for the reader. UserError for what `Writer` would not have written."""
+    """Pass one packet of the file to the reader. UserError for what `Writer` would not have written."""
     decode_error = importlib.import_module("google.protobuf.message").DecodeError
     try:
         reader.take(schema.TracePacket.FromString(packet))
@@ -141,7 +141,7 @@ def index_of(path: pathlib.Path, data: Any) -> np.ndarray:
 
 
 class Reader:
-    """Packets, one after another, into tracks."""
+    """Sorts packets, one after another, into tracks."""
 
     def __init__(self, schema: Any, begin_ns: int) -> None:
         self.event = schema.TrackEvent
@@ -152,7 +152,7 @@ class Reader:
         self.note_names: dict[int, str] = {}
 
     def take(self, packet: Any) -> None:
-        """One packet."""
+        """Take one packet."""
         for each in packet.interned_data.event_names:
             self.names[each.iid] = each.name
         for each in packet.interned_data.debug_annotation_names:
@@ -195,7 +195,7 @@ class Reader:
             yield name, note.string_value if note.HasField("string_value") else note.double_value
 
     def close(self, end_ns: int) -> None:
-        """What is still open ends at `end_ns`."""
+        """End what is still open at `end_ns`."""
         for stack in self.open.values():
             for each in stack:
                 each.end_ns = end_ns

@@ -1,4 +1,4 @@
-"""What a board's processor did, as slices: slots with their tasks, interrupts, turns of the main loop."""
+"""A processor's activity, as slices: slots with their tasks, interrupts, turns of the main loop."""
 
 from typing import Any
 
@@ -27,10 +27,10 @@ from ranger_sim.harness.timeline.model import Instant, Instants, Slices
 
 
 class Processor:
-    """One board's activity. `rows`: of its ActivityLog; `legend`: what their numbers stand for.
+    """One board's activity. `rows`: of its ActivityLog; `legend`: the meaning of their numbers.
 
     `slots`, with the tasks inside. `services`: the interrupts, the fast ones inside those that they interrupted.
-    `turns` of the main loop. `services_asked_ns`, `fast_asked_ns`: when each of them was asked for.
+    `turns` of the main loop. `services_asked_ns`, `fast_asked_ns`: when each of them was requested.
     """
 
     def __init__(self, legend: Any, rows: np.ndarray, zero_ns: int) -> None:
@@ -52,7 +52,7 @@ class Processor:
         self.overruns = self._overruns(rows[(kind == SLOT_OVERRAN) | (kind == TASK_DROPPED)])
 
     def tracks(self) -> list[Slices]:
-        """All that has something in it."""
+        """All tracks that are not empty."""
         found = [self.slots, self.services, self.turns]
         return [slices for slices in found if len(slices) or (slices.inside is not None and len(slices.inside))]
 
@@ -61,7 +61,7 @@ class Processor:
         return Slices(("Boards", self.name, track), names, start, end, name, dict(notes))
 
     def _tasks(self, rows: np.ndarray) -> Slices:
-        """Tasks and waits; of an occasional list its entry, which has the list's own row right behind it."""
+        """Tasks and waits; of an occasional list its entry, directly followed by the list's own row."""
         if len(rows) > 1:
             lists = np.array([bool(task.entries) for task in self.legend.tasks])
             same = (rows[1:, COLUMN_START] == rows[:-1, COLUMN_START]) & (rows[1:, COLUMN_END] == rows[:-1, COLUMN_END])
@@ -71,10 +71,10 @@ class Processor:
         return self._made("slots", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES])
 
     def _slots(self, rows: np.ndarray, begun: np.ndarray, overrun: np.ndarray) -> Slices:
-        """One slice a slot, called by its row. A slot that waits for the end of an overrun one begins behind that.
+        """One slice per slot, named by its row. A slot that waits for the end of an overrun one begins after that.
 
-        One that has not ended, because it goes on or its processor stopped in it, lasts until the end of its latest
-        task. One that was dropped as a whole is none.
+        One that has not ended, because it is running or its processor stopped in it, lasts until the end of its latest
+        task. One that was dropped as a whole has no slice.
         """
         names = [f"row {row}" for row in range(len(self.legend.rows))]
         began = begun[:, COLUMN_START]
@@ -105,7 +105,7 @@ class Processor:
         )
 
     def _asked(self, services: Slices) -> np.ndarray:
-        """Start and latency are those of the way to the handler, which takes the source's own latency."""
+        """Request times; start and latency are those of the way to the handler, with the source's own latency."""
         ways_ns = [int(source.latency / self.legend.cycles_per_ns) for source in self.legend.interrupts]
         latency_ns = np.round(services.notes["latency_us"] * 1e3).astype(np.int64)
         asked_ns: np.ndarray = services.start_ns + np.array([*ways_ns, 0])[services.name] - latency_ns
@@ -115,7 +115,7 @@ class Processor:
         return self._made("main loop", ["turn"], rows, np.zeros(len(rows), dtype=np.int64))
 
     def _overruns(self, rows: np.ndarray) -> Instants:
-        """Each slot that a tick found unfinished, with the names of what was dropped."""
+        """Each slot that a tick found unfinished, with the names of the dropped tasks."""
         dropped: dict[int, list[str]] = {}
         for row in rows[rows[:, COLUMN_KIND] == TASK_DROPPED]:
             dropped.setdefault(int(row[COLUMN_END]), []).append(self.legend.tasks[int(row[COLUMN_NUMBER])].name)

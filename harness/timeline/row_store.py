@@ -1,4 +1,4 @@
-"""Keeps the blocks of a row stream: those of the last seconds in memory, or all of them in a file without a name."""
+"""Keeps the blocks of a row stream: those of the last seconds in memory, or all of them in an unnamed file."""
 
 import collections
 import tempfile
@@ -12,8 +12,8 @@ import numpy as np
 class RowStore:
     """The sink of one `RowStream`. `columns` of a row; `last_ns`: how much of the past is kept, None: all of it.
 
-    What is kept in full lies in a temporary file, so that nothing is left behind whatever happens to the process.
-    `before`: who took the blocks until now, and goes on getting them.
+    With `last_ns` None the rows are in a temporary file, so that nothing is left behind however the process ends.
+    `before`: the previous sink of the blocks, which continues to receive them.
     """
 
     def __init__(self, columns: int, last_ns: int | None, before: Callable[[int, bytes], None] | None = None) -> None:
@@ -24,10 +24,10 @@ class RowStore:
         self.spool: Any = None
         if last_ns is None:
             self.spool = tempfile.TemporaryFile(prefix="ranger-sim-timeline-")  # noqa: SIM115
-            weakref.finalize(self, self.spool.close)  # also of a timeline that nobody closes
+            weakref.finalize(self, self.spool.close)  # also of a timeline that is never closed
 
     def take(self, last_time_ns: int, block: bytes) -> None:
-        """Keep a block whose last row is of `last_time_ns`, and forget what has become too old."""
+        """Keep a block whose last row is of `last_time_ns`, and drop blocks that are too old."""
         if self.before is not None:
             self.before(last_time_ns, block)
         if self.spool is not None:
@@ -57,7 +57,7 @@ class RowStore:
         return sum(len(block) for _, block in self.blocks)
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         if self.spool is not None:
             self.spool.close()
         self.blocks.clear()

@@ -1,4 +1,4 @@
-"""What has a value at every time: variables of the data table, quantities of the body, states of the machines."""
+"""Signals with a value at every time: variables of the data table, quantities of the body, states of the machines."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from ranger_sim.plant.ranger import SAMPLES
 
 
 def variables(rows: np.ndarray, zero_ns: int) -> list[Counter]:
-    """Every variable that changed, as the main brain's table had it; `rows`: of the words' stream (time first)."""
+    """Every variable that changed, by the main brain's table; `rows`: of the words' stream (time first)."""
     time = rows[:, 0] - zero_ns
     found = []
     for number, name in all_variables.NAMES.items():
@@ -58,7 +58,7 @@ def machine_states(robot: Any, rows: np.ndarray, zero_ns: int, end_ns: int) -> l
 
 
 def duties(board: str, rows: np.ndarray, zero_ns: int) -> list[Counter]:
-    """The duty of a bridge, -1 ... 1: what its two leads differ by, of the period."""
+    """The duty of a bridge, -1 ... 1: the difference of its two leads, as a share of the period."""
     writes = rows[rows[:, 1] == PWM_UPDATE]
     time, duty = changes(writes[:, 0] - zero_ns, (writes[:, 2] - writes[:, 3]) / PERIOD_COUNTS)
     return [Counter(("Boards", board, "duty"), "", time, duty)] if len(time) else []

@@ -1,4 +1,4 @@
-"""`Timeline`: what is to be kept of a run while it passes, and the events that are made of it when somebody asks."""
+"""`Timeline`: records kept during a run, and the events made from them on request."""
 
 import itertools
 import pathlib
@@ -17,17 +17,17 @@ from ranger_sim.harness.timeline.model import Events
 from ranger_sim.harness.timeline.processors import Processor
 from ranger_sim.harness.timeline.row_store import RowStore
 
-LINK_COLUMNS = 5  # what SspWire notes: ns, from the slave, header, two words
-OUTPUT_COLUMNS = 5  # what BoardWires notes: ns, kind, three numbers
+LINK_COLUMNS = 5  # a row of SspWire: ns, from the slave, header, two words
+OUTPUT_COLUMNS = 5  # a row of BoardWires: ns, kind, three numbers
 GATHER_NS = 50_000_000  # of seven boards each every 0.35 s: some 2 MB of a motor board (chosen by us)
 
 
 class Timeline:
     """Attached to a Ranger before it runs: keeps the last `last_s` seconds of virtual time, or everything (None).
 
-    It changes nothing: the trace digest stays what it is. Boards may run in processes of their own; one that is outside
-    shows nothing of what its processor does. Memory is flat with `last_s`; without, everything lies in temporary files
-    that have no name. Use `write` (format by the file's suffix), or `events` to look at it in a test.
+    It changes nothing: the trace digest stays the same. Boards may run in separate processes; one that is outside
+    shows nothing of what its processor does. Memory is flat with `last_s`; without, everything is in unnamed temporary
+    files. Use `write` (format by the file's suffix), or `events` to inspect it in a test.
     """
 
     def __init__(self, robot: Any, last_s: float | None = None) -> None:
@@ -79,7 +79,7 @@ class Timeline:
     # --- what was kept --------------------------------------------------------------------------------------
 
     def events(self) -> Events:
-        """What happened in the time that was kept."""
+        """The events of the time that was kept."""
         robot = self.robot
         for stream in self.streams:
             stream.flush()
@@ -124,11 +124,11 @@ class Timeline:
         return found
 
     def gather(self, name: str) -> None:
-        """Take what board `name` has written by now: from another process, where it lives there."""
+        """Fetch what board `name` has written by now, from another process where it runs there."""
         activity_of(self.robot, name).flush()
 
     def _since(self, rows: np.ndarray, begin_ns: int, time_column: int = 0) -> np.ndarray:
-        """The rows of which an instant, mostly the first number, is in the time to be shown."""
+        """The rows whose time, mostly the first number, is in the time to be shown."""
         return rows[rows[:, time_column] - self.robot.start_ns >= begin_ns]
 
     def title(self) -> str:
@@ -140,11 +140,11 @@ class Timeline:
         )
 
     def write(self, path: str | pathlib.Path) -> None:
-        """The timeline into a file; its suffix says in which format (`files.FORMATS`)."""
+        """Write the timeline into a file; the suffix gives the format (`files.FORMATS`)."""
         files.write(self.events(), pathlib.Path(path), self.title())
 
     def close(self) -> None:
-        """Keep nothing any more."""
+        """Discard all records and stop recording."""
         for stream, store in zip(self.streams, self.stores, strict=True):
             stream.sink = store.before
             store.close()
@@ -169,9 +169,9 @@ class Timeline:
 
 
 class Gathering(StepWatch):
-    """Takes from boards in processes of their own what they have written, one after another, before they keep too much.
+    """Fetches the records of boards in other processes, one after another, before they keep too much.
 
-    Only for a timeline that keeps everything: of the last seconds each board keeps its own until the end.
+    Only for a timeline that keeps everything: each board keeps the last seconds itself until the end.
     """
 
     def __init__(self, timeline: Timeline) -> None:

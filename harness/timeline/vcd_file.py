@@ -1,7 +1,7 @@
 """Writes the bits of a timeline as a value change dump (IEEE 1364, section 18): for GTKWave, Surfer and the like.
 
 A scope for each board: its slot line (high while a slot runs), its interrupt line, its row, the pins it drove; one for
-the buses: busy or idle, and the identifier that is on it; one for the machines: the names of their states. Time in ns.
+the buses: busy or idle, and the identifier on it; one for the machines: the names of their states. Time in ns.
 """
 
 import io
@@ -17,7 +17,7 @@ Change = tuple[int, int, Any]  # ns, number of the variable, value
 
 
 def write(events: Events, file: IO[bytes], title: str) -> None:
-    """The whole timeline into `file`; `title` is its comment. The same timeline gives the same bytes."""
+    """Write the whole timeline into `file`; `title` is its comment. The same timeline gives the same bytes."""
     import vcd  # only here
 
     text = io.TextIOWrapper(file, encoding="ascii", write_through=True)
@@ -38,7 +38,7 @@ def write(events: Events, file: IO[bytes], title: str) -> None:
 
 
 def lines(events: Events) -> Iterator[tuple[str, str, str, int | None, Any, list[tuple[int, Any]]]]:
-    """(scope, name, kind, size, value at first, [(ns, value)]) of everything that is drawn."""
+    """(scope, name, kind, size, value at first, [(ns, value)]) of every signal in the file."""
     for slices in events.slices:
         if slices.path[0] == "Boards" and slices.path[-1] in ("slots", "interrupts", "main loop"):
             scope = f"boards.{slices.path[1]}"
@@ -62,7 +62,7 @@ def columns(*values: np.ndarray) -> list[list[int]]:
 
 
 def levels(slices: Slices) -> list[tuple[int, int]]:
-    """1 while a slice or one inside goes on, 0 between them; where two meet it stays 1."""
+    """1 during a slice or one inside it, 0 between them; where two meet it stays 1."""
     start, end = slices.start_ns, slices.end_ns
     if slices.inside is not None and slices.path[-1] == "interrupts":  # a fast one need not lie in a slow one
         start = np.concatenate([start, slices.inside.start_ns])
@@ -78,7 +78,7 @@ def levels(slices: Slices) -> list[tuple[int, int]]:
 
 
 def named(slices: Slices) -> list[tuple[int, str]]:
-    """The name while a slice goes on, nothing between them; a space would end a VCD string."""
+    """The name during a slice, nothing between them; a space would end a VCD string."""
     found: list[tuple[int, str]] = []
     for start, end, name in zip(*columns(slices.start_ns, slices.end_ns, slices.name), strict=True):
         if found and found[-1][0] == start:

@@ -33,7 +33,7 @@ def page(path: pathlib.Path, moment: Moment, kept_ns: int, shown_ns: int) -> str
 
 
 def laid_out(trace: ReadTrace, begin_ns: int) -> dict[str, Any]:
-    """Names, tracks and flows as the page reads them; times in ns from `begin_ns` on.
+    """Names, tracks and flows in the page's form; times in ns from `begin_ns` on.
 
     A track: path, unit, slices as one list of start, duration, name, depth; notes by slice; counters and instants.
     """
@@ -77,7 +77,7 @@ def track_data(trace: ReadTrace, track: ReadTrack, names: dict[str, int], begin_
 
 
 def rounded(value: str | float) -> Any:
-    """A number as short as it can be told; not finite ones as text, which JSON does not have."""
+    """A number in its shortest form; not finite ones as text, because JSON does not have them."""
     if isinstance(value, str):
         return value
     if value != value or value in (float("inf"), float("-inf")):

@@ -1,1 +1,1 @@
-"""Slot timing: who had a board's processor when, as tests ask and as a table shows; and what can be said beforehand."""
+"""Slot timing: what had a board's processor and when, for tests and tables; and a static check beforehand."""

@@ -15,13 +15,13 @@ from ranger_sim.harness.waiting import Condition, Wanted
 
 
 class Held(StepWatch):
-    """When a condition held, as far as it was looked at: once per step of the plant, every 250 us."""
+    """When a condition held, as far as it was checked: once per step of the plant, every 250 us."""
 
     def __init__(self, robot: Any, wanted: Condition) -> None:
         StepWatch.__init__(self)
         self.wanted = wanted
         self.origin_ns: int = robot.start_ns
-        self.changes = [-1]  # instants since power-up: it did not hold, then it held, then not ...
+        self.changes = [-1]  # times since power-up: it did not hold, then it held, then not ...
         wanted.begin(robot)
 
     def before_step(self, now_ns: int) -> None:
@@ -29,7 +29,7 @@ class Held(StepWatch):
             self.changes.append(now_ns - self.origin_ns)
 
     def at(self, instants: np.ndarray) -> np.ndarray:
-        """True where the latest look up to an instant found that it held."""
+        """True where the latest check up to a time found that it held."""
         held: np.ndarray = np.searchsorted(self.changes, instants, side="right") % 2 == 0
         return held
 
@@ -42,19 +42,19 @@ class MachineSlots(SlotView):
         self.robot = robot
 
     def where(self, wanted: Wanted) -> Self:
-        """Only slots that begin while a condition of the machine holds; it is looked at from now on."""
+        """Only slots that begin while a condition of the machine holds; it is checked from now on."""
         held = Held(self.robot, self.robot.condition(wanted))
         self.robot.loop.watchers.append(held)
         return self.during(f"where {held.wanted.text}", held.at)
 
 
 def slot_view(robot: Any, name: str) -> MachineSlots:
-    """Begin to record board `name` of `robot`, wherever it runs. UserError for a board that has no activity to show."""
+    """Begin to record board `name` of `robot`, in any process. UserError for a board that has no activity to show."""
     if name not in robot.boards:
-        robot.board(name)  # says which there are
+        robot.board(name)  # its error lists the known names
 
     def find_board() -> Any:
-        return robot.boards[name]  # another one after its supply failed
+        return robot.boards[name]  # a different one after its supply failed
 
     def find_log() -> Any:
         log = activity_of(robot, name)

@@ -1,10 +1,10 @@
-"""A slot as a picture in text, to scale: who had the processor, tasks on one line, interrupts on another.
+"""A slot as a picture in text, to scale: what had the processor, tasks on one line, interrupts on another.
 
     tasks       each function has a letter, in the order in which they ran; "." where interrupts took most of a cell
     interrupts  each source has a digit
-    limits      where the slot ends ("tick": the next one comes), and the limit that a test asks for
+    limits      where the slot ends ("tick": the next one comes), and the limit of a test
 
-A cell shows who had most of its time; what is shorter than half a cell may not be seen there, and stands in the list.
+A cell shows what had most of its time; what is shorter than half a cell may not be visible, but is in the list.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _head(slot: Any) -> str:
 
 
 def _signs(names: list[str], signs: str) -> dict[str, str]:
-    """One sign for each name, in order; the last one for all that are too many."""
+    """One sign for each name, in order; the last one for all beyond their number."""
     return {name: signs[min(place, len(signs) - 1)] for place, name in enumerate(dict.fromkeys(names))}
 
 
@@ -108,7 +108,7 @@ def _fill(
 
 
 def _most(share: dict[str, float], cell: float) -> str:
-    """Who had most of a cell, if together they had at least a tenth of it."""
+    """What had most of a cell, if together they had at least a tenth of it."""
     if sum(share.values()) < cell / 10:
         return " "
     return max(share, key=lambda sign: share[sign])

@@ -28,7 +28,7 @@ from ranger_sim.firmware_sim.activity import (
 )
 from ranger_sim.firmware_sim.legend import Legend
 
-# 256 MiB of one board, a minute of a motor board that walks (chosen by us): what is older is given up, and said
+# 256 MiB of one board, a minute of a motor board that walks (chosen by us): older rows are discarded, and reported
 MOST_ROWS = 4 * 1024 * 1024
 NOT_THROUGH = -1
 EXECUTIONS = (TASK_RAN, WAIT_RAN, INTERRUPT_RAN, MAIN_LOOP_RAN)
@@ -36,11 +36,11 @@ EXECUTIONS = (TASK_RAN, WAIT_RAN, INTERRUPT_RAN, MAIN_LOOP_RAN)
 
 @dataclasses.dataclass(frozen=True)
 class Slots:
-    """The complete slots of a recording, as arrays of equal length in order of time; instants since power-up, ns.
+    """The complete slots of a recording, as arrays of equal length in order of time; times since power-up, ns.
 
     `cycles` from tick to end, interrupts included; `end` its end. A slot that was dropped as a whole has 0 cycles and
-    ends at its start; where the last task of an overrun slot is not through yet, both stand for the time until the tick
-    that found it. `first` ... `last`: where in `Recording.rows` what ran from its tick to the next one stands.
+    ends at its start; where the last task of an overrun slot is not finished yet, both cover the time until the tick
+    that found it. `first` ... `last`: the part of `Recording.rows` that ran from its tick to the next one.
     `place`: among all slots that began (`Recording.slot_of`).
     """
 
@@ -61,9 +61,9 @@ class Slots:
 class Recording:
     """Everything that `board` does from now on. `rows`: an array of ACTIVITY_COLUMNS columns, sorted by start.
 
-    `find_log` says where its log is now, if not on `board`: a board may move into a process of its own. `find_board`:
-    which one it is now, where another may take its place.
-    `origin_ns`: power-up of the robot; instants are counted from there.
+    `find_log` returns its present log, if that is not on `board`: a board may move into another process. `find_board`:
+    returns the present board, where another may replace it.
+    `origin_ns`: power-up of the robot; times count from there.
     `slot_of`: to which slot each row belongs, -1 for what ran before the first.
     """
 
@@ -82,7 +82,7 @@ class Recording:
         self.begun_ns = begun_ns
         self.most_rows = most_rows
         self.given_up = 0
-        self.lost_before_us = 0  # rows that a board in a process of its own gave up before we asked
+        self.lost_before_us = 0  # rows that a board in another process discarded before the first request
         self.forgotten = 0  # of them, before `forget`
         self.blocks: list[bytes] = []
         self.kept = 0
@@ -98,7 +98,7 @@ class Recording:
         return legend
 
     def forget(self) -> None:
-        """Give up what was recorded so far."""
+        """Discard what was recorded so far."""
         self.update()
         self.blocks.clear()
         self.kept = 0
@@ -115,14 +115,14 @@ class Recording:
             self.given_up += given_up
 
     def reaching_into(self, place: int, start_ns: int) -> np.ndarray:
-        """Of the rows before `place`: tasks, interrupts and turns that began before `start_ns` and ended behind it."""
+        """Of the rows before `place`: tasks, interrupts and turns that began before `start_ns` and ended after it."""
         rows = self.rows[:place]
         chosen = np.isin(rows[:, COLUMN_KIND], EXECUTIONS) & (rows[:, COLUMN_START] < start_ns)
         return rows[chosen & (rows[:, COLUMN_END] > start_ns)]
 
     @property
     def lost(self) -> int:
-        """Rows that were given up for newer ones since the beginning, or since `forget`."""
+        """Rows that were discarded for newer ones since the beginning, or since `forget`."""
         return self.given_up + self.lost_before_us - self.forgotten
 
     def update(self) -> Slots:
@@ -135,7 +135,7 @@ class Recording:
             rows = np.frombuffer(b"".join(self.blocks), dtype=np.int64).reshape(-1, ACTIVITY_COLUMNS).copy()
             rows[:, COLUMN_START] -= self.origin_ns
             rows[:, COLUMN_END] -= self.origin_ns
-            # of two with one start: a slot's begin first, then the outer before the inner
+            # of two that start together: a slot's begin first, then the outer before the inner
             began = rows[:, COLUMN_KIND] != SLOT_BEGAN
             order = np.lexsort((-rows[:, COLUMN_END], began, rows[:, COLUMN_START]))
             self.rows = rows[order]
@@ -174,7 +174,7 @@ class Recording:
         cycles[places(ended)] = ended[:, COLUMN_CYCLES]
         end[places(ended)] = ended[:, COLUMN_END]
         self.slot_of = np.searchsorted(began[:, COLUMN_START], rows[:, COLUMN_START], side="right") - 1
-        dropped = kind == TASK_DROPPED  # at the very tick of the next one
+        dropped = kind == TASK_DROPPED  # exactly at the tick of the next one
         self.slot_of[dropped] = np.searchsorted(began[:, COLUMN_START], rows[dropped, COLUMN_START], side="left") - 1
         starts = np.searchsorted(rows[:, COLUMN_START], began[:, COLUMN_START], side="left")
         lasts = np.append(starts[1:], len(rows)) if count else starts

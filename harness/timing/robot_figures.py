@@ -1,4 +1,4 @@
-"""What the robot's own boards took: the figures of docs/robot.md T1 and T2, as data for tables and tests.
+"""Execution times of the robot's own boards: the figures of docs/robot.md T1 and T2, as data for tables and tests.
 
 Two sources: RoboDAQ logs of EXECUTION_TIME (49 logs of 2015 and 2016), and the unmodified firmware images run
 instruction by instruction, where one instruction takes 2.0 cycles at 60 MHz.
@@ -6,9 +6,9 @@ instruction by instruction, where one instruction takes 2.0 cycles at 60 MHz.
 
 from __future__ import annotations
 
-CYCLES_PER_INSTRUCTION = 2  # the one calibration that makes logs and images agree (robot.md T1)
+CYCLES_PER_INSTRUCTION = 2  # the single calibration that makes logs and images agree (robot.md T1)
 
-# EXECUTION_TIME in us (robot.md T1): medians while it stands or is held; then what it may be while it walks: from the
+# EXECUTION_TIME in us (robot.md T1): medians while it stands or is held; then its range while it walks: from the
 # usual slot up to the highest in the logs.
 EXECUTION_TIME_US = {
     #         held         walking
@@ -21,7 +21,7 @@ EXECUTION_TIME_US = {
 REZEROING_US = (286, 313)  # an ankle board whose motor encoder is being set
 
 # Instructions per call (robot.md T2): least and most over 360 slots, interrupts excluded. MCFO has no counted figures.
-# A variable's line takes with it what our `can_transmit` does at the row's end (30 instructions).
+# A variable's line includes the work of our `can_transmit` at the row's end (30 instructions).
 INSTRUCTIONS = {
     "MCH": {
         "adcx_convert_all": (37, 37),
@@ -107,6 +107,6 @@ INSTRUCTIONS = {
 
 
 def cycles_of(board: str, function: str) -> tuple[int, int] | None:
-    """Least and most cycles of a call in the board's own image; None where nobody counted."""
+    """Least and most cycles of a call in the board's own image; None where it was not counted."""
     counted = INSTRUCTIONS.get(board, {}).get(function)
     return None if counted is None else (CYCLES_PER_INSTRUCTION * counted[0], CYCLES_PER_INSTRUCTION * counted[1])

@@ -1,4 +1,4 @@
-"""What a board's slots were, as tests ask: one by one, by function, by interrupt; and assertions about them.
+"""A board's slots, for tests: one by one, by function, by interrupt; and assertions about them.
 
     slots = robot.slots("MCH")          # from here on everything is recorded
     robot.until("step 4")
@@ -8,8 +8,8 @@
     slots.between("2 s", "3 s").assert_latency("encoder_edge_0", at_most="8 us")
     print(slots.worst().picture())
 
-A limit is a number of cycles (a whole number) or a time (text with a unit); what is equal to it keeps it. An assertion
-that fails shows the slot that is farthest off, to scale. A question to a view without any slot is a UserError: nothing
+A limit is a number of cycles (a whole number) or a time (text with a unit); a value equal to it passes. An assertion
+that fails shows the slot that is farthest off, to scale. A query on a view without any slot is a UserError: nothing
 was recorded, or nothing was selected, so there is no answer.
 """
 
@@ -48,7 +48,7 @@ Instant = Duration  # since power-up
 
 @dataclasses.dataclass(frozen=True)
 class Ran:
-    """One execution: `cycles` its own, from `start_ns` to `end_ns` with what interrupted it. Latency: of interrupts."""
+    """One execution: `cycles` its own, from `start_ns` to `end_ns` interruptions included. Latency: of interrupts."""
 
     name: str
     start_ns: int
@@ -59,7 +59,7 @@ class Ran:
     limit: int = 0
     interrupt: bool = False
     main_loop: bool = False
-    chooses: bool = False  # an occasional list, whose entry has an execution of its own
+    chooses: bool = False  # an occasional list, whose entry has its own execution
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,9 +82,9 @@ class Slot:
     """One slot: `number` since the board's power-up, `row` of its table, `start_ns` since the robot's power-up.
 
     `cycles` and `end_ns`: to the end of its last task, interrupts included. `ran`: functions, interrupts and turns of
-    the main loop in order of their start, up to the next tick; what began after the slot's end is there and not in its
-    `cycles`. `reached_in`: what the tick found at work, such as a turn of the main loop; the slot waited for it.
-    `dropped`: names of the tasks that an overrun dropped.
+    the main loop in order of their start, up to the next tick; it includes what began after the slot's end, but
+    `cycles` does not. `reached_in`: what the tick found running, such as a turn of the main loop; the slot waited for
+    it. `dropped`: names of the tasks that an overrun dropped.
     """
 
     def __init__(self, recording: Recording, place: int) -> None:
@@ -120,7 +120,7 @@ class Slot:
 
     @property
     def reached_in(self) -> list[Ran]:
-        """What had begun before its tick and was not through."""
+        """What had begun before its tick and was not finished."""
         place = int(np.searchsorted(self.rows[:, COLUMN_START], self.start_ns))
         return self._executions(self.recording.reaching_into(place, self.start_ns))
 
@@ -131,7 +131,7 @@ class Slot:
 
     @property
     def turns(self) -> list[Ran]:
-        """Turns of the main loop beside the scheduler, as the router has it, from its tick to the next."""
+        """Turns of the main loop outside the scheduler, as on the router, from its tick to the next."""
         return [each for each in self.ran if each.main_loop]
 
     @property
@@ -141,7 +141,7 @@ class Slot:
 
     @property
     def dropped(self) -> list[str]:
-        """Tasks that the next tick found not begun."""
+        """Tasks that had not begun at the next tick."""
         return [self.legend.tasks[number].name for number in self.dropped_numbers]
 
     @property
@@ -158,7 +158,7 @@ class Slot:
         return _summed(self.interrupts)
 
     def picture(self, limit_ns: int | None = None) -> str:
-        """Who had the processor, to scale."""
+        """What had the processor, to scale."""
         begin, end = np.searchsorted(self.rows[:, COLUMN_START], (self.start_ns, max(self.end_ns, self.start_ns + 1)))
         window = self._executions(self.rows[begin:end])
         if self.end_ns > self.start_ns + self.legend.slot_ns:  # tasks of the slots after it are not its own
@@ -166,7 +166,7 @@ class Slot:
         return picture.of_slot(self, self._from_its_tick(window) + window, limit_ns)
 
     def _from_its_tick(self, window: list[Ran]) -> list[Ran]:
-        """What reached into it, with the cycles that it took behind the tick; `window`: what began from the tick on."""
+        """What reached into it, with its cycles after the tick; `window`: what began from the tick on."""
         found = []
         for each in self.reached_in:
             left_ns = min(each.end_ns, self.end_ns) - self.start_ns
@@ -205,11 +205,11 @@ def _summed(executions: list[Ran]) -> dict[str, int]:
 
 
 class SlotView:
-    """The slots of a board that were recorded, or a selection of them. Iterate, ask, assert; it grows with time."""
+    """The recorded slots of a board, or a selection of them. Iterate, query, assert; it grows with time."""
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
-        # what each selection is called, and which slots of `Recording.slots` it takes
+        # the name of each selection, and which slots of `Recording.slots` it takes
         self.chosen: tuple[tuple[str, Callable[[Any], np.ndarray]], ...] = ()
         self.from_ns = 0  # no slot before is chosen
 
@@ -233,17 +233,17 @@ class SlotView:
         return selected
 
     def during(self, called: str, held: Callable[[np.ndarray], np.ndarray]) -> Self:
-        """Only slots at whose start `held` (an array of instants, ns since power-up) is true."""
+        """Only slots at whose start `held` (of an array of times, ns since power-up) is true."""
         return self._select(called, lambda slots: held(slots.start))
 
     def _select(self, called: str, which: Callable[[Any], np.ndarray]) -> Self:
-        """The same view with one selection more."""
+        """The same view with another selection."""
         selected = copy.copy(self)
         selected.chosen = (*self.chosen, (called, which))
         return selected
 
     def forget(self) -> None:
-        """Give up what was recorded so far."""
+        """Discard what was recorded so far."""
         self.recording.forget()
 
     # --- the slots ----------------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ class SlotView:
         return " ".join((f"slots of {self.board}", *(called for called, _ in self.chosen)))
 
     def _places(self) -> np.ndarray:
-        """Where the chosen slots stand in `Recording.slots`."""
+        """Indices of the chosen slots in `Recording.slots`."""
         slots = self.recording.update()
         mask = np.ones(len(slots), dtype=bool)
         for _, which in self.chosen:
@@ -270,7 +270,7 @@ class SlotView:
         return np.flatnonzero(mask)
 
     def _some(self) -> np.ndarray:
-        """The same; UserError when there are none, or older ones were given up."""
+        """The same; UserError when there are none, or older ones were discarded."""
         places = self._places()
         began = duration_text(self.recording.begun_ns)
         rows = self.recording.rows
@@ -299,7 +299,7 @@ class SlotView:
 
     @property
     def overruns(self) -> int:
-        """How many were unfinished when the next tick came."""
+        """The number of slots unfinished at the next tick."""
         places = self._some()
         return int(self.recording.slots.overran[places].sum())
 
@@ -350,7 +350,7 @@ class SlotView:
 
     @property
     def main_loop(self) -> Statistics | None:
-        """Turns of the main loop beside the scheduler; None where there were none."""
+        """Turns of the main loop outside the scheduler; None without any."""
         rows = self._rows(MAIN_LOOP_RAN)
         return _statistics(MAIN_LOOP, rows, 0) if len(rows) else None
 
@@ -376,7 +376,7 @@ class SlotView:
     # --- assertions (pytest shows the line that asserts, not these) -----------------------------------------
 
     def assert_no_overrun(self) -> None:
-        """No slot was unfinished when the next tick came."""
+        """Assert that no slot was unfinished at the next tick."""
         __tracebackhide__ = True
         count = self.overruns
         if count:
@@ -389,7 +389,7 @@ class SlotView:
             self._fail(told, worst, self.legend.slot_ns)
 
     def assert_within(self, at_most: Limit) -> None:
-        """Every slot was through `at_most` after its tick, interrupts included."""
+        """Assert that every slot ended within `at_most` of its tick, interrupts included."""
         __tracebackhide__ = True
         limit_ns = self._limit_ns(at_most)
         places = self._some()
@@ -402,21 +402,21 @@ class SlotView:
             self._fail(told, worst, limit_ns)
 
     def assert_function(self, name: str, at_most: Limit) -> None:
-        """No execution of function `name` cost more than `at_most`, interrupts not included."""
+        """Assert that no execution of function `name` cost more than `at_most`, interrupts not included."""
         __tracebackhide__ = True
         self._named("function", name, [task.name for task in self.legend.tasks], self.functions)
         cycles, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_CYCLES], TASK_RAN, WAIT_RAN)
         self._compare(f"{name} cost", cycles, at_most, slot)
 
     def assert_interrupt(self, name: str, at_most: Limit) -> None:
-        """No service of interrupt `name` cost more than `at_most`, what interrupted it not included."""
+        """Assert that no service of interrupt `name` cost more than `at_most`, its own interruptions excluded."""
         __tracebackhide__ = True
         self._named("interrupt", name, [source.name for source in self.legend.interrupts], self.interrupts)
         cycles, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_CYCLES], INTERRUPT_RAN)
         self._compare(f"{name} cost", cycles, at_most, slot)
 
     def assert_latency(self, name: str, at_most: Duration) -> None:
-        """No request of interrupt `name` waited longer than `at_most` for the first instruction of its handler."""
+        """Assert that no request of interrupt `name` waited over `at_most` for its handler's first instruction."""
         __tracebackhide__ = True
         self._named("interrupt", name, [source.name for source in self.legend.interrupts], self.interrupts)
         limit_ns = duration_ns(at_most, "limit")
@@ -445,7 +445,7 @@ class SlotView:
 
 
 def _by_name(rows: np.ndarray, names: list[str], limits: list[int]) -> dict[str, Statistics]:
-    """Statistics of those that ran, by name; what has one name counts together."""
+    """Statistics of those that ran, by name; entries of one name count together."""
     found = {}
     for name in dict.fromkeys(names):
         numbers = [number for number, each in enumerate(names) if each == name]

@@ -1,23 +1,23 @@
-"""Before anything runs: can a board's slots hold what its table allows, its interrupts, and its bus at their worst?
+"""Check before a run whether a board's slots can hold its table, its interrupts, and its bus at their worst.
 
-For every row three sums, in cycles: of the costs (nothing to do), of the worst that is possible at the rates stated
-below, and of the limits (which no call may exceed, all of them at once). To the second comes what interrupts can take
-in one slot at those rates. Then:
+Every row has three sums, in cycles: of the costs (without work), of the worst case at the rates stated
+below, and of the limits (which no call may exceed, all of them at once). The second also includes what interrupts can
+take in one slot at those rates. Then:
 
     fits         worst and interrupts are within the slot
-    may overrun  they are not: a slot that has all of it at once is not through when the next tick comes
+    may overrun  they are not: a slot that has all of it at once is not finished at the next tick
 
-Both are upper bounds of one slot. They add what hardly comes together (every encoder at full speed, ten new errors,
-every frame of a busy bus): `may overrun` says that it is possible, not that it happens, and `ranger-sim slots` puts
-beside it what was seen.
+Both are upper bounds of one slot. They add what hardly coincides (every encoder at full speed, ten new errors, every
+frame of a busy bus): `may overrun` means that it is possible, not that it happens, and `ranger-sim slots` puts
+measurements next to it.
 
-What is possible in one slot:
+The most in one slot:
 - Edges: an encoder at the speed of its motor without load, RATED_SPEED_RPM; both edges of channel A.
 - Frames: every stream of the bus (harness/outside/bus_schedule.py) as often as its period and its proven response time
-  let it fall into a slot, and never more than the wire can carry; `full_bus`: always as many as the wire can carry.
-- A function whose work is counted in edges or frames costs that many items; every other one may take its limit.
-- A wait ends when its conversions do: its limit counts from the function that starts them, CONVERSION_STARTS.
-- Interrupts: each source as often as RATES says. Errors of a bus come beside a fault and are not counted.
+  allow in a slot, and never more than the wire can carry; `full_bus`: always as many as the wire can carry.
+- A function whose work is counted in edges or frames costs that many items; every other one may use its limit.
+- A wait ends with its conversions: its limit counts from the function that starts them, CONVERSION_STARTS.
+- Interrupts: each source as often as RATES has it. Bus errors come with a fault and are not counted.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ EXCHANGE_NS = bus_schedule.EXCHANGE_NS  # of the serial link between router and 
 CAPTURE_WRAP_NS = 500_000  # of the encoders' timer (boards/modules/encoder_capture.py)
 IMU_BAUD = 460_526  # robot.md N4.10
 IMU_BITS_PER_BYTE = 10
-IMU_FIFO = 8  # bytes for which the UART asks once
+IMU_FIFO = 8  # bytes per interrupt request of the UART
 RC_EDGES = 6  # in 1 ms: pulses are 1 to 2 ms long, so of each of three channels at most one edge of either kind
 COMPUTER_SEGMENT_NS = 92 * 10 * 1_000_000 // 929  # 92 bytes at 928,571 baud (firmware_sim/peripherals/uart_hs.py)
 
 
 @dataclasses.dataclass(frozen=True)
 class FunctionBound:
-    """A line of the table, in cycles. `items`: the most that one call can meet; `worst`: what it can cost then."""
+    """A line of the table, in cycles. `items`: the most that one call can handle; `worst`: its cost then."""
 
     number: int
     name: str
@@ -103,7 +103,7 @@ class RowBound:
 
 @dataclasses.dataclass(frozen=True)
 class BoardBound:
-    """All of a board; `frames`: that can arrive in one slot, by bus; `edges`: by encoder interrupt."""
+    """All bounds of a board; `frames`: that can arrive in one slot, by bus; `edges`: by encoder interrupt."""
 
     board: str
     hz: int
@@ -125,7 +125,7 @@ FITS, OVERRUNS = "fits", "may overrun"
 
 
 def check(board: Any, edges_per_s: float | None = None, full_bus: bool = False) -> BoardBound:
-    """Bounds of an emulated board as it stands. `edges_per_s`: of every encoder, instead of its motor's top speed."""
+    """Bounds of an emulated board in its present state. `edges_per_s`: of every encoder, not its motor's top speed."""
     if edges_per_s is not None and not (math.isfinite(edges_per_s) and edges_per_s >= 0.0):
         raise UserError(f"{board.name}: {edges_per_s!r} edges per second: a number of 0 or more is needed")
     legend: Legend = board.legend()
@@ -182,7 +182,7 @@ def row_sum(legend: Legend, numbers: tuple[int, ...], cycles: list[int]) -> int:
 
 
 def in_order(legend: Legend) -> list[int]:
-    """Task numbers as the firmware's table has them: every slot's, the rows' with the occasional entries, the last."""
+    """Task numbers as in the firmware's table: every slot's, the rows' with the occasional entries, the last."""
     rows = legend.rows
     common = 0
     while all(len(row) > common and row[common] == rows[0][common] for row in rows):
@@ -198,7 +198,7 @@ def in_order(legend: Legend) -> list[int]:
 
 
 def place_of(legend: Legend, number: int) -> str:
-    """Where a task stands in the table."""
+    """A task's place in the table."""
     inside = [row for row, numbers in enumerate(legend.rows) if number in numbers]
     lists = [task for task in range(len(legend.tasks)) if number in legend.tasks[task].entries]
     if lists:
@@ -211,7 +211,7 @@ def place_of(legend: Legend, number: int) -> str:
 def function_bound(
     number: int, task: TaskLegend, board: Any, legend: Legend, edges: Mapping[str, int], frames: Mapping[str, int]
 ) -> FunctionBound:
-    """What one call can cost at the most."""
+    """The most that one call can cost."""
     items: int | None = None
     extra = 0
     if task.item == "edge":
@@ -237,7 +237,7 @@ def function_bound(
 
 
 def edges_of(board: Any, slot_ns: int, edges_per_s: float | None = None) -> dict[str, int]:
-    """Edges that one slot can bring, by the encoder's interrupt."""
+    """The most edges in one slot, by the encoder's interrupt."""
     found = {}
     for channel, capture in ((0, "cap01"), (2, "cap23")):
         decoder = getattr(board, capture, None)
@@ -252,7 +252,7 @@ def edges_of(board: Any, slot_ns: int, edges_per_s: float | None = None) -> dict
 
 
 def encoder_of(board: Any, capture: str) -> tuple[int, bool]:
-    """(pulses of a turn of its shaft, whether it sits on the motor's shaft) of an encoder, from its board's room."""
+    """(pulses of a turn of its shaft, whether it sits on the motor's shaft) of an encoder, from its board's package."""
     from ranger_sim.boards import hip, inner_feet, outer_feet
 
     room = {"MCH": hip, "MCFO": outer_feet, "MCFI": inner_feet}[board.name]
@@ -294,14 +294,14 @@ def frames_of(board: str, slot_ns: int, full_bus: bool = False) -> dict[str, int
 
 
 def periods(slot_ns: int, period_ns: int) -> int:
-    """How often what comes every `period_ns` is served in a slot at the most: one may have waited for its begin."""
+    """The most services in a slot of an event every `period_ns`: one may have been pending at its start."""
     return slot_ns // period_ns + 1
 
 
 def interrupts_of(
     board: Any, slot_ns: int, edges: Mapping[str, int], frames: Mapping[str, int]
 ) -> list[InterruptBound]:
-    """Every source that somebody listens to, as often as one slot can bring it."""
+    """Every source that is in use, with its most occurrences in one slot."""
     found = []
     for source in board.vic.sources.values():
         if not source.attached:
@@ -315,7 +315,7 @@ def interrupts_of(
 def services(
     board: Any, source: Any, slot_ns: int, edges: Mapping[str, int], frames: Mapping[str, int]
 ) -> tuple[int, int, int, str]:
-    """(services in a slot, items of each, cycles beside that, why) of a source."""
+    """(services in a slot, items of each, further cycles, why) of a source."""
     kind = source.kind
     if kind == SLOT_TIMER:
         extra = user_interface.LCD_BYTE_CYCLES if board.name == "UI" else 0

@@ -1,1 +1,1 @@
-"""The wires of a machine, as tables: which sensor and motor hangs on which pin, which board on which bus."""
+"""The wires of a machine, as tables: which sensor and motor is on which pin, which board on which bus."""

@@ -1,9 +1,9 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is a controller 1 ... 4, as the tables of the wires say)
-"""The wires that lead away from the boards: to buses, bridges, the serial link, and whatever hangs on a UART.
+# (every index below is a controller 1 ... 4, as in the tables of the wires)
+"""The wires that leave the boards: to buses, bridges, the serial link, and devices on a UART.
 
-A message is carried on in the moment in which a board puts it out, with its stamp. What goes the other way, into a
-board's inbox, is written there by whoever sends it: the bus, the link, the plant's sensors.
+A message is carried on when a board puts it out, with its stamp. The other direction, into a
+board's inbox, is written there by its sender: the bus, the link, the plant's sensors.
 """
 
 from typing import TYPE_CHECKING
@@ -78,7 +78,7 @@ class SspWire:
 
     @cython.ccall
     def start(self, time_ns: cython.longlong, segment: object) -> cython.void:
-        """The master starts an exchange; both sides have the other's segment at its end."""
+        """Start an exchange for the master; both sides have the other's segment at its end."""
         end: cython.longlong = time_ns + self.exchange_ns
         to_slave: object = segment
         to_master: object = self.loaded
@@ -95,7 +95,7 @@ class SspWire:
 
     @cython.cfunc
     def _note(self, time_ns: cython.longlong, segment: SspSegment, from_slave: cython.longlong) -> cython.void:
-        """A row of `watch` for each frame in a segment: start of the exchange (ns), from_slave, header, both words."""
+        """Add a row to `watch` for each frame in a segment: exchange start (ns), from_slave, header, both words."""
         i: cython.longlong
         watch: RowStream = self.watch
         for i in range(0, segment.used * 3 // 5, 3):  # five half-words are a frame and three numbers of `rows`
@@ -108,17 +108,17 @@ class SspWire:
 
     @cython.ccall
     def load(self, segment: object) -> cython.void:
-        """The slave puts up what it will send in the next exchange."""
+        """Set what the slave will send in the next exchange."""
         self.loaded = segment
 
 
 @cython.final
 @cython.cclass
 class BoardWires(Outbox):
-    """The wires that lead away from one board: its outbox in the assembled robot.
+    """The wires that leave one board: its outbox in the assembled robot.
 
-    Frames go to its buses, PWM and pins to its bridge, segments over the link, bytes to whoever listens. A pin, a
-    controller or a UART that is not connected here leads nowhere.
+    Frames go to its buses, PWM and pins to its bridge, segments over the link, bytes to their receiver. Output of a
+    pin, a controller or a UART that is not connected here is dropped.
     """
 
     board: "Board"
@@ -139,28 +139,28 @@ class BoardWires(Outbox):
 
     def __init__(self, board, window_ns) -> None:
         self.board = board
-        self.window_ns = window_ns  # nothing that the board puts out comes back to it sooner
+        self.window_ns = window_ns  # the earliest return of the board's own output
         # by controller 1 ... 4: the bus and the node number there
         self.buses = [None] * 5
         self.nodes = [-1] * 5
-        self.can_lines = {}  # {controller: what takes its requests}, where the bus is outside
+        self.can_lines = {}  # {controller: receiver of its requests}, where the bus is outside
         self.drive = None
         self.watchdog_pin = -1
         self.low_side_2_pin = -1
         self.low_side_6_pin = -1
         self.low_side_2 = False
         self.low_side_6 = False
-        self.silent_until = 0  # ns: before that the board was to put nothing on a bus
+        self.silent_until = 0  # ns: before that the board promised to put nothing on a bus
         self.link = None
-        self.watch = None  # a RowStream that takes what its pins and its PWM unit show: ns, kind, a, b, c
-        self.serial_lines = {}  # {UART: what hears it}
+        self.watch = None  # a RowStream that takes the outputs of its pins and its PWM unit: ns, kind, a, b, c
+        self.serial_lines = {}  # {UART: its receiver}
 
     def connect_bus(self, controller, bus, node) -> None:
-        """Controller 1 ... 4 of the board is `node` of `bus`; None for `bus` takes it off.
+        """Connect controller 1 ... 4 of the board as `node` of `bus`; None for `bus` takes it off.
 
-        The bus writes the ends of its transmissions where the controller looks for them.
+        The bus writes the ends of its transmissions where the controller reads them.
         """
-        if bus is not None and not isinstance(bus, Bus):  # taken for one without asking again
+        if bus is not None and not isinstance(bus, Bus):  # used as one without a further check
             raise UserError(f"{self.board.name}: {bus!r} is no Bus")
         if self.buses[controller] is not None:
             self.buses[controller].nodes[self.nodes[controller]].connect(None)
@@ -174,14 +174,14 @@ class BoardWires(Outbox):
             bus.nodes[self.nodes[controller]].connect(self.board.transmit_ends(controller))
 
     def lead_from(self, board) -> None:
-        """`board` hangs on these wires from now on."""
+        """Connect `board` to these wires from now on."""
         self.board = board
         board.outbox = self
         for controller in CONTROLLERS:
             self._connect_ends(controller)
 
     def connect_drive(self, drive, watchdog_pin, low_side_2_pin, low_side_6_pin) -> None:
-        """The board's PWM unit and three of its pins drive a bridge."""
+        """Connect the board's PWM unit and three of its pins to a bridge."""
         self.drive = drive
         self.watchdog_pin = watchdog_pin
         self.low_side_2_pin = low_side_2_pin
@@ -200,7 +200,7 @@ class BoardWires(Outbox):
         f: cython.longlong = 0,
         ref: object = None,
     ) -> None:
-        """Carry on what the board puts out at `time` (ns)."""
+        """Forward the board's output at `time` (ns)."""
         if self.watch is not None and (kind == PIN_OUTPUT or kind == PWM_UPDATE):
             self._note(time, kind, a, b, c)
         if kind == PIN_OUTPUT:
@@ -254,7 +254,7 @@ class BoardWires(Outbox):
         lo: cython.longlong,
         hi: cython.longlong,
     ) -> None:
-        """Carry a frame to its bus."""
+        """Forward a frame to its bus."""
         if time < self.silent_until:
             self._spoke_early(time)
         if self.buses[controller] is None:

@@ -13,7 +13,7 @@ from ranger_sim.harness.step_watch import SerialDevice
 if TYPE_CHECKING:
     from ranger_sim.plant.sensors.imu import Imu
 
-MESSAGE_BYTES: Final = 8  # a UART_BYTE carries so many at most,
+MESSAGE_BYTES: Final = 8  # a UART_BYTE carries at most this many,
 WORD_BYTES: Final = 4  # half of them in each of its two words
 PAUSE_NS: Final = 25_000  # from byte to byte; after more a new message begins (at 460,800 baud a byte takes 21.7 us)
 
@@ -21,7 +21,7 @@ PAUSE_NS: Final = 25_000  # from byte to byte; after more a new message begins (
 @cython.final
 @cython.cclass
 class ImuWire(SerialDevice):
-    """`imu` on UART `uart` of `board`. `tap.bytes_sent(times, values, count)` hears what the unit sends, beside it."""
+    """`imu` on UART `uart` of `board`. `tap.bytes_sent(times, values, count)` also receives what the unit sends."""
 
     imu: "Imu"
     inbox: EventQueue
@@ -37,15 +37,15 @@ class ImuWire(SerialDevice):
         self.plugged = True
 
     def unplug(self) -> None:
-        """The unit is no longer heard: another one takes its place on the UART."""
+        """Disconnect the unit: another one replaces it on the UART."""
         self.plugged = False
 
     def from_board(self, time, byte, count, data) -> None:
-        """A byte of the board arrives at the unit."""
+        """Deliver a byte of the board to the unit."""
         self.imu.receive_byte(time, byte)
 
     def deliver(self) -> object:
-        """Carry on what the unit sent during the step that was just integrated."""
+        """Forward what the unit sent during the step just integrated."""
         if self.plugged and self.imu.bytes.count:
             if self.tap is not None:
                 self.tap.bytes_sent(self.imu.bytes.times, self.imu.bytes.values, self.imu.bytes.count)
@@ -54,7 +54,7 @@ class ImuWire(SerialDevice):
 
     @cython.cfunc
     def _put_bytes(self) -> cython.void:
-        """Up to eight bytes that follow each other closely travel as one message."""
+        """Send up to eight bytes that follow each other closely as one message."""
         line: ByteBuffer = self.imu.bytes
         inbox: EventQueue = self.inbox
         time: cython.longlong = line.times[0]

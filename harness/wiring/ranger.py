@@ -1,17 +1,17 @@
-"""Every wire of the robot, as tables: which sensor hangs on which pin of which board, which board on which bus.
+"""Every wire of the robot, as tables: which sensor is on which pin of which board, which board on which bus.
 
 Source: robot.md N1.1 (buses), N4.1 (encoders), N4.5-N4.9 (converters, switches), N4.10, N4.11 (user interface).
-Read a line from left to right in the direction in which the signal goes.
+Read a line from left to right in the direction of the signal.
 """
 
 from ranger_sim.boards import can_router, motor_board, user_interface
 from ranger_sim.harness.wiring.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, EncoderWord, Wiring
 from ranger_sim.plant import wiring_points as point
 
-# The order in which boards are advanced and their messages sorted within an instant.
+# The order in which boards are advanced and their messages sorted within one time.
 BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
 
-# Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once, or looks at
+# Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once, or reads
 # a sensor because of them.
 HEAR_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
 
@@ -83,7 +83,7 @@ MOTORS = {
 MOTOR_PINS = motor_board.PINS
 PINS = {**dict.fromkeys(("MCH", "MCFO", "MCFI", "MCSI"), motor_board.PINS), "UI": user_interface.PINS}
 
-# The inertial unit talks to UART 1 of the user interface board.
+# The inertial unit is connected to UART 1 of the user interface board.
 IMU_BOARD, IMU_UART = "UI", user_interface.IMU_UART
 
 MOTOR_BOARDS = ("MCH", "MCFO", "MCFI", "MCSI")

@@ -1,6 +1,6 @@
-"""The wires of a machine, as tables: which sensor hangs on which pin of which board, which board on which bus.
+"""The wires of a machine, as tables: which sensor is on which pin of which board, which board on which bus.
 
-Read a line from left to right in the direction in which the signal goes. Ranger's tables are harness/wiring/ranger.py.
+Read a line from left to right in the direction of the signal. Ranger's tables are harness/wiring/ranger.py.
 """
 
 import dataclasses
@@ -11,7 +11,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 class CanWire(NamedTuple):
-    """Controller `controller` of `board` hangs on bus `bus`, counted from 1 in the order of the machine's buses."""
+    """Controller `controller` of `board` is on bus `bus`, counted from 1 in the order of the machine's buses."""
 
     board: str
     controller: int
@@ -44,7 +44,7 @@ class EncoderWord(NamedTuple):
 
 
 class BridgeWire(NamedTuple):
-    """A board's PWM unit and three of its pins drive a bridge (place in the plant's list); "": no such pin."""
+    """A board's PWM unit and three of its pins drive a bridge (place in the plant's list); "": without such a pin."""
 
     board: str
     bridge: int
@@ -57,8 +57,8 @@ class BridgeWire(NamedTuple):
 class Wiring:
     """All wires of a machine. names: {board: {pin, input or register: its number}}; P0.n is pin n, P1.n pin 32 + n.
 
-    hear_in_slots: boards on which frames, edges and bytes wait for a task: no handler
-    and no main loop of theirs answers them at once; they are then left alone until they have something to say.
+    hear_in_slots: boards on which frames, edges and bytes wait for a task: none of their handlers or main loops
+    answers them at once; they are then left alone until they have something to send.
     """
 
     can: Sequence[CanWire] = ()
@@ -70,7 +70,7 @@ class Wiring:
     names: Mapping[str, Mapping[str, int]] = dataclasses.field(default_factory=dict)
 
     def number(self, board: str, name: str) -> int:
-        """Of a pin, an input or a register of a board. UserError for a name that the board does not have."""
+        """The number of a pin, an input or a register of a board. UserError for a name that the board does not have."""
         if name == "":
             return -1
         known = self.names.get(board, {})

@@ -1,15 +1,15 @@
-"""XCP on CAN: a probe on the main brain's memory, with a controller of its own on one of the robot's buses.
+"""XCP on CAN: a probe on the main brain's memory, with its own controller on one of the robot's buses.
 
-The robot's firmware has no XCP, and the main brain sits behind the router and the serial link, where a slave in its
-program could answer and measure once per slot of 2 ms. So the slave is no board of the robot. It is what one plugs onto
-a control unit that is to be measured faster than its program allows: it reads the memory directly and costs the program
-nothing. Its frames are frames of the bus like all others: they arbitrate, add to the load, and are lost with it.
+The robot's firmware has no XCP, and the main brain is behind the router and the serial link, where a slave in its
+program could answer and measure once per slot of 2 ms. So the slave is not a board of the robot. It is a probe such as
+one plugs onto a control unit to measure faster than its program allows: it reads the memory directly and costs the
+program nothing. Its frames are like all others of the bus: they arbitrate, add to the load, and are lost with it.
 
-ROBOT PARITY: the robot had no such probe. The router and the boards of that bus hear its frames and spend their receive
-interrupt on them; the router's table, which names the identifiers of XCP, sends them nowhere.
+ROBOT PARITY: the robot had no such probe. The router and the boards of that bus receive its frames and spend their
+receive interrupt on them; the router's table, which has the identifiers of XCP, forwards them nowhere.
 
-Time is virtual. The probe looks at every step of the plant (250 us), when all boards stand at one instant: it obeys the
-commands that have come, measures, and puts its packets into a queue. Its controller sends that queue frame by frame,
+Time is virtual. The probe acts at every step of the plant (250 us), when all boards are at one time: it executes the
+commands that have arrived, measures, and queues its packets. Its controller sends that queue frame by frame,
 each as soon as the one before has ended. So the same frames from a master give the same bytes.
 
 Transport layer of the standard (ASAM MCD-1 XCP, part 3, CAN): a packet is a frame, without length or counter; frames
@@ -54,7 +54,7 @@ NAME = "XCP"
 # the rest is for commands and answers, for other masters of the bus, and for repeated frames.
 MOST_LOAD = Fraction(4, 5)
 WAITING = 1024  # packets; chosen by us: 46 ms of a bus at 3 Mbit/s, far more than a disturbance within the bound
-LOOK_NS = 1_000_000_000  # nothing outside waits for it; asked for its counters only
+LOOK_NS = 1_000_000_000  # no external program waits for it; it is polled for its counters only
 
 # Commands of the transport layer.
 TRANSPORT_LAYER_CMD = 0xF2
@@ -87,7 +87,7 @@ class _Station(Board):
                 self.sending = False
                 self.counts["packets_out" if inbox.c == TX_SENT else "packets_lost"] += 1
                 self.go_on(inbox.time)
-            elif inbox.kind == CAN_STATUS and inbox.e:  # bus-off: what waits is old when it may speak again
+            elif inbox.kind == CAN_STATUS and inbox.e:  # bus-off: waiting packets are old when it may send again
                 self.counts["bus_off"] += 1
                 self.counts["packets_lost"] += len(self.waiting)
                 self.waiting.clear()
@@ -100,14 +100,14 @@ class _Station(Board):
             self.heard.append(data[: min(flags & LENGTH_CODE, MAX_DLC)])
 
     def put(self, packet: bytes) -> None:
-        """Behind all that waits; what finds no room is dropped."""
+        """Queue a packet; it is dropped when the queue is full."""
         if len(self.waiting) >= WAITING:
             self.counts["packets_dropped"] += 1
         else:
             self.waiting.append(packet)
 
     def go_on(self, now_ns: int) -> None:
-        """The next packet into the controller, if that is free."""
+        """Move the next packet into the controller, if that is free."""
         if self.sending or not self.waiting:
             return
         packet = self.waiting.popleft()
@@ -122,7 +122,7 @@ class _Station(Board):
 class XcpCanProbe(StepWatch):
     """A slave over `robot`'s data table on its bus can1 ... can4. Give it to `robot.attach`.
 
-    outside: the bus of this name, where `can_bus.edge.external_bus` stands in its place. UserError for no such bus.
+    outside: the bus of this name, where `can_bus.edge.external_bus` replaces it. UserError for an unknown bus.
     """
 
     kind = "xcp-can"
@@ -153,16 +153,16 @@ class XcpCanProbe(StepWatch):
         robot.loop.watchers.append(self)
 
     def bears(self, packets: Sequence[tuple[int, int]]) -> bool:
-        """Whether the bus has room for packets (bytes, ns from one to the next) beside the robot's own frames."""
+        """Whether the bus can carry packets (bytes, ns from one to the next) with the robot's own frames."""
         return self.robots_share + self.share_of(packets) <= MOST_LOAD
 
     def share_of(self, packets: Sequence[tuple[int, int]]) -> Fraction:
-        """What they take of the bus, with all stuff bits that they can have."""
+        """Their share of the bus, with the most stuff bits that they can have."""
         sent = [message(NAME, XCP_SLAVE_ID, period_ns, size) for size, period_ns in packets]
         return utilisation(sent, self.bit_rate)
 
     def before_step(self, now_ns: int) -> object:
-        """Obey what has come, measure, and send."""
+        """Execute received commands, measure, and send."""
         station = self.station
         while station.heard:
             self.commands += 1
@@ -176,10 +176,10 @@ class XcpCanProbe(StepWatch):
         return None
 
     def answer(self, packet: bytes, now_ns: int) -> bytes:
-        """What the slave says, or the transport for it."""
+        """The answer of the slave, or of the transport for it."""
         if packet[0] != TRANSPORT_LAYER_CMD or len(packet) < 2:
             return self.slave.command(packet, now_ns)
-        if packet[1] == GET_SLAVE_ID:  # who is there? Also answered to one that is not connected
+        if packet[1] == GET_SLAVE_ID:  # a query for slaves, answered to masters that are not connected, too
             if packet[2:5] != XCP_TEXT or packet[5:6] not in (bytes((IDENTIFY,)), bytes((CONFIRM,))):
                 return b""
             echo = XCP_TEXT if packet[5] == IDENTIFY else bytes(each ^ 0xFF for each in XCP_TEXT)
@@ -192,10 +192,10 @@ class XcpCanProbe(StepWatch):
             return bytes((ANSWER, FIXED, 0, 0)) + XCP_SLAVE_ID.to_bytes(4, "little")
         return bytes((ERROR, ERR_CMD_UNKNOWN))
 
-    # --- an end that `robot.attach` takes
+    # --- the interface for `robot.attach`
 
     def poll(self, now_ns: int) -> int:
-        """Everything happens in virtual time; nothing outside is looked at."""
+        """Do nothing: everything happens in virtual time, and nothing outside is polled."""
         return now_ns + LOOK_NS
 
     def filenos(self) -> list[int]:
@@ -208,6 +208,6 @@ class XcpCanProbe(StepWatch):
         return {"commands": self.commands, **found, **self.station.counts, "writes_refused": self.memory.refused}
 
     def close(self) -> None:
-        """Measure no more."""
+        """Stop measuring."""
         if self in self.robot.loop.watchers:
             self.robot.loop.watchers.remove(self)

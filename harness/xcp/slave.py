@@ -1,8 +1,8 @@
 """The XCP slave without a transport: a command packet in, an answer packet out; measurement lists when time passes.
 
 Packets are those of ASAM MCD-1 XCP, part 2 (protocol layer 1.1), in Intel byte order. No clock, no socket, no robot:
-the same commands at the same instants give the same packets. What is not served is answered ERR_CMD_UNKNOWN. A master
-may write more than one packet holds: DOWNLOAD and the DOWNLOAD_NEXT behind it are one write, answered once.
+the same commands at the same times give the same packets. The answer to an unserved command is ERR_CMD_UNKNOWN. A
+master may write more than one packet holds: DOWNLOAD and the DOWNLOAD_NEXT after it are one write, with one answer.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ ADD_14 = 0x03  # checksum: bytes added up in 32 bits
 ID_TEXT, ID_A2L_NAME = 0, 1
 A2L_NAME = "ranger"  # of the file, without its ending
 MASTER_BLOCKS = 0x01  # of the optional communication modes
-MOST_BLOCK_BYTES = 255  # what the count of DOWNLOAD can say
-A_DAQ_LIST, CONSISTENT = 0x04, 0x80  # an event's: for lists that measure, which are of one instant all together
-MOST_LISTS = 32  # chosen by us: bounds what one master can make us keep and sample
+MOST_BLOCK_BYTES = 255  # the limit of DOWNLOAD's count
+A_DAQ_LIST, CONSISTENT = 0x04, 0x80  # an event's: for lists that measure, whose values are all of one time
+MOST_LISTS = 32  # chosen by us: limits what one master can make the slave keep and sample
 MOST_ENTRY_BYTES = 4
 MOST_CHECKSUM_BYTES = 65536  # chosen by us, above the whole table
 
 
 class XcpError(Exception):
-    """A command that is refused: `code` goes to the master, and `more` behind it."""
+    """A refused command: the master receives `code`, followed by `more`."""
 
     def __init__(self, code: int, more: bytes = b"") -> None:
         super().__init__(f"XCP error {code:#04x}")
@@ -53,37 +53,37 @@ class XcpError(Exception):
 
 
 class Memory(Protocol):
-    """What is measured and changed. Both raise XcpError, and then nothing has changed."""
+    """The memory that is measured and changed. Both methods raise XcpError, and then nothing has changed."""
 
     def read(self, address: int, count: int) -> bytes:
-        """`count` bytes from `address` on."""
+        """Read `count` bytes from `address` on."""
 
     def write(self, address: int, data: bytes) -> None:
-        """All of `data` from `address` on, or none of it."""
+        """Write all of `data` from `address` on, or none of it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Clock:
-    """Time stamps of a transport: `size` bytes, counting units of `unit_ns`; `unit_code` as the standard has it."""
+    """Time stamps of a transport: `size` bytes, counting units of `unit_ns`; `unit_code` as in the standard."""
 
     size: int
     unit_code: int
     unit_ns: int
 
     def stamp(self, time_ns: int) -> int:
-        """The count at an instant, as long as `size` allows."""
+        """The count at `time_ns`, truncated to `size`."""
         return time_ns // self.unit_ns % (1 << 8 * self.size)
 
 
 FINE = Clock(4, 3, 1_000)  # 1 us: wraps after 71 minutes
-# A frame of 8 bytes has room for identifier, stamp and one value only if the stamp has 2 bytes: wraps after 0.65 s,
+# A frame of 8 bytes holds identifier, stamp and one value only if the stamp has 2 bytes: wraps after 0.65 s,
 # hundreds of times the slowest event's period.
 SHORT = Clock(2, 4, 10_000)
 
 
 @dataclasses.dataclass(frozen=True)
 class Event:
-    """When lists are sampled; unit codes as the standard has them (5: 100 us)."""
+    """When lists are sampled; unit codes as in the standard (5: 100 us)."""
 
     name: str
     period_ns: int
@@ -112,9 +112,9 @@ class _List:
 
 
 class Slave:
-    """One slave for one master. `name`: what GET_ID says; `max_cto`, `max_dto`: bytes of a packet, 8 ... 255 and more.
+    """One slave for one master. `name`: the answer to GET_ID; `max_cto`, `max_dto`: packet bytes, 8 ... 255 and more.
 
-    `command` answers; `sample` gives the packets of the lists that are due. `bears`: whether the transport has room for
+    `command` answers; `sample` returns the packets of the lists that are due. `bears`: whether the transport can carry
     packets (bytes, shortest time between two in ns), all that would be measured at once; None: always.
     """
 
@@ -134,14 +134,14 @@ class Slave:
         self._forget()
 
     def _forget(self) -> None:
-        """As after power-up."""
+        """Reset to the state after power-up."""
         self.lists: list[_List] = []
-        self.stage = ""  # of allocation: which command came last
+        self.stage = ""  # of allocation: the last command
         self.pointer: tuple[int, int, int] | None = None
         self.address = 0
         self.text: bytes | None = None  # what UPLOAD reads instead of memory: a name that was asked for
-        self.block: bytes | None = None  # what of a write in several packets has come
-        self.block_bytes = 0  # and how long it will be
+        self.block: bytes | None = None  # the part received of a write in several packets
+        self.block_bytes = 0  # and its total length
 
     @property
     def running(self) -> bool:
@@ -151,9 +151,9 @@ class Slave:
     # ---- commands
 
     def command(self, packet: bytes, time_ns: int) -> bytes:
-        """The answer to a command at this instant of virtual time, ns.
+        """The answer to a command at this virtual time, ns.
 
-        No bytes while nobody is connected, and for all but the last packet of a block.
+        No bytes while no master is connected, and for all but the last packet of a block.
         """
         self.time_ns = time_ns
         if not packet or (not self.connected and packet[0] != 0xFF):
@@ -173,7 +173,7 @@ class Slave:
         return b"" if self.block is not None else answer
 
     def _connect(self, packet: bytes) -> bytes:
-        if packet[1] != 0:  # user-defined modes: none here
+        if packet[1] != 0:  # user-defined modes: not served
             raise XcpError(ERR_OUT_OF_RANGE)
         self._forget()
         self.connected = True
@@ -203,7 +203,7 @@ class Slave:
         return b""
 
     def _read(self, count: int) -> bytes:
-        """From the pointer on, which moves."""
+        """Read from the pointer on, and move it."""
         if self.text is not None:
             if count > len(self.text):
                 raise XcpError(ERR_OUT_OF_RANGE)
@@ -268,7 +268,7 @@ class Slave:
         return self.lists[number]
 
     def _still(self) -> None:
-        """Lists are not changed while one runs."""
+        """Refuse a change of lists while one runs."""
         if self.running:
             raise XcpError(ERR_DAQ_ACTIVE)
 
@@ -328,7 +328,7 @@ class Slave:
         return self._put(packet[1], packet[2], packet[3], packet, 4)
 
     def _enter_several(self, packet: bytes) -> bytes:
-        """Entries of eight bytes: bit, size, address, extension, one that only fills up."""
+        """Entries of eight bytes: bit, size, address, extension, one of padding."""
         if len(packet) < 2 + 8 * packet[1]:
             raise XcpError(ERR_CMD_SYNTAX)
         for at in range(2, 2 + 8 * packet[1], 8):
@@ -336,7 +336,7 @@ class Slave:
         return b""
 
     def _put(self, bit: int, size: int, extension: int, packet: bytes, at: int) -> bytes:
-        """One entry at the pointer, which moves."""
+        """Write one entry at the pointer, and move it."""
         self._still()
         if self.pointer is None:
             raise XcpError(ERR_SEQUENCE)
@@ -366,8 +366,8 @@ class Slave:
         return struct.pack("<BHHBB", state, 0, wanted.event, wanted.prescaler, 0)
 
     def _may_run(self, wanted: _List) -> None:
-        """Refused when its packets are too long or, with all others, too many for the transport, or an entry is left
-        out."""
+        """Refuse a list whose packets are too long or, with all others, too many for the transport, or that has an
+        entry left out."""
         left_out = any(size == 0 for entries in wanted.tables for _, size in entries)
         if not wanted.tables or left_out or any(size > self.max_dto for size, _ in self._packets(wanted)):
             raise XcpError(ERR_DAQ_CONFIG)
@@ -467,14 +467,14 @@ def _address(extension: int, packet: bytes, at: int) -> int:
 
 
 def most_packets(max_cto: int) -> int:
-    """Of one write: as many as its longest block needs."""
+    """The most packets of one write: as many as its longest block needs."""
     return -(-MOST_BLOCK_BYTES // (max_cto - 2))
 
 
 DOWNLOAD_NEXT = 0xEF
 # What a packet of CAN is too short for: SHORT_DOWNLOAD and WRITE_DAQ_MULTIPLE with one byte and one entry
 SHORTEST_CTO = {0xED: 9, 0xC7: 10}
-# Code of a command: what obeys it, and how many bytes it has at least.
+# Code of a command: its handler, and its least number of bytes.
 COMMANDS: dict[int, tuple[Callable[[Slave, bytes], bytes], int]] = {
     0xFF: (Slave._connect, 2),
     0xFE: (Slave._disconnect, 1),

@@ -1,4 +1,4 @@
-"""The main brain's data table as memory of an XCP slave: everything is read, parameters alone are written."""
+"""The main brain's data table as memory of an XCP slave: all of it is readable, only parameters are writable."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TableMemory:
         return data[skipped : skipped + count]
 
     def write(self, address: int, data: bytes) -> None:
-        """Whole words of parameters, all within their limits; else XcpError, and none is changed."""
+        """Whole words of parameters, all within their limits; otherwise XcpError, and none is changed."""
         try:
             words = self._checked(address, data)
         except XcpError:
@@ -42,7 +42,7 @@ class TableMemory:
         for number, word in words:
             if hasattr(board, "store"):
                 board.store.set_word(number, word, board.time.ms)
-            else:  # it lives in another process
+            else:  # it runs in another process
                 board.send(SET_WORD, self.robot.loop.time, number, word)
 
     def _checked(self, address: int, data: bytes) -> list[tuple[int, int]]:

@@ -1,12 +1,12 @@
 """XCP on UDP: one master over datagrams (ASAM MCD-1 XCP, part 3: length and counter before each packet).
 
-It keeps the rule of `foundation/peers.py` as far as datagrams have it: a look carries out at most `burst` commands,
-however they are packed; one master has the place, who else speaks is not answered and counted by reason, and beyond
-this machine nobody is served unless that is asked for. A datagram that finds no room is dropped, and counted.
+It keeps the rule of `foundation/peers.py` as far as datagrams allow: a poll carries out at most `burst` commands,
+however they are packed; there is one master, other senders get no answer and are counted by reason, and machines
+other than this one are served only on request. A datagram for which there is no space is dropped, and counted.
 
-The master has a socket of its own on the same port, connected to it: the kernel keeps its datagrams apart from those of
-strangers, who fill only their own queue. Of that a look takes a few, and only to who says CONNECT is anything owed: the
-kernel is asked, so many times a second, whose it is.
+The master has its own socket on the same port, connected to it: the kernel keeps its datagrams separate from those of
+strangers, who fill only their own queue. A poll takes a few from that queue, and only the sender of a CONNECT may need
+an answer: the kernel is asked, a limited number of times a second, which user owns it.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ from ranger_sim.harness.xcp.table_memory import TableMemory
 MAX_CTO, MAX_DTO = 248, 1400  # bytes: a datagram fits into one frame of Ethernet
 RULE = LIMITS["xcp-udp"]
 DATAGRAMS_A_LOOK = RULE.read_bytes // RULE.longest
-WAITING = 4096  # packets of measurements kept for the next look; chosen by us: 2 s of one list at 0.5 ms
-STRANGERS_A_LOOK = 2  # datagrams of theirs; chosen by us: a look of what cannot be answered takes 10 us
-QUESTIONS = 8  # for the kernel, at once; chosen by us: masters that come and go by hand
-LOOK_NS = 500_000  # virtual time between two looks: the fastest event
+WAITING = 4096  # packets of measurements kept for the next poll; chosen by us: 2 s of one list at 0.5 ms
+STRANGERS_A_LOOK = 2  # datagrams; chosen by us: polling those that get no answer takes 10 us
+QUESTIONS = 8  # to the kernel, at once; chosen by us: masters that a person starts and stops
+LOOK_NS = 500_000  # virtual time between two polls: the fastest event
 CONNECT, DISCONNECT = 0xFF, b"\xfe"  # codes of commands
 HEADER = struct.Struct("<HH")
 
 
 class _Sampling(StepWatch):
-    """Asks the slave at every step of the plant; measures, and changes nothing."""
+    """Samples the slave at every step of the plant, and changes nothing."""
 
     def __init__(self, server: XcpUdpServer) -> None:
         super().__init__()
@@ -61,7 +61,7 @@ class _Sampling(StepWatch):
 class XcpUdpServer:
     """A slave over `robot`'s data table on a UDP port (0: a free one; see `port`). Give it to `robot.attach`.
 
-    UserError when the port cannot be had, or would be open to the network without `allow_network`.
+    UserError when the port is not available, or would be open to the network without `allow_network`.
     """
 
     kind = "xcp-udp"
@@ -81,21 +81,21 @@ class XcpUdpServer:
         self.memory = TableMemory(robot)
         self.slave = Slave(self.memory, MAX_CTO, MAX_DTO, FINE)
         self.master: tuple[str, int] | None = None
-        self.private: socket.socket | None = None  # the master's own; it has none where the kernel gives none
+        self.private: socket.socket | None = None  # the master's own; None where the kernel gives none
         self.counter = 0
         self.waiting: deque[bytes] = deque()
         self.sent_away: Counter[str] = Counter()
         self.totals = {"commands": 0, "packets_out": 0, "packets_dropped": 0}
-        self.left_over = False  # datagrams may wait for the next look
-        self.rest, self.speaker = b"", ("", 0)  # of a datagram whose commands wait for the next look, and whose it is
+        self.left_over = False  # datagrams may wait for the next poll
+        self.rest, self.speaker = b"", ("", 0)  # of a datagram whose commands wait for the next poll, and its sender
         self.room = RULE.burst
         self.clock = wallclock.monotonic_s
-        self.questions, self.asked_s = float(QUESTIONS), self.clock()  # for the kernel: room now, and when that was so
+        self.questions, self.asked_s = float(QUESTIONS), self.clock()  # to the kernel: how many, as of when
         self.sampling = _Sampling(self)
         robot.loop.watchers.append(self.sampling)
 
     def sample(self, now_ns: int) -> None:
-        """What is measured at this instant waits for the next look."""
+        """Queue what is measured at this time for the next poll."""
         if not self.slave.running:
             return
         for packet in self.slave.sample(now_ns, now_ns - self.robot.start_ns):
@@ -105,7 +105,7 @@ class XcpUdpServer:
                 self.waiting.append(packet)
 
     def poll(self, now_ns: int) -> int:
-        """Commands that have come, measurements that wait; returns when it wants to be looked at next, ns."""
+        """Handle commands that have arrived and send waiting measurements; returns the next poll's time, ns."""
         while self.waiting:
             self._send(self.waiting.popleft())
         self.room, self.left_over = RULE.burst, False
@@ -116,7 +116,7 @@ class XcpUdpServer:
         return now_ns + LOOK_NS
 
     def _read(self, source: socket.socket, strangers: int, now_ns: int) -> None:
-        """Datagrams of a socket: as many as a look may take, and so many that are not the master's."""
+        """Read a socket's datagrams: as many as a poll may take, and `strangers` that are not the master's."""
         for _ in range(DATAGRAMS_A_LOOK):
             if self.rest or strangers <= 0:
                 self.left_over = True
@@ -125,7 +125,7 @@ class XcpUdpServer:
                 data, sender = source.recvfrom(2048)
             except (BlockingIOError, InterruptedError):
                 return
-            except OSError:  # an earlier datagram found nobody there, or the master has just left
+            except OSError:  # an earlier datagram found no receiver, or the master has just left
                 if source.fileno() < 0:
                     return
                 continue
@@ -134,7 +134,7 @@ class XcpUdpServer:
         self.left_over = True
 
     def _take(self, data: bytes, sender: tuple[str, int], now_ns: int) -> None:
-        """A datagram, from whomever."""
+        """Handle a datagram from any sender."""
         if sender != self.master and (fault := self._fault_of_stranger(data, sender, now_ns)) is not None:
             self.sent_away[fault] += 1
             return
@@ -142,7 +142,7 @@ class XcpUdpServer:
         self._carry_out(now_ns)
 
     def _fault_of_stranger(self, data: bytes, sender: tuple[str, int], now_ns: int) -> str | None:
-        """Why somebody who has not got the place is not heard; None when it may have it."""
+        """Return why a sender that is not the master is refused; None when it may become the master."""
         if data[HEADER.size : HEADER.size + 1] != bytes((CONNECT,)):
             return FULL if self.slave.connected else MALFORMED
         if not self._may_ask():
@@ -153,7 +153,7 @@ class XcpUdpServer:
         return self._fault_of(sender)
 
     def _may_ask(self) -> bool:
-        """Whether the kernel may be asked now: as often as a connection may be taken in at other doors."""
+        """Whether the kernel may be asked now: as often as other servers may accept a connection."""
         now_s = self.clock()
         self.questions = min(float(QUESTIONS), self.questions + ARRIVALS_PER_S * (now_s - self.asked_s))
         self.asked_s = now_s
@@ -163,7 +163,7 @@ class XcpUdpServer:
         return True
 
     def _leave(self) -> None:
-        """Nobody has the place."""
+        """Release the master's place."""
         self.master = None
         self.waiting.clear()
         if self.private is not None:
@@ -171,10 +171,10 @@ class XcpUdpServer:
             self.private = None
 
     def _has_place(self, master: tuple[str, int]) -> None:
-        """From now on this is the master, and its datagrams come to a socket of its own.
+        """Make this sender the master, and receive its datagrams at a separate socket.
 
-        The door shares its port only now: while it was bound, no other program could have it as well. The kernel
-        lets this user's programs alone share.
+        The server's socket shares its port only now: while it was bound, no other program could bind it too. The
+        kernel lets only this user's programs share it.
         """
         self._leave()
         self.master = master
@@ -191,7 +191,7 @@ class XcpUdpServer:
             self.private = own
 
     def _carry_out(self, now_ns: int) -> None:
-        """The packets of a datagram, in their order, as far as there is room for commands in this look."""
+        """Carry out the packets of a datagram in order, as far as this poll's limit of commands allows."""
         while self.rest and self.room > 0:
             data = self.rest
             length = HEADER.unpack_from(data)[0] if len(data) >= HEADER.size else 0
@@ -212,11 +212,11 @@ class XcpUdpServer:
                 self._leave()
 
     def _master_is_gone(self) -> bool:
-        """True when the one that has the place was a program of this machine that has ended without a word."""
+        """True when the master was a program of this machine that has ended without DISCONNECT."""
         return self.master is not None and loopback(self.master[0]) and owner_of(self.master) is None
 
     def _fault_of(self, sender: tuple[str, int]) -> str | None:
-        """Why this sender is not served; None when it may be."""
+        """Return why this sender is not served; None when it may be."""
         if self.slave.connected:
             return FULL
         if not loopback(self.host):
@@ -238,7 +238,7 @@ class XcpUdpServer:
         self.counter = (self.counter + 1) & 0xFFFF  # also of what is lost, so that the master sees it
 
     def filenos(self) -> list[int]:
-        """What becomes readable when the master speaks, or while there is none whoever does."""
+        """What becomes readable when the master sends, or, without a master, when any client does."""
         return [(self.private or self.socket).fileno()]
 
     def counters(self) -> dict[str, int]:
@@ -247,7 +247,7 @@ class XcpUdpServer:
         return {**self.totals, "writes_refused": self.memory.refused, **away}
 
     def close(self) -> None:
-        """Serve nobody any more."""
+        """Stop serving."""
         if self.sampling in self.robot.loop.watchers:
             self.robot.loop.watchers.remove(self.sampling)
         self._leave()
@@ -255,7 +255,7 @@ class XcpUdpServer:
 
 
 def owner_of(sender: tuple[str, int]) -> int | None:
-    """The user id behind a UDP port of this machine, by the kernel's table; None when it is not there."""
+    """Return the user id behind a UDP port of this machine, by the kernel's table; None when it is not listed."""
     number = int.from_bytes(socket.inet_aton(sender[0]), sys.byteorder)
     wanted = {f"{number:08X}:{sender[1]:04X}", f"00000000:{sender[1]:04X}"}
     for line in Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]:
