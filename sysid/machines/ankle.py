@@ -384,8 +384,7 @@ class Prediction:
 def predicted(
     training: Table, held: Table, extra: Mapping[str, Torque] | None = None, of_program: bool = False
 ) -> tuple[dict[str, float], list[Prediction]]:
-    """Fit the base and `extra` to `training` by least squares in free simulation, and predict `held` with the
-    values."""
+    """Fit base and `extra` to `training` by least squares in free simulation; predict `held` with the values."""
     fit = _Fit(signals.uniform(training), Ankle.parameters, of_program, extra)
     fit.improve()
     if not _recording(fit).whitened:
