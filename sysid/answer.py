@@ -1,4 +1,4 @@
-"""What was found, as the dictionary that `ranger-sim diagnose --json` writes."""
+"""The findings of a diagnosis as the dictionary that `ranger-sim diagnose --json` writes."""
 
 import dataclasses
 import math
@@ -25,7 +25,7 @@ NEXT = {
 
 
 def of(found: Diagnosis, findings: Sequence[dict]) -> dict[str, Any]:
-    """Everything but what held-out data say. findings: what is to be said of the data besides."""
+    """Everything except the result of held-out data. findings: additional ones about the data."""
     extended, doubtful, impossible = found.extended, found.doubtful, _impossible(found)
     step_s = found.recordings[0].table.step_s
     together = ", ".join(each.table.name for each in found.recordings)
@@ -62,7 +62,7 @@ def of(found: Diagnosis, findings: Sequence[dict]) -> dict[str, Any]:
 
 
 def cause(found: Diagnosis, each: Named) -> dict[str, Any]:
-    """A named effect with its parameters, their intervals, and what speaks for it and against."""
+    """A named effect with its parameters, their intervals, and the evidence for it and against it."""
     machine, extended = found.machine, found.extended
     parameters = {
         name: _value(extended, full) for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
@@ -90,7 +90,7 @@ def cause(found: Diagnosis, each: Named) -> dict[str, Any]:
 
 
 def _channels(found: Diagnosis) -> list[dict[str, Any]]:
-    """Misfit of each equation, in all and in each regime: rms of the residual over its noise, both in deviations."""
+    """Misfit of each equation, in total and in each regime: rms of the residual over its noise, both in deviations."""
     plain, extended, recordings = found.plain, found.extended, found.recordings
     out = []
     for equation in plain.equations:
@@ -137,7 +137,7 @@ def _subsystem(found: Diagnosis) -> str | None:
 
 
 def _impossible(found: Diagnosis) -> list[str]:
-    """Parameters that lie outside their limits with their whole interval: no machine has such."""
+    """Parameters whose whole interval is outside their limits: no machine has such values."""
     regression, out = found.extended, []
     for known in found.machine.parameters:
         if known.name in regression.values:
@@ -148,7 +148,7 @@ def _impossible(found: Diagnosis) -> list[str]:
 
 
 def _known(had: Named, was: KnownEffect, extended: Regression) -> dict[str, Any]:
-    """What the model had, and what these data say of it."""
+    """The model's known effects, and their values by these data."""
     return {
         "name": was.cause,
         "at": was.at,

@@ -1,8 +1,8 @@
 """The catalogue: 42 ways in which a machine differs from its model, by identifier, with the balances that show them.
 
-An identifier is stable. Where `plant/terms.py` has a form for the cause, the form's name is the identifier, or it is
-named in `form`; such a cause can be put into the simulator by a model file. One identifier may stand at several
-places (`sensor_offset` at the current, the gyro, an angle): `at` says which, and `key` tells them apart.
+An identifier is stable. Where `plant/terms.py` has a form for the cause, the form's name is the identifier, or `form`
+names it; a model file can put such a cause into the simulator. One identifier may have several places (`sensor_offset`
+at the current, the gyro, an angle): `at` names the place, and `key` distinguishes them.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ BALANCES = {
 @dataclasses.dataclass(frozen=True)
 class Cause:
     """One cause. number: in the catalogue; confusable: numbers of causes with a similar signature; shift: it is a
-    wrong value of a number that the base model has, which a fit of that number takes up.
+    wrong value of a number of the base model, which a fit of that number absorbs.
     """
 
     number: int
@@ -141,7 +141,7 @@ NUMBERS = 42
 
 
 def find(name: str) -> Cause:
-    """The cause of this key, or of this identifier when it stands at one place only. UserError with the nearest."""
+    """The cause of this key, or of this identifier when it has one place only. UserError with the nearest."""
     if name in CAUSES:
         return CAUSES[name]
     same = [cause.key for cause in _ALL if cause.identifier == name]

@@ -1,4 +1,4 @@
-"""Measured data: channels with unit and time stamps of their own, what was found wrong with them, what was mended.
+"""Measured data: channels with their own unit and time stamps, findings about them, repairs of them.
 
     Channel   one quantity: stamps and values, each of shape (n,), in SI units
     Finding   something odd at a place in a channel, with its size; nothing is changed by finding it

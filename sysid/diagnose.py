@@ -1,6 +1,6 @@
-"""From measured data to what the simulation gets wrong: detect, localise, name, tie or abstain, extend, gain.
+"""From measured data to the simulation's errors: detect, localise, name, tie or abstain, extend, gain.
 
-What was found is a `Diagnosis`, told by `answer.py`; held-out data judge it in `held_out.py`.
+The result is a `Diagnosis`, which `answer.py` turns into the printed answer; held-out data judge it in `held_out.py`.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,10 +16,10 @@ from ranger_sim.sysid.regression import Regression
 
 NAMED_LEVEL = 0.005  # of the whole selection
 ROUNDS, MOST = 4, 5  # of naming; effects that are named
-AGAIN = 2  # times that what was named is simulated, and all naming done over
-SKEW = 0.5  # samples: stamps of two channels differ by so much in any log
+AGAIN = 2  # times that the named effects are simulated and the whole naming is repeated
+SKEW = 0.5  # samples: usual difference between two channels' stamps in any log
 
-Progress = Callable[[str, float], None]  # (what is done now, share of the work that lies behind)
+Progress = Callable[[str, float], None]  # (present step, finished share of the work)
 
 
 def diagnose(
@@ -31,9 +31,9 @@ def diagnose(
     known: Sequence[KnownEffect] = (),
     progress: Progress = lambda what, share: None,
 ) -> Diagnosis:
-    """What `machine`'s equations get wrong about these recordings. UserError when they cannot be judged at all.
+    """Errors of `machine`'s equations about these recordings. UserError when they cannot be judged at all.
 
-    known: effects that the model has already; like the machine's parameters they are fitted anew and are no finding.
+    known: effects that the model has already; like the machine's parameters they are fitted again and are not findings.
     """
     progress("equations", 0.0)
     recordings = [machine.prepare(table) for table in tables]
@@ -86,7 +86,7 @@ def diagnose(
 
 
 def _hold_out(found: Diagnosis, holdout: Sequence[Table], seed: int) -> None:
-    """What held-out data say; what they refuse is named no longer."""
+    """Judgement by held-out data; effects that they refuse are no longer named."""
     named = [] if found.doubtful else found.named
     held = held_out.judged(found.machine, found.plain, found.extended, holdout, found.skews, named, seed)
     told = found.answer
@@ -106,7 +106,7 @@ def _name(
     skews: Sequence[Named],
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[Named], Regression]:
-    """What of the effects is named, the most telling first, and the regression with it."""
+    """The named effects, the most telling first, and the regression with them."""
     named: list[Named] = []
     extended, rest = plain, list(effects)
     for number in range(ROUNDS):
@@ -116,13 +116,13 @@ def _name(
             break
         named += found
         rest = [each for each in rest if not any(other.effect.excludes(each) for other in found)]
-        # what was named no longer counts as noise, and smaller effects stand out
+        # named effects no longer count as noise, and smaller effects become visible
         extended = naming.refit(plain, named, [*skews, *named], fresh=True)
     return named, extended
 
 
 def _skews(effects: Sequence[Effect], regression: Regression) -> list[Named]:
-    """Lags of less than half a sample: stamps, not causes. They are taken into account without a word."""
+    """Lags of less than half a sample: stamps, not causes. They are included without a finding."""
     lags = [each for each in effects if each.cause == "sensor_lag"]
     step_s = regression.recordings[0].table.step_s
     found = naming.select(lags, regression, NAMED_LEVEL, most=2)
@@ -133,7 +133,7 @@ def _skews(effects: Sequence[Effect], regression: Regression) -> list[Named]:
 
 
 def _had(known: KnownEffect, effects: Sequence[Effect]) -> Named:
-    """A known effect among those of the machine; UserError when it has none such with these channels."""
+    """A known effect among those of the machine; UserError when the machine has no such effect with these channels."""
     for effect in effects:
         same = (effect.cause, effect.at, set(effect.coefficients)) == (known.cause, known.at, set(known.coefficients))
         if same and set(effect.shapes[0]) == set(known.shape):
@@ -142,6 +142,6 @@ def _had(known: KnownEffect, effects: Sequence[Effect]) -> Named:
 
 
 def _left(machine: Machine, term: residual_term.ResidualTerm, holdout: Sequence[Table]) -> list[float]:
-    """What the equation leaves of held-out data without and with the learned term: rms in its unit."""
+    """rms of the equation's residual on held-out data without and with the learned term, in its unit."""
     recordings = [machine.prepare(table) for table in holdout]
     return list(term.left(machine, recordings, Regression(recordings)))

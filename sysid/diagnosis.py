@@ -1,4 +1,4 @@
-"""What a diagnosis found, before it is told (`answer.py`) or drawn."""
+"""The result of a diagnosis, before it is printed (`answer.py`) or drawn."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -9,15 +9,15 @@ from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
 
-# Of all general tests together. Chosen by us: their chi-squares hold for many samples only, and 0.001 gave 1 alarm in
-# 30 sound recordings of the motor bench; effects worth a name are far below it.
+# Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
+# in 30 sound recordings of the motor bench; effects worth a name are far below it.
 GENERAL_LEVEL = 0.0001
-EXPLAINED = 0.7  # of what repeats: a name that explains less is none
+EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not named
 
 
 @dataclasses.dataclass(frozen=True)
 class KnownEffect:
-    """An effect that the model has already: its shape, and the coefficients that it was found with."""
+    """An effect that the model has already: its shape, and its coefficients in the model."""
 
     cause: str
     at: str
@@ -27,17 +27,17 @@ class KnownEffect:
 
 @dataclasses.dataclass
 class Diagnosis:
-    """Everything that was found, for the report; `answer` is what is printed."""
+    """All results, for the report; `answer` is the printed part."""
 
     machine: Machine
     recordings: list[Recording]
     plain: Regression
     extended: Regression
-    skews: list[Named]  # stamps that are off, and what the model has already: in the base of both regressions
-    had: list[Named]  # the latter alone, in the order of `known`
+    skews: list[Named]  # stamps that are off, and the model's known effects: in the base of both regressions
+    had: list[Named]  # the known effects alone, in the order of `known`
     known: list[KnownEffect]
     named: list[Named]
-    intervals: dict[str, intervals.Intervals]  # of what is named, by its name, over every shape that explains the data
+    intervals: dict[str, intervals.Intervals]  # of the named effects, by name, over every shape that explains the data
     before: misfit.Misfit
     after: misfit.Misfit
     doubts: plausibility.Doubts
@@ -57,6 +57,6 @@ class Diagnosis:
 
     @property
     def doubtful(self) -> bool:
-        """Something is wrong, and what it is cannot be said."""
+        """Something is wrong, and its cause cannot be named."""
         left = self.explained < EXPLAINED and self.after.p < GENERAL_LEVEL
         return self.detected and (not self.named or self.doubts.forbid or left)

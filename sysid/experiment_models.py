@@ -1,9 +1,9 @@
 """Each experiment as linearised equations about a reference motion: unknowns, sensors, parameters, where causes enter.
 
-An equation says that a sum of terms is zero. Each term is an unknown signal, or its derivative, times a coefficient
-over time. A channel that is measured adds an equation: what the sensor shows is the signal. Parameters that a fit
-adjusts, and causes, enter an equation by what they add to it: their regressor. A cause stands where it is most usual;
-`places` says so where there is a choice.
+An equation sets a sum of terms to zero. Each term is an unknown signal, or its derivative, times a coefficient
+over time. A measured channel adds an equation: the sensor's reading equals the signal. Parameters that a fit
+adjusts, and causes, enter an equation by their contributions to it: their regressors. A cause is at its most usual
+place; `places` names it where there is a choice.
 
 The numbers are those of the robot's hip motor (plant/electrics/motor_parameters.py) and of the bench of the blind tests
 (tests/blind/README.md). Only their order matters here: it decides how alike two signatures look.
@@ -21,7 +21,7 @@ from ranger_sim.sysid.dataset import Array
 
 SAMPLES = 120  # of the reference motion, from which signatures are compared
 FINE = 20  # steps of the signals with memory between two samples
-MODEL_SIGMA = 1e-2  # an equation is so exact, as a part of the rms of its first parameter's regressor
+MODEL_SIGMA = 1e-2  # error of an equation, as a part of the rms of its first parameter's regressor
 
 Regressors = Mapping[str, Array]
 Signal = NDArray[Any]  # over the fine grid
@@ -30,8 +30,8 @@ Values = Mapping[str, Signal | float]
 
 @dataclasses.dataclass(frozen=True)
 class Equation:
-    """sum of coefficient x unknown (or its derivative) = 0. sigma: how exactly, in the equation's unit; channel: of a
-    sensor's equation, which is there when the channel is measured. Arrays have shape (SAMPLES,).
+    """sum of coefficient x unknown (or its derivative) = 0. sigma: its error, in the equation's unit; channel: of a
+    sensor's equation, which exists when the channel is measured. Arrays have shape (SAMPLES,).
     """
 
     name: str
@@ -90,7 +90,7 @@ class Builder:
         return self._walk(value, lambda y, x: y + (x - y) * self.step_s / constant_s)
 
     def bristle(self, speed: Signal, way: float) -> Signal:
-        """What a bristle of this length has less than full sliding friction, of 1: Dahl's law."""
+        """Deficit of a bristle of this length against full sliding friction, of 1: Dahl's law."""
         moved = speed * self.step_s / way
         z = np.zeros_like(speed)
         for k in range(1, len(z)):
@@ -152,19 +152,19 @@ class Builder:
         self.equation(f"sensor of {channel}", balance, [(unknown, -1.0)], None, causes, sigma, channel)
 
     def model(self, name: str, excitation: str) -> Model:
-        """What was collected."""
+        """The collected model."""
         return Model(name, self.t[::FINE], tuple(self.equations), excitation, dict(self.places))
 
 
 def _friction(b: Builder, w: Signal, torque: Signal, way: float, slow: float) -> dict[str, Signal | float]:
-    """What the catalogue's frictions add to a balance of torques or forces: `way`, `slow` are their scales."""
+    """Contributions of the catalogue's frictions to a balance of torques or forces: `way`, `slow` are their scales."""
     sign = np.tanh(w / (0.1 * slow))
     return {
         "coulomb_friction": sign,
         "viscous_friction": w,
         "stribeck": sign * np.exp(-((w / slow) ** 2)),
         "presliding": b.bristle(w, way),
-        # beyond what the base model has: more of it while the load drives
+        # in addition to the base model: more of it while the load drives
         "load_friction": sign * np.abs(torque) * (torque * w < 0.0),
         "direction_friction": np.abs(sign) + 0.2 * np.abs(w) / slow,
         "friction_warm_up": sign * np.exp(-4.0 * b.t / b.t[-1]),
@@ -206,7 +206,7 @@ def motor_bench() -> Model:
     p = MotorParameters(gear=14.0)
     gear_K, R, J = 14.0 * p.torque_constant_Nm_per_A, p.resistance_ohm, 0.01
     b = Builder(20.0)
-    envelope = np.clip(1.6 * np.sin(2.0 * np.pi * 0.06 * b.t) ** 2 - 0.15, 0.0, 1.0)  # stands still now and then
+    envelope = np.clip(1.6 * np.sin(2.0 * np.pi * 0.06 * b.t) ** 2 - 0.15, 0.0, 1.0)  # at rest now and then
     w = envelope * b.waves((9.0, 0.21, 0.0), (5.0, 0.53, 1.0), (2.0, 1.31, 2.0))
     load = b.waves((0.25, 0.09, 0.4), (0.15, 0.47, 1.7), (0.05, 1.7, 0.3))
     sign = np.tanh(w / 0.1)
@@ -404,7 +404,7 @@ def positioning() -> Model:
     b.equation(
         "motion",
         "M",
-        [("v", -mass, 1), ("u", gain), ("v", -viscous)],  # force pulses come through the drive too (data's README)
+        [("v", -mass, 1), ("u", gain), ("v", -viscous)],  # force pulses pass through the drive too (data's README)
         {"M": b.rate(v), "F_v": v, "F_c": sign, "offset": 1.0},
         {
             **_friction(b, v, force, 5e-4, 0.02),

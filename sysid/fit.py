@@ -1,10 +1,10 @@
 """Parameters fitted to data, with intervals; refused rather than wrong.
 
-    Parameter        what is fitted: start, limits, where the limits come from; what was known of it before
-    fit              least squares between two proofs: before it, that every parameter moves the residual;
-                     after it, that no parameter stands on a limit and that the values are possible
-    Identifiability  what these data can tell apart, known before the fit
-    Fit              values with standard errors and 95 % intervals, or the reason why there are none
+    Parameter        one unknown: start, limits, source of the limits; prior knowledge of it
+    fit              least squares between two checks: before it, that every parameter moves the residual;
+                     after it, that no parameter is on a limit and that the values are possible
+    Identifiability  the parameters that these data can separate, known before the fit
+    Fit              values with standard errors and 95 % intervals, or the reason for their absence
 
 A residual is a function of a dict {name: value} that returns measured minus simulated, shape (n,). Its rows should have
 the same noise: divide each channel by its own.
@@ -29,11 +29,11 @@ Residual = Callable[[dict[str, float]], Array]
 
 NOT_SEPARABLE = 0.95  # |cos| of two orthogonalised signatures from which on these data do not separate them
 PROFILE_LIMIT = 3.84  # of twice the log-likelihood's fall: 95 % of chi-square with one degree of freedom
-# A residual that moves by less than this part of its size has not moved: rounding. Chosen by us.
+# A residual that changes by less than this part of its size has not moved: rounding. Chosen by us.
 STILL = 1e-12
-# So near to a limit, in standard errors, a value stands on it: a free one comes so near once in a thousand fits.
+# This near to a limit, in standard errors, a value is on it: a free one is as near once in a thousand fits.
 ON_A_LIMIT = 1e-3
-ROUNDS = 8  # of fit and noise estimate, where something known before is weighed against data of unknown noise
+ROUNDS = 8  # of fit and noise estimate, where prior knowledge is weighed against data of unknown noise
 STEADY = 1e-3  # relative change of the noise below which the rounds end
 
 
@@ -42,7 +42,7 @@ class Parameter:
     """One unknown. value: start; low, high: limits; source: of start and limits.
 
     uncertainty: standard deviation with which `value` is known before the data (an instrument's offset from its data
-    sheet, a length from a tape measure); 0: nothing is known. scale: a change of it that matters; 0: |value|, or a
+    sheet, a length from a tape measure); 0: no prior knowledge. scale: a change of it that matters; 0: |value|, or a
     tenth of the range where the value is 0.
     """
 
@@ -79,11 +79,11 @@ class Parameter:
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """What the data can tell apart, before anything was known.
+    """Parameters that the data can separate, without prior knowledge.
 
     singular_values: of the residual's derivatives, each parameter in its `step`, falling; weakest: the direction of the
     last of them, by name; sensitivity: root mean square of the residual's change per `step` of a parameter; cosines:
-    of each pair's signatures, after all others were projected out, shape (p, p).
+    of each pair's signatures, after projecting out all others, shape (p, p).
     """
 
     names: tuple[str, ...]
@@ -110,7 +110,7 @@ class Identifiability:
         return sorted(found, key=lambda tie: -tie[2])
 
     def lines(self) -> list[str]:
-        """For a person."""
+        """Text for a person."""
         values = "  ".join(f"{value:.3g}" for value in self.singular_values)
         told = [f"singular values  {values}  (condition {self.condition:.3g})"]
         told += [
@@ -122,8 +122,8 @@ class Identifiability:
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """What a fit found. With `refused` there is nothing good in it: `values`, `standard_errors` and `ci95` are empty,
-    and `ended_at` says where it stood.
+    """Result of a fit. With `refused` it is unusable: `values`, `standard_errors` and `ci95` are empty,
+    and `ended_at` has the values at the end.
 
     residual: at the end, shape (n,); rho: correlation of its neighbours; effective_samples: of n;
     noise: standard deviation of one row, estimated (or as given); covariance: shape (p, p), in order of `names`.
@@ -165,12 +165,12 @@ class Fit:
         return self.covariance / np.outer(errors, errors)
 
     def covers(self, name: str, truth: float) -> bool:
-        """Whether the 95 % interval of `name` holds `truth`."""
+        """Whether the 95 % interval of `name` contains `truth`."""
         low, high = self.ci95[name]
         return low <= truth <= high
 
     def profile(self, name: str, width: float = 3.0, count: int = 13) -> tuple[Array, Array]:
-        """Values of `name` within `width` standard errors and its limits, and what they cost when all others follow.
+        """Values of `name` within `width` standard errors and its limits, and their cost with all others refitted.
 
         The cost is twice the fall of the log-likelihood: PROFILE_LIMIT of it bounds the 95 % interval.
         """
@@ -179,7 +179,7 @@ class Fit:
         return tried, np.array([cost(float(value)) for value in tried])
 
     def profile_interval(self, name: str, width: float = 10.0) -> tuple[float, float]:
-        """Where the profile of `name` crosses PROFILE_LIMIT; infinite on a side where it does not within `width`."""
+        """Points where the profile of `name` crosses PROFILE_LIMIT; infinite on a side without one within `width`."""
         cost, low, high = self._profile_of(name, width)
         best = self.values[name]
         ends = [
@@ -191,7 +191,7 @@ class Fit:
         return ends[0], ends[1]
 
     def _profile_of(self, name: str, width: float) -> tuple[Callable[[float], float], float, float]:
-        """Cost of a value of `name`, and the ends between which it may be asked for."""
+        """Function of the cost of a value of `name`, and the ends of its range."""
         best = np.array([self[each] for each in self.names])
         assert self.objective is not None
         objective, at = self.objective, self.names.index(name)
@@ -204,7 +204,7 @@ class Fit:
         )
 
     def lines(self) -> list[str]:
-        """For a person: one line for each parameter, or why there is none."""
+        """Text for a person: one line for each parameter, or the reason for their absence."""
         if self.refused:
             return [f"refused: {self.refused}"]
         told = []
@@ -226,7 +226,7 @@ def neighbours_correlation(residual: Array, runs: Sequence[slice] = ()) -> float
 
 
 def independent_samples(count: int, rho: float) -> float:
-    """What `count` samples of an AR(1) are worth; never more than there are, though negative rho would allow it."""
+    """Number of independent samples that `count` samples of an AR(1) are worth; at most `count`, even for rho < 0."""
     inside = min(max(rho, 0.0), 1.0 - 1e-9)
     return count * (1.0 - inside) / (1.0 + inside)
 
@@ -234,7 +234,7 @@ def independent_samples(count: int, rho: float) -> float:
 def identifiability(
     residual: Residual, parameters: Sequence[Parameter], derivative_step: float = 1e-5
 ) -> Identifiability:
-    """What the residual's derivatives at the start say. UserError names the parameters that do not move it."""
+    """Identifiability from the residual's derivatives at the start. UserError names parameters that do not move it."""
     unknown = _Objective(residual, parameters, (), derivative_step)
     return _identifiability(unknown, unknown.start, unknown.evaluate(unknown.start))
 
@@ -253,13 +253,13 @@ def fit(
 ) -> Fit:
     """Fit by least squares.
 
-    effective_samples: how many rows are independent; None: from the residual's correlation, within `runs`.
-    noise: standard deviation of a row where it is known; None: estimated from the residual.
-    earlier: fits of other data; what they found of parameters of the same names is weighed in, with its covariance.
-    physical: what is impossible about these values, in words, or None. tell: is given the lines of the identifiability
-    before the fit begins. derivative_step: of the central differences, in each parameter's `step`.
+    effective_samples: number of independent rows; None: from the residual's correlation, within `runs`. noise: standard
+    deviation of a row where it is known; None: estimated from the residual. earlier: fits of other data; their results
+    for parameters of the same names are weighed in, with their covariance. physical: returns why these values are
+    impossible, in words, or None. tell: receives the lines of the identifiability before the fit begins.
+    derivative_step: of the central differences, in each parameter's `step`.
 
-    UserError: a parameter does not move the residual, values are not finite, names come twice, rows are too few.
+    UserError: a parameter does not move the residual, values are not finite, names are repeated, rows are too few.
     """
     names = tuple(parameter.name for parameter in parameters)
     unknown = _Objective(residual, parameters, earlier, derivative_step)
@@ -289,7 +289,7 @@ def fit(
         if noise is None:
             sigma = float(np.sqrt(at_best @ at_best / max(count - used, 1.0)))
         if unknown.rank == 0 or abs(sigma - last) <= STEADY * last:
-            break  # without anything known before, the weight does not move the best values
+            break  # without prior knowledge, the weight does not move the best values
     unknown.weigh(sigma, samples / count)
     covariance, singular = unknown.covariance(unknown.derivatives(best))
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -328,9 +328,9 @@ def fit(
 
 
 class _Objective:
-    """The residual as a function of a vector, and what was known before as further rows.
+    """The residual as a function of a vector, with the prior knowledge as further rows.
 
-    precision: of what was known, shape (p, p), about `centre`; `rank` of it is 0 where nothing was.
+    precision: of the prior knowledge, shape (p, p), about `centre`; its `rank` is 0 where there is none.
     """
 
     def __init__(
@@ -360,7 +360,7 @@ class _Objective:
         self.weight = 1.0
 
     def _know(self, other: Fit) -> Array:
-        """Take what another fit found of our parameters into the precision; returns its pull."""
+        """Add another fit's results for our parameters to the precision; returns its pull."""
         pull = np.zeros(len(self.names))
         shared = [name for name in other.names if name in self.names]
         if not shared:
@@ -378,7 +378,7 @@ class _Objective:
         return pull
 
     def weigh(self, sigma: float, share: float) -> None:
-        """Rows of data count with 1 / sigma^2 times `share`, the part of them that is independent."""
+        """Weight rows of data with 1 / sigma^2 times `share`, the part of them that is independent."""
         self.weight = math.sqrt(share) / sigma if sigma > 0.0 else 1.0 / STILL
 
     def evaluate(self, values: Array) -> Array:
@@ -403,7 +403,7 @@ class _Objective:
         return np.column_stack(columns)
 
     def rows(self, values: Array) -> Array:
-        """Weighed residual, and how far the values are from what was known."""
+        """Weighted residual, and distances of the values from the prior."""
         data = self.weight * self.evaluate(values)
         return np.concatenate([data, self.root @ (values - self.centre)]) if self.rank else data
 
@@ -445,18 +445,19 @@ class _Objective:
         return values(found.x), 2.0 * float(found.cost), "" if found.status > 0 else "no end within 200 iterations"
 
     def parameters_used(self, derivatives: Array) -> float:
-        """How many parameters the data (and not what was known) determine: the trace of the fit's hat matrix."""
+        """Number of parameters that the data (and not the prior) determine: the trace of the fit's hat matrix."""
         scaled = self.weight * derivatives * self.step
         data = scaled.T @ scaled
         known = self.precision * np.outer(self.step, self.step)
         return float(np.trace(np.linalg.pinv(data + known, hermitian=True) @ data))
 
     def covariance(self, derivatives: Array) -> tuple[Array, str]:
-        """Of the estimates, shape (p, p), and the names that nothing determines ("" in the good case)."""
+        """Covariance of the estimates, shape (p, p), and the names that nothing determines ("" in the good case)."""
         rows = np.vstack([self.weight * derivatives, self.root])
         lengths = np.linalg.norm(rows, axis=0)
         _, sizes, axes = np.linalg.svd(rows / lengths, full_matrices=False)
-        # Central differences of a simulation leave 1e-9 of a column; a direction so weak is their error and no finding.
+        # Central differences of a simulation leave 1e-9 of a column; a direction that weak is their error, not a
+        # result.
         good = sizes > 1e-7 * sizes[0]
         inverse = np.where(good, 1.0 / np.where(good, sizes, 1.0), 0.0)
         covariance = (axes.T * inverse**2) @ axes / np.outer(lengths, lengths)
@@ -465,7 +466,7 @@ class _Objective:
 
 
 def _identifiability(unknown: _Objective, start: Array, at_start: Array) -> Identifiability:
-    """Derivatives at the start and what they say; UserError for parameters that do not move the residual."""
+    """Derivatives at the start and the identifiability; UserError for parameters that do not move the residual."""
     size = float(np.max(np.abs(at_start), initial=0.0))
     derivatives = unknown.derivatives(start)
     still = np.max(np.abs(derivatives), axis=0) * unknown.step * unknown.derivative_step <= STILL * size
@@ -487,7 +488,7 @@ def _identifiability(unknown: _Objective, start: Array, at_start: Array) -> Iden
 
 
 def signature_cosines(signatures: Array) -> Array:
-    """|cos| of each pair of columns after all others were projected out of both, shape (p, p)."""
+    """|cos| of each pair of columns after projecting all others out of both, shape (p, p)."""
     columns = signatures / np.linalg.norm(signatures, axis=0)
     count = columns.shape[1]
     cosines = np.eye(count)
@@ -499,14 +500,14 @@ def signature_cosines(signatures: Array) -> Array:
             lengths = np.linalg.norm(left, axis=0)
             if np.min(lengths) > 1e-9:
                 pair = left / lengths
-            # Else the others contain one of the two already. That is their tie; what is left would be rounding, so this
-            # pair's cosine is that of the two as they are.
+            # Otherwise the others already contain one of the two. That is their tie; the remainder would be rounding,
+            # so this pair's cosine uses the two unprojected columns.
             cosines[i, j] = cosines[j, i] = min(abs(float(pair[:, 0] @ pair[:, 1])), 1.0)
     return cosines
 
 
 def _limits_met(parameters: Sequence[Parameter], values: Array, errors: Array) -> str:
-    """Which values stand on a limit, in words; "" when none does."""
+    """The values that are on a limit, in words; "" when none is."""
     met = []
     for parameter, value, error in zip(parameters, values, errors, strict=True):
         near = max(ON_A_LIMIT * error, 1e-6 * parameter.step)
@@ -517,5 +518,5 @@ def _limits_met(parameters: Sequence[Parameter], values: Array, errors: Array) -
 
 
 def _impossible(physical: Callable[[dict[str, float]], str | None] | None, values: Mapping[str, float]) -> str:
-    """What is physically impossible, in words."""
+    """The reason why the values are physically impossible, in words."""
     return (physical(dict(values)) or "") if physical is not None else ""

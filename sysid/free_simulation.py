@@ -1,26 +1,26 @@
-"""A machine told by its simulator: fitted in the simulation, handed to the diagnosis as a linear regression.
+"""A machine given by its simulator: fitted in the simulation, diagnosed as a linear regression.
 
-An equation error needs every derivative of what was measured, and a noisy column leaves its shadow in the residual.
-Here nothing measured is differentiated. The simulator's trajectory is fitted to the recording, parameters and all;
+An equation error needs every derivative of the measured signals, and a noisy column biases the residual. Here nothing
+measured is differentiated. The simulator's trajectory is fitted to the recording, parameters and all;
 along it the simulator is linearised, for all samples together:
 
     x[k+1] = f(x[k], u[k], p) + noise of the inputs          states, measured inputs, parameters
     y[k]   = h(x[k], u[k], p) + noise of the sensors         outputs that were measured
 
-    response   what the simulation misses of the outputs, one step ahead
+    response   the simulation's error in the outputs, one step ahead
     columns    the outputs' sensitivities to the parameters: the forward sensitivity equations
     effects    the outputs' first-order response to an extra torque, voltage or sensor's error at a port
 
-All three pass one linear, time-varying filter, the Kalman predictor of the linearised simulator. It is what makes the
-residual white: a sensor's noise stays as it is, an input's noise is followed through the machine, and an initial state
-is projected out. With exact inputs it is the output error of multiple shooting, segment by segment (`horizon_s`) with
+All three pass one linear, time-varying filter, the Kalman predictor of the linearised simulator. It makes the residual
+white: a sensor's noise stays unchanged, an input's noise is followed through the machine, and an initial state is
+projected out. With exact inputs it is the output error of multiple shooting, segment by segment (`horizon_s`) with
 free initial states; the trajectory itself is found by multiple shooting with segments of one sample (Bock 1987), whose
-gaps are closed as far as the inputs' noise does not explain them. So a start far off converges, and a machine that
-forgets nothing does not carry its errors along.
+gaps are closed as far as the inputs' noise does not explain them. So a distant start converges, and errors do not
+accumulate in a machine that forgets nothing.
 
-An effect that is named acts in the simulator from then on (`again`): trajectory, parameters and its own size are fitted
-together, so that a large one is not told by its first order about a model without it. What an extension gains is asked
-of simulations that run freely over windows (`free`).
+A named effect acts in the simulator from then on (`again`): trajectory, parameters and its own size are fitted
+together, so that a large effect is not judged by its first order about a model without it. The gain of an extension is
+measured in simulations that run freely over windows (`free`).
 
 A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is a complete one.
 """
@@ -41,23 +41,23 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Entry, Equation, Known, Quantity, Recording, Values
 
 ROUNDS = 30  # of Gauss and Newton, at most
-RENEWED = 2  # times that the sensors' noise is found anew, each time when the rounds have come to rest
+RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
 WORSE = 4.0  # times the least sum of squares: a round that ended there went too far
 STEADY = 0.1  # standard errors of a parameter: a smaller step of all of them ends the rounds
-LAGS_S = (0.0, 0.01, 0.03, 0.1)  # back at which the general tests look at slopes
+LAGS_S = (0.0, 0.01, 0.03, 0.1)  # lags at which the general tests use slopes
 NUDGE = 1e-6  # of a quantity's size: step of a central difference
-ROUGH_S = 0.1  # window in which a channel's own noise is told from its course, by a parabola
+ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
 MOST_ROWS = 12000  # of a recording; a longer one is averaged over neighbours
-AWAY = 30.0  # a free initial state's deviation, in rms of the state: as good as unknown
-STRETCH = 400  # samples of a stretch whose covariances are found side by side with the others'
-LOUDER = 2.0  # times the noise that a channel shows itself (`roughness`), which misses what is slower. Chosen by us
-OPEN_S = 0.01  # memory of what dry friction does where it holds; chosen by us
-AGAIN = 6  # rounds with an effect in the simulator, at most: it starts where the fit without it ended
+AWAY = 30.0  # a free initial state's deviation, in rms of the state: practically unknown
+STRETCH = 400  # samples of a stretch; covariances of all stretches are computed side by side
+LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
+OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
+AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
 Quantities = Mapping[str, Array]  # by name, all of one shape
 Shape = Mapping[str, float]
-Ports = Mapping[str, Array]  # by port, (n,) or (n, k): what an effect puts in
+Ports = Mapping[str, Array]  # an effect's input by port, (n,) or (n, k)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,10 +72,10 @@ class Output:
 
 @dataclasses.dataclass(frozen=True)
 class Port:
-    """Where something that the simulator lacks can enter: an input that is 0 as long as nothing is wrong.
+    """A place where something that the simulator lacks can enter: an input that is 0 as long as nothing is wrong.
 
-    where: name of a signal, 0 ... 1, by which everything that enters is weighed; "": it enters at all times. A torque
-    does nothing where dry friction holds.
+    where: name of a signal, 0 ... 1, that weights everything that enters; "": it enters at all times. A torque has no
+    effect where dry friction holds.
     """
 
     name: str
@@ -86,10 +86,10 @@ class Port:
 
 @dataclasses.dataclass(frozen=True)
 class Term:
-    """A candidate cause, as `Effect`, told by what it puts into the ports.
+    """A candidate cause, as `Effect`, given by its input at the ports.
 
     make(signals, shape, values) -> by port (n,) for one coefficient or (n, k) for k. signals: states, inputs, outputs
-    and `t` along the fitted trajectory, (n,) by name, and what `SimulatedMachine.signals` adds.
+    and `t` along the fitted trajectory, (n,) by name, and the signals that `SimulatedMachine.signals` adds.
     """
 
     cause: str
@@ -120,7 +120,7 @@ class Acting:
 
 
 def held(rate: Array, braking: Array) -> Array:
-    """A rate after dry friction that can take `braking` of it in this step: it comes to rest and does not turn round.
+    """A rate after dry friction that can take `braking` of it in this step: it stops at zero and does not reverse.
 
     This is the implicit step of Coulomb's law: true standstill, without a smoothed sign that creeps.
     """
@@ -128,10 +128,10 @@ def held(rate: Array, braking: Array) -> Array:
 
 
 def standing(rate: Array, friction: Array, slow: float, step_s: float) -> Array:
-    """Deviation of dry friction's impulse per step near standstill, where it takes what comes (for `loose`).
+    """Deviation of dry friction's impulse per step near standstill, where friction balances any torque (for `loose`).
 
-    rate: (n,); friction: its limit, torque or force; slow: rate about which a smoothed sign turns. A machine that truly
-    stands would otherwise differ from every simulation with a smoothed sign, and that would be called an effect.
+    rate: (n,); friction: its limit, torque or force; slow: rate about which a smoothed sign turns. Otherwise a machine
+    that truly rests would differ from every simulation with a smoothed sign, and that would be called an effect.
     """
     return np.asarray(friction * np.exp(-0.5 * (rate / (2.0 * slow)) ** 2) * np.sqrt(2.0 * OPEN_S * step_s))
 
@@ -143,7 +143,7 @@ def runge_kutta(
     p: Quantities,
     step_s: float,
 ) -> dict[str, Array]:
-    """One step of the classical fourth-order method; inputs stay as they are in its middle. For `step`."""
+    """One step of the classical fourth-order method; inputs keep their values of the step's middle. For `step`."""
 
     def at(rate: Quantities, part_s: float) -> dict[str, Array]:
         return {name: x[name] + part_s * rate[name] for name in x}
@@ -177,7 +177,7 @@ class Jacobians:
 
 
 class Predictor:
-    """The Kalman predictor of a linearised simulator: takes forcings in, gives white prediction errors.
+    """The Kalman predictor of a linearised simulator: turns forcings into white prediction errors.
 
     A forcing has a part in the states, (n, s, k), and a part in the outputs, (n, o, k).
     """
@@ -190,7 +190,7 @@ class Predictor:
         o = lin.output.shape[1]
         self.n, self.s, self.o = n, s, o
         self.h_x = lin.h_x
-        self.ends: Array  # (stretches, s, s) covariances behind each stretch
+        self.ends: Array  # (stretches, s, s) covariances at the end of each stretch
         self.gain = np.empty((n, s, o))
         self.spread = np.empty((n, o, o))  # Cholesky factor of the prediction error's covariance
         self.covariance = np.empty((n, s, s))
@@ -202,8 +202,8 @@ class Predictor:
         both_noise = (lin.f_u * variance) @ lin.h_u.transpose(0, 2, 1)
         is_start = np.zeros(n, dtype=bool)
         is_start[starts] = True
-        # Side by side in stretches, each from the covariance that the one before ended with in the last round; in the
-        # first round a stretch knows nothing, which is multiple shooting as it stands in the books.
+        # Side by side in stretches, each from the covariance at the end of the one before in the last round; in the
+        # first round a stretch has no prior knowledge, which is textbook multiple shooting.
         free = np.asarray(np.diag(away**2), dtype=float)
         length = min(n, stretch)
         P: Array = np.tile(free, (-(-n // length), 1, 1))
@@ -226,7 +226,7 @@ class Predictor:
         self.unspread = np.linalg.inv(self.spread)
         self.inner = lin.f_x - self.gain @ lin.h_x
         self.inner[starts[1:] - 1] = 0.0
-        self.into = np.ones((n, 1, 1))  # what is forced in the last sample before a start is forgotten
+        self.into = np.ones((n, 1, 1))  # a start forgets the forcing of the sample before it
         self.into[starts[1:] - 1] = 0.0
         # Rows of the recursion x[k+1] - inner[k] x[k] = forcing[k] as a banded lower triangle
         self.band = np.zeros((2 * s, n * s))
@@ -258,7 +258,7 @@ class Predictor:
         return (self.unspread @ errors) * self.unit[None, :, None]
 
     def smoothed(self, state: Array, output: Array, f_u: Array, h_u: Array, noise_u: Array) -> tuple[Array, Array]:
-        """(n, s) and (n, i): the most probable deviations of states and noisy inputs, all samples taken together.
+        """(n, s) and (n, i): the most probable deviations of states and noisy inputs, given all samples.
 
         state, output: (n, s), (n, o), forcings of the response (Bryson and Frazier's form of the smoother).
         """
@@ -276,17 +276,17 @@ class Predictor:
 
 @dataclasses.dataclass
 class SimulatedRecording(Recording):
-    """A recording with its linearised simulator. fitted: parameters with which it was linearised."""
+    """A recording with its linearised simulator. fitted: parameters about which it was linearised."""
 
     fitted: dict[str, float] = dataclasses.field(default_factory=dict)
     linear: Jacobians | None = None
     predictor: Predictor | None = None
     ports: tuple[Port, ...] = ()
     outputs: tuple[str, ...] = ()
-    fit: "_Fit | None" = None  # where it comes from, and goes on with an effect in the simulator
+    fit: "_Fit | None" = None  # the fit that made it, which continues with an effect in the simulator
 
     def entering(self, entries: Ports) -> Array:
-        """(n, ports, k): what enters at the ports, (n,) or (n, k) by name, weighed by where it can."""
+        """(n, ports, k): the input at the ports, (n,) or (n, k) by name, weighted by each port's `where`."""
         columns = {name: each[:, None] if each.ndim == 1 else each for name, each in entries.items()}
         out = np.zeros((len(self.table), len(self.ports), next(iter(columns.values())).shape[1]))
         for number, port in enumerate(self.ports):
@@ -297,7 +297,7 @@ class SimulatedRecording(Recording):
         return out
 
     def respond(self, entries: Ports) -> Columns:
-        """What the equations see, to first order, of something at the ports: (n, k) each."""
+        """First-order response of the equations to an input at the ports: (n, k) each."""
         lin, predictor = self.linear, self.predictor
         assert lin is not None and predictor is not None
         unknown = [name for name in entries if name not in {port.name for port in self.ports}]
@@ -313,12 +313,12 @@ class SimulatedRecording(Recording):
 
 
 def _between(column: Array) -> Array:
-    """Middle values of a sample and the next, in which a step is taken."""
+    """Means of each sample and the next, for the step between them."""
     return np.asarray(0.5 * (column + np.concatenate((column[1:], column[-1:]))), dtype=float)
 
 
 def forced(sensitivity: Array, entering: Array) -> Array:
-    """(n, r, k): what enters at the ports, (n, q, k), times sensitivities (n, r, q) to it."""
+    """(n, r, k): the input at the ports, (n, q, k), times sensitivities (n, r, q) to it."""
     out = np.zeros((len(entering), sensitivity.shape[1], entering.shape[2]))
     for number in range(entering.shape[1]):
         if np.any(entering[:, number]):
@@ -331,13 +331,13 @@ def _names(ports: Sequence[Port]) -> str:
 
 
 def roughness(table: Table, column: Array) -> float:
-    """Deviation of a channel's own noise: what a parabola over a tenth of a second does not follow, but for jumps."""
+    """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps."""
     size = max(7, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
     parts = [savgol_filter(column[run], size, 2) - column[run] for run in table.runs if run.stop - run.start > size]
     if not parts:
         return 0.0
     rest = np.concatenate(parts)
-    # the parabola takes up three of so many degrees of freedom
+    # the parabola uses three of these degrees of freedom
     return float(np.median(np.abs(rest))) / 0.6745 * float(np.sqrt(size / (size - 3.0)))
 
 
@@ -370,9 +370,9 @@ def averaged(table: Table, count: int) -> Table:
 class SimulatedMachine(abc.ABC):
     """A `Machine` (sysid/machine.py) that is an ordinary differential equation with measured inputs.
 
-    A subclass says the names below and the methods `inputs`, `first_guess`, `step`, `observe`, `terms`; `loose`,
-    `extra_signals` and `looked_over` when it needs them. All of these get and give arrays of any one shape: samples,
-    and samples beside samples for the differences; they must work element by element.
+    A subclass defines the names below and the methods `inputs`, `first_guess`, `step`, `observe`, `terms`; and `loose`,
+    `extra_signals` and `looked_over` when it needs them. All of these take and return arrays of any one shape: samples,
+    and stacks of samples for the differences; they must work element by element.
     """
 
     name: str
@@ -381,19 +381,19 @@ class SimulatedMachine(abc.ABC):
     states: tuple[str, ...]
     outputs: tuple[Output, ...]
     ports: tuple[Port, ...]
-    # Inputs with noise, by name: its standard deviation, or None for what the channel itself shows
+    # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
-    horizon_s: float = float("inf")  # after so long the state is free again: shorter for a model that is far off
-    shortest_s: float = 2.0  # of a recording that says anything
-    window_s: float = 2.0  # over which a gain is asked of the free simulation
+    horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
+    shortest_s: float = 2.0  # least duration of a usable recording
+    window_s: float = 2.0  # over which the gain is measured in free simulation
 
     @abc.abstractmethod
     def inputs(self, table: Table) -> dict[str, Array]:
-        """What drives the simulator, (n,) by name: measured channels, or a target that its law follows."""
+        """Inputs of the simulator, (n,) by name: measured channels, or a target that its law follows."""
 
     @abc.abstractmethod
     def first_guess(self, table: Table) -> dict[str, Array]:
-        """The states, (n,) by name, roughly: a measured angle and its smoothed slope will do."""
+        """Rough states, (n,) by name: a measured angle and its smoothed slope are enough."""
 
     @abc.abstractmethod
     def step(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
@@ -405,7 +405,7 @@ class SimulatedMachine(abc.ABC):
 
     @abc.abstractmethod
     def terms(self, recordings: Sequence[SimulatedRecording]) -> list[Term]:
-        """Everything that could be wrong, with grids that suit these recordings."""
+        """All candidate causes, with grids that suit these recordings."""
 
     def loose(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
         """Deviations of states per step that the law leaves open, by name: where dry friction holds, for example."""
@@ -416,15 +416,15 @@ class SimulatedMachine(abc.ABC):
         return {}
 
     def counts(self, along: Quantities, table: Table) -> dict[str, np.ndarray]:
-        """By output, (n,): False for samples that say nothing of it; an output that is not told counts always."""
+        """By output, (n,): False for samples that carry no information on it; an output not listed always counts."""
         return {}
 
     def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
-        """For ports and equations the signals over which a misfit is looked for without a cause in mind."""
+        """For ports and equations, the signals over which a misfit is sought without a cause in mind."""
         everything = {name: recording.signals[name] for name in (*self.states, "t")}
         return {each.name: everything for each in self.ports}
 
-    # --- what the diagnosis calls --------------------------------------------------------------------------------
+    # --- called by the diagnosis ---------------------------------------------------------------------------------
 
     def prepare(self, table: Table) -> SimulatedRecording:
         """Fit the simulator to one recording and linearise it there."""
@@ -442,7 +442,7 @@ class SimulatedMachine(abc.ABC):
         return _Fit(self, table, -(-len(table) // MOST_ROWS)).recording()
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
-        """The terms, as what the outputs make of them."""
+        """The terms as effects on the outputs."""
         made: list[Effect] = []
         for term in self.terms(cast(Sequence[SimulatedRecording], recordings)):
 
@@ -480,8 +480,8 @@ class SimulatedMachine(abc.ABC):
         return fit.acted_on(acting, fixed).recording(AGAIN)
 
     def free(self, recording: Recording) -> Recording:
-        """The recording with equations that are errors of free simulation: what the simulator, started at the most
-        probable state of each window, misses of the outputs over `window_s`. Inputs count as exact."""
+        """The recording with errors of free simulation as its equations: the outputs' errors over `window_s`, with the
+        simulator started at the most probable state of each window. Inputs count as exact."""
         fit = cast(SimulatedRecording, recording).fit
         assert fit is not None
         return fit.free()
@@ -495,7 +495,7 @@ class _Fit:
     """Trajectory and parameters of one recording, by Gauss and Newton."""
 
     def __init__(self, machine: SimulatedMachine, table: Table, count: int = 1) -> None:
-        """count: so many samples are averaged into one, what the machine makes of them too."""
+        """count: samples averaged into one, also for the machine's own signals."""
         given, guess = machine.inputs(table), machine.first_guess(table)
         if count > 1:
             whole = dataclasses.replace(table, columns=table.columns | given | {f"first {n}": guess[n] for n in guess})
@@ -540,10 +540,10 @@ class _Fit:
         self.ends[[run.stop - 1 for run in table.runs]] = True
         self.acting: list[Acting] = []
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
-        self.at_ports = np.zeros((len(table), len(machine.ports), 0))  # of one unit of each coefficient
+        self.at_ports = np.zeros((len(table), len(machine.ports), 0))  # input for a unit of each coefficient
 
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "_Fit":
-        """A fit that goes on from here with effects in the simulator; their coefficients follow the parameters."""
+        """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
         new, count = copy.copy(self), len(self.names)
         new.acting = list(acting)
         added = np.array([each for one in acting for each in one.coefficients])
@@ -555,11 +555,11 @@ class _Fit:
         new.size_p = np.concatenate((self.size_p[:count], np.where(added != 0.0, np.abs(added), 1.0)))
         new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
         new.came_from = (new.x, new.u, new.p)
-        new.at_ports = np.zeros((*self.at_ports.shape[:2], len(added)))  # found by the first round, if anything acts
+        new.at_ports = np.zeros((*self.at_ports.shape[:2], len(added)))  # filled by the first round, if any effect acts
         return new
 
     def _acting_now(self) -> Array:
-        """(n, ports, coefficients): what the effects put into the ports along the trajectory as it is."""
+        """(n, ports, coefficients): the effects' input at the ports along the present trajectory."""
         if not self.acting:
             return self.at_ports
         seen, values = self._seen(), dict(zip(self.names, self.p, strict=False))
@@ -637,7 +637,7 @@ class _Fit:
         given |= {each.name: entering[:, i] for i, each in enumerate(machine.ports)}
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
-        # a trace of noise keeps the predictor from being certain of what it has never seen
+        # a trace of noise keeps the predictor from being certain of what it has not seen
         return np.column_stack([found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x
 
     def round(self) -> float:
@@ -648,7 +648,7 @@ class _Fit:
         )
         wide = self.predictor
         assert wide is not None
-        offset = self.measured_u - self.u  # what the inputs' noise has to explain already
+        offset = self.measured_u - self.u  # the part that the inputs' noise has to explain already
         gap = lin.next_state - np.concatenate((self.x[1:], self.x[-1:]))
         gap[self.ends] = 0.0
         self.state = -(gap + (lin.f_u @ offset[:, :, None])[:, :, 0])
@@ -666,10 +666,10 @@ class _Fit:
         change = (vt[strong].T @ ((u.T @ b)[strong] / sv[strong])) / length * self.size_p
         error = np.sqrt(((vt[strong] / sv[strong, None]) ** 2).sum(axis=0)) / length * self.size_p
         change = np.clip(self.p + change, self.low, self.high) - self.p
-        # what must be positive is a divisor, far from linear: nothing moves farther than halves or doubles it
+        # positive parameters are divisors, far from linear: no step more than halves or doubles one
         ratio = np.divide(self.p + change, self.p, out=np.ones_like(self.p), where=self.low > 0.0)
         change *= min(1.0, *(0.5 / (1.0 - r) if r < 0.5 else 1.0 / (r - 1.0) if r > 2.0 else 1.0 for r in ratio))
-        # the rest of the response, after the parameters have moved, tells trajectory and inputs
+        # the rest of the response, after the parameters' step, gives trajectory and inputs
         state = self.state - (lin.f_p @ change)
         output = self.output - (lin.h_p @ change)
         dx, du = wide.smoothed(state, output, lin.f_u, lin.h_u, self.noise_u)
@@ -678,10 +678,10 @@ class _Fit:
         return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
 
     def _renew_noise(self) -> None:
-        """The sensors' noise is what is left; what was wrong for a while has no say in a median.
+        """Estimate the sensors' noise from the residual; the median ignores a short error.
 
-        What the channels do not show themselves is the model's error and not noise: taken for noise, it would let a
-        model that is far off pull the trajectory away from what was measured, and the fit would not come back.
+        Noise that the channels do not show themselves is the model's error: taken for noise, it would let a very wrong
+        model pull the trajectory away from the measurement, and the fit would not return.
         """
         left = np.median(np.abs(self.rest), axis=0) / 0.6745
         self.noise_y = np.clip(left, 1e-9 * np.ptp(self.y, axis=0), LOUDER * self.shown_y)
@@ -693,7 +693,7 @@ class _Fit:
             accepted = (self.x, self.u, self.p)
             step = self.round()
             if not self.cost < WORSE * best:
-                # too far: a quarter of the way
+                # too far: a quarter of the step
                 old = self.came_from
                 self.x, self.u, self.p = (b + 0.25 * (a - b) for a, b in zip(accepted, old, strict=True))
                 continue
@@ -710,9 +710,9 @@ class _Fit:
         return self._told(self.predictor, self.response, self.columns)
 
     def free(self) -> SimulatedRecording:
-        """Errors of free simulation over windows, about the same trajectory: no noise drives, each window starts free.
+        """Errors of free simulation over windows, about the same trajectory: without noise, each window starts free.
 
-        Where the law is open (`loose`) it stays so. Not whitened: a sum of squares is one of what the outputs miss.
+        Where the law is open (`loose`) it stays so. Not whitened: a sum of squares is that of the outputs' errors.
         """
         window = max(2, round(self.machine.window_s / self.step_s))
         starts = np.array([k for run in self.table.runs for k in range(run.start, run.stop, window)])
@@ -725,7 +725,7 @@ class _Fit:
         return told
 
     def _told(self, predictor: Predictor, missed: Array, columns: Array) -> SimulatedRecording:
-        """The recording whose equations are what a predictor misses, (n, o), beside its columns (n, o, parameters)."""
+        """The recording whose equations are a predictor's errors, (n, o), with columns (n, o, parameters)."""
         machine, table = self.machine, self.table
         along = self._seen().signals
         counts = machine.counts(along, table)
@@ -757,7 +757,7 @@ class _Fit:
         return made
 
     def round_again(self) -> None:
-        """Linearise where the last round ended, and stay there."""
+        """Linearise where the last round ended, without moving."""
         self.p_at = self.p.copy()
         x, u = self.x, self.u
         self.round()

@@ -1,4 +1,4 @@
-"""What an extension of the model gains on data that had no part in finding it."""
+"""Gain of an extension of the model on data that were not used to find it."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence

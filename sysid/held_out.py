@@ -1,4 +1,4 @@
-"""Held-out data: which of the named effects they refuse, and what the rest gains there."""
+"""Judgement by held-out data: the named effects that they refuse, and the gain of the others there."""
 
 import dataclasses
 import math
@@ -11,14 +11,14 @@ from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
 
-HOLDS_OUT = 0.0  # chi-square that a further effect must win on held-out data
-REFUSES = 2.33  # deviations, 1 % on one side, below what is expected: held-out data that refuse an effect
-TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below it these say nothing of it
+HOLDS_OUT = 0.0  # chi-square that a further effect must gain on held-out data
+REFUSES = 2.33  # deviations, 1 % on one side, below the expected gain: held-out data that refuse an effect
+TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below it these data do not judge the effect
 
 
 @dataclasses.dataclass(frozen=True)
 class Held:
-    """gain: of what they do not refuse; tells: False where they do not excite any of it, so that they say nothing."""
+    """gain: of the effects not refused; tells: False where the data excite none of them and judge nothing."""
 
     gain: gain.Gain | None
     holdout: str
@@ -26,7 +26,7 @@ class Held:
     tells: bool
 
     def told(self) -> dict[str, Any] | None:
-        """For the JSON; None where no gain was measured."""
+        """Entry of the JSON; None where no gain was measured."""
         if self.gain is None or not self.tells:
             return None
         return {
@@ -46,7 +46,7 @@ def judged(
     named: Sequence[Named],
     seed: int,
 ) -> Held:
-    """What held-out recordings say of effects that were found without them."""
+    """Judgement of held-out recordings on effects that were found without them."""
     recordings = [machine.prepare(table) for table in holdout]
     if named and hasattr(machine, "again"):
         recordings = simulated_again(machine, recordings, named, extended, fixed=True)
@@ -58,7 +58,7 @@ def judged(
     for each in named:
         tried = gain.measure(base, [*kept, each], extended.values, general, seed)
         won = tried.chi2_won - (found.chi2_won if found is not None else 0.0)
-        # were the effect there as in training, it would win about what is expected, by twice its root either way
+        # an effect as strong as in training would gain about the expected value, within twice its root either way
         expected = tried.chi2_expected
         if won > HOLDS_OUT or won > expected - REFUSES * 2.0 * math.sqrt(expected):
             kept, found = [*kept, each], tried
@@ -66,7 +66,7 @@ def judged(
         else:
             refused.append(each)
     if found is not None and hasattr(machine, "free"):
-        # refused or not is asked of the sharpest equations; how much nearer the simulation comes, of the simulation
+        # the sharpest equations decide on refusal; the free simulation gives the gain
         recordings = [machine.free(recording) for recording in recordings]
         general = misfit.general_features(machine, recordings)
         base = naming.refit(Regression(recordings), skews, values=plain.values)
@@ -81,6 +81,6 @@ def simulated_again(
     extended: Regression,
     fixed: bool = False,
 ) -> list[Recording]:
-    """The recordings of a machine that is told by its simulator, with what was named in the simulation."""
+    """The recordings of a machine given by its simulator, with the named effects in the simulation."""
     acting = [(each.effect, each.shape, [extended.values[name] for name in each.coefficients]) for each in named]
     return [machine.again(recording, acting, fixed) for recording in recordings]  # type: ignore[attr-defined]

@@ -1,12 +1,12 @@
-"""What an engineer looks at on the machine when a cause was named: one sentence for each cause of the catalogue.
+"""One sentence for each cause of the catalogue: the check on the machine after the cause was named.
 
 In our own words, from the practice of motors, gearboxes, cables, encoders and CAN; a figure in a sentence is a rule of
-thumb that says which size is worth a look.
+thumb for a size worth checking.
 """
 
 from ranger_sim.sysid.causes import CAUSES
 
-# by the key of the cause; a sensor's identifier alone is for places that the catalogue does not tell apart
+# by the key of the cause; a sensor's identifier alone is for places that the catalogue does not distinguish
 LOOK_AT = {
     "contact_drop_change": (
         "Brushes and commutator: worn or glazed brushes, weak springs, film or oil on the bars; hold the shaft, step "
@@ -190,7 +190,7 @@ LOOK_AT = {
         "reference, and the factor in the firmware or the logger."
     ),
 }
-# words in the name of a place, and the place of the catalogue that they mean
+# words in the name of a place, and the catalogue's place for them
 PLACES = {"current": "current", "_A": "current", "gyro": "gyro", "angle": "angle", "_rad": "angle"}
 
 
@@ -203,7 +203,7 @@ def look_at(cause: str, at: str = "") -> str:
 
 
 def meaning(cause: str, at: str = "") -> str:
-    """What the catalogue says a cause is, for a sentence; the identifier in words when it is not in the catalogue."""
+    """The catalogue's text for a cause, for a sentence; the identifier in words for a cause not in the catalogue."""
     same = [each for each in CAUSES.values() if each.identifier == cause]
     if len(same) == 1:
         return same[0].meaning

@@ -1,15 +1,15 @@
-"""Before any data: which causes given channels can show, which they can tell apart, and what would separate the rest.
+"""Before any data: causes that given channels can show and separate, and changes that would separate the rest.
 
-Two questions are asked of an experiment's linearised equations (`experiment_models.py`):
+An experiment's linearised equations (`experiment_models.py`) answer two questions:
 
     structure   does a cause enter where there are more equations than unknowns, and does it still without the
-                equation of another? Then they can be told apart whatever they look like (`structure.py`).
-    signature   what is left of a cause's regressor when everything that is not measured and all fitted parameters
-                may take up what they can; the cosine of two such remainders says how alike they look in the
+                equation of another? Then they can be separated whatever their shape (`structure.py`).
+    signature   the remainder of a cause's regressor after everything that is not measured and all fitted parameters
+                have explained as much as they can; the cosine of two such remainders is their similarity in the
                 reference motion. Above 0.95 they are a tie.
 
 Causes in one equation look the same to the structure and may still differ in shape; causes in different equations
-may still look alike once the parameters are fitted. A tie says which of the two it is.
+may still look alike once the parameters are fitted. A tie names its kind.
 """
 
 import dataclasses
@@ -26,11 +26,11 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.experiment_models import MODELS, SAMPLES, Equation, Model
 from ranger_sim.sysid.structure import isolable, overdetermined
 
-TIE = 0.95  # |cos|: N_eff r^2 (1 - c^2) >= 16 asks for ten times the data beyond it
-TAKEN_UP = 0.05  # of a signature is left: the fitted parameters take up the rest
-INVISIBLE = 1e-6  # of a regressor is left where unknown signals take it up whole: rounding, and the ridge below
-# So much is left where unknowns take it up but at instants: their coefficient passes through zero there, as the
-# swing foot's torque in the balance of the stance leg. Structure knows no instants.
+TIE = 0.95  # |cos|: beyond it, N_eff r^2 (1 - c^2) >= 16 needs ten times the data
+TAKEN_UP = 0.05  # remainder of a signature: below it, the fitted parameters explain the rest
+INVISIBLE = 1e-6  # remainder of a regressor that unknown signals explain entirely: rounding, and the ridge below
+# Remainder where unknowns explain all but single times: their coefficient passes through zero there, as the swing
+# foot's torque in the balance of the stance leg. The structure does not know about times.
 AT_INSTANTS = 1e-3
 RIDGE = 1e-12  # keeps unknowns that nothing determines from dividing by zero
 ROUNDS = 5
@@ -39,7 +39,7 @@ SHOWN, AS_PARAMETER, HIDDEN = "shown", "as a parameter", "not shown"
 
 @dataclasses.dataclass(frozen=True)
 class Tie:
-    """Two causes that these channels do not separate. reason: "structure" or "signature"; cosine: of what is left."""
+    """Two causes that these channels do not separate. reason: "structure" or "signature"; cosine: of the remainders."""
 
     first: str
     second: str
@@ -49,8 +49,8 @@ class Tie:
 
 @dataclasses.dataclass
 class Analysis:
-    """What channels of an experiment can do. status: {cause: SHOWN, AS_PARAMETER or HIDDEN}; left: {cause: part of the
-    signature that no parameter takes up}; by_structure: {cause: causes that structure tells it from}.
+    """Abilities of an experiment's channels. status: {cause: SHOWN, AS_PARAMETER or HIDDEN}; left: {cause: part of the
+    signature that no parameter explains}; by_structure: {cause: causes that structure separates from it}.
     """
 
     experiment: str
@@ -72,7 +72,7 @@ class Analysis:
 
 @dataclasses.dataclass(frozen=True)
 class Advice:
-    """What would help. causes: a hidden one, or the two of a tie; channels of this experiment; other experiments;
+    """Remedies. causes: a hidden one, or the two of a tie; channels of this experiment; other experiments;
     motion: another run of the same experiment, in words.
     """
 
@@ -82,7 +82,7 @@ class Advice:
     motion: str = ""
 
 
-# What separates two causes that look alike in one run, by what their signatures depend on.
+# Remedies for two causes that look alike in one run, by the signals that their signatures depend on.
 MOTIONS = {
     frozenset(("contact_drop_change", "dead_time")): "a run at another battery voltage, with which a dead time grows",
     frozenset(("coulomb_friction", "viscous_friction")): "a run at another speed",
@@ -98,7 +98,7 @@ MOTIONS = {
 
 @functools.cache
 def model_of(experiment: str) -> Model:
-    """The equations of an experiment. UserError with all names when there is none."""
+    """The equations of an experiment. UserError with all names for an unknown one."""
     if experiment not in MODELS:
         raise UserError(f"{experiment!r}: no such experiment; there are {', '.join(MODELS)}")
     return MODELS[experiment]()
@@ -137,7 +137,7 @@ def _analysed(experiment: str, channels: tuple[str, ...]) -> Analysis:
     ties = []
     for first, second in itertools.combinations(model.causes, 2):
         if status[first] != status[second] or status[first] == HIDDEN:
-            continue  # what parameters take up differs from what they do not
+            continue  # one of them is explained by parameters, the other is not
         cosine = signatures.cosine(first, second, fitted=status[first] == SHOWN)
         if cosine > TIE:
             told = second in by_structure.get(first, ()) or first in by_structure.get(second, ())
@@ -146,12 +146,12 @@ def _analysed(experiment: str, channels: tuple[str, ...]) -> Analysis:
 
 
 def analyse(experiment: str, channels: Iterable[str] | None = None) -> Analysis:
-    """What these channels (all when None) of an experiment can show and tell apart."""
+    """Causes that these channels (all when None) of an experiment can show and separate."""
     return _analysed(experiment, measured(model_of(experiment), channels))
 
 
 def advice(analysis: Analysis) -> list[Advice]:
-    """For every hidden cause and every tie the single channels and other experiments that would help."""
+    """For every hidden cause and every tie, the single channels and other experiments that would help."""
     model = model_of(analysis.experiment)
     missing = [channel for channel in model.channels if channel not in analysis.channels]
     more = {channel: analyse(analysis.experiment, (*analysis.channels, channel)) for channel in missing}
@@ -170,7 +170,7 @@ def advice(analysis: Analysis) -> list[Advice]:
 
 
 class Signatures:
-    """What is left of each cause's regressor behind what is not measured, and behind the fitted parameters."""
+    """Remainder of each cause's regressor behind unmeasured signals, and behind the fitted parameters."""
 
     def __init__(self, equations: list[Equation], step_s: float) -> None:
         unknowns = sorted({term[0] for each in equations for term in each.terms})
@@ -194,19 +194,19 @@ class Signatures:
         }
 
     def raw(self, cause: str) -> float:
-        """The part of a cause's regressor that unknown signals do not take up; 0 for one that enters nowhere."""
+        """The part of a cause's regressor that unknown signals do not explain; 0 for one that enters nowhere."""
         if cause not in self.columns:
             return 0.0
         size = float(np.linalg.norm(self.columns[cause]))
         return float(np.linalg.norm(self.behind[cause])) / size if size else 0.0
 
     def left(self, cause: str) -> float:
-        """The part of that which fitted parameters do not take up."""
+        """The part of it that fitted parameters do not explain."""
         size = float(np.linalg.norm(self.behind[cause]))
         return float(np.linalg.norm(self.fitted[cause])) / size if size else 0.0
 
     def cosine(self, first: str, second: str, fitted: bool = True) -> float:
-        """How alike two signatures are: |cos|, behind the fitted parameters or not."""
+        """Similarity of two signatures: |cos|, behind the fitted parameters or not."""
         of = self.fitted if fitted else self.behind
         a, b = of[first], of[second]
         size = float(np.linalg.norm(a) * np.linalg.norm(b))
@@ -239,14 +239,14 @@ class Signatures:
         return np.concatenate(parts)
 
     def _behind(self, column: Array) -> Array:
-        """What unknown signals cannot take up; in rounds, because of the ridge and of rounding."""
+        """The part that unknown signals cannot explain; in rounds, because of the ridge and of rounding."""
         for _ in range(ROUNDS):
             column = column - self.matrix @ self.solver.solve(self.matrix.T @ column)
         return column
 
     @staticmethod
     def _basis(columns: list[Array]) -> Array:
-        """An orthonormal basis of columns, without those that the others have."""
+        """An orthonormal basis of columns, without those in the span of the others."""
         sizes = [float(np.linalg.norm(column)) for column in columns]
         kept = [column / size for column, size in zip(columns, sizes, strict=True) if size > 0.0]
         if not kept:

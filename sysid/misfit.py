@@ -1,8 +1,8 @@
-"""Whether a model misses something in the data, without asking what: chi-square tests over general features.
+"""Test for a misfit of a model without a cause in mind: chi-square tests over general features.
 
-The features of an equation are what could depend on what: cells of each signal and of each pair of signals, the
-course of time, and what lies a few samples back. Each group is one test; Holm's rule keeps the chance that any of them
-fires without a cause at the level asked for.
+The features of an equation are possible dependencies: cells of each signal and of each pair of signals, the
+course of time, and slopes a few samples back. Each group is one test; Holm's rule keeps the chance that any of them
+fires without a cause at the requested level.
 """
 
 import dataclasses
@@ -19,13 +19,13 @@ from ranger_sim.sysid.regression import Regression, explained
 SINGLE_CELLS = 10
 PAIR_CELLS = 5
 TIME_CELLS = 8
-BESIDE = 201  # lines of the spectrum whose median is the level of one
-FASTEST = 0.2  # of the spectrum: above it the counts of an encoder at a steady speed are lines of their own
+BESIDE = 201  # lines of the spectrum whose median is the local level
+FASTEST = 0.2  # of the spectrum: above it the counts of an encoder at a steady speed are lines themselves
 
 
 @dataclasses.dataclass(frozen=True)
 class Test:
-    """One group of features in one equation: chi-square it explains, its degrees of freedom, probability by chance."""
+    """One group of features in one equation: its chi-square, its degrees of freedom, probability by chance."""
 
     equation: str
     features: str
@@ -36,7 +36,7 @@ class Test:
 
 @dataclasses.dataclass
 class Misfit:
-    """What the tests say. p: of the most telling test after Holm's rule; excess: chi-square over its expectation."""
+    """Results of the tests. p: of the most telling test after Holm's rule; excess: chi-square over its expectation."""
 
     tests: list[Test]
     p: float
@@ -49,17 +49,17 @@ class Misfit:
 
 
 def edges(signal: Array, count: int) -> Array:
-    """(count - 1,) or fewer inner borders of cells that hold equally many samples."""
+    """(count - 1,) or fewer inner borders of cells with equally many samples."""
     return np.unique(np.quantile(signal, np.linspace(0.0, 1.0, count + 1)[1:-1]))
 
 
 def cells(signal: Array, count: int) -> np.ndarray:
-    """(n,) number of the cell, 0 ... count-1; the cells hold equally many samples; equal values share a cell."""
+    """(n,) number of the cell, 0 ... count-1; cells have equally many samples; equal values share a cell."""
     return np.searchsorted(edges(signal, count), signal, side="right")
 
 
 def indicator(number: np.ndarray) -> Array:
-    """(n, k): which of its k numbers each row has."""
+    """(n, k): 1 in the column of each row's number, 0 elsewhere."""
     kept, place = np.unique(number, return_inverse=True)
     out = np.zeros((len(number), len(kept)))
     out[np.arange(len(number)), place] = 1.0
@@ -67,7 +67,7 @@ def indicator(number: np.ndarray) -> Array:
 
 
 def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Array]:
-    """Groups of features (n, k) over an equation's general signals; lags: how far back slopes are looked at."""
+    """Groups of features (n, k) over an equation's general signals; lags: samples back at which slopes are used."""
     names = list(signals)
     groups: dict[str, Array] = {}
     for name in names:
@@ -127,7 +127,7 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
 
 
 def _seen(recording: Recording, place: str, columns: Array) -> Columns:
-    """What the equations see of columns in one of them, or at an entry."""
+    """Columns of the equations for columns in one of them, or at an entry."""
     if place in recording.entries:
         return recording.entries[place].respond(columns)
     return {place: columns}
@@ -163,14 +163,14 @@ def look(regression: Regression, general: General) -> Misfit:
 
 
 def _beside(groups: Sequence[Mapping[str, Array]], regression: Regression) -> tuple[Array, Array]:
-    """(m, m) products of all columns of these groups, put beside the base, and (m,) of them with the residual."""
+    """(m, m) products of all columns of these groups, projected off the base, and (m,) of them with the residual."""
     together = {name: np.hstack([white[name] for white in groups]) for name in groups[0]}
     shadow = regression.shadow(together)
     return regression.gram(together, shadow), regression.product(together, shadow, regression.residual)
 
 
 def _line(equation: str, regression: Regression) -> Test:
-    """The strongest line in the spectrum of one equation's residual, above what stands on either side of it."""
+    """The strongest line in the spectrum of one equation's residual, relative to its neighbours on both sides."""
     good = regression.good[equation]
     even = np.zeros(len(good))
     even[good] = regression.residual[regression.rows[equation]]

@@ -1,8 +1,8 @@
 """Effects of a diagnosis as terms of the simulator (plant/terms.py), and back.
 
-An effect's coefficients are what was measured: at a bench's gearbox, cosine and sine of an angle whose zero is the
-recording's. A term is what the simulator adds: at the robot's joint, amplitude and phase. With r = robot's gear over
-the bench's, of one rotor: torque x r, rate / r. What has no form says why.
+An effect's coefficients are measured: at a bench's gearbox, cosine and sine of an angle with the recording's zero. A
+term is the simulator's addition: at the robot's joint, amplitude and phase. With r = robot's gear over the bench's, of
+one rotor: torque x r, rate / r. An effect without a form gives the reason.
 """
 
 import dataclasses
@@ -19,13 +19,13 @@ from ranger_sim.sysid.machine import Machine
 
 Numbers = Mapping[str, float]
 MOTORS: dict[str, MotorParameters] = {"hip_motor": HIP_MOTOR, "outer_motor": ANKLE_MOTOR, "inner_motor": ANKLE_MOTOR}
-# s: a winding's heat that follows the current squared with such a time constant is the simulator's own winding (20 s)
+# s: a winding's heat that follows the current squared with this time constant is the simulator's own winding (20 s)
 WINDING_S = (10.0, 40.0)
 
 
 @dataclasses.dataclass(frozen=True)
 class Context:
-    """What a conversion may need: r as above, the machine's parameters as fitted, the simulator's motor."""
+    """Data for a conversion: r as above, the machine's parameters as fitted, the simulator's motor."""
 
     ratio: float
     values: Numbers
@@ -33,7 +33,7 @@ class Context:
 
 
 class NoFormError(Exception):
-    """The simulator cannot have this; the text says why."""
+    """The simulator cannot represent the effect; the text gives the reason."""
 
 
 Made = Callable[[Numbers, Context], dict[str, float]]
@@ -60,7 +60,7 @@ def _periodic(name: str, with_gear: bool) -> Made:
 def _resistance(numbers: Numbers, context: Context) -> dict[str, float]:
     """Ohm per kelvin of the measured temperature, or per A^2 of a filter that the simulator's winding has as well."""
     ohm = context.values["resistance_ohm"]
-    time_s = numbers.get("time_constant_s", 0.0)  # none beside the winding's own
+    time_s = numbers.get("time_constant_s", 0.0)  # 0: the winding's measured temperature
     if time_s == 0.0:
         return {"per_K": numbers["ohm_per_heat"] / ohm}
     if not WINDING_S[0] <= time_s <= WINDING_S[1]:
@@ -81,7 +81,7 @@ def _dead_time(numbers: Numbers, _: Context) -> dict[str, float]:
 
 
 FORM_OF = {cause.identifier: cause.form for cause in CAUSES.values() if cause.form}
-# by cause; each takes coefficients and shape, and gives the form's parameters
+# by cause; each takes coefficients and shape, and returns the form's parameters
 TO_TERM: dict[str, Made] = {
     "stribeck": lambda n, c: {"excess_Nm": n["excess_Nm"] * c.ratio, "speed_rad_s": n["speed_rad_s"] / c.ratio},
     "coulomb_friction": lambda n, c: {"change_Nm": n["change_Nm"] * c.ratio},
@@ -96,7 +96,7 @@ TO_TERM: dict[str, Made] = {
     "once_per_turn": _periodic("amplitude_Nm", False),
     "resistance_temperature": _resistance,
     "torque_constant_temperature": _torque_constant,
-    # above the current of its shape the drop is all there, and so it is in the simulator at every current
+    # above its shape's current the drop is complete, and the simulator has it complete at every current
     "contact_drop_change": lambda n, c: {"change_V": n["change_V"]},
     "dead_time": _dead_time,
     "cable_backlash": lambda n, c: {"gap_rad": n["half_gap_rad"]},
@@ -104,7 +104,7 @@ TO_TERM: dict[str, Made] = {
     "sensor_offset": lambda n, c: {"value": next(v for k, v in n.items() if k.startswith("offset"))},
     "sensor_lag": lambda n, c: {"time_constant_s": n["time_constant_s"]},
 }  # fmt: skip
-# a parameter of a motor's equations, and the term that makes the simulator's motor the same
+# a parameter of a motor's equations, and the term that gives the simulator's motor the same value
 PARAMETER_TERMS: dict[str, tuple[str, Callable[[float, float], dict[str, float]]]] = {
     "resistance_ohm": ("resistance_change", lambda found, was: {"change_ohm": found - was}),
     "contact_drop_V": ("contact_drop_change", lambda found, was: {"change_V": found - was}),
@@ -113,7 +113,7 @@ PARAMETER_TERMS: dict[str, tuple[str, Callable[[float, float], dict[str, float]]
 
 
 def context_of(machine: Machine, at: str, values: Numbers) -> Context:
-    """For the place `at` of a machine that may have a gearbox of its own."""
+    """Conversion for the place `at` of a machine that may have its own gearbox."""
     motor = MOTORS.get(at, HIP_MOTOR)
     gear = getattr(machine, "gear", None)
     return Context(motor.gear / gear if gear and at in MOTORS else 1.0, values, motor)
@@ -122,7 +122,7 @@ def context_of(machine: Machine, at: str, values: Numbers) -> Context:
 def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Numbers) -> dict[str, Any]:
     """A [[term]] of the simulator. numbers: coefficients and shape; values: the machine's parameters as fitted.
 
-    NoFormError with the reason when the simulator has none.
+    Raise NoFormError with the reason when the simulator has none.
     """
     name = FORM_OF.get(cause, cause)
     form = terms.FORMS.get(name)
@@ -132,7 +132,7 @@ def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Num
         raise NoFormError(f"the simulator has it at {', '.join(form.places)}, and no place {at}")
     context = context_of(machine, at, values)
     if all(name in {each.name for each in form.parameters} for name in numbers) and context.ratio == 1.0:
-        made = dict(numbers)  # told in the form's own parameters
+        made = dict(numbers)  # given in the form's own parameters
     elif cause in TO_TERM:
         try:
             made = TO_TERM[cause](numbers, context)
@@ -143,14 +143,14 @@ def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Num
     return _checked({"form": name, "at": at, **made})
 
 
-SAME = 0.005  # of a parameter: nearer than that to the simulator's own it stays as it is
+SAME = 0.005  # of a parameter: values nearer than this to the simulator's leave it unchanged
 
 
 def parameter_terms(machine: Machine, values: Numbers, intervals: Mapping[str, tuple[float, float]]) -> list[dict]:
     """Terms that give the simulator's motor the fitted parameters that differ from its own.
 
-    Of a machine that says which motor of the simulator is its own (`motor`); friction and inertia are those of the
-    bench's gearbox and load, so they stay there.
+    Only for a machine that names its motor in the simulator (`motor`); friction and inertia are those of the bench's
+    gearbox and load, so they stay there.
     """
     at = getattr(machine, "motor", None)
     made = []
@@ -158,20 +158,20 @@ def parameter_terms(machine: Machine, values: Numbers, intervals: Mapping[str, t
         if at is None or known.name not in PARAMETER_TERMS or known.name not in values:
             continue
         low, high = intervals[known.name]
-        # what a fit misses of its own model is some thousandths; a motor's parts differ by more
+        # a fit's error about its own model is some thousandths; a motor's parts differ by more
         if not low <= known.value <= high and abs(values[known.name] - known.value) > SAME * abs(known.value):
             form, change = PARAMETER_TERMS[known.name]
             try:
                 made.append(_checked({"form": form, "at": at, **change(values[known.name], known.value)}))
-            except NoFormError:  # a value that no motor has is told by the diagnosis itself
+            except NoFormError:  # the diagnosis itself reports a value that no motor has
                 continue
     return made
 
 
 def effects_of(machine: Machine, term: terms.Term) -> list[tuple[str, str, dict[str, float], dict[str, float]]]:
-    """(cause, place, coefficients, shape) of the machine's effects that a term is; none for a parameter's change.
+    """(cause, place, coefficients, shape) of the machine's effects for a term; empty for a parameter's change.
 
-    NoFormError when the machine's equations have no such effect.
+    Raise NoFormError when the machine's equations have no such effect.
     """
     name, v = term.form.name, term.values
     ratio = context_of(machine, term.at, {}).ratio
@@ -202,7 +202,7 @@ def effects_of(machine: Machine, term: terms.Term) -> list[tuple[str, str, dict[
 
 
 def _checked(table: dict[str, Any]) -> dict[str, Any]:
-    """The table when the simulator would take it."""
+    """The table, if the simulator accepts it."""
     try:
         terms.Model([table], "x")
     except UserError as error:

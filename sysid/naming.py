@@ -1,8 +1,8 @@
-"""Which cause explains a misfit: forward selection among the effects of a machine, with thresholds that are honest.
+"""Find the cause of a misfit: forward selection among the effects of a machine, with honest thresholds.
 
-Every effect is tried at every shape of its grid. What is taken must be more than chance among all that was tried, pay
-for its parameters (Bayesian information criterion), be possible for a machine, and what explains the data as well is
-told as a tie.
+Every effect is tried at every shape of its grid. An accepted effect must exceed chance among all trials, pay
+for its parameters (Bayesian information criterion), and be possible for a machine; effects that explain the data as
+well are reported as ties.
 """
 
 import dataclasses
@@ -17,17 +17,17 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Effect
 from ranger_sim.sysid.regression import Regression, explained
 
-LEVEL = 0.01  # of the whole selection, shared among all that is tried
-PAYS = 10.0  # difference of the information criterion that an effect must earn
-TIE = 6.0  # within this of the best is a tie
-EITHER_SIGN = 2.0  # standard errors of 0 within which a coefficient may be of either sign
-MOST = 4  # effects that are taken
+LEVEL = 0.01  # of the whole selection, shared among all trials
+PAYS = 10.0  # gain of the information criterion that an effect must reach
+TIE = 6.0  # effects within this of the best are ties
+EITHER_SIGN = 2.0  # standard errors of 0 within which a coefficient may have either sign
+MOST = 4  # number of accepted effects
 
 
 @dataclasses.dataclass
 class Trial:
-    """One effect at one shape, beside the base: white, shadow as `Regression.product` takes them; gram (k, k); product
-    (k,) with the residual; taken (k, m): its coordinates among what was taken before it."""
+    """One effect at one shape, projected off the base: white, shadow as `Regression.product` takes them; gram (k, k);
+    product (k,) with the residual; taken (k, m): its coordinates among the effects accepted before it."""
 
     effect: Effect
     shape: Mapping[str, float]
@@ -41,7 +41,8 @@ class Trial:
 
 @dataclasses.dataclass
 class Named:
-    """An effect that was taken, at its best shape. p: by chance among all trials; bic: gained; tied: does as well."""
+    """An accepted effect, at its best shape. p: by chance among all trials; bic: gain; tied: effects that do as
+    well."""
 
     effect: Effect
     shape: Mapping[str, float]
@@ -50,18 +51,18 @@ class Named:
     p: float
     bic: float
     tied: list[Effect]
-    rivals: list[tuple[Effect, float]]  # all others, and how far the information criterion has each behind
+    rivals: list[tuple[Effect, float]]  # all others, and their deficit in the information criterion
 
     @property
     def coefficients(self) -> tuple[str, ...]:
-        """Names of its columns in a regression that has them, unlike those of any other effect."""
+        """Names of its columns in a regression that has them, different from those of any other effect."""
         return tuple(f"{self.effect.cause}@{self.effect.at}:{name}" for name in self.effect.coefficients)
 
 
 def trials(
     effects: Sequence[Effect], regression: Regression, shapes: Sequence[Mapping[str, float]] | None = None
 ) -> list[Trial]:
-    """Every effect at every shape, of its own grid or of `shapes`."""
+    """Trials of every effect at every shape, of its own grid or of `shapes`."""
     made = []
     for effect in effects:
         for shape in effect.shapes if shapes is None else shapes:
@@ -82,7 +83,7 @@ def trials(
 
 
 def select(effects: Sequence[Effect], regression: Regression, level: float = LEVEL, most: int = MOST) -> list[Named]:
-    """The effects that the data ask for, the most telling first."""
+    """The effects that the data support, the most telling first."""
     all_trials = trials(effects, regression)
     taken: list[Named] = []
     count = max(1, len(all_trials))
@@ -96,7 +97,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
             chi2 /= trial.inflation
             if freedom:
                 shapes = len(trial.effect.shapes)
-                # a shape found on a grid is a parameter too
+                # a shape found on a grid counts as a parameter
                 free = freedom + (1 if shapes > 1 else 0)
                 bic = chi2 - free * math.log(size) - 2.0 * math.log(shapes)
                 scored.append((bic, chi2, freedom, trial))
@@ -127,7 +128,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
 
 
 def _take(chosen: Trial, trials: Sequence[Trial], regression: Regression) -> None:
-    """Put every trial beside the chosen one as well."""
+    """Project every trial off the chosen one as well."""
     beside = regression.full(chosen.white) - regression.z @ chosen.shadow
     values, vectors = np.linalg.eigh(chosen.gram)
     strong = values > 1e-9 * max(float(values[-1]), 1e-300)
@@ -148,7 +149,7 @@ def coefficients(columns: Array, residual: Array) -> Array:
 
 
 def _possible(trial: Trial) -> bool:
-    """Whether a machine can have what was found. What its noise lets be of either sign may be of the possible one."""
+    """Whether a machine can have these values. A sign within the noise may be the possible one."""
     found = np.linalg.lstsq(trial.gram, trial.product, rcond=1e-12)[0]
     errors = np.sqrt(np.diag(np.linalg.pinv(trial.gram, rcond=1e-12)))
     choices = [
@@ -168,9 +169,9 @@ def refit(
     values: Mapping[str, float] | None = None,
     fresh: bool = False,
 ) -> Regression:
-    """The regression with these effects in its base; its noise stays as it was, or is found anew when `fresh`.
+    """The regression with these effects in its base; its noise stays the same, or is estimated again when `fresh`.
 
-    together: what the base is to have besides, when the regression has some of it already. values: the machine's
+    together: the base's whole set of effects, when the regression already has some of it. values: the machine's
     parameters with which the effects' columns are made, those of the regression when None.
     """
     chosen = list(named if together is None else together)

@@ -1,6 +1,6 @@
-"""The order of a channel's samples in time: which are kept, which are sorted in between them, which cannot be placed.
+"""The order of a channel's samples in time: samples that are kept, sorted in between, or impossible to place.
 
-Rows that are merely out of order fit where their stamps say: sorted, the samples are as far apart as they should be.
+Rows that are merely out of order fit at their stamps: sorted, the samples have the expected distances.
 Where a sample was moved and does not fit, its stamp is wrong, or it belongs to another recording.
 """
 
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ranger_sim.sysid.dataset import Array
 
-ALIKE = 0.5  # of the usual step: steps that differ by no more are of one sampling
+ALIKE = 0.5  # of the usual step: steps that differ by no more belong to one sampling
 ALIKE_PART = 0.6  # of the steps from row to row: then these are the sampling's, and not those of the sorted stamps
-# usual steps to the next sample on either side; two recordings of one rate that lie between each other are half a
-# step from each other, or nearer
+# usual steps to the next sample on either side; two interleaved recordings of one rate are half a step from each other,
+# or nearer
 NEAREST, FARTHEST = 0.6, 1.5
 EVEN = 0.1  # of the usual step, for the evidence that is reported
 SHORTEST_RECORDING = 30  # samples without a step back
@@ -24,7 +24,7 @@ SHORTEST_RECORDING = 30  # samples without a step back
 
 @dataclasses.dataclass(frozen=True)
 class Order:
-    """kept: places of the samples in the order of their stamps, none twice; moved: how many of them are sorted.
+    """kept: places of the samples in the order of their stamps, none twice; moved: number of sorted samples.
 
     even: part of the sorted steps that are the usual one, `step_s`, to a tenth. left_out: places by reason
     (dataset.LOSSES and NOTHING_LOST). kept and left_out together are all samples.
@@ -49,7 +49,7 @@ def of(time_s: Array, value: Array) -> Order:
         moved = ~_in_place(stamps.tobytes())
         usual = _usual_step(stamps)
         restarted = _restarts(steps)
-        in_order = np.lexsort((moved, stamps))  # of one stamp, what was in place comes first
+        in_order = np.lexsort((moved, stamps))  # of one stamp, samples in place precede moved ones
         place, stamps, moved = place[in_order], stamps[in_order], moved[in_order]
     first = np.concatenate(([True], np.diff(stamps) != 0.0))[: len(stamps)]
     same = ~first & (value[place] == value[place[np.maximum.accumulate(np.where(first, np.arange(len(place)), 0))]])
@@ -76,7 +76,7 @@ def of(time_s: Array, value: Array) -> Order:
 
 @functools.lru_cache(maxsize=2)  # the channels of a table have one time column
 def _in_place(stamps: bytes) -> NDArray[np.bool_]:
-    """True for the samples that can stay: the most of them whose stamps do not go back."""
+    """True for the samples that can stay: the largest number whose stamps do not decrease."""
     values = np.frombuffer(stamps, dtype=np.float64).tolist()
     last: list[float] = []  # smallest last stamp of a run of this length
     ends: list[int] = []  # its sample

@@ -1,8 +1,8 @@
-"""Whether the numbers that a fit gives can be those of the machine at all, before any cause is named.
+"""Checks that a fit's values can belong to the machine at all, before any cause is named.
 
-A channel in another unit, another channel under its name, or one that does not belong to the others, gives a fit as
-any: its parameters tell, and equations that share one contradict each other. A doubt forbids a name, a warning is only
-told.
+A channel in another unit, a wrong channel under its name, or one that does not belong to the others, still gives a fit:
+its parameters show the error, and equations that share a parameter contradict each other. A doubt forbids naming a
+cause; a warning is only reported.
 """
 
 import dataclasses
@@ -17,28 +17,28 @@ from ranger_sim.sysid.machine import Known, Machine
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Part, Regression
 
-SURE = 5.0  # standard errors beyond a limit: chance and a small model error do not reach there
-OTHER_WAY = 0.5  # of its known value: so far on the other side of zero a sign is wrong, in the data or in the model
+SURE = 5.0  # standard errors beyond a limit: chance and a small model error do not reach that far
+OTHER_WAY = 0.5  # of its known value: this far on the other side of zero a sign is wrong, in the data or in the model
 FACTOR = 5.0  # to the simulation's value: between a machine of the same kind and rpm taken for rad/s (9.5)
-CLEAR = 0.2  # relative error up to which a factor is told
-EXPLAINED = 0.2  # of what an equation balances: below it the channels do not belong together
-# Or below this share where what is left moves slowly, as a machine does and a sensor's noise does not. Chosen by us: of
-# the motor bench's recordings with a fault 0.98 and more is explained, with a channel 1 s late or reversed mostly less
-# than 0.75; the blind cases' noise has a memory of 0.93 at most from sample to sample.
+CLEAR = 0.2  # relative error up to which a factor is reported
+EXPLAINED = 0.2  # of an equation's balance: below it the channels do not belong together
+# Or below this share where the residual moves slowly, as a machine does and a sensor's noise does not. Chosen by us:
+# fits explain 0.98 and more of the motor bench's recordings with a fault, and mostly less than 0.75 with a channel 1 s
+# late or reversed; the blind cases' noise has a memory of 0.93 at most from sample to sample.
 COHERENT, SLOW = 0.9, 0.95
 FEWEST = 100  # rows
-FEW = 0.02  # of the rows; what is thinned to rows that are independent may be a small part
-APART = 0.25  # of the mean square: equations leave less than so much of it when a parameter may differ between them
-TELLS = 0.05  # of a column's length: what the others leave of it, when the equation alone tells its parameter
+FEW = 0.02  # of the rows; decimation to independent rows may leave a small part
+APART = 0.25  # of the mean square: equations leave less than this share when a parameter may differ between them
+TELLS = 0.05  # of a column's length: the part that the others leave when the equation alone determines its parameter
 SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
 MOST = 5  # causes at once: where everything seems wrong, it is another machine, or other data
-LARGEST_SCALE = 0.5  # change that a sensor's scale may be: what is beyond is another signal, or another unit
-UNIT_TOLERANCE = 0.05  # of a factor that is told as a unit's: friction and noise move it by per cents
-# kinds of findings after which no cause is named
+LARGEST_SCALE = 0.5  # largest change of a sensor's scale: beyond it, the channel shows another signal or another unit
+UNIT_TOLERANCE = 0.05  # of a factor that is reported as a unit's: friction and noise move it by per cents
+# kinds of findings that forbid naming a cause
 FORBID = ("impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal", "other_machine")
-# small beside the rest, or of an instrument: a model error moves them by any factor
+# small compared with the rest, or of an instrument: a model error moves them by any factor
 MAY_BE_ANY = ("friction", "inductance", "lag", "filter", "gates", "zero", "offset", "bias")
-# {unit of a channel: {what may be meant by its numbers instead: how many of them make one of ours}}
+# {unit of a channel: {other unit that its numbers may have: how many of them make one of ours}}
 OTHER_UNITS = {
     "rad/s": {"rpm": 30.0 / np.pi, "deg/s": 180.0 / np.pi, "turns/s": 0.5 / np.pi},
     "rad": {"deg": 180.0 / np.pi, "turns": 0.5 / np.pi, "mrad": 1e3},
@@ -59,7 +59,7 @@ class Doubts:
 
 
 def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) -> Doubts:
-    """What is odd in a fit. regression: with everything in it that was named."""
+    """Implausible values of a fit. regression: with every named cause in it."""
     findings: list[Finding] = []
     if len(named) >= MOST:
         text = f"{len(named)} causes at once explain it: where everything is wrong it is another machine, or other data"
@@ -103,7 +103,7 @@ def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) 
 
 
 def absurd(known: Known, value: float, error: float) -> bool:
-    """True for what lies surely beyond the limits; a little below zero is not absurd where little is usual."""
+    """True for values surely beyond the limits; a little below zero is not absurd where the usual value is small."""
     reach = SURE * error
     if known.low >= 0.0 and known.value > 0.0 and value < 0.0:
         return value + reach < -OTHER_WAY * known.value
@@ -111,10 +111,10 @@ def absurd(known: Known, value: float, error: float) -> bool:
 
 
 def explained(regression: Regression, name: str) -> float | None:
-    """Share of what an equation balances that it explains: of its response and of what its parameters add to it.
+    """Share of an equation's balance (its response and its parameters' contributions) that the equation explains.
 
-    None for an equation with fewer than two parameters of its own or few rows, and for a machine told by its
-    simulator, whose response is already what the simulation misses.
+    None for an equation with fewer than two parameters of its own or few rows, and for a machine given by its
+    simulator, whose response is already the simulation's error.
     """
     if _of_a_simulator(regression):
         return None
@@ -133,8 +133,9 @@ def explained(regression: Regression, name: str) -> float | None:
 
 
 def slowness(regression: Regression, name: str) -> float | None:
-    """rms of what an equation leaves, over that of what its past does not tell of it: sqrt(1 / (1 - rho^2)) for noise
-    with a memory of rho. None where the residual is not whitened, or for few rows.
+    """rms of an equation's residual over that of its innovations: sqrt(1 / (1 - rho^2)) for noise with a memory of rho.
+
+    None where the residual is not whitened, or for few rows.
     """
     if not all(recording.whitened for recording in regression.recordings):
         return None
@@ -144,7 +145,7 @@ def slowness(regression: Regression, name: str) -> float | None:
 
 
 def _of_a_simulator(regression: Regression) -> bool:
-    """True where responses are what a simulation misses."""
+    """True where responses are errors of a simulation."""
     return any(recording.left_over or recording.entries for recording in regression.recordings)
 
 
@@ -158,7 +159,7 @@ def _values(regression: Regression) -> Array:
 
 
 def _left(regression: Regression, name: str) -> Array:
-    """What an equation leaves, not whitened, at the rows that count."""
+    """An equation's residual, not whitened, at the rows that count."""
     part = regression.parts[name]
     rows = _counting(part)
     return part.response[rows] - part.measured[rows] @ _values(regression)
@@ -171,7 +172,7 @@ def _memory(left: Array) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class _Alone:
-    """A parameter by one equation alone. better: what the equation then leaves, of what it leaves with the others."""
+    """A parameter from one equation alone. better: the equation's residual then, over that with the other equations."""
 
     equation: str
     value: float
@@ -179,7 +180,7 @@ class _Alone:
 
 
 def _contradictions(machine: Machine, regression: Regression) -> list[Finding]:
-    """Parameters that two equations have, with opposite signs or far apart: a channel has another sign or unit."""
+    """Parameters with opposite or far different values in two equations: a channel has another sign or unit."""
     findings: list[Finding] = []
     if _of_a_simulator(regression):
         return findings
@@ -201,7 +202,7 @@ def _contradictions(machine: Machine, regression: Regression) -> list[Finding]:
 
 
 def _alone(regression: Regression, equation: str, name: str) -> _Alone | None:
-    """None where the equation alone does not surely tell the parameter: without it, or beside columns much like it."""
+    """None where the equation alone does not surely determine the parameter: absent, or among columns much like it."""
     part = regression.parts[equation]
     rows = _counting(part)
     measured, response = part.measured[rows], part.response[rows]
@@ -228,7 +229,7 @@ def _alone(regression: Regression, equation: str, name: str) -> _Alone | None:
 
 
 def other_units(machine: Machine, factor: float) -> list[str]:
-    """Which channels' numbers in which other unit are so many times ours, or ours so many times them."""
+    """Channels and units in which numbers would be larger or smaller than ours by `factor`."""
     found = []
     for channel in machine.quantities:
         for unit, size in OTHER_UNITS.get(channel.unit, {}).items():
@@ -238,7 +239,7 @@ def other_units(machine: Machine, factor: float) -> list[str]:
 
 
 def _of_sensor(regression: Regression, named: Named) -> list[Finding]:
-    """A scale or an offset of a sensor that no sensor has: its channel shows another signal, or in another unit."""
+    """An impossible scale or offset of a sensor: its channel shows another signal, or has another unit."""
     value = regression.values[named.coefficients[0]]
     if named.effect.cause == "sensor_scale" and abs(value) > LARGEST_SCALE:
         text = f"it would show {1.0 + value:.3g} times its quantity: another signal, or another unit, and no scale"
@@ -253,8 +254,8 @@ def _of_sensor(regression: Regression, named: Named) -> list[Finding]:
 
 
 def _factor(known: Known, value: float, factor: float, simulated: bool) -> Finding:
-    """A parameter far from the simulation's. simulated: by equations that are linear about where a fit has ended; so
-    far from where it began it may have been fitted to anything.
+    """A parameter far from the simulation's. simulated: from equations that are linearised where a fit ended; a value
+    far from the fit's start may then be an artefact.
     """
     text = (
         f"it comes out as {value:.4g} {known.unit}, {factor:.3g} times the simulation's {known.value:.4g}: "

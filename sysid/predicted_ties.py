@@ -1,8 +1,8 @@
 """Ties that structure predicts before any data (`isolability.py`), against those that the data leave.
 
-A prediction is made on a reference motion, with the experiment's channels alone. The data confirm it when both causes
-explain them as well, and break it when one of them is behind: their motion, or their noise, separates what the
-reference motion does not. The other way round, a tie that nobody predicted says that this motion is a poor one.
+A prediction uses a reference motion, with the experiment's channels alone. The data confirm it when both causes
+explain them equally well, and break it when one of them is behind: their motion, or their noise, separates causes that
+the reference motion does not. Conversely, a tie without a prediction shows that this motion is a poor one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,19 +14,19 @@ from ranger_sim.sysid.experiment_models import MODELS
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.naming import TIE, Named
 
-CONFIRMED = "confirmed"  # these data cannot tell either
-BROKEN = "broken"  # the data are behind with the other one
-IMPOSSIBLE = "broken by its value"  # it explains as much, with a value that no machine has
+CONFIRMED = "confirmed"  # these data cannot separate them either
+BROKEN = "broken"  # the data prefer the named cause
+IMPOSSIBLE = "broken by its value"  # the other explains as much, with a value that no machine has
 NOT_TRIED = "not tried"  # the machine's equations have no such effect
-NOT_PREDICTED = "not predicted"  # and the data cannot tell
+NOT_PREDICTED = "not predicted"  # and the data cannot separate them
 
 
 def of(machine: Machine, recordings: Sequence[Recording], named: Named) -> dict[str, Any] | None:
-    """What was predicted of a named cause, and what the data say of it; None where nothing was predicted: of another
-    machine, or for another place than that of the prediction.
+    """Predictions for a named cause, and the data's result; None without a prediction: for another machine, or for
+    another place than that of the prediction.
 
-    status: of the cause with these channels; ties: of each its other cause, reason and cosine of the prediction (None
-    where there was none), what the data made of it, and by how much of the information criterion they are behind.
+    status: of the cause with these channels; ties: for each its other cause, reason and cosine of the prediction (None
+    without one), the data's result, and the other's deficit in the information criterion.
     """
     if machine.name not in MODELS or not recordings:
         return None
@@ -75,7 +75,7 @@ def _outcome(
 
 
 def key_of(cause: str, at: str) -> str:
-    """A cause of an effect as the catalogue has it, with its place where it has several: "sensor_offset@current"."""
+    """A cause of an effect as the catalogue names it, with its place where it has several: "sensor_offset@current"."""
     try:
         return causes.find(cause).key
     except UserError:

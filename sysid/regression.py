@@ -1,8 +1,8 @@
 """Several linear balances over several recordings as one regression with white noise of deviation 1.
 
 Each equation has its own noise: an autoregression of its residual whitens it, a deviation scales it; two equations
-that share a noisy channel have correlated residuals, which is turned out of them row by row. What is left is ordinary
-least squares, so that a sum of squares is a chi-square and a difference of two of them tests a hypothesis.
+that share a noisy channel have correlated residuals, and the regression removes that correlation row by row. The result
+is ordinary least squares, so that a sum of squares is a chi-square and a difference of two of them tests a hypothesis.
 """
 
 import dataclasses
@@ -16,17 +16,17 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Equation, Recording
 
 LEAST = 1e-9  # of the largest response: noise below it is rounding
-RANK = 1e-8  # a parameter whose column the others have to this part is not separable from them
-NOTHING = 1e-9  # of a column's square beside the base: rounding, with columns of up to 1e7 deviations
-ORDER = 8  # of the autoregression at most
-MEMORIES = tuple(0.05 * n for n in range(19))  # of noise from sample to sample, that are tried
-FEWEST_SHARED = 40  # rows of two equations for what they share: its correlation is then known to 0.16
-UPPER = 0.95  # noise found from repeats is taken at the upper limit of this one-sided interval: few repeats, less trust
-FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual tells the noise
+RANK = 1e-8  # a parameter is not separable if the other columns explain its column up to this part
+NOTHING = 1e-9  # of a column's square after the base is projected out: rounding, with columns of up to 1e7 deviations
+ORDER = 8  # largest order of the autoregression
+MEMORIES = tuple(0.05 * n for n in range(19))  # memories of noise from sample to sample that the fit tries
+FEWEST_SHARED = 40  # common rows of two equations for their correlation, which is then known to 0.16
+UPPER = 0.95  # noise from repeats is the upper limit of this one-sided interval: few repeats, less trust
+FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual gives the noise
 
 
 def reduced(recording: Recording, column: Array) -> Array:
-    """A column (n,) or (n, k) under the recording's Gaussian, every so many rows."""
+    """A column (n,) or (n, k) smoothed by the recording's Gaussian, at every `every`-th row."""
     if recording.width > 0.0:
         out = np.empty_like(column, dtype=float)
         for run in recording.table.runs:
@@ -36,12 +36,12 @@ def reduced(recording: Recording, column: Array) -> Array:
 
 
 def _rows(recording: Recording) -> np.ndarray:
-    """Numbers of the rows that are kept, counted from each run's start."""
+    """Numbers of the kept rows, counted from each run's start."""
     return np.concatenate([np.arange(run.start, run.stop, recording.every) for run in recording.table.runs])
 
 
 def kept_rows(recording: Recording, column: np.ndarray) -> np.ndarray:
-    """A column (n,) of flags or numbers at the rows that are kept, not smoothed."""
+    """A column (n,) of flags or numbers at the kept rows, not smoothed."""
     return column[_rows(recording)]
 
 
@@ -56,7 +56,7 @@ def _inside(recording: Recording) -> np.ndarray:
 
 
 def _starts(recording: Recording) -> np.ndarray:
-    """True for the first kept rows of each run, which have not enough others before them."""
+    """True for the first kept rows of each run, which have too few rows before them."""
     first = [
         np.arange(run.start, run.stop, recording.every) - run.start < ORDER * recording.every
         for run in recording.table.runs
@@ -65,9 +65,9 @@ def _starts(recording: Recording) -> np.ndarray:
 
 
 def autoregression(residual: Array, valid: np.ndarray) -> Array:
-    """Coefficients (0 ... ORDER,) that predict a residual from those before it, over rows that are valid throughout.
+    """Coefficients (0 ... ORDER,) that predict a residual from earlier ones, over rows that are valid throughout.
 
-    As many as the Bayesian information criterion asks for.
+    The Bayesian information criterion chooses their number.
     """
     n = len(residual)
     if np.count_nonzero(valid) < 20 * ORDER:
@@ -91,12 +91,12 @@ def autoregression(residual: Array, valid: np.ndarray) -> Array:
 def autoregression_above(
     residual: Array, good: np.ndarray, share: float, width: float = 0.0, every: int = 1
 ) -> tuple[Array, float]:
-    """(coefficients, deviation of what they leave) of noise that alone is there above `share` of the rows' frequency.
+    """(coefficients, deviation of the innovations) of noise, estimated above `share` of the rows' frequency only.
 
-    What is slower may be an effect's. There the noise's spectrum is that of samples which remember the one before,
-    under a Gaussian of `width` samples and one in `every` kept: its memory is Whittle's estimate above. From
-    the spectrum follow the autocorrelations, from these the coefficients (Yule and Walker), as many as the Bayesian
-    information criterion asks for. good: rows that count; each unbroken stretch of them has a periodogram of its own.
+    Slower parts may belong to an effect. Below `share` the noise gets the spectrum of samples that remember the one
+    before, under a Gaussian of `width` samples and with one in `every` kept; Whittle's estimate above `share` gives the
+    memory. The spectrum gives the autocorrelations, these give the coefficients (Yule and Walker), and the Bayesian
+    information criterion chooses their number. good: rows that count; each unbroken stretch has its own periodogram.
     """
     stretches = [_periodogram(residual[rows]) for rows in _stretches(good)]
     frequencies, powers = (np.concatenate([each[part] for each in stretches] or [np.zeros(0)]) for part in (0, 1))
@@ -126,22 +126,22 @@ def autoregression_above(
 
 
 def _spectrum(frequency: Array, memory: float, width: float, every: int) -> Array:
-    """Of rows, in parts of their frequency, but for a factor: of samples with this memory, smoothed and thinned out."""
+    """Spectrum up to a factor, at parts of the rows' frequency, of samples with this memory, smoothed and decimated."""
     total = np.zeros_like(frequency)
-    for fold in range(-(every // 2), every // 2 + 1):  # what thinning folds back
+    for fold in range(-(every // 2), every // 2 + 1):  # aliases of the decimation
         turn = 2.0 * np.pi * (frequency + fold) / every
         total += np.exp(-((turn * width) ** 2)) / (1.0 + memory**2 - 2.0 * memory * np.cos(turn))
     return total
 
 
 def _stretches(good: np.ndarray) -> list[slice]:
-    """Unbroken stretches of rows, but for short ones."""
+    """Unbroken stretches of rows, without short ones."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
     return [slice(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a > 8 * ORDER]
 
 
 def _periodogram(residual: Array) -> tuple[Array, Array]:
-    """Frequencies in parts of the rows' one, and power at each; a Hann window, lest the slow part leaks."""
+    """Frequencies as parts of the rows' frequency, and power at each; a Hann window limits leakage of the slow part."""
     window = np.hanning(len(residual))
     power = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / float(window @ window)
     frequency = np.arange(1, len(power)) / len(residual)
@@ -160,7 +160,7 @@ class Part:
     repeats: np.ndarray
 
     def pure_error(self, residual: Array) -> tuple[Array, int]:
-        """(residual less the mean of its repeats (n,), degrees of freedom); 0 of these: too few repeats."""
+        """(residual less the mean of its repeats (n,), degrees of freedom); 0 degrees where repeats are too few."""
         counted = self.valid & (self.repeats >= 0)
         numbers, place, count = np.unique(self.repeats[counted], return_inverse=True, return_counts=True)
         freedom = int(np.count_nonzero(counted)) - len(numbers)
@@ -173,14 +173,14 @@ class Part:
 
 @dataclasses.dataclass
 class Whitening:
-    """How one equation's residual becomes white noise of deviation 1."""
+    """Coefficients and deviation that turn one equation's residual into white noise of deviation 1."""
 
     coefficients: Array
     deviation: float
 
 
 class Regression:
-    """Equations of some recordings, whitened, and what is asked of them.
+    """Equations of some recordings, whitened and solved, for tests of effects.
 
     response: (N,) whitened; measured, stand_in: (N, p) whitened columns of `names`; residual: (N,).
     """
@@ -192,11 +192,11 @@ class Regression:
         extra_names: Sequence[str] = (),
         noise: "Regression | None" = None,
     ) -> None:
-        """extra: more base columns, as an effect gives them: one {equation: (n, k)} per recording, named so. noise:
-        another regression whose whitening and parameters are taken over as a start."""
+        """extra: more base columns, as an effect gives them: one {equation: (n, k)} per recording, by name. noise:
+        another regression whose whitening and parameters are the start here."""
         self.recordings = list(recordings)
         self.equations = list(dict.fromkeys(name for each in recordings for name in each.equations))
-        if noise is not None:  # of an equation that the other has not, no noise is known
+        if noise is not None:  # the noise is unknown for an equation that the other regression does not have
             self.equations = [name for name in self.equations if name in noise.whitening]
         if not self.equations:
             there = ", ".join(recording.table.name for recording in self.recordings)
@@ -222,7 +222,7 @@ class Regression:
     def _part(self, equation: str, extra: Sequence[Columns], extra_names: list[str]) -> Part:
         """One equation over all recordings, unwhitened."""
         parts = []
-        first_free = 0  # repeats of one recording are none of another's
+        first_free = 0  # a recording's repeats are not repeats of another recording's rows
         for number, recording in enumerate(self.recordings):
             rows = len(_rows(recording))
             repeats = kept_rows(recording, recording.repeats.get(equation, np.full(len(recording.table), -1)))
@@ -247,7 +247,7 @@ class Regression:
         return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _find_whitening(self) -> None:
-        """The residual of a first fit tells the noise; once more with that noise."""
+        """Estimate the noise from the residual of a first fit, then solve again with that noise."""
         residuals = {}
         for _ in range(2):
             found = self._quick()
@@ -278,7 +278,7 @@ class Regression:
                     self.shared[one, other] = float(np.clip(np.mean(a * b), -0.98, 0.98))
 
     def _loudness(self, noise: Array, freedom: int) -> float:
-        """Deviation of a white noise that says as little as this one, whose samples hang together.
+        """Deviation of a white noise with as little information as this one, whose samples are correlated.
 
         N_eff = N (1 - rho) / (1 + rho) with the first autocorrelation, of rows that count. freedom: of a pure error.
         """
@@ -290,7 +290,7 @@ class Regression:
         return float(np.sqrt(total * (1.0 + rho) / (1.0 - rho)))
 
     def _good(self, equation: str, coefficients: Array | None = None) -> np.ndarray:
-        """Rows that count: valid with everything before them that the whitening looks at, if it looks back."""
+        """Rows that count: valid, with valid rows before them as far as the whitening reaches back."""
         part = self.parts[equation]
         good = part.valid & ~part.starts
         if coefficients is None and equation in self.whitening:
@@ -330,7 +330,7 @@ class Regression:
         self.response = self._stack({name: part.response for name, part in self.parts.items()})
         self.measured = self._stack({name: part.measured for name, part in self.parts.items()})
         self.stand_in = self._stack({name: part.stand_in for name, part in self.parts.items()})
-        # known parameters come after the equations; an effect has nothing in these rows
+        # rows of the priors follow the equations' rows; an effect is zero there
         known, wanted = self._prior_rows()
         self.response = np.concatenate([self.response, wanted])
         self.measured, self.stand_in = (np.vstack([each, known]) for each in (self.measured, self.stand_in))
@@ -351,12 +351,12 @@ class Regression:
         self._solve()
 
     def _priors(self) -> dict[str, tuple[float, float]]:
-        """(value, standard deviation) of the parameters that sound machines have by and large."""
+        """(value, standard deviation) of the parameters that are roughly known for sound machines."""
         known = {name: prior for recording in self.recordings for name, prior in recording.priors.items()}
         return {name: prior for name, prior in known.items() if name in self.names}
 
     def _prior_rows(self) -> tuple[Array, Array]:
-        """(k, p) and (k,): what is known of sound machines as measurements of deviation 1."""
+        """(k, p) and (k,): the priors of sound machines as measurements of deviation 1."""
         known = self._priors()
         rows = np.zeros((len(known), self.count))
         for row, (name, (_, deviation)) in enumerate(known.items()):
@@ -378,7 +378,7 @@ class Regression:
         solved[kept] = self.inverse @ (self.z.T @ self.response) / scale[kept]
         self._face()
         covariance = np.zeros((self.count, self.count))
-        # equations that share a noisy channel tell less together than as many that do not
+        # equations that share a noisy channel carry less information together than independent ones
         noise = self.own.copy()
         for pair, correlation in self.shared.items():
             noise += correlation * (self.across[pair] + self.across[pair].T)
@@ -390,7 +390,7 @@ class Regression:
         self.chi2 = float(self.residual @ self.residual)
 
     def _face(self) -> None:
-        """Products of z; of equations that share noise also between them, and for the rows of each the other's z."""
+        """Products of z; for equations that share noise also between them, and for the rows of each the other's z."""
         self.own = self.z.T @ self.z
         self.across: dict[tuple[str, str], Array] = {}
         self.facing: dict[tuple[tuple[str, str], str], Array] = {}
@@ -411,18 +411,18 @@ class Regression:
         return self.beside(self.full(self.whitened(made)))
 
     def beside(self, stacked: Array) -> Array:
-        """What of whitened columns (N, k) the base does not have.
+        """The part of whitened columns (N, k) that the base does not explain.
 
-        The residual is (1 - phi (z^T phi)^-1 z^T) noise; so a column's product with it is the product of this with the
-        noise, which has the variance of its length.
+        The residual is (1 - phi (z^T phi)^-1 z^T) noise; so a column's product with it is the product of this part with
+        the noise, and its variance is this part's squared length.
         """
         return stacked - self.z @ (self.inverse.T @ (self.phi.T @ stacked))
 
     def inflation(self, white: Mapping[str, Array], shadow: Array, gram: Array) -> float:
-        """How much larger than chance alone the chi-square of whitened columns, put beside the base, is; at least 1.
+        """Factor by which the chi-square of whitened columns, projected off the base, exceeds chance; at least 1.
 
-        Equations that share a noisy channel have correlated residuals. It matters only to a column that stands in
-        both; there the variance of its product with the residual grows by the correlation.
+        Equations that share a noisy channel have correlated residuals. This affects only a column that is in both;
+        there the variance of its product with the residual grows by the correlation.
         """
         total = max(float(np.trace(gram)), 1e-300)
         worst = 1.0
@@ -440,7 +440,7 @@ class Regression:
         return worst
 
     def whitened(self, made: Sequence[Columns]) -> dict[str, Array]:
-        """An effect's columns as they are, whitened: by equation (n, k), only where the effect stands."""
+        """An effect's whitened columns, not projected: by equation (n, k), only where the effect enters."""
         width = next(column.shape[1] for each in made for column in each.values())
         out = {}
         for name in self.equations:
@@ -464,32 +464,33 @@ class Regression:
         return out
 
     def shadow(self, white: Mapping[str, Array]) -> Array:
-        """(p, k): how much of z is taken off whitened columns when they are put beside the base."""
+        """(p, k): coefficients of z that the projection off the base subtracts from whitened columns."""
         together = sum((self.phi[self.rows[name]].T @ columns for name, columns in white.items()), 0.0)
         return np.asarray(self.inverse.T @ together)
 
     def product(self, white: Mapping[str, Array], shadow: Array, other: Array) -> Array:
-        """(k, m): whitened columns, put beside the base, times rows (N, m)."""
+        """(k, m): whitened columns, projected off the base, times rows (N, m)."""
         straight = sum((columns.T @ other[self.rows[name]] for name, columns in white.items()), 0.0)
         return np.asarray(straight - shadow.T @ (self.z.T @ other))
 
     def gram(self, white: Mapping[str, Array], shadow: Array) -> Array:
-        """(k, k): products of whitened columns among themselves, put beside the base."""
+        """(k, k): products of whitened columns with each other, projected off the base."""
         straight = sum((columns.T @ columns for columns in white.values()), 0.0)
         across = sum((columns.T @ self.z[self.rows[name]] for name, columns in white.items()), 0.0) @ shadow
         gram = np.asarray(straight - across - across.T + shadow.T @ self.own @ shadow)
-        # what the base has to the last digits leaves only rounding
+        # a column that the base explains to the last digits leaves only rounding
         nothing = np.diag(gram) < NOTHING * np.diag(straight)
         gram[nothing, :] = gram[:, nothing] = 0.0
         return gram
 
     def rows_of(self, equation: str) -> slice:
-        """Where an equation stands in the stacked rows."""
+        """Slice of an equation in the stacked rows."""
         return self.rows[equation]
 
 
 def innovations(coefficients: Array, column: Array) -> Array:
-    """What a column (n,) or columns (n, k) add to their forecast from the rows before; zeros stand before the first."""
+    """Innovations of a column (n,) or columns (n, k): each row less its forecast from earlier ones, zeros before row
+    0."""
     out = column.copy()
     for lag, coefficient in enumerate(coefficients, 1):
         out[lag:] -= coefficient * column[:-lag]
@@ -506,7 +507,7 @@ def orthonormal(columns: Array) -> Array:
 
 
 def explained(gram: Array, product: Array) -> tuple[float, int]:
-    """(chi-square that columns take out of a residual, how many of them are independent).
+    """(chi-square that columns explain of a residual, number of independent columns).
 
     gram: (k, k) of the columns; product: (k,) of them with the residual.
     """

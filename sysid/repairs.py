@@ -1,8 +1,9 @@
 """Changes to measured data, each explicit, each recorded in the dataset with its reason and its count.
 
-`mend` does what has one right answer: it leaves out what is not a sample, sorts samples that came out of order, puts an
-overrun counter right. What is a judgement (another unit, a lag, a zero) is asked for by name, and so is any change to
-what drives the machine. A value is never invented: a wrong one is left out, and is a loss in the channel's ledger.
+`mend` makes the repairs with one right answer: it leaves out everything that is not a sample, sorts samples that are
+out of order, corrects an overrun counter. A judgement (another unit, a lag, a zero) is requested by name, and so is any
+change to an input of the machine. A value is never invented: a wrong one is left out, and is a loss in the channel's
+ledger.
 """
 
 import dataclasses
@@ -28,7 +29,7 @@ KINDS = {
     "wrap": "an overrun integer counts on",
     "bit_flip": "single wrong values are left out",
     "dropped": "a channel with nothing in it is left out",
-    # asked for by name
+    # requested by name
     "converted": "another unit than was told",
     "shifted": "a channel's stamps moved",
     "offset": "a constant added",
@@ -37,10 +38,10 @@ KINDS = {
 
 
 def mend(dataset: Dataset, findings: list[Finding] | None = None, inputs: Collection[str] = ()) -> Dataset:
-    """The dataset without what is certainly wrong; findings (`sanity.inspect` where not given) come along.
+    """The dataset without certain errors; findings (`sanity.inspect` where not given) are included.
 
-    inputs: channels that drive the machine. Their values stay as they are, and a finding says what could be repaired.
-    A channel that has fewer than FEWEST samples left is not in the result. UserError when no channel is left.
+    inputs: channels that drive the machine. Their values stay unchanged, and a finding names the possible repair.
+    A channel with fewer than FEWEST samples left is not in the result. UserError when no channel is left.
     """
     findings = sanity.inspect(dataset) if findings is None else findings
     flips = {each.channel for each in findings if each.kind == "bit_flip"}
@@ -132,7 +133,7 @@ def _without_bits(channel: Channel, places: NDArray[np.intp], repairs: list[Repa
 
 
 def converted(dataset: Dataset, name: str, unit: str) -> Dataset:
-    """The channel `name`, whose values are in `unit` whatever was told, in SI. UserError for an unknown unit."""
+    """The channel `name` in SI, whose values are in `unit` despite its stated one. UserError for an unknown unit."""
     channel = dataset[name]
     true = units.unit_of(unit)
     if true is None or not unit.strip():

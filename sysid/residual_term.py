@@ -1,9 +1,9 @@
-"""A term without a cause: what a balance misses, learned from the data as a table over one or two signals.
+"""A term without a cause: a balance's misfit, learned from the data as a table over one or two signals.
 
-Where something is wrong and no cause of the catalogue explains it, the most telling general test says over which
-signals it depends. The term is a mean for each of its cells, fitted together with the machine's own parameters by least
-squares. The data are not whitened for it: a table has steps, and whitening would weigh these most. Outside the signals'
-range in training it is 0, so that the model returns to its base there.
+Where something is wrong and no cause of the catalogue explains it, the most telling general test gives the signals of
+the term. The term is a mean for each of its cells, fitted together with the machine's own parameters by least squares.
+The data are not whitened for it: a table has steps, and whitening would give these the most weight. Outside the
+signals' range in training it is 0, so that the model returns to its base there.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.misfit import Misfit
 from ranger_sim.sysid.regression import Part, Regression, kept_rows, reduced
 
-SMALL = 1e-6  # of the largest: directions of the table that the base has
+SMALL = 1e-6  # of the largest: directions of the table that the base already spans
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ResidualTerm:
         }
 
     def left(self, machine: Machine, recordings: Sequence[Recording], regression: Regression) -> tuple[float, float]:
-        """(rms without, with the term) of what the equation leaves, the machine's parameters fitted anew both times."""
+        """(rms without, with the term) of the equation's residual, the machine's parameters fitted again both times."""
         part = regression.parts[self.equation]
         rows = _counting(part)
         column = np.concatenate([reduced(r, self.column(machine, r)) for r in recordings])[rows, 0]
@@ -122,7 +122,7 @@ def _over(features: str) -> tuple[str, ...]:
 
 
 def _cells(signals: dict[str, Array], table: ResidualTerm) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) number of the cell in the flattened table, and whether the row lies in the domain."""
+    """(n,) number of the cell in the flattened table, and whether the row is in the domain."""
     cell: np.ndarray | None = None
     inside: np.ndarray | None = None
     for name, edges, low, high in zip(table.over, table.edges, table.low, table.high, strict=True):

@@ -1,7 +1,7 @@
-"""What is odd in measured data, each with place and size, before anything is concluded from them.
+"""Oddities of measured data, each with place and size, to check before any conclusion.
 
-Nothing is changed here: `repairs.py` does, explicitly. Thresholds are chosen by us so that the measured logs of
-docs/robot.md C6 show what is told of them there and nothing else; each stands with its reason beside it.
+This module changes nothing; `repairs.py` does, explicitly. Thresholds are chosen by us so that the measured logs of
+docs/robot.md C6 give the findings described there and no others; each has its reason next to it.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
 
 NOTE, WARNING, FATAL = "note", "warning", "fatal"
 KINDS = {
-    # of the file, told by its reader
+    # of the file, reported by its reader
     "no_header": "the columns have no names",
     "no_unit": "nothing says the unit",
     "unknown_unit": "the file says a unit that is not known",
@@ -58,26 +58,26 @@ KINDS = {
 }
 DOUBTED = ("unknown_unit", "slow_samples", "wrong_unit", "stuck", "noise")
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
-NAMED_PLACES = 6  # single findings of a kind in a channel; more of them are one finding together
+NAMED_PLACES = 6  # single findings of a kind in a channel; more become one finding
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
 WARMTHS = ("C", "K")  # units of temperatures
 STUCK_SAMPLES = 50  # a fifth of a second of a fast channel of the robot
-STUCK_RATIO = 8.0  # to the longest other stretch: a quantised channel at rest stands still as well
+STUCK_RATIO = 8.0  # to the longest other stretch: a quantised channel at rest is constant as well
 MOVES_PART = 0.2  # of a channel's whole range, within a stretch: less is rest
-# Deviation of values to that of neighbours' differences over root 2, squared: 1 for white noise at rest, 2 for one
-# with a correlation of 0.5 from sample to sample; a sine of 10 samples a period has 2.6, slower ones have more.
+# Variance of values over half the mean square of neighbours' differences: 1 for white noise at rest, 2 for one with a
+# correlation of 0.5 from sample to sample; a sine of 10 samples a period has 2.6, slower ones have more.
 MOVES_RATIO = 2.25
 CLIPPED_SAMPLES = 3  # in a row at the limit
 CLIPPED_RUNS = 2
-FLAT_PART = 0.5  # of the steps are zero in commands that are held, which cannot be told from cut-off ones
+FLAT_PART = 0.5  # zero steps in commands that are held, which cannot be distinguished from cut-off ones
 DRIFT_PPM = 100.0  # quartz crystals differ by less
 LONGEST_LAG_S = 0.25
-LAG_STEPS = 0.5  # of the sampling: what lies below is the stamps' own rounding
+LAG_STEPS = 0.5  # of the sampling: smaller ones are the stamps' own rounding
 WHITE = 0.8  # half the mean square of neighbours' differences to the variance; 1 for white noise
 COMMON = 6.0  # deviations of a correlation with white noise; some hundred lags of some channels reach 4.5 by chance
 COMMON_LAGS, FEWEST_OF_NOISE = 50, 300  # samples
-FEWEST = 30  # samples below which nothing but stamps is looked at
-SLOPES = {  # what a rate may be as a multiple of the angle's derivative, and what that says
+FEWEST = 30  # samples; with fewer, only stamps are checked
+SLOPES = {  # possible factor of a rate to the angle's derivative, and its meaning
     180.0 / math.pi: "the rate is in deg/s, or the angle in turns of rad",
     math.pi / 180.0: "the angle is in degrees",
     30.0 / math.pi: "the rate is in rpm",
@@ -104,17 +104,17 @@ DERIVATIVES = (
     ("outer_leg_angle_rad", "outer_leg_rate_rad_per_s"),
     ("motor_angle_rad", "motor_rate_rad_per_s"),
 )
-# the same angle by two encoders, but for what lies between them
+# the same angle by two encoders, up to the transmission between them
 REDUNDANT = (
     ("joint_angle_rad", "motor_angle_rad"),
     ("hip_angle_rad", "hip_motor_angle_rad"),
     ("outer_ankle_angle_rad", "outer_motor_angle_rad"),
     ("inner_ankle_angle_rad", "inner_motor_angle_rad"),
 )
-# the same motion by angle and rate, beside those above: one stands where the other does
+# the same motion by angle and rate, in addition to those above: both rest at the same times
 TOGETHER = (*DERIVATIVES, *REDUNDANT, ("motor_angle_rad", "speed_rad_per_s"))
 JOINTS = ("hip_angle", "joint_angle", "ankle_angle", "leg_angle")
-# (end of a name, largest value that is likely, what it would rather be): a machine of this size has no more
+# (end of a name, largest likely value, likelier unit): a machine of this size does not exceed it
 LARGEST = (
     ("_A", 200.0, "mA"),
     ("_V", 1000.0, "mV"),
@@ -127,8 +127,8 @@ LONGEST_STEP_S = 0.5  # median of the stamps: slower than any experiment here
 
 
 def inspect(dataset: Dataset) -> list[Finding]:
-    """Everything that is odd: what the reader told, each channel's stamps and values, channels against each other."""
-    with np.errstate(all="ignore"):  # numbers near the largest are told as odd; what overflows on the way says nothing
+    """All oddities: the reader's findings, each channel's stamps and values, channels against each other."""
+    with np.errstate(all="ignore"):  # checks report numbers near the largest; their overflows mean nothing more
         return _inspected(dataset)
 
 
@@ -150,14 +150,14 @@ def _inspected(dataset: Dataset) -> list[Finding]:
 
 
 def stop_if_fatal(name: str, findings: list[Finding]) -> None:
-    """UserError with the first finding that leaves nothing to work on."""
+    """Raise UserError with the first finding that leaves no usable data."""
     for finding in findings:
         if finding.severity == FATAL:
             raise UserError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
 
 
 def doubts(findings: list[Finding]) -> list[Finding]:
-    """The findings after which no cause may be named with confidence: the data are not what they are said to be."""
+    """Findings that forbid naming a cause with confidence: the data are not as described."""
     return [each for each in findings if each.kind in DOUBTED]
 
 
@@ -167,7 +167,7 @@ def as_json(finding: Finding) -> dict[str, object]:
 
 
 def _tidied(channel: Channel) -> Channel:
-    """Only finite samples in the order of their stamps: what the checks of values look at."""
+    """Finite samples only, in the order of their stamps: the input of the checks of values."""
     time_s = wraps.counted_on(channel.time_s)
     kept = order.of(time_s, channel.value).kept
     return dataclasses.replace(channel, time_s=time_s[kept], value=channel.value[kept])
@@ -212,7 +212,7 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
         text = f"{len(same)} stamps come twice"
         ends = float(finite[same[0]]), float(finite[same[-1]])
         yield Finding(name, "duplicate_stamps", *ends, len(same), "samples", text)
-    if len(back) or overruns:  # gaps are those that are left when the samples are in order
+    if len(back) or overruns:  # gaps are those that remain after sorting the samples
         finite = wraps.counted_on(finite)
         finite = finite[order.of(finite, np.zeros(len(finite))).kept]
         steps = np.diff(finite)
@@ -289,12 +289,12 @@ def _size(channel: Channel) -> Iterator[Finding]:
 
 
 def wraps_of(channel: Channel) -> wraps.Wraps:
-    """Where the channel's integer ran over; the channel's samples are in order and finite."""
+    """Places where the channel's integer overflows; the channel's samples are in order and finite."""
     return wraps.of(channel.value, channel.unit, (lattice_step(channel.value), channel.resolution))
 
 
 def spike_places(value: Array) -> NDArray[np.intp]:
-    """Samples that are far from both neighbours, while these agree."""
+    """Samples far from both neighbours, which agree with each other."""
     if len(value) < FEWEST:
         return np.array([], dtype=np.intp)
     left, right = value[1:-1] - value[:-2], value[1:-1] - value[2:]
@@ -305,7 +305,7 @@ def spike_places(value: Array) -> NDArray[np.intp]:
 
 
 def _usual(sizes: Array) -> float:
-    """A size that most do not pass: the 90th percentile, so that a channel that mostly rests is not all spikes."""
+    """A size that most do not exceed: the 90th percentile, so that a channel mostly at rest is not all spikes."""
     return float(np.percentile(sizes, 90.0))
 
 
@@ -319,7 +319,7 @@ def _spikes(channel: Channel, overruns: Sequence[int]) -> Iterator[Finding]:
     ends = float(time_s[places[0]]), float(time_s[places[-1]])
     worst = float(sizes[np.argmax(np.abs(sizes))])
     if step > 0.0:
-        # neighbours that move blur the size by a few steps, which are nothing beside a high bit
+        # moving neighbours blur the size by a few steps, little compared with a high bit
         powers = np.round(np.log2(np.abs(sizes) / step))
         blur = np.abs(value[places + 1] - value[places - 1]) + 2.0 * step
         if np.all(np.abs(np.abs(sizes) - step * 2.0**powers) <= blur) and powers.min() >= 3:
@@ -340,7 +340,7 @@ def equal_runs(value: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Finding]:
     """The longest stretch of one value, when it is far longer than all others and other channels move in it.
 
-    A second sensor of the same motion that stands there as well tells rest: friction holds, whatever drives.
+    A second sensor of the same motion that is constant too indicates rest: friction holds, whatever the drive does.
     """
     starts, lengths = equal_runs(channel.value)
     longest = int(np.argmax(lengths))
@@ -369,7 +369,7 @@ def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Findi
 
 
 def _moves(channel: Channel, begin: float, end: float) -> bool:
-    """True when it goes through a part of its range within these stamps, and not as noise does."""
+    """True when the channel covers a part of its range within these stamps, and not as noise does."""
     inside = channel.value[(channel.time_s > begin) & (channel.time_s < end)]
     if len(inside) <= 3 or np.ptp(inside) <= MOVES_PART * np.ptp(channel.value):
         return False
@@ -377,7 +377,7 @@ def _moves(channel: Channel, begin: float, end: float) -> bool:
 
 
 def _rests(channel: Channel, begin: float, end: float) -> bool:
-    """True when it has samples within these stamps, and does not move."""
+    """True when the channel has samples within these stamps and does not move."""
     count = np.count_nonzero((channel.time_s > begin) & (channel.time_s < end))
     return bool(count >= FEWEST) and not _moves(channel, begin, end)
 
@@ -388,7 +388,7 @@ def _is_held(value: Array) -> bool:
 
 
 def _saturation(channel: Channel) -> Iterator[Finding]:
-    """Stretches at the largest or smallest value that are entered at speed: a turning point is entered slowly."""
+    """Stretches at the largest or smallest value that begin at speed: a turning point begins slowly."""
     value, time_s = channel.value, channel.time_s
     starts, lengths = equal_runs(value)
     if len(lengths) < 20 or np.mean(np.diff(value) == 0.0) > 0.9:
@@ -407,12 +407,12 @@ def _saturation(channel: Channel) -> Iterator[Finding]:
 
 
 def _rests_at(value: Array, limit: float) -> bool:
-    """True when the value lies there most of the time: a resting value, no limit."""
+    """True when the value is there most of the time: a resting value, not a limit."""
     return bool(np.mean(value == limit) > 0.5)
 
 
 def lattice_step(value: Array) -> float:
-    """The finest step of a quantised or printed channel; 0 when its values lie on no lattice."""
+    """The finest step of a quantised or printed channel; 0 when its values are not on a lattice."""
     different = np.unique(value[np.isfinite(value)])
     if len(different) < 4:
         return 0.0
@@ -448,9 +448,9 @@ def _between(channels: dict[str, Channel]) -> Iterator[Finding]:
 
 
 def _noise(channels: dict[str, Channel]) -> Iterator[Finding]:
-    """Channels that are white noise and have nothing in common with any other; all of them, where rows are in disorder.
+    """Channels that are white noise and have nothing in common with any other; all of them, where rows are disordered.
 
-    A motor may be driven by white noise: then what it does goes with it, within some samples.
+    White noise may drive a motor: then the motor's channels correlate with it, within some samples.
     """
     white = [each for each in channels.values() if _is_white(each)]
     if len(white) > 1 and len(white) == len([each for each in channels.values() if np.ptp(each.value) > 0.0]):
@@ -473,7 +473,7 @@ def _is_white(channel: Channel) -> bool:
 
 
 def _have_in_common(channel: Channel, other: Channel) -> bool:
-    """True when a white channel is correlated with another one or its differences, at some lag."""
+    """True when a white channel correlates with another one or its differences, at some lag."""
     value = (channel.value - channel.value.mean()) / channel.value.std()
     beside = np.interp(channel.time_s, other.time_s, other.value)
     for shown in (beside, np.gradient(beside)):
@@ -496,7 +496,7 @@ def _clock(channel: Channel) -> Iterator[Finding]:
     if not 0.99 < slope < 1.01:
         return
     left = channel.value - slope * (channel.time_s - channel.time_s[0]) - offset
-    # a straight line through n stamps with this scatter is uncertain by so much
+    # uncertainty of a straight line through n stamps with this scatter
     uncertain = float(left.std()) * math.sqrt(12.0 / len(left)) / span
     ppm = (slope - 1.0) * 1e6
     if abs(ppm) > max(DRIFT_PPM, 5e6 * uncertain):
@@ -539,7 +539,7 @@ def _derivative(angle: Channel, rate: Channel) -> Iterator[Finding]:
 
 
 def _smooth(value: Array) -> Array:
-    """The mean of five neighbours, which shifts nothing."""
+    """The mean of five neighbours, which causes no shift."""
     if len(value) < FEWEST:
         return value
     return np.convolve(np.pad(value, 2, mode="edge"), np.full(5, 0.2), mode="valid")
@@ -560,7 +560,7 @@ def _lag(first: Channel, second: Channel, late: float) -> Iterator[Finding]:
 
 
 def lag_s(first: Channel, second: Channel) -> float | None:
-    """By how much the second comes later than the first, in s; None when they are not the same motion.
+    """Delay of the second channel after the first, in s; None when they are not the same motion.
 
     The maximum of their cross-correlation, between samples by a parabola.
     """
@@ -578,7 +578,7 @@ def lag_s(first: Channel, second: Channel) -> float | None:
     wide = 1 << (len(a) + longest).bit_length()
     product = np.fft.irfft(np.fft.rfft(b, wide) * np.conj(np.fft.rfft(a, wide)), wide)
     shifts = np.arange(-longest, longest + 1)
-    # each shift against what overlaps in it: without that the shorter overlap of larger shifts draws towards zero
+    # each shift uses its own overlap: otherwise the shorter overlap of larger shifts biases the result towards zero
     squares = [np.concatenate(([0.0], np.cumsum(each * each))) for each in (a, b)]
     ahead, behind = np.maximum(shifts, 0), np.maximum(-shifts, 0)
     count = len(a)
@@ -598,7 +598,7 @@ def lag_s(first: Channel, second: Channel) -> float | None:
 
 
 def _longest_stretch(first: Channel, second: Channel) -> tuple[float, float]:
-    """Begin and end of the longest time in which neither has a gap: across one, straight lines would be compared."""
+    """Begin and end of the longest time without a gap in either: across a gap, straight lines would be compared."""
     begin, end = max(first.time_s[0], second.time_s[0]), min(first.time_s[-1], second.time_s[-1])
     edges = [begin, end]
     for time_s in (first.time_s, second.time_s):
@@ -618,7 +618,7 @@ def _is_gap(low: float, high: float, *channels: Channel) -> bool:
 
 
 def _drift(first: Channel, second: Channel) -> float | None:
-    """Change of the lag in s per s, when five parts of the recording say it alike; else None."""
+    """Change of the lag in s per s, when five parts of the recording agree on it; otherwise None."""
     begin, end = max(first.time_s[0], second.time_s[0]), min(first.time_s[-1], second.time_s[-1])
     cuts = np.linspace(begin, end, 6)
     lags, middles = [], []

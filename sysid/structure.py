@@ -1,9 +1,9 @@
-"""What equations can show by their structure alone: which unknowns each holds, which are over-determined.
+"""Analysis of equations by their structure alone: the unknowns of each, and the over-determined equations.
 
-The part of a set of equations that has more equations than unknowns can be contradicted by data (Dulmage and
-Mendelsohn 1958). A fault that enters equation e is detectable when e lies in that part; it can be told from a fault in
-f when e still does without f (Krysander and Frisk 2008, Sensor placement for fault diagnosis). A derivative counts as
-the unknown that it is the derivative of.
+Data can contradict the part of a set of equations that has more equations than unknowns (Dulmage and Mendelsohn 1958).
+A fault that enters equation e is detectable when e is in that part; it can be separated from a fault in f when e is
+still in it without f (Krysander and Frisk 2008, Sensor placement for fault diagnosis). A derivative counts as the
+unknown that it is the derivative of.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,10 +41,10 @@ def overdetermined(equations: Incidence) -> set[str]:
 
 
 def isolable(equations: Incidence, faults: Mapping[str, Sequence[str]]) -> dict[str, set[str]]:
-    """{fault: the faults that it can be told from} of the detectable ones. faults: {fault: equations it enters}.
+    """{fault: faults that it can be separated from}, of the detectable ones. faults: {fault: equations it enters}.
 
-    A fault in several equations can be told from another when one of its equations stays over-determined without all
-    of the other's.
+    A fault in several equations can be separated from another when one of its equations stays over-determined without
+    all of the other's.
     """
     whole = overdetermined(equations)
     detectable = [fault for fault, where in faults.items() if whole & set(where)]

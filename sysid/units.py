@@ -1,15 +1,15 @@
-"""Units in the names of columns, and what makes SI of them.
+"""Units in the names of columns, and their conversion to SI.
 
-A column says its unit at the end of its name, `current_mA`, `rate_deg_per_s`, `torque_N_mm`, or in brackets,
-`Motor current [mA]`. Temperatures are kept in degrees Celsius, as `temperature_C` everywhere in the project.
-A unit that is not known is no unit: nothing is guessed.
+A column has its unit at the end of its name, `current_mA`, `rate_deg_per_s`, `torque_N_mm`, or in brackets,
+`Motor current [mA]`. Temperatures stay in degrees Celsius, as `temperature_C` everywhere in the project.
+An unknown unit counts as none: nothing is guessed.
 """
 
 import dataclasses
 import math
 import re
 
-# what people write: (what we write, factor). An exponent may follow: s2, m^2.
+# common spellings: (our spelling, factor). An exponent may follow: s2, m^2.
 ATOMS: dict[str, tuple[str, float]] = {
     "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "µs": ("s", 1e-6), "μs": ("s", 1e-6), "ns": ("s", 1e-9),
     "min": ("s", 60.0), "h": ("s", 3600.0), "d": ("s", 86400.0), "sec": ("s", 1.0),
@@ -28,7 +28,7 @@ ATOMS: dict[str, tuple[str, float]] = {
     "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3), "MHz": ("Hz", 1e6),
     "counts": ("counts", 1.0), "count": ("counts", 1.0), "K": ("K", 1.0),
 }  # fmt: skip
-# what stands for more than one atom, or is no power of others: (numerator, denominator, factor, offset)
+# words for more than one atom, or not a power of others: (numerator, denominator, factor, offset)
 WHOLE: dict[str, tuple[str, str, float, float]] = {
     "rpm": ("rad", "s", 2.0 * math.pi / 60.0, 0.0),
     "RPM": ("rad", "s", 2.0 * math.pi / 60.0, 0.0),
@@ -41,15 +41,15 @@ WHOLE: dict[str, tuple[str, str, float, float]] = {
     "percent": ("", "", 1e-2, 0.0),
     "%": ("", "", 1e-2, 0.0),
     "1": ("", "", 1.0, 0.0),
-    # drives are written so: per minute is revolutions per minute
+    # usual for drives: per minute is revolutions per minute
     **{each: ("rad", "s", 2.0 * math.pi / 60.0, 0.0)
        for each in ("U/min", "Umdr/min", "Upm", "r/min", "1/min", "min-1", "min^-1", "min⁻¹")},
-    # of an alternating current or voltage, the value that heats
+    # of an alternating current or voltage, the effective value (rms)
     **{f"{unit}{mark}": (unit, "", 1.0, 0.0) for unit in "AV" for mark in ("rms", "_rms", " rms", "(rms)", "eff")},
     # numbers of states and the like
     **{each: ("", "", 1.0, 0.0) for each in ("enum", "bool", "boolean", "state", "flag", "none", "unitless")},
 }  # fmt: skip
-AMBIGUOUS_ALONE = ("min", "h", "d")  # current_min is a minimum; as units of their own only behind a word for time
+AMBIGUOUS_ALONE = ("min", "h", "d")  # current_min is a minimum; units by themselves only behind a word for time
 WORDS_OF_NAMES = ("enum", "bool", "boolean", "state", "flag", "none", "unitless")  # walk_state is a name
 TIME_WORDS = ("t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "zeit")
 SUPERSCRIPTS = str.maketrans("⁻−¹²³⁴", "--1234")
@@ -59,7 +59,7 @@ LONGEST_SUFFIX = 6  # tokens of a unit in a name, as in cmd_dampness_A_s_per_rad
 
 @dataclasses.dataclass(frozen=True)
 class Unit:
-    """SI value = factor x what is written + offset. `numerator`, `denominator`: SI units with exponents."""
+    """SI value = factor x written value + offset. `numerator`, `denominator`: SI units with exponents."""
 
     numerator: tuple[str, ...] = ()
     denominator: tuple[str, ...] = ()
@@ -68,7 +68,7 @@ class Unit:
 
     @property
     def text(self) -> str:
-        """As in "A s/rad"; empty for a plain number."""
+        """Text as in "A s/rad"; empty for a plain number."""
         top = " ".join("N m" if each == "Nm" else each for each in self.numerator)
         if not self.denominator:
             return top
@@ -76,7 +76,7 @@ class Unit:
 
     @property
     def suffix(self) -> str:
-        """As at the end of a name: "A_s_per_rad"."""
+        """Text as at the end of a name: "A_s_per_rad"."""
         parts = list(self.numerator)
         if self.denominator:
             parts += ["per", *self.denominator]
@@ -84,7 +84,7 @@ class Unit:
 
     @property
     def is_si(self) -> bool:
-        """True when nothing has to be converted."""
+        """True when no conversion is necessary."""
         return self.factor == 1.0 and self.offset == 0.0
 
     def same_kind(self, other: "Unit") -> bool:
@@ -93,7 +93,7 @@ class Unit:
 
 
 def unit_of(text: str) -> Unit | None:
-    """The unit that `text` says ("deg/s", "A s/rad", "N m", "1/K"), None when it is not known."""
+    """The unit of `text` ("deg/s", "A s/rad", "N m", "1/K"), None for an unknown one."""
     text = text.strip()
     if not text or text == "-":
         return Unit()
@@ -108,7 +108,7 @@ def unit_of(text: str) -> Unit | None:
 
 
 def _with_a_bar(text: str) -> str:
-    """The unit's text with what has a negative exponent below a bar: "rad*s^-1" is "rad/s"."""
+    """The unit's text with negative exponents below a bar: "rad*s^-1" is "rad/s"."""
     words = _words(text)
     below = [match[1] + match[2].replace("1", "") for word in words if (match := NEGATIVE.fullmatch(word))]
     if not below or "/" in text:
@@ -146,7 +146,7 @@ def _of_words(words: list[str]) -> Unit | None:
         factor *= size ** (-exponent if below else exponent)
         sides[below].append(name + (str(exponent) if exponent > 1 else ""))
     if not below and len(sides[0]) == 2 and sides[0][0] in ("rad", "m") and sides[0][1] in ("s", "s2"):
-        sides = (sides[0][:1], sides[0][1:])  # speed_rad_s, accel_m_s2: nobody measures a product of these
+        sides = (sides[0][:1], sides[0][1:])  # speed_rad_s, accel_m_s2: products of these are never measured
         factor = _ratio(words)
     if not sides[0] and not sides[1] or (below and not sides[1]):
         return None
@@ -165,7 +165,7 @@ def _ratio(words: list[str]) -> float:
 
 
 def split(column: str) -> tuple[str, Unit | None]:
-    """(name without unit, unit) of a column's name; the unit is None when the name has none that is known."""
+    """(name without unit, unit) of a column's name; the unit is None when the name has no known one."""
     column = column.strip()
     if re.search(r"\w\[\d+\]$", column):  # xyz[1] is the second of several, "ratio [1]" a pure number
         return _plain(column), None

@@ -1,7 +1,7 @@
-"""The terms of a model file on a virtual bench: what the simulator's own equations add, at the bench's gear.
+"""The terms of a model file on a virtual bench: additions of the simulator's own equations, at the bench's gear.
 
-Terms stand at the robot's joint (plant/terms.py). A bench with the same rotor and another gearbox feels torques of the
-rotor by its own gear: with r = robot's gear over the bench's, torque / r at rate x r.
+Terms act at the robot's joint (plant/terms.py). A bench with the same rotor and another gearbox has the rotor's torques
+by its own gear: with r = robot's gear over the bench's, torque / r at rate x r.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ STEADY = ("stribeck", "direction_friction", "drag")
 RIPPLE = "commutation_ripple"  # of the torque constant, in torque and back-EMF alike
 PERIODIC = ("cogging", RIPPLE)
 TURN = "once_per_turn"
-# what each bench can have, by place; a reading of a turning shaft is a mean over its turns
+# forms that each bench can have, by place; a reading of a turning shaft is a mean over its turns
 TAKES: dict[str, dict[str, tuple[str, ...]]] = {
     "stall": {"hip_motor": ELECTRIC},
     "cantilever": {"hip_motor": ELECTRIC + FRICTION + STEADY},
@@ -45,7 +45,7 @@ TAKES: dict[str, dict[str, tuple[str, ...]]] = {
 
 
 class BenchTerms:
-    """What the terms of a model are on a bench; none by default.
+    """The terms of a model as they act on a bench; none by default.
 
     parameters: of the experiment motor-bench as fitted there, at `gear`; its friction and inertia are then the motor's.
     """
@@ -65,17 +65,17 @@ class BenchTerms:
                 self.places.append(term.at)
 
     def of_bench(self, bench: str) -> "BenchTerms":
-        """Only what this bench can have."""
+        """Only the terms that this bench can have."""
         taken = [term for term in self.terms if term.form.name in TAKES.get(bench, {}).get(term.at, ())]
         return BenchTerms(taken, self.parameters, self.gear)
 
     def not_of_bench(self, bench: str) -> list[str]:
-        """The terms that this bench does not have, for telling: "spring at inner_ankle"."""
+        """The terms that this bench does not have, as text: "spring at inner_ankle"."""
         held = self.of_bench(bench).terms
         return [f"{term.form.name} at {term.at}" for term in self.terms if term not in held]
 
     def unit(self, place: str, parameters: MotorParameters, name: str) -> MotorUnit:
-        """A motor of these parameters with the ripples that stand there; its K follows the rotor by `turn`."""
+        """A motor of these parameters with the ripples of its place; its K follows the rotor by `turn`."""
         made = MotorUnit(name, parameters)
         for term in self.terms:
             if term.at == place and term.form.name == RIPPLE:
@@ -93,7 +93,7 @@ class BenchTerms:
     def output_Nm(self, angle_rad: float, rate_rad_s: float, gear: float) -> float:
         """The hip motor's terms at the output of a bench's gearbox: torque there, of angle and rate there.
 
-        What goes once per turn of the robot's joint goes once per turn of the bench's output.
+        A term with the period of a turn of the robot's joint has that of a turn of the bench's output.
         """
         if not self.places:
             return 0.0
@@ -102,7 +102,7 @@ class BenchTerms:
         return at_motor + self.torque_Nm("hip_joint", angle_rad, rate_rad_s)
 
     def motor(self, place: str, parameters: MotorParameters) -> MotorParameters:
-        """The motor with the electrical terms that stand there, and with the friction of the model."""
+        """The motor with the electrical terms of its place, and with the friction of the model."""
         p = parameters
         if place == "hip_motor" and self.parameters:
             p = self._fitted(p)
@@ -127,7 +127,7 @@ class BenchTerms:
         return p
 
     def _fitted(self, p: MotorParameters) -> MotorParameters:
-        """Friction and inertia as fitted at the bench's gearbox; a fit's small negative value is none."""
+        """Friction and inertia as fitted at the bench's gearbox; a fit's small negative value counts as 0."""
         r, v = p.gear / self.gear, self.parameters
         changes = {
             "constant_friction_Nm": v.get("constant_friction_Nm", p.constant_friction_Nm / r) * r,

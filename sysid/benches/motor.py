@@ -1,7 +1,7 @@
 """The motor alone: stalled, and turning a shaft against a brake (appendix 8.2, figures 26, 28, 29, 31).
 
-Both measure the plant's own motor (`plant/electrics/motor_unit.py`), fed by a DC supply: a bridge that stands still. A
-reading is taken when speed and current have settled.
+Both measure the plant's own motor (`plant/electrics/motor_unit.py`), fed by a DC supply: a bridge that does not switch.
+A reading is taken when speed and current have settled.
 
     stall        voltage_V, current_A at a shaft that is held
     cantilever   voltage_V, current_A, speed_rad_per_s, torque_Nm at the output of the 14:1 gearbox, for -6 ... 6 V,
@@ -21,7 +21,7 @@ from ranger_sim.sysid.instruments import CURRENT_SENSOR, SHAFT_SPEED, TORQUE_CEL
 
 Array = NDArray[np.float64]
 
-# The bench's motor: 14:1 gearbox, C_0 of that box, no inductor, no bridge [A 8.2, 8.4; table 3]. C_1 as eq. 37 gave it.
+# The bench's motor: 14:1 gearbox, C_0 of that box, no inductor, no bridge [A 8.2, 8.4; table 3]. C_1 by eq. 37.
 BENCH_MOTOR = dataclasses.replace(
     MotorParameters(),
     gear=14.0,
@@ -32,7 +32,7 @@ BENCH_MOTOR = dataclasses.replace(
     viscous_friction_Nms=0.0033,
 )
 VOLTAGES = (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0)  # [A 8.2]
-BRAKES_Nm = 0.36  # largest braking torque. Chosen by us: about 2 A, what a gearbox of this size takes for a while
+BRAKES_Nm = 0.36  # largest braking torque. Chosen by us: about 2 A, which a gearbox of this size takes for a while
 BRAKE_STEPS = 13  # from one end to the other, and back. Chosen by us
 STALL_VOLTAGES = tuple(float(v) for v in (*np.arange(-3.6, -0.9, 0.2), *np.arange(1.0, 3.7, 0.2)))
 SETTLED_NS = 50_000_000  # thousand time constants of the winding
@@ -41,7 +41,7 @@ LARGEST_SPEED = 80.0  # rad/s, where the search for a steady speed ends
 
 
 class SuppliedMotor:
-    """A motor at a DC supply: what it carries and gives at a voltage and an output speed."""
+    """A motor at a DC supply: its current and torque at a voltage and an output speed."""
 
     def __init__(self, parameters: MotorParameters, terms: BenchTerms = NOTHING) -> None:
         parameters = terms.motor("hip_motor", parameters)
@@ -64,7 +64,7 @@ class SuppliedMotor:
         return current, float(self.unit.torque_Nm(current, speed_rad_per_s)) + more
 
     def steady_speed(self, voltage_V: float, load_Nm: float) -> float:
-        """Output speed at which the motor carries `load_Nm`: torque falls with speed, so halving finds it."""
+        """Output speed at which the motor carries `load_Nm`: torque falls with speed, so bisection finds it."""
         low, high = -LARGEST_SPEED, LARGEST_SPEED
         while high - low > 1e-7:
             middle = 0.5 * (low + high)
@@ -76,7 +76,7 @@ class SuppliedMotor:
 
 
 def readings(name: str, seed: int, measured: dict[str, tuple[Array, Instrument | None]]) -> Dataset:
-    """A dataset of single readings, READING_S apart; without an instrument a column is what was set."""
+    """A dataset of single readings, READING_S apart; a column without an instrument has the set values."""
     count = len(next(iter(measured.values()))[0])
     time_s = np.asarray(READING_S * np.arange(count), dtype=np.float64)
     channels = {}

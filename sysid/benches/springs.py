@@ -1,11 +1,11 @@
 """Springs by a scale's pull (appendix 7.3, figure 25).
 
     hip-spring     the robot lies on its side, so that gravity has no part; a leg is pulled out and let back in steps.
-                   angle_rad, force_N, side (the way it is pulled), outward (1: pulled out, 0: let back in)
-    ankle-spring   the motor holds its angle, the foot is pulled. angle_rad, force_N, side. What is measured is the
-                   cable and, beside it, the soft return springs.
+                   angle_rad, force_N, side (direction of the pull), outward (1: pulled out, 0: let back in)
+    ankle-spring   the motor holds its angle, the foot is pulled. angle_rad, force_N, side. The measured spring is the
+                   cable with the soft return springs in parallel.
 
-The hip's gearbox rubs: pulled out the scale shows its friction too, let back in it shows less. The difference tells it.
+The hip's gearbox has friction: the scale shows more when pulled out and less when let back in. The difference gives it.
 """
 
 import dataclasses
@@ -21,12 +21,12 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.instruments import FISH_SCALE, JOINT_ENCODER, TAPE_M
 
 HIP_ANGLES = (0.1, 0.2, 0.3, 0.4, 0.5)  # rad: the range in which the hip works [A 7.3]
-ANKLE_ANGLES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)  # rad. Chosen by us: to 4 N m, what the gearbox carries
-ANKLE_ARM_M = 0.15  # from the ankle to where the foot is pulled. Chosen by us: the end of its toe
+ANKLE_ANGLES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)  # rad. Chosen by us: to 4 N m, which the gearbox carries
+ANKLE_ARM_M = 0.15  # from the ankle to the pulled point of the foot. Chosen by us: the end of its toe
 HIP_ARM_M = 0.96  # the leg's length [A 7.3]
 REPEATS = 2
-HAND_rad = 0.005  # by how much a hand misses the angle it aims at. Chosen by us
-# An encoder that has been set to zero at parallel legs, or where the cable carries nothing.
+HAND_rad = 0.005  # error of a hand about its intended angle. Chosen by us
+# An encoder that was set to zero at parallel legs, or where the cable carries no load.
 ZEROED = dataclasses.replace(JOINT_ENCODER, offset=0.001)
 
 

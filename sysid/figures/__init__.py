@@ -1,1 +1,1 @@
-"""Diagnosis from figures: a few published or measured numbers instead of time series (README of the room above)."""
+"""Diagnosis from figures: a few published or measured numbers instead of time series (README of `sysid`)."""

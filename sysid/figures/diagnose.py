@@ -1,11 +1,11 @@
 """The diagnosis from figures: what to simulate, which hypotheses explain the figures, what to measure next.
 
-First the simulation as it stands and each candidate a step up and down; then, round by round, the best hypotheses where
-they are best, with all candidates at their estimates, until they have been simulated where they claim to be. So what
-is named has walked. The rule of the house decides (docs/diagnose.md): something is wrong when the figures refuse
-"nothing is" at 1 % or a hypothesis earns 10 in the Bayesian information criterion; what comes within 6 of the best is
-a tie; a candidate is named when every hypothesis of the tie has it; nothing is named when the best one is refused at
-1 % itself.
+First the simulation runs unchanged and with each candidate a step up and down; then, round by round, at the best fits
+of the best hypotheses, with all candidates at their estimates, until each has been simulated at its claimed place. So
+every named cause has been simulated. The project's usual rule decides (docs/diagnose.md): something is wrong when the
+figures refuse "nothing is" at 1 % or a hypothesis earns 10 in the Bayesian information criterion; hypotheses within 6
+of the best are tied; a candidate is named when every hypothesis of the tie has it; nothing is named when the best one
+is refused at 1 % itself.
 """
 
 import dataclasses
@@ -25,27 +25,27 @@ DETECTED_P = 0.01
 DETECTED_BIC = 10.0
 TIE_BIC = 6.0
 REFUSED_P = 0.01
-NOT_SEPARABLE = 0.95  # |cos| of two signatures, as everywhere in this room
-MOST_FREE = 2  # candidates of a hypothesis: a handful of figures carries no more
+NOT_SEPARABLE = 0.95  # |cos| of two signatures, as everywhere in this package
+MOST_FREE = 2  # candidates of a hypothesis: a handful of figures supports no more
 ROUNDS = 4
 PER_ROUND = 3  # hypotheses that are simulated in a round
-TOLD = 12  # pairs are told that are among so many of the best
-CHECKED = 0.3  # steps: a hypothesis that was simulated nearer than this was simulated
-PROMISING = 20.0  # of the criterion at a first look: what is further from the best is not looked at again
+TOLD = 12  # number of the best pairs that the answer lists
+CHECKED = 0.3  # steps: a place nearer than this to a simulated one counts as simulated
+PROMISING = 20.0  # of the criterion at a first search: hypotheses farther from the best are not searched again
 
-Tell = Callable[[int, int, str], None]  # runs done, runs foreseen, what for
+Tell = Callable[[int, int, str], None]  # runs done, runs planned, purpose
 
 
 @dataclasses.dataclass
 class Simulated:
-    """Every place that was simulated, in steps, and its outcomes; the first is the simulation as it stands."""
+    """Every simulated place, in steps, and its outcomes; the first is the unchanged simulation."""
 
     candidates: Sequence[Candidate]
     places: list[Array] = dataclasses.field(default_factory=list)
     outcomes: list[list[Outcome]] = dataclasses.field(default_factory=list)
 
     def evidence(self, names: Sequence[str], seeds: int) -> Evidence:
-        """Surfaces of the figures `names`, and what endured where. UserError for a figure of no run at all."""
+        """Surfaces of the figures `names`, and the endurance by place. UserError for a figure that no run showed."""
         surfaces = {name: self._surface(name) for name in names}
         survived = [sum(each.survived for each in runs) for runs in self.outcomes]
         failures = [sum(each.failed for each in runs) for runs in self.outcomes]
@@ -62,13 +62,13 @@ class Simulated:
         return Surface(np.array(self.places)[told], [runs[number] for number in told])
 
     def nearest(self, place: Array) -> float:
-        """Distance to the nearest place, in steps."""
+        """Distance to the nearest simulated place, in steps."""
         return float(np.sqrt(((np.array(self.places) - place) ** 2).sum(axis=1).min()))
 
 
 @dataclasses.dataclass
 class Diagnosis:
-    """What was found. ranking: all hypotheses, the best first; `answer`: as JSON carries it."""
+    """Result of a diagnosis. ranking: all hypotheses, the best first; `answer`: in the form of the JSON."""
 
     question: Question
     simulated: Simulated
@@ -115,13 +115,13 @@ def diagnose(
 
 
 def design(judge: Judge) -> list[Array]:
-    """The first places: as it stands, and each candidate a step up and down; at a limit two steps the other way."""
+    """The first places: unchanged, and each candidate a step up and down; at a limit two steps the other way."""
     count = len(judge.names)
     places = [np.zeros(count)]
     for number in range(count):
         up, down = min(1.0, judge.high[number]), max(-1.0, judge.low[number])
         steps = [down, up]
-        if up - down < 1.5:  # the value stands at a limit, or nearly
+        if up - down < 1.5:  # the value is at a limit, or nearly
             steps = [min(2.0, judge.high[number]), up] if up > -down else [max(-2.0, judge.low[number]), down]
         for step in steps:
             if abs(step) > 1e-6:
@@ -168,7 +168,7 @@ def changes(candidates: Sequence[Candidate], place: Array) -> tuple[tuple[str, f
 
 
 def ranked(judge: Judge, evidence: Evidence) -> list[Hypothesis]:
-    """Nothing wrong, each candidate, each pair: the best first, the simpler first where alike."""
+    """Hypotheses that nothing, one candidate or a pair is wrong: best first, the simpler first where equal."""
     most = min(MOST_FREE, len(judge.gait) - 1)
     subsets = [free for size in range(most + 1) for free in itertools.combinations(judge.names, size)]
     looks = {free: judge.weigh(evidence, free, 0) for free in subsets}
@@ -181,7 +181,7 @@ def ranked(judge: Judge, evidence: Evidence) -> list[Hypothesis]:
 
 
 def unchecked(ranking: Sequence[Hypothesis], simulated: Simulated) -> list[Array]:
-    """Places of the best hypotheses that were not simulated yet, and of the best with one candidate."""
+    """Places of the best hypotheses, and of the best with one candidate, that are not simulated yet."""
     near = [each for each in ranking if each.bic < ranking[0].bic + TIE_BIC]
     single = next((each for each in ranking if len(each.free) == 1), None)
     if single is not None and single not in near[:PER_ROUND]:
@@ -197,9 +197,9 @@ def unchecked(ranking: Sequence[Hypothesis], simulated: Simulated) -> list[Array
 def answered(
     question: Question, judge: Judge, simulated: Simulated, evidence: Evidence, ranking: Sequence[Hypothesis]
 ) -> dict[str, Any]:
-    """The answer with the keys of every diagnosis of this room, and more.
+    """The answer with the keys of every diagnosis of this package, and more.
 
-    sharper: candidates that are not wrong, but elsewhere within what was known of them, as the figures have it.
+    sharper: candidates that are not wrong, but that the figures move within their known errors.
     """
     best = ranking[0]
     nothing = next(each for each in ranking if not each.free)
@@ -266,7 +266,7 @@ def answered(
 
 
 def misfit(judge: Judge, at: Hypothesis) -> list[dict[str, Any]]:
-    """Each figure: measured less simulated at a hypothesis' best, beside the error that is allowed."""
+    """Each figure: measured less simulated at a hypothesis' best place, with the allowed error."""
     return [
         {
             "channel": figure.name,
@@ -282,7 +282,7 @@ def misfit(judge: Judge, at: Hypothesis) -> list[dict[str, Any]]:
 
 
 def value_of(candidate: Candidate, judge: Judge, at: Hypothesis) -> dict[str, Any]:
-    """Value and 95 % interval: of a free candidate by its profile, of another by what was known and the figures."""
+    """Value and 95 % interval: of a free candidate by its profile, of another from its prior and the figures."""
     number = judge.names.index(candidate.name)
     place = float(at.place[number])
     on_limit = [False, False]
@@ -303,13 +303,13 @@ def value_of(candidate: Candidate, judge: Judge, at: Hypothesis) -> dict[str, An
 
 
 def beyond(estimate: Mapping[str, Any]) -> bool:
-    """Whether the interval of an estimate leaves out the value that the simulation has."""
+    """Whether the interval of an estimate excludes the simulation's value."""
     low, high = estimate["ci95"]
     return not low <= estimate["was"] <= high
 
 
 def signatures(judge: Judge, evidence: Evidence, at: Hypothesis) -> dict[str, dict[str, float]]:
-    """|cos| between what each pair of candidates does to the figures at a hypothesis' best, all others as known."""
+    """|cos| of the effects of each pair of candidates on the figures at a hypothesis' best, all others as known."""
     everything = list(range(len(judge.names)))
     place = at.place[None, :]
     slopes = judge.slopes(evidence, place, everything)[0]
@@ -328,12 +328,12 @@ def signatures(judge: Judge, evidence: Evidence, at: Hypothesis) -> dict[str, di
 def next_measurements(
     question: Question, judge: Judge, simulated: Simulated, best: Hypothesis, tie: Sequence[Hypothesis]
 ) -> list[dict[str, Any]]:
-    """What each further measurement would bring, the most first.
+    """Benefit of each further measurement, the largest first.
 
-    Linear about the best hypothesis. Every candidate of the tie is free within its limits, the others are as well known
-    as they are: P is what the figures leave of them. A measurement with slopes h and error s turns P into
-    P - P h h' P / (h' P h + s^2). `bits`: what it tells of all, log2 of the root of (1 + h' P h / s^2). `shrinks`: by
-    which share the interval of each candidate of the tie gets shorter.
+    Linear about the best hypothesis. Every candidate of the tie is free within its limits, the others have their known
+    errors: P is their covariance given the figures. A measurement with slopes h and error s turns P into
+    P - P h h' P / (h' P h + s^2). `bits`: its information, log2 of the root of (1 + h' P h / s^2). `shrinks`: the share
+    by which the interval of each candidate of the tie gets shorter.
     """
     wanted = [each.name for each in question.measurements]
     if not wanted:
@@ -377,7 +377,7 @@ def next_measurements(
 
 
 def _plain(value: float) -> float:
-    """Six digits of a number: what stands in files."""
+    """A number with six digits, as in files."""
     return float(f"{float(value):.6g}")
 
 

@@ -1,20 +1,20 @@
-"""How well "these candidates are wrong, and the others are what they are known to be" explains the figures.
+"""Fit of the hypothesis "these candidates are wrong, and the others are as known" to the figures.
 
 Under a hypothesis its candidates are free within their limits. Every other candidate has the error with which it is
-known, and that error is taken out of the figures' (generalised least squares): with f the simulated figures at z and J
-their slopes over the others, each in its own step,
+known, and the figures' covariance includes that error (generalised least squares): with f the simulated figures at z
+and J their slopes over the others, each in its own step,
 
     r = y - f,   D = diag(sd^2 + model_sd^2 + variance of f),   V = D + J P J'
     deviance = r' V^-1 r + ln det D - 2 ln (chance of the endurance)
 
-P is diagonal, (known_sd / step)^2. The others' own estimate is P J' V^-1 r. The free ones are searched on a grid, so no
-start decides, and what the profile of the deviance says of their interval is read off the same grid: 3.84 above the
+P is diagonal, (known_sd / step)^2. The others' own estimate is P J' V^-1 r. A grid search covers the free ones, so the
+result depends on no start, and the profile of the deviance on the same grid gives their interval: 3.84 above the
 least for 95 %.
 
 Endurance. From F failures in S units survived around a point the chance of another N units is
-(S / (S + N))^(F + 1/2): a constant hazard, of which nothing was known (Jeffreys' prior), integrated out. Points nearer
-than about half a step count, and everywhere `unseen` units without a failure are taken as seen, so that where nobody
-looked there is no evidence.
+(S / (S + N))^(F + 1/2): a constant hazard without prior knowledge (Jeffreys' prior), integrated out. Points nearer
+than about half a step count, and everywhere `unseen` units without a failure are added, so that there is no evidence
+where nothing was simulated.
 """
 
 import dataclasses
@@ -28,16 +28,16 @@ from ranger_sim.sysid.figures.surface import Array, Surface
 
 PROFILE_LIMIT = 3.84  # above the least deviance: 95 % of a chi-square with one degree of freedom
 GRID = {0: 1, 1: 61, 2: 15}  # values of each free candidate on the first grid and on each finer one; chosen by us
-REFINED = 2  # times the grid is laid anew about what is left
-WINDOW = 14.0  # above the least deviance: so far the refined grid reaches, beyond the 3.84 and the 6 of a tie
-NEAR = 0.5  # steps: standard deviation of the weight with which runs of another point tell of the endurance here
-LINEARISED = 2  # rounds of moving the others to their estimate and taking their slopes there
-FARTHEST = 4.0  # of its own known_sd an other candidate is moved at most: beyond, it should be a hypothesis itself
+REFINED = 2  # times that the grid is refined about its remaining part
+WINDOW = 14.0  # above the least deviance: reach of the refined grid, beyond the 3.84 and the 6 of a tie
+NEAR = 0.5  # steps: standard deviation of the weight of another point's runs for the endurance here
+LINEARISED = 2  # rounds of moving the others to their estimates and taking their slopes there
+FARTHEST = 4.0  # of its own known_sd, the largest move of an other candidate: beyond, it should be a hypothesis itself
 
 
 @dataclasses.dataclass
 class Evidence:
-    """Everything that was simulated so far, as the hypotheses need it.
+    """All simulations so far, in the form that the hypotheses need.
 
     places: (n, p) in steps; survived, failures: (n,) summed over a place's runs.
     """
@@ -55,7 +55,7 @@ class Evidence:
         seen = self.unseen + weight @ self.survived
         power = 0.5 + weight @ self.failures
         log = power * (np.log(seen) - np.log(seen + figure.value))
-        if not figure.at_least:  # it failed there: the density instead of the chance to come so far
+        if not figure.at_least:  # it failed there: the density instead of the chance to get this far
             log += np.log(power) - np.log(seen + figure.value)
         return log
 
@@ -83,7 +83,7 @@ class Hypothesis:
 
     @property
     def p(self) -> float:
-        """Chance of a larger misfit if it is true; of no use with as many free candidates as figures."""
+        """Chance of a larger misfit if the hypothesis is true; meaningless with as many free candidates as figures."""
         return float(stats.chi2.sf(self.misfit, self.freedom)) if self.freedom > 0 else 1.0
 
 
@@ -117,7 +117,7 @@ class Judge:
         return np.stack(slopes, axis=1)
 
     def weigh(self, evidence: Evidence, free: tuple[str, ...], refined: int = REFINED) -> Hypothesis:
-        """The hypothesis that the candidates `free` are wrong, at its best; `refined` 0: a first look."""
+        """The hypothesis that the candidates `free` are wrong, at its best; `refined` 0: a first, coarse search."""
         at = [self.names.index(name) for name in free]
         ends = [(self.low[each], self.high[each]) for each in at]
         axes = _axes(ends, GRID[len(at)])
@@ -161,7 +161,7 @@ class Judge:
         reach = FARTHEST * self.known[others]
         low, high = np.maximum(self.low[others], -reach), np.minimum(self.high[others], reach)
         prior = np.tile(self.known[others] ** 2, (count, 1))
-        centre = np.zeros_like(prior)  # of the prior; where an estimate meets a limit it stands there, without error
+        centre = np.zeros_like(prior)  # of the prior; an estimate that meets a limit stays on it, without error
         for turn in range(LINEARISED):
             mean, variance = self.simulated(evidence, places)
             slopes = self.slopes(evidence, places, others)
@@ -184,7 +184,7 @@ class Judge:
         sds = np.zeros_like(places)
         told = np.einsum("mfo,mfo->mo", slopes, spread)
         known = self.known[others] ** 2
-        # what stands on a limit has no part in V, so that its own share is put in here
+        # a value on a limit has no part in V, so that this adds its own share
         left = np.where(prior > 0.0, prior - prior**2 * told, known / (1.0 + known * told))
         sds[:, others] = np.sqrt(np.maximum(left, 0.0))
         mean, variance = self.simulated(evidence, places)
@@ -201,12 +201,12 @@ class Judge:
 
 
 def _axes(ends: Sequence[tuple[float, float]], count: int) -> list[Array]:
-    """Even values between each pair of ends, and 0, which is the simulation as it stands."""
+    """Even values between each pair of ends, and 0, which is the unchanged simulation."""
     return [np.union1d(np.linspace(low, high, count), [min(max(0.0, low), high)]) for low, high in ends]
 
 
 def _interval(axis: Array, profile: Array, ends: tuple[float, float]) -> tuple[float | None, float | None]:
-    """Where the profile first comes to PROFILE_LIMIT on either side of its least; None where the limit is nearer."""
+    """First crossing of PROFILE_LIMIT on either side of the profile's least; None where the limit is nearer."""
     best = int(np.argmin(profile))
     found: list[float | None] = []
     for step in (-1, 1):

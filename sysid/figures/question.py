@@ -1,9 +1,9 @@
-"""What is asked of a diagnosis from figures: what was measured, what may be wrong, what could be measured besides.
+"""The question of a diagnosis from figures: measured figures, candidates that may be wrong, possible measurements.
 
-Figure        one measured number, its errors, its source; or how far the machine came before it failed
+Figure        one measured number, its errors, its source; or how far the machine got before it failed
 Candidate     one number of the simulated machine that may be wrong, its limits, and how well it is known
-Measurement   a further figure that somebody could measure, and how well
-Point, Outcome, Simulator: what is asked of the simulator that is passed in, and what it answers
+Measurement   a further figure that could be measured, and how well
+Point, Outcome, Simulator: the input and the output of the simulator that is passed in
 """
 
 import dataclasses
@@ -18,9 +18,9 @@ from ranger_sim.foundation.user_error import UserError
 class Figure:
     """One measured number.
 
-    sd: standard deviation of the measurement. model_sd: how far the simulator may be off with every candidate right;
-    without it a simulator that errs elsewhere would be held to a measurement that it cannot meet. endurance: the value
-    is how far the machine came before it failed, in the unit of `Outcome.survived`; at_least: it had not failed then.
+    sd: standard deviation of the measurement. model_sd: error of the simulator with every candidate right; without it a
+    simulator that errs elsewhere would have to meet a measurement that it cannot meet. endurance: the value is how far
+    the machine got before it failed, in the unit of `Outcome.survived`; at_least: it had not failed then.
     """
 
     name: str
@@ -52,10 +52,10 @@ class Figure:
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """One number that may be wrong. value: as the simulation has it; low, high: what no machine goes beyond.
+    """One number that may be wrong. value: as the simulation has it; low, high: limits that no machine exceeds.
 
-    known_sd: how well `value` is known to whoever measured it (a tape measure's error, the rounding of a printed
-    number). step: the change that its effect is first looked at with. moves: numbers of the simulator that move with
+    known_sd: how well the person who measured `value` knows it (a tape measure's error, the rounding of a printed
+    number). step: the change of the first simulations of its effect. moves: numbers of the simulator that move with
     it, by name, and by how much each. cause: identifier of the catalogue (sysid/causes.py).
     """
 
@@ -83,13 +83,13 @@ class Candidate:
 
     @property
     def spread(self) -> float:
-        """Standard deviation of it when all that is known is its limits: of an even distribution between them."""
+        """Its standard deviation when only its limits are known: of a uniform distribution between them."""
         return (self.high - self.low) / math.sqrt(12.0)
 
 
 @dataclasses.dataclass(frozen=True)
 class Measurement:
-    """A figure that could be measured next. name: one of the simulator's; how: what a person would do."""
+    """A figure that could be measured next. name: one of the simulator's; how: instruction for a person."""
 
     name: str
     sd: float
@@ -102,7 +102,7 @@ class Measurement:
 
 @dataclasses.dataclass(frozen=True)
 class Question:
-    """The whole. UserError for names that come twice, and for nothing to go by."""
+    """The complete question. UserError for repeated names, and for a question without figures or candidates."""
 
     title: str
     figures: tuple[Figure, ...]
@@ -129,13 +129,13 @@ class Question:
 
     @property
     def endurance(self) -> Figure | None:
-        """How far the machine came, if that was told."""
+        """The endurance, if the question has one."""
         return next((each for each in self.figures if each.endurance), None)
 
 
 @dataclasses.dataclass(frozen=True)
 class Point:
-    """One run to be simulated: changes of the candidates' values, by name (others are unchanged), and the seed."""
+    """One run to simulate: changes of the candidates' values, by name (others are unchanged), and the seed."""
 
     changes: tuple[tuple[str, float], ...]
     seed: int
@@ -143,9 +143,9 @@ class Point:
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """One simulated run. figures: what it showed, without those that it did not come to.
+    """One simulated run. figures: its results, without those that it did not reach.
 
-    survived: how far it came after the start, in the endurance's unit (steps); failed: it ended there.
+    survived: how far it got after the start, in the endurance's unit (steps); failed: it ended there.
     """
 
     figures: Mapping[str, float]

@@ -1,14 +1,14 @@
-"""What a simulator answers between the points where it was asked, with the error of saying so.
+"""Estimates of a simulator's figures between the simulated points, with the error of each estimate.
 
-One `Surface` is one figure over the candidates' changes z (each in its own step, 0 as the simulation stands): a
+One `Surface` is one figure over the candidates' changes z (each in its own step, 0 for the unchanged simulation): a
 Gaussian process whose covariance is that of a polynomial of second degree with unknown coefficients, and of a smooth
 remainder that is known only near the points (Rasmussen and Williams 2006, Gaussian Processes for Machine Learning,
 chapters 2 and 5):
 
     k(z, z') = C^2 + L^2 z.z' + Q^2 ((z.z')^2 + sum z_j^2 z'_j^2) / 2 + R^2 exp(-|z - z'|^2 / 2)
 
-Runs of one point differ by their seeds; the points' means carry that noise. L, Q and R are those of a grid under which
-the points are most likely.
+Runs of one point differ by their seeds; the points' means carry that noise. L, Q and R are the values of a grid that
+make the points most likely.
 """
 
 import itertools
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# In standard deviations of the figure over the points: from an effect that nobody sees to one above all of them.
+# In standard deviations of the figure over the points: from an invisible effect to one above all of them.
 SLOPES = (0.1, 0.3, 1.0, 3.0)
 BENDS = (0.01, 0.03, 0.1, 0.3, 1.0)
 REMAINDERS = (0.01, 0.03, 0.1, 0.3, 1.0)
 CONSTANT = 10.0
-# Runs of one point say little of their own scatter: the scatter of all points weighs as so many runs more.
+# Runs of one point give a poor estimate of their own scatter: the scatter of all points weighs as this many more runs.
 POOLED_RUNS = 4.0
 
 
@@ -56,7 +56,7 @@ class Surface:
         self.weights = np.linalg.solve(self.lower.T, np.linalg.solve(self.lower, target))
 
     def mean(self, asked: Array) -> Array:
-        """The first of what a call gives, alone."""
+        """Mean of the figure at `asked`, (m, p) -> (m,)."""
         return self.centre + self.scale * (_sum(_parts(asked, self.places), self.scales) @ self.weights)
 
     def slopes(self, asked: Array) -> Array:
@@ -69,7 +69,7 @@ class Surface:
         return np.asarray(self.scale * whole)
 
     def __call__(self, asked: Array) -> tuple[Array, Array]:
-        """Mean and variance of the figure at `asked`, (m, p) -> (m,), (m,); the variance has no run's noise in it."""
+        """Mean and variance of the figure at `asked`, (m, p) -> (m,), (m,); the variance excludes a run's own noise."""
         across = _sum(_parts(asked, self.places), self.scales)
         half = np.linalg.solve(self.lower, across.T)
         variance = _sum(_own(asked), self.scales) - (half**2).sum(axis=0)

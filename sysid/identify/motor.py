@@ -1,7 +1,7 @@
 """Table 3 of the appendix: R, V_c, K by the power equation, C_1, C_0, mu by the torque equation.
 
-In the paper's steps: stall, then K with R and V_c as found, then friction by the pulley with K as found; what a step
-takes over it takes with its covariance. And by one joint fit of all three recordings.
+In the paper's steps: stall, then K with R and V_c as found, then friction by the pulley with K as found; each step
+takes over earlier values with their covariance. And by one joint fit of all three recordings.
 
     E    V = R I + V_c sgn I + G K w                        (eq. 32)
     M    T = G K I - (mu G K |I| + C_0) sgn w - C_1 w        (eq. 33, 35, steady)
@@ -23,7 +23,7 @@ from ranger_sim.sysid.instruments import CALLIPER_M, CURRENT_SENSOR, SHAFT_SPEED
 Array = NDArray[np.float64]
 
 GEAR = 14.0  # of the bench's gearbox [A 8.2]
-# Starts are sizes for a motor of this class, not its values. Limits only keep out what means nothing: chosen by us.
+# Starts are sizes for a motor of this class, not its values. Limits only exclude meaningless values: chosen by us.
 R = Parameter("R", "ohm", 1.0, 1e-3, 1e3, "start: a small motor's winding")
 V_C = Parameter("V_c", "V", 0.5, -5.0, 10.0, "start: carbon brushes")
 K = Parameter("K", "N m/A", 0.01, 1e-5, 10.0, "start: a 24 V motor of this size")
@@ -40,7 +40,7 @@ SURE_SPEED_rad_s = 0.3
 
 @dataclasses.dataclass(frozen=True)
 class Turning:
-    """Readings of a cantilever recording that the two equations hold for."""
+    """Readings of a cantilever recording for which the two equations are valid."""
 
     voltage_V: Array
     current_A: Array
@@ -111,7 +111,7 @@ def cantilever_block(data: Dataset, gear: float = GEAR) -> Block:
     rough_R, _, rough_GK = np.linalg.lstsq(
         np.column_stack([at.current_A, sign, at.speed_rad_s]), at.voltage_V, rcond=None
     )[0]
-    # covariance of the two rows, with friction's part in it left out: it changes the weight of a row by a few percent
+    # covariance of the two rows, without friction's part: it changes the weight of a row by a few percent
     through_current = np.array([-rough_R, -rough_GK]) * CURRENT_SENSOR.sigma
     through_speed = np.array([-rough_GK, 0.0]) * SHAFT_SPEED.sigma
     own = np.diag([VOLTMETER.sigma**2, TORQUE_CELL.sigma**2])
@@ -131,7 +131,7 @@ def cantilever_block(data: Dataset, gear: float = GEAR) -> Block:
 
 
 def pulley_block(data: Dataset, gear: float = GEAR, apart: bool = False) -> Block:
-    """M at the onset of motion and in steady fall, of all trials. apart: static and dynamic friction each their own."""
+    """M at the onset of motion and in steady fall, of all trials. apart: separate static and dynamic friction."""
     names = ("current_A", "mass_kg", "side", "tapped", "speed_rad_per_s")
     columns = [column(data, name, "pulley") for name in names]
     same_rows(data, "pulley", *columns)
@@ -140,7 +140,7 @@ def pulley_block(data: Dataset, gear: float = GEAR, apart: bool = False) -> Bloc
     driven = np.abs(I) > 5.0 * CURRENT_SENSOR.sigma + CURRENT_SENSOR.offset
     direction = np.sign(I) * driven
     current, current_errors = corrected("pulley", I, CURRENT_SENSOR)
-    # the load at which motion began lies between the last two masses
+    # the load at which motion began is between the last two masses
     load_kg = mass - np.where(onset, 0.5 * MASS_STEP_KG * side, 0.0)
     planned_GKI = gear * 0.018 * np.abs(I) * driven  # weights only: the friction's scatter grows with the load
     step_Nm = np.where(onset, MASS_STEP_KG * GRAVITY * RADIUS_M / np.sqrt(12.0), 0.0)
@@ -172,7 +172,7 @@ def pulley_block(data: Dataset, gear: float = GEAR, apart: bool = False) -> Bloc
 
 @dataclasses.dataclass(frozen=True)
 class MotorSteps:
-    """The paper's path. power: K, with R and V_c; friction: static and dynamic apart, at the pulley."""
+    """The paper's path. power: K, with R and V_c; friction: static and dynamic separately, at the pulley."""
 
     stall: Fit
     power: Fit
@@ -182,7 +182,7 @@ class MotorSteps:
 def steps(
     stall: Dataset, cantilever: Dataset, pulley: Dataset, gear: float = GEAR, tell: Callable[[str], None] | None = None
 ) -> MotorSteps:
-    """Appendix 8.3.1, 8.3.2, 8.4.1 to 8.4.5, each with what the one before found."""
+    """Appendix 8.3.1, 8.3.2, 8.4.1 to 8.4.5, each with the results of the one before."""
     at_rest = solve([stalled_block(stall)], tell=tell)
     power = solve([power_block(cantilever, gear)], earlier=[at_rest], tell=tell)
     friction = solve([pulley_block(pulley, gear, apart=True)], earlier=[power], tell=tell)

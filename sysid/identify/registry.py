@@ -1,4 +1,4 @@
-"""The benches by name: what each records, and what can be found from its recording alone."""
+"""The benches by name: columns of each recording, and the parameters that it determines alone."""
 
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence

@@ -1,4 +1,4 @@
-"""The machines of this room, by the name of their experiment."""
+"""The machines of this package, by the name of their experiment."""
 
 import importlib
 from typing import Any

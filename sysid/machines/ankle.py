@@ -1,21 +1,23 @@
-"""An ankle that follows a sine while the robot hangs: the board's law on the motor's angle, and what the angles show.
+"""An ankle that follows a sine while the robot hangs: a fit of the board's law and the ankle to the measured angles.
 
-The law is stiff: 1 ms of latency is 0.25 A at the fast sine, as much as the motor draws. So no current is computed
-from angles. The law is inside the simulation (`ankle_motion.py`), the angles of a free simulation are compared, and
-an equation is one angle, linearised about the motion that fits best:
+The law is stiff: 1 ms of latency is 0.25 A at the fast sine, as much as the motor draws. Therefore no current is
+computed from angles. The simulation includes the law (`ankle_motion.py`), the fit compares the angles of a free
+simulation, and each equation is one angle, linearised about the motion that fits best:
 
     joint         a - a_simulated = sum over parameters of change x sensitivity        where only the joint is measured
     motor         the same of p
     transmission  the same of a - p                                                    where both are measured
     joint rate    the same of a', where it is measured
 
-Free in it is what no two ankles share: foot, springs, friction with its part under load, cable, rotor, torque constant,
-the zero of one angle against the other, what the law and its target are late by. Each is known before any data, within
-what sound ankles differ in (`SPREAD`): what the angles do not tell stays there, and what they tell against it is a
-wrong value and named as one (`WRONG`). The motor creeps inside its friction, as the simulator does, or stands still, as
-a machine does; the law sees the rate through the board's filter, or as it is: whichever fits.
+The fit's free parameters are those that differ between ankles: foot, springs, friction with its load-dependent part,
+cable, rotor, torque constant, the zero of one angle against the other, the delays of the law and of its target. Each
+has a prior with the spread of sound ankles (`SPREAD`): a parameter that the angles do not determine keeps its prior
+value, and one that they contradict is reported as a wrong value (`WRONG`). The motor either creeps inside its friction,
+as in the simulator, or rests, as a real machine does; the law uses the rate behind the board's filter, or the
+unfiltered rate. The fit keeps the better of each.
 
-The response is that difference plus the found values times their sensitivities, so that values come out as they are.
+The response is that difference plus the fitted values times their sensitivities, so that the regression returns values
+and not changes.
 """
 
 import copy
@@ -58,39 +60,36 @@ from ranger_sim.sysid.machines.ankle_motion import (
 from ranger_sim.sysid.machines.forms import bristles
 from ranger_sim.sysid.regression import Regression
 
-# of the robot's foot-inertia logs, which do not hold them (robot.md C6.2)
+# of the robot's foot-inertia logs, which do not record them (robot.md C6.2)
 STIFFNESS_A_per_rad, DAMPNESS_As_per_rad = 11.219, 1.634
-SETTLED_S = 0.5  # from a run's start, which is not known exactly: the law's slow pole is K / D = 7 to 15 1/s
-SHORTEST_S = 1.0  # of a run
-FEWEST = 50  # rows of a run
-EVERY, WIDTH = 3, 1.5  # samples: rows that count, and the Gaussian over both sides
-MOST_STEPS, MOST_TRIES = 25, 8  # of the fit, and of one step's damping
-# The robot's program limits the target from below and feeds forward the return spring that it believes in: the sine
-# logs hold I_0 (docs/ankle-measured.md). A log with targets only may come of it, or of the plain law.
+SETTLED_S = 0.5  # from a run's start, whose state is not known exactly: the law's slow pole is K / D = 7 to 15 1/s
+SHORTEST_S = 1.0  # least duration of a run
+FEWEST = 50  # least rows of a run
+EVERY, WIDTH = 3, 1.5  # samples: spacing of the rows that count, and the Gaussian that smooths both sides
+MOST_STEPS, MOST_TRIES = 25, 8  # steps of the fit, and attempts at one step's damping
+# The robot's program limits the target from below and feeds forward its own value of the return spring: the sine logs
+# record I_0 (docs/ankle-measured.md). A log of targets alone may come from this program or from the plain law.
 FLOOR_rad, FORWARD_A_per_rad, FORWARD_REST_rad = 0.3, 0.134 / (34.0 * 0.018), 1.662
-ROUGHLY, FULLY = 1e-2, 1e-4  # of the sum of squares that a step must win for another one
-INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing makes the sum of squares rugged along the inertia
-# Chosen by us: a motor's ripple is a part of its torque, cogging is of the size of its friction, and an encoder whose
-# disc is out of centre by more than 2 % of its radius does not read.
+ROUGHLY, FULLY = 1e-2, 1e-4  # share of the sum of squares that a step must gain for another step to follow
+INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing gives the sum of squares local minima along the inertia
+# Chosen by us: a motor's ripple is a part of its torque, cogging is about as large as its friction, and an encoder
+# whose disc is off centre by more than 2 % of its radius does not read.
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
-LATEST_s = (
-    0.05  # of a command in force, as of the target's `LATE`: 25 of the robot's frames. Later, it is another fault
-)
-MOVES_TO_Hz = 10.0  # five times the fastest sine: faster, the angles' residual is noise
-SLOW = 5.0  # times what is new in it from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
-SLOWEST_NOISE = 0.9  # memory from row to row (12 ms) of what the base leaves, at most: beyond it, it is an effect's
-CLEARLY = 20.0  # better by so much, a law fits that the board is not known to have
-# Deviations from what is known before, from which on a value hardly pulls; with `LOOSE` it always does: an error of the
-# model would be taken up by the value that knows it best.
+LATEST_s = 0.05  # of a command, as of the target's `LATE`: 25 of the robot's frames. A longer delay is another fault
+MOVES_TO_Hz = 10.0  # five times the fastest sine: above it, the angles' residual is noise
+SLOW = 5.0  # times the innovation from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
+SLOWEST_NOISE = 0.9  # largest row-to-row (12 ms) memory of the base's residual that is noise; more is an effect's
+CLEARLY = 20.0  # gain in cost from which on the fit keeps a law that the board is not known to have
+# Deviations from the prior beyond which a value hardly pulls; with `LOOSE` it always pulls, otherwise the value with
+# the tightest prior would absorb an error of the model.
 FAR, FAR_LOOSE = 3.0, 1e3
-MEMORY, MEMORY_LOOSE = 4.0, 10.0  # rows that tell the same: of noise with a memory of 0.6, and of a model's error
+MEMORY, MEMORY_LOOSE = 4.0, 10.0  # rows worth one: of noise with a memory of 0.6, and of a model's error
 JOINT, MOTOR, TRANSMISSION, RATE = "joint", "motor", "transmission", "joint rate"
-# How far sound ankles are from `USUAL`, as a deviation, chosen by us: 15 % of what is made of steel, cable and springs,
-# so that twice that is nothing and four times that is named. Otherwise: the spring's rest angle a quarter of a radian;
-# viscous friction from the 0.004 of the robot's logs to the appendix's 0.01 N m s/rad; a rotor and its magnets are a
-# data sheet's, 5 and 10 %; zeros are those of the
-# robot's logs, 0.02 to 0.04 rad; half a slot of the board and
-# its current loop are 0.5 to 1 ms; targets come every 2 ms, and a log's stamps are 1 ms.
+# Spread of sound ankles about `USUAL`, one standard deviation, chosen by us: 15 % for steel parts, cable and springs,
+# so that twice that is ignored and four times that is named. Otherwise: the spring's rest angle a quarter of a radian;
+# viscous friction from the 0.004 of the robot's logs to the appendix's 0.01 N m s/rad; rotor and magnets as in a data
+# sheet, 5 and 10 %; zeros as in the robot's logs, 0.02 to 0.04 rad; half a slot of the board and its current loop are
+# 0.5 to 1 ms; targets arrive every 2 ms, and a log's stamps are 1 ms.
 SPREAD = {
     INERTIA: 0.15 * USUAL[INERTIA],
     STIFFNESS: 0.15 * USUAL[STIFFNESS],
@@ -106,8 +105,8 @@ SPREAD = {
     BALANCE: 0.15 * USUAL[STIFFNESS],
     CONSTANT: 0.1 * USUAL[CONSTANT],
 }
-# Where the joint alone is measured and the model's error is far above the noise, that error is in every value: then
-# springs and friction are free, the rest is known to about half of itself, and no value is called wrong.
+# Where only the joint is measured and the model's error is far above the noise, that error affects every value: then
+# springs and friction are free, the rest is known to about half of itself, and no value is reported as wrong.
 LOOSE = {
     INERTIA: USUAL[INERTIA],
     LOAD: 0.5 * USUAL[LOAD],
@@ -120,8 +119,8 @@ LOOSE = {
     CONSTANT: 0.01 * USUAL[CONSTANT],
 }
 LOGGED_LATE_S = 0.0001  # where the log has the command itself
-# A wrong value, by the parameter whose sensitivity it has: cause, place, coefficient. What a coefficient says is by how
-# much the value is off what is known before.
+# Wrong values, by the parameter whose sensitivity they have: cause, place, coefficient. The coefficient is the
+# deviation of the value from its prior.
 WRONG = (
     (INERTIA, "inertia", "inner_foot", "inertia_kg_m2", "mechanical", "of the foot about the ankle"),
     (STIFFNESS, "spring_value", "inner_ankle", "stiffness_Nm_per_rad", "mechanical", "of the foot's return spring"),
@@ -139,16 +138,16 @@ Shape = Mapping[str, float]
 
 @dataclasses.dataclass
 class Run:
-    """One run of a recording and the motion that was found for it. rows: in the table."""
+    """One run of a recording and the motion fitted to it. rows: in the table."""
 
     rows: slice
     drive: Drive
     motion: Motion
-    target_rad: Array  # (m,) at the motion's steps; of the command where no target is logged
+    target_rad: Array  # (m,) at the motion's steps; from the command where no target is logged
     target_rate_rad_per_s: Array
 
     def shown(self, rate: Array) -> Array:
-        """Rates (m,) or (m, k) as the board tells them: behind the filter that its law has."""
+        """Rates (m,) or (m, k) as the board reports them: behind its law's filter."""
         return behind(rate, self, self.drive.filter_s) if self.drive.filter_s else rate
 
 
@@ -163,39 +162,39 @@ def behind(values: Array, run: Run, time_constant_s: float) -> Array:
 
 @dataclasses.dataclass
 class AnkleRecording(Recording):
-    """A recording with its simulated runs, the values that the simulation has, and the effects in it."""
+    """A recording with its simulated runs, the simulation's parameter values, and the effects in it."""
 
     simulated: list[Run] = dataclasses.field(default_factory=list)
     values: dict[str, float] = dataclasses.field(default_factory=dict)
     fit: "_Fit | None" = None
-    loose: bool = False  # too much is wrong to call a value wrong
+    loose: bool = False  # the model's error is too large to report a value as wrong
     acting: dict[tuple, tuple[float, ...]] = dataclasses.field(default_factory=dict)  # coefficients, keys as in `made`
     made: dict[tuple, Columns] = dataclasses.field(default_factory=dict)  # columns of effects, by effect and shape
 
 
-# torques (m,) at motor and foot of a run, for one coefficient; or what motor and joint show beside it, (m,) each
+# torques (m,) at motor and foot of a run, for one coefficient; or additions to what both encoders show, (m,) each
 Pair = tuple[Array, Array]
 Make = Callable[[Run, Table, Shape], list[Pair]]
 Torque = Callable[[Motion], Array]
-# what motor and joint show with a coefficient of this size, where that is no multiple of it
+# additions to what the encoders show at a coefficient of this size, where they are not proportional to it
 Exact = Callable[[Run, float], Pair]
-STEP = 1e-5  # of such a coefficient, for its derivative
+STEP = 1e-5  # step of such a coefficient, for its derivative
 
 
 @dataclasses.dataclass(frozen=True)
 class AnkleEffect(Effect):
-    """An effect that can be in the simulation. shown: it is in what is measured, and moves nothing."""
+    """An effect that the simulation can include. shown: it changes the measurement only and moves nothing."""
 
     make: Make | None = None
     shown: bool = False
     exact: Exact | None = None
 
     def key(self, shape: Shape) -> tuple:
-        """Of what is kept with a recording."""
+        """Key under which a recording keeps this effect's columns."""
         return (self.name, *self.coefficients, *sorted(shape.items()))
 
     def pairs(self, run: Run, table: Table, shape: Shape, at: float = 0.0) -> list[Pair]:
-        """By one of each coefficient, about a simulation that has `at` of it."""
+        """Pairs for a unit of each coefficient, linearised about a simulation with `at` of it."""
         if self.exact is None or at <= 0.0:
             assert self.make is not None
             return self.make(run, table, shape)
@@ -203,7 +202,7 @@ class AnkleEffect(Effect):
         return [((more[0] - less[0]) / (2.0 * STEP), (more[1] - less[1]) / (2.0 * STEP))]
 
     def seen(self, run: Run, table: Table, shape: Shape, coefficients: Sequence[float]) -> Pair:
-        """All that it shows or pushes with these coefficients."""
+        """The effect's torques, or what it adds to the encoders, at these coefficients."""
         if self.exact is not None and coefficients[0] > 0.0:
             return self.exact(run, coefficients[0])
         pairs = self.pairs(run, table, shape)
@@ -257,7 +256,7 @@ class Ankle:
     )
 
     def prepare(self, table: Table) -> AnkleRecording:
-        """Fits the base to the angles in free simulation, and linearises about it."""
+        """Fit the base to the angles in free simulation, and linearise about it."""
         _check(table)
         table = signals.uniform(table)
         fit = _Fit(table, self.parameters)
@@ -275,21 +274,21 @@ class Ankle:
     ) -> Recording:
         """The recording fitted and linearised with these effects in the simulation; fixed: their coefficients stay.
 
-        Where the joint alone is measured and what is left is far above the noise with them too, it is as it was: the
-        form in the simulation would be preferred to its ties for what else is wrong.
+        Where only the joint is measured and the residual stays far above the noise, return the recording unchanged:
+        the form in the simulation would be preferred to its ties because of the other errors.
         """
         assert isinstance(recording, AnkleRecording) and recording.fit is not None
         made = _recording(recording.fit.with_effects(effects, fixed))
         return made if made.whitened else recording
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """Signals over which each angle is looked at without a cause in mind."""
+        """Signals over which the general tests examine each angle, without a cause in mind."""
         s = recording.signals
         about = {name: s[name] for name in ("p", "u", "t")}
         return {name: ({"w": s["w"], "t": s["t"]} if name == RATE else about) for name in recording.equations}
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
-        """What an ankle, its cable, its encoders and its board's law can have."""
+        """Candidate causes in an ankle, its cable, its encoders and its board's law."""
         top = max(float(np.quantile(np.abs(r.signals["u"]), 0.98)) for r in recordings)
         both = any(MOTOR in r.equations for r in recordings)
         return [
@@ -300,7 +299,7 @@ class Ankle:
 
 
 def _recording(fit: "_Fit") -> AnkleRecording:
-    """Equations about the motion that was found."""
+    """Equations about the fitted motion."""
     table = fit.table
     recording = AnkleRecording(
         table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs, fit=fit, loose=fit.loose
@@ -320,12 +319,12 @@ def _recording(fit: "_Fit") -> AnkleRecording:
         slopes[:, 3] = run.shown(slopes[:, 3])
         sensitivity[run.rows] = slopes[run.motion.rows]
 
-    bare: dict[str, Array] = {}  # responses without what the effects in the simulation do
+    bare: dict[str, Array] = {}  # responses without the contribution of the effects in the simulation
 
     def equation(name: str, letter: str, subsystem: str, missed: Array, slopes: Array) -> None:
         columns = {each: slopes[:, PARAMETERS.index(each)] for each in PARAMETERS}
         response = missed + sum(fit.values[each] * column for each, column in columns.items())
-        for acting in fit.acting:  # a cause in the simulation is named again, about a motion that has it
+        for acting in fit.acting:  # a cause in the simulation is named again, about a motion that includes it
             made = _made(recording, acting.shape, acting.effect)
             if name in made:
                 by_effects = made[name] @ np.array(acting.of(fit.values))
@@ -346,8 +345,8 @@ def _recording(fit: "_Fit") -> AnkleRecording:
         equation(RATE, "S", "sensor", table["joint_rate_rad_per_s"] - s["rate"], sensitivity[:, 3])
     fast = np.abs(s["u"]) > 0.3 * np.max(np.abs(s["u"][valid]))
     recording.regimes = {"upward": s["u"] > 0.0, "downward": s["u"] < 0.0, "near reversals": ~fast}
-    # By the joint alone an error of the model far above the noise is as slow as the foot, and whitening it would
-    # high-pass what is wrong. The joint against the motor tells of faster things.
+    # With the joint alone, an error of the model far above the noise is as slow as the foot, and whitening would act as
+    # a high-pass on it. Joint against motor also shows faster errors.
     sound = {
         name: dataclasses.replace(e, response=bare.get(name, e.response)) for name, e in recording.equations.items()
     }
@@ -363,7 +362,7 @@ def _recording(fit: "_Fit") -> AnkleRecording:
 @dataclasses.dataclass(frozen=True)
 class Prediction:
     """A held-out recording in free simulation with values of another. angle, simulated, law_rad: (n,) of each row that
-    counts; law_rad: where the law alone would hold a motor without load. channel: whose angle."""
+    counts; law_rad: where the law alone would hold a motor without load. channel: of `angle`."""
 
     channel: str
     time_s: Array
@@ -373,19 +372,19 @@ class Prediction:
 
     @property
     def rms(self) -> float:
-        """Of what the simulation misses, rad."""
+        """Root mean square of the simulation's error, rad."""
         return float(np.sqrt(np.mean((self.angle - self.simulated) ** 2)))
 
     @property
     def nrmse(self) -> float:
-        """That over the standard deviation of what the law leaves to explain."""
+        """`rms` over the standard deviation of the part of the angle that the law alone does not explain."""
         return self.rms / float(np.std(self.angle - self.law_rad))
 
 
 def predicted(
     training: Table, held: Table, extra: Mapping[str, Torque] | None = None, of_program: bool = False
 ) -> tuple[dict[str, float], list[Prediction]]:
-    """Values of the base and of `extra` by least squares of free simulation of `training`, and `held` with them."""
+    """Fit base and `extra` to `training` by least squares in free simulation; predict `held` with the values."""
     fit = _Fit(signals.uniform(training), Ankle.parameters, of_program, extra)
     fit.improve()
     if not _recording(fit).whitened:
@@ -432,7 +431,7 @@ def _filter_found(table: Table) -> Finding:
 
 
 def _check(table: Table) -> None:
-    """UserError when the channels do not tell what the ankle was to do."""
+    """Raise UserError when the channels do not determine the ankle's command."""
     if "joint_angle_rad" not in table:
         raise UserError(f"{table.name}: ankle needs joint_angle_rad; there are {', '.join(table.columns)}")
     if "command_current_A" not in table and not ("target_angle_rad" in table and "target_rate_rad_per_s" in table):
@@ -461,13 +460,13 @@ def _gains(table: Table) -> tuple[float, float]:
 
 
 def _pulls(beside: Array, far: float) -> float:
-    """Twice the negative logarithm of how probable values are that are so many deviations from what is known before:
-    heavy tails beyond `far`, so that one wrong value draws no other with it."""
+    """Twice the negative log-probability of values at these deviations from their priors: heavy tails beyond `far`, so
+    that one wrong value does not pull others with it."""
     return float(np.sum(far**2 * np.log1p((beside / far) ** 2)))
 
 
 class _Fit:
-    """The base fitted to one recording: Gauss and Newton in free simulation, damped (Levenberg and Marquardt)."""
+    """The base fitted to one recording: Gauss-Newton in free simulation, damped (Levenberg and Marquardt)."""
 
     def __init__(
         self,
@@ -476,7 +475,7 @@ class _Fit:
         of_program: bool = False,
         extra: Mapping[str, "Torque"] | None = None,
     ) -> None:
-        """extra: more torques on the foot, for one of their coefficients, by the coefficient's name."""
+        """extra: more torques on the foot, for a unit of each coefficient, by the coefficient's name."""
         self.extra = dict(extra or {})
         self.acting: list[Acting] = []
         self.table, self.both, self.of_program = table, "motor_angle_rad" in table, of_program
@@ -516,8 +515,8 @@ class _Fit:
         self.missed = self._missed([run.motion for run in self.runs], self.values)
 
     def _start(self, rows: slice, values: Values) -> tuple[float, float, float, float]:
-        """States at a run's start, whose cable carries what the foot needs: a foot that starts off it would ring on,
-        for the base's cable has no damping."""
+        """States at a run's start, with the cable torque that the foot needs: a foot that starts off balance would ring
+        on, because the base's cable has no damping."""
         measured = self.table["motor_angle_rad" if self.both else "joint_angle_rad"][rows]
         some = slice(0, FEWEST)
         along = np.polynomial.Polynomial.fit(np.arange(FEWEST) * self.table.step_s, measured[some], 3).convert()
@@ -530,7 +529,7 @@ class _Fit:
         return angle + twist, rate + slower, angle, rate
 
     def _target(self, rows: slice, by_command: Array) -> tuple[Array, Array]:
-        """Target and its rate; by the command where they are not logged."""
+        """Target and its rate; from the command where they are not logged."""
         table = self.table
         target = table["target_angle_rad"][rows] if "target_angle_rad" in table else by_command
         if "target_rate_rad_per_s" in table:
@@ -538,7 +537,7 @@ class _Fit:
         return target, np.gradient(target, table.step_s)
 
     def loosened(self) -> "_Fit":
-        """Fitted anew with `LOOSE`, from what is usual."""
+        """Fit again with `LOOSE`, from the usual values."""
         other = copy.copy(self)
         other.runs = [dataclasses.replace(run) for run in self.runs]
         other.loose, other.far, other.memory = True, FAR_LOOSE, MEMORY_LOOSE
@@ -548,7 +547,7 @@ class _Fit:
         return other
 
     def with_effects(self, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool) -> "_Fit":
-        """Fitted anew with effects in the simulation; fixed: their coefficients stay as they are."""
+        """Fit again with effects in the simulation; fixed: their coefficients stay unchanged."""
         other = copy.copy(self)
         other.runs = [dataclasses.replace(run) for run in self.runs]
         other.acting = []
@@ -569,7 +568,7 @@ class _Fit:
         return self
 
     def shown_beside(self) -> Pair:
-        """What motor's and joint's encoder show beside the motion, by the effects that act: (n,) each."""
+        """What the acting effects add to the readings of the motor's and the joint's encoder: (n,) each."""
         found = np.zeros(len(self.table)), np.zeros(len(self.table))
         for run in self.runs:
             for each, part in zip(found, self._shown(run, run.motion, self.values), strict=True):
@@ -587,7 +586,7 @@ class _Fit:
         return p, a
 
     def _stacked(self, part: Callable[[int], tuple[Array, Array]]) -> Array:
-        """Motor, and joint against it, of every run one below the other."""
+        """Motor, and joint less motor, stacked over all runs."""
         of_motor, of_joint = [], []
         for number, run in enumerate(self.runs):
             good = self.valid[run.rows]
@@ -628,7 +627,7 @@ class _Fit:
         return self._stacked(part)
 
     def improve(self) -> None:
-        """To the least squares, with what is known before; friction that creeps or that stands, whichever fits."""
+        """Minimise the sum of squares, priors included; keep creeping or sticking friction, whichever fits better."""
         found = []
         for factor in INERTIA_STARTS:
             values = {**self.usual, INERTIA: factor * self.usual[INERTIA], ZERO: self._zero()}
@@ -645,7 +644,7 @@ class _Fit:
         self._settle()
 
     def _if_better(self, creep_rad_s: float | None = None, filter_s: float | None = None, by: float = 0.0) -> None:
-        """Another friction or law where it fits better by so much, each at its best values."""
+        """Keep another friction or law where it lowers the cost by at least `by`, each at its best values."""
         was, old = self._state(), (self.creep_rad_s, self.filter_s)
         self._made_so(old[0] if creep_rad_s is None else creep_rad_s, old[1] if filter_s is None else filter_s)
         moved = self._moved(self.values)
@@ -657,7 +656,7 @@ class _Fit:
             self._take(*was[1:])
 
     def _made_so(self, creep_rad_s: float, filter_s: float) -> None:
-        """Friction that changes its sign over a speed, and a law that sees the rate through a filter."""
+        """Set the speed over which friction changes its sign, and the filter of the rate that the law uses."""
         self.creep_rad_s, self.filter_s = creep_rad_s, filter_s
         for run in self.runs:
             run.drive = dataclasses.replace(run.drive, filter_s=filter_s)
@@ -666,19 +665,19 @@ class _Fit:
         return self.cost(), self.values, [run.motion for run in self.runs], self.missed
 
     def cost(self) -> float:
-        """Twice the negative logarithm of how probable the angles and the values are, up to a constant."""
+        """Twice the negative log-probability of the angles and the values, up to a constant."""
         beside = self._beside(self.values)
         independent = len(self.missed) / self.memory
         return independent * math.log(float(np.mean(self.missed**2))) + _pulls(beside, self.far)
 
     def _zero(self) -> float:
-        """Joint less motor, on the mean; 0 where the motor is not measured."""
+        """Mean of joint less motor; the usual zero where the motor is not measured."""
         if not self.both:
             return self.usual[ZERO]
         return float(np.mean((self.table["joint_angle_rad"] - self.table["motor_angle_rad"])[self.valid]))
 
     def _beside(self, values: Values) -> Array:
-        """How far values are from what is known before, in its spreads."""
+        """Deviations of values from their priors, in units of the priors' spreads."""
         return np.array([(values[name] - self.usual[name]) / spread for name, spread in self.spread.items()])
 
     def _settle(self, enough: float = FULLY) -> None:
@@ -715,7 +714,7 @@ class _Fit:
                 return
 
     def _moved(self, values: Values) -> tuple[list[Motion], Array] | None:
-        """Motions with these values and what they miss; None when there are none."""
+        """Motions with these values and their residuals; None where the simulation fails."""
         try:
             motions = [
                 ankle_motion.simulated(
@@ -749,7 +748,7 @@ class _Fit:
         return torques
 
     def held_as(self, other: "_Fit") -> None:
-        """Takes the values of another fit, with its friction and its law."""
+        """Take the values of another fit, with its friction and its law."""
         self._made_so(other.creep_rad_s, other.filter_s)
         moved = self._moved(other.values)
         if moved is None:
@@ -763,14 +762,14 @@ class _Fit:
 
 
 def _signals(table: Table, runs: Sequence[Run]) -> dict[str, Array]:
-    """The simulated motion on the table's rows: what has no noise in common with any measurement."""
+    """The simulated motion on the table's rows, which shares no noise with any measurement."""
     s = {name: np.zeros(len(table)) for name in ("p", "u", "a", "w", "I", "acceleration")}
     for run in runs:
         m = run.motion
         for name, values in (("p", m.p), ("u", m.u), ("a", m.a), ("w", m.w), ("I", m.I), ("acceleration", m.slopes[3])):
             s[name][run.rows] = values[m.rows]
     s["rate"], s["slope"] = np.zeros(len(table)), np.zeros(len(table))
-    for run in runs:  # as the board tells the joint's rate
+    for run in runs:  # as the board reports the joint's rate
         s["rate"][run.rows] = run.shown(run.motion.w)[run.motion.rows]
         s["slope"][run.rows] = run.shown(run.motion.slopes[3])[run.motion.rows]
     s["t"] = table.time_s - table.time_s[0]
@@ -781,7 +780,7 @@ def _signals(table: Table, runs: Sequence[Run]) -> dict[str, Array]:
 
 
 def _made(recording: AnkleRecording, shape: Shape, effect: AnkleEffect) -> Columns:
-    """Columns of an effect by what it pushes, or shows beside the motion, for every equation; kept."""
+    """Columns of an effect, from its torques or its part in the measurement, for every equation; cached."""
     key = effect.key(shape)
     if key in recording.made:
         return recording.made[key]
@@ -855,7 +854,7 @@ def _at_foot(*torques: Callable[[Motion, Shape], Array]) -> Make:
 
 
 def _wrong() -> list[Effect]:
-    """A value that is not what is known of sound ankles: as the parameter itself, without what holds that."""
+    """A value that differs from that of sound ankles: the parameter's own sensitivity, without its prior."""
 
     def of(parameter: str) -> Callable[[Recording, Shape, Values], Columns]:
         def columns(recording: Recording, _: Shape, __: Values) -> Columns:
@@ -1041,7 +1040,7 @@ def _of_rate(cause: str, coefficient: str, make: Callable[[Mapping[str, Array]],
 
 
 def _law(recordings: Sequence[Recording]) -> list[Effect]:
-    """What the board's law can have otherwise than thought."""
+    """Deviations of the board's law from the assumed one."""
     F = "firmware"
     logged = any("command_current_A" in r.table for r in recordings)
 

@@ -1,16 +1,16 @@
 """An ankle under its board's law, simulated freely: motor and foot as two inertias with the cable between them.
 
-    I = I_0 - K p - D r, late by a lag        the board's law, on the motor's angle p; I_0 is what it was told, late
+    I = I_0 - K p - D r, late by a lag        the board's law, on the motor's angle p; I_0 is its command, late
     r = p', or behind the board's filter      robot.md N4.1: a sixteenth every 0.5 ms
-    J_A p'' = T(I, p') - k_s x - k_m p + m    T of EQUATIONS 2.1; m, f: torques of effects beside the base model
+    J_A p'' = T(I, p') - k_s x - k_m p + m    T of EQUATIONS 2.1; m, f: torques of effects added to the base model
     J_f a'' = k_s x - k_r (a - a_0) + b + f   EQUATIONS 2.3, 2.7 with a_0 as the body has it
     x = p + z - a                             z: what the joint's encoder shows at the motor's zero
 
 k_m is of the spring at the motor, which balances that of the foot (appendix 2.2); the body has the two as one at the
-joint, and none at the motor. The constant part of its torque is not told from z and b.
+joint, and none at the motor. The constant part of its torque cannot be separated from z and b.
 
-Were the motor's torque constant larger, all torques and inertias would come out larger by the same factor. The rotor's,
-which is known best, tells which it is.
+A larger torque constant of the motor would scale all torques and inertias by the same factor. The rotor's inertia, the
+best known, fixes that factor.
 """
 
 import dataclasses
@@ -26,13 +26,13 @@ from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid.dataset import Array
 
 STEP_S = 0.002  # longest step: the cable's mode with the foot, 100 1/s, is within 0.4 % of its frequency
-STATES = 6  # p, u, a, w; the rate r that the law takes, the current I
-BELOW, ABOVE = 2 * STATES - 1, STATES - 1  # the matrix's bands: the states at two instants
-MOST_STEPS = 60  # of one instant's friction
-MOST_ROUNDS = 30  # with torques beside the base: each takes what they move from some per cent to so much of that
-NEAR = 1e-6  # rad, of the last round
+STATES = 6  # p, u, a, w; the rate r that the law uses, the current I
+BELOW, ABOVE = 2 * STATES - 1, STATES - 1  # the matrix's bands: the states at two steps
+MOST_STEPS = 60  # iterations for the friction of one step
+MOST_ROUNDS = 30  # rounds with torques added to the base: each leaves some per cent of the change of the round before
+NEAR = 1e-6  # rad, change in the last round
 CLEAR = 19.0  # speeds over which friction changes its sign: beyond it tanh is 1
-FASTEST_rad_s, FARTHEST_rad = 1e3, 1e2  # beyond it nothing moves that has gears
+FASTEST_rad_s, FARTHEST_rad = 1e3, 1e2  # beyond these no geared machine moves
 
 (
     INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG, LATE, BALANCE, CONSTANT,
@@ -43,8 +43,8 @@ FASTEST_rad_s, FARTHEST_rad = 1e3, 1e2  # beyond it nothing moves that has gears
 )  # fmt: skip
 BODY = body_files.load("ranger")
 REST_rad = BODY.parameters.ankle_return_rest_rad
-# What the simulator has, of the body that was identified by the robot's own logs. The lag is half of
-# the board's slot of 0.5 ms, and its current loop: robot.md N4.3.
+# Values of the simulator's body, which was identified from the robot's own logs. The lag is half of the board's slot of
+# 0.5 ms, and its current loop: robot.md N4.3.
 USUAL = {
     INERTIA: BODY.parameters.foot_inertia_kg_m2,
     STIFFNESS: BODY.parameters.ankle_return_Nm_per_rad,
@@ -61,8 +61,8 @@ USUAL = {
     CONSTANT: BODY.electrics.inner_ankle.gear * BODY.electrics.inner_ankle.torque_constant_Nm_per_A,
 }
 RATE_FILTER_S = 0.00775  # of the board's rate: robot.md N4.1
-# Speeds over which friction changes its sign: the simulator's, and next to none, of a motor that stands still inside
-# its friction (chosen by us: 2 mrad/s creep by 0.5 mrad in a quarter of a second, the noise of the robot's encoders).
+# Speeds over which friction changes its sign: the simulator's, and nearly zero, for a motor that sticks in its friction
+# (chosen by us: 2 mrad/s creep by 0.5 mrad in a quarter of a second, the noise of the robot's encoders).
 SMOOTHED, STANDING = ANKLE_MOTOR.friction_smoothing_rad_s, 0.002
 
 Values = Mapping[str, float]
@@ -70,20 +70,20 @@ Values = Mapping[str, float]
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What drives a run: the law's numbers and I_0 at even instants. time_s, command_A: shape (n,)."""
+    """Inputs of a run: the law's numbers and I_0 at even times. time_s, command_A: shape (n,)."""
 
     time_s: Array
     command_A: Array
     stiffness_A_per_rad: float
     dampness_As_per_rad: float
-    filter_s: float = 0.0  # time constant of the filter through which the law sees the rate
+    filter_s: float = 0.0  # time constant of the filter through which the law reads the rate
 
 
 @dataclasses.dataclass
 class Motion:
     """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: the friction's tanh,
-    all of shape (m,) at every step; slopes: rates of p, u, a, w; rows: the steps that the log has; later: what the
-    current would change by for a lag longer by 1 s; behind: for a target later by 1 s."""
+    all of shape (m,) at every step; slopes: rates of p, u, a, w; rows: the steps that the log has; later: change of the
+    current for a lag longer by 1 s; behind: for a target later by 1 s."""
 
     time_s: Array
     states: Array  # (6, m)
@@ -94,7 +94,7 @@ class Motion:
     rows: slice
     values: dict[str, float]
     factors: tuple
-    pushed: tuple[Array, Array] | None = None  # torques beside the base at motor and foot
+    pushed: tuple[Array, Array] | None = None  # torques added to the base at motor and foot
 
     @property
     def p(self) -> Array:
@@ -132,7 +132,7 @@ class Motion:
         return self.p + self.values[ZERO] - self.a
 
     def answer(self, at_motor: Array, at_foot: Array, at_current: Array | None = None) -> Array:
-        """What small torques (m, k), and small changes of the current itself, do to the states: (m, 6, k)."""
+        """Response of the states to small torques (m, k), and to small changes of the current itself: (m, 6, k)."""
         steps, count = at_motor.shape
         right = np.zeros((steps, STATES, count))
         half = 0.5 * (self.time_s[1] - self.time_s[0])
@@ -182,9 +182,9 @@ def simulated(
     before: tuple[Array, Array] | None = None,
 ) -> Motion:
     """The motion under `drive` from p, u, a, w = `start`. creep_rad_s: over which friction changes its sign. before:
-    what the torques were in a motion near this one.
+    the torques of a motion near this one.
 
-    UserError when there is no motion that a machine could make with these values.
+    Raise UserError when these values give a motion that no machine could make.
     """
     n = len(drive.time_s)
     step_s = (drive.time_s[-1] - drive.time_s[0]) / (n - 1)
@@ -203,7 +203,7 @@ def simulated(
         steps.complete(motion, *pushed)
         pushed, was = torques(motion), motion.states
         motion.states = steps.walked(*pushed, start)
-        if not np.max(np.abs(motion.states[[0, 2]] - was[[0, 2]])) > NEAR:  # or lost
+        if not np.max(np.abs(motion.states[[0, 2]] - was[[0, 2]])) > NEAR:  # or the motion has diverged
             break
     motion.pushed = pushed
     steps.complete(motion, *pushed)
@@ -229,8 +229,8 @@ class _Steps:
         self.ends, self.starts = np.eye(STATES), np.zeros((STATES, STATES))
         self.ends[:4] -= 0.5 * h * rates
         self.starts[:4] = np.eye(4, STATES) + 0.5 * h * rates
-        # A filter slower than a step by a trapezoid; a faster one, and the current, by the step's end alone, which
-        # delays by the time constant all the same.
+        # A filter slower than a step uses the trapezoidal rule; a faster one, and the current, only the step's end,
+        # which gives a delay of the time constant as well.
         k = 0.5 * h / max(drive.filter_s, h)
         keep, was, now = (1.0 - k) / (1.0 + k), k / (1.0 + k), k / (1.0 + k)
         if drive.filter_s < h:
@@ -242,14 +242,14 @@ class _Steps:
         self.starts[5, 5] = 1.0 - self.takes
 
     def pushed(self, at_motor: Array, at_foot: Array) -> Array:
-        """Rates of p, u, a, w (4, m) by what does not depend on the states."""
+        """The part of the rates of p, u, a, w (4, m) that does not depend on the states."""
         values, none = self.values, np.zeros_like(self.command)
         zero = values[CABLE] * values[ZERO]
         bias = values[TORQUE] + values[STIFFNESS] * REST_rad
         return np.array([none, (at_motor - zero) / values[ROTOR], none, (zero + bias + at_foot) / values[INERTIA]])
 
     def walked(self, at_motor: Array, at_foot: Array, start: Sequence[float]) -> Array:
-        """States (6, m), step by step: what they were without friction at a step's end, and then that friction."""
+        """States (6, m), step by step: first without friction at a step's end, and then with it."""
         values, drive = self.values, self.drive
         p, u, a, w = start
         r = u
@@ -271,7 +271,7 @@ class _Steps:
             current = I0 * p + I1 * u + I2 * a + I3 * w + I4 * r + I5 * I + f5
             # y = (C_0 + m |current - by_I y|) tanh((free - by_u y) / creep): at full slip first
             way = 1.0 if free > 0.0 else -1.0
-            loads = m if current > by_I * way * C_0 else -m  # by the sign of the current behind that friction
+            loads = m if current > by_I * way * C_0 else -m  # by the sign of the current with that friction
             y = way * (C_0 + loads * current) / (1.0 + loads * by_I * way)
             if way * (free - by_u * y) < clear:
                 y = _friction(free, by_u, current, -by_I, C_0, m, creep_rad_s)
@@ -303,7 +303,7 @@ class _Steps:
         motion.behind = -self.takes * np.gradient(self.command, self.h)
 
     def factors(self, motion: Motion) -> tuple:
-        """LU factors of all steps' equations: instants one below the other, the first one fixed."""
+        """LU factors of all steps' equations, stacked by step, the first step fixed."""
         values, steps = self.values, len(motion.p)
         bound = values[COULOMB] + values[LOAD] * values[CONSTANT] * np.abs(motion.I)
         ends = np.repeat(self.ends[:, :, None], steps, axis=2)
@@ -324,8 +324,8 @@ class _Steps:
 
 
 def _friction(free: float, v: float, current: float, by_r: float, C_0: float, m: float, creep_rad_s: float) -> float:
-    """r = (C_0 + m |current + by_r r|) tanh((free - v r) / creep) by Newton's method, halving where that leaves what
-    is known: the difference of both sides grows with r."""
+    """r = (C_0 + m |current + by_r r|) tanh((free - v r) / creep) by Newton's method, with bisection where that leaves
+    the known bounds: the difference of both sides grows with r."""
     high = (C_0 + m * abs(current)) / (1.0 - abs(m * by_r)) + 1e-12
     low = -high
     r = min(max(free / v, low), high)

@@ -1,12 +1,12 @@
-"""A leg that hangs from the hip and is swung by the hip's motor: angle, current, the motor's voltage if there is one.
+"""A leg that hangs from the hip, swung by the hip's motor: angle, current, and the motor's voltage if measured.
 
     electric     I = (V - K q' - V_c sgn I) / R - (L / R) dI/dt, nothing inside the drop           appendix eq. 32
     mechanical   J q'' = K I - k_h q - m g (c sin q - w cos q) - C_1 q' - (C_0 + mu K |I|) sgn q'      eq. 33 to 35
 
-q from the vertical, K at the joint, gear included. m c is known (the leg held level tells it, appendix 7.2): without
+q from the vertical, K at the joint, gear included. m c is known (from the leg held level, appendix 7.2): without
 one known torque nothing here has a scale. The leg is simulated (sysid/free_simulation.py): driven by the measured
-voltage, with angle and current as outputs; without a voltage driven by the measured current, whose noise the leg then
-follows.
+voltage, with angle and current as outputs; without a voltage driven by the measured current, and then the leg follows
+the current's noise.
 """
 
 import math
@@ -41,29 +41,29 @@ from ranger_sim.sysid.machines.forms import (
 FIRST_MOMENT_KG_M = 0.72  # c m of a leg, appendix table 2
 GRAVITY_M_PER_S2 = 9.81
 HIP_GEAR = 66.0
-GUESS_S = 0.02  # Gaussian under which the angle's first guess lies: ten times faster than the leg's own swing
-CURRENT_S = 0.003  # Gaussian under a current or a voltage whose slope a sensor's lag is multiplied with
-# Gaussian under what drives the current, whose slope the inductance is multiplied with. Without it the slope is mostly
-# the voltage's noise: L came out as 0, and what it should have taken of every jump went into V_c. Chosen by us: half
-# of a laboratory supply's own lag, so that jumps keep their shape to a seventh.
+GUESS_S = 0.02  # Gaussian for the angle's first guess: ten times faster than the leg's own swing
+CURRENT_S = 0.003  # Gaussian for a current or a voltage whose slope multiplies a sensor's lag
+# Gaussian for the driving signal whose slope multiplies the inductance. Without it the slope is mostly the voltage's
+# noise: the fit returned L = 0, and the inductance's share of every jump went into V_c. Chosen by us: half of a
+# laboratory supply's own lag, so that jumps keep their shape to a seventh.
 SLOPE_S = 0.004
-CALM_S = 0.04  # Gaussian under the current by which a misfit is sorted: four times the memory of a converter's noise
+CALM_S = 0.04  # Gaussian for the current that sorts a misfit: four times the memory of a converter's noise
 FINE_S = 0.002  # longest step of the integration: friction settles in some milliseconds where it holds
 # Where friction holds it may be anything up to its limit (eq. 35). Below this rate it is open (`standing`): such
-# stretches tell little of torques. One count of the encoder (0.77 mrad) takes 0.08 s there. Chosen by us.
+# stretches carry little information on torques. One count of the encoder (0.77 mrad) takes 0.08 s there. Chosen by us.
 STANDSTILL_RAD_S = 0.01
 MOVES_RAD_S = 0.03
 JUMP_SHARE, JUMP_ROWS = 0.03, 4  # of the voltage's range within a sample; samples before and after. Chosen by us
-LARGEST_ECCENTRICITY_RAD = 0.01  # a disc of 10 mm radius that lies 0.1 mm beside its axis; chosen by us
+LARGEST_ECCENTRICITY_RAD = 0.01  # a disc of 10 mm radius that is 0.1 mm off its axis; chosen by us
 SLIDES_RAD = (0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1)
-NEAR_ZERO_DUTY = 0.02  # of the largest voltage, within which a sensor's step at duty zero is passed
+NEAR_ZERO_DUTY = 0.02  # of the largest voltage, within which a sensor's step at zero duty is crossed
 
 M, E, S = "mechanical", "electrical", "sensor"
 Made = Callable[[SimulatedRecording, Shape, Values], Ports]
 
 
 class LegSwing:
-    """The leg, by voltage where there is one. gear: of the hip's motor; first_moment_kg_m: of the leg about the hip."""
+    """The leg, driven by the voltage where measured. gear: of its motor; first_moment_kg_m: about the hip."""
 
     name = "leg-swing"
     quantities = (
@@ -82,7 +82,7 @@ class LegSwing:
         return (self.by_voltage if "voltage_V" in table else self.by_current).prepare(table)
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
-        """What a swinging leg can have. UserError when only some of the recordings have the voltage."""
+        """Candidate causes in a swinging leg. UserError when only some of the recordings have the voltage."""
         kinds = {self._of(recording).with_voltage for recording in recordings}
         if len(kinds) > 1:
             without = ", ".join(r.table.name for r in recordings if "voltage_V" not in r.table)
@@ -90,7 +90,7 @@ class LegSwing:
         return self._of(recordings[0]).effects(recordings)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """Signals over which a misfit is looked for without a cause in mind."""
+        """Signals over which a misfit is sought without a cause in mind."""
         return self._of(recording).generic(recording)
 
     def again(
@@ -149,7 +149,7 @@ class _Leg(SimulatedMachine):
             self.ports += (Port("drop_V", "V", E),)
 
     def inputs(self, table: Table) -> dict[str, Array]:
-        """Voltage, and the slope of what drives the current; or the current."""
+        """Voltage, and the slope of the signal that drives the current; or the current."""
         if not self.with_voltage:
             return {"I": table["current_A"]}
         turning = signals.derivative(table, table["hip_angle_rad"], GUESS_S / table.step_s)
@@ -195,7 +195,7 @@ class _Leg(SimulatedMachine):
         return {"q": q, "w": w}
 
     def observe(self, x: Quantities, u: Quantities, p: Quantities) -> Quantities:
-        """Angle, and the current that the voltage makes."""
+        """Angle, and the current from the voltage."""
         seen = {"hip_angle_rad": x["q"] + u["angle_shown_rad"]}
         if self.with_voltage:
             seen["current_A"] = self._current(x["w"], u, p) + u["current_shown_A"]
@@ -211,7 +211,7 @@ class _Leg(SimulatedMachine):
         current = along["current_A"] if self.with_voltage else along["I"]
         w = along["w"]
         slope_s = CURRENT_S / table.step_s
-        # 0 at standstill, where friction takes what comes and the fitted rate is noise
+        # 0 at standstill, where friction balances any torque and the fitted rate is noise
         moves = 1.0 - np.exp(-0.5 * (w / MOVES_RAD_S) ** 2)
         made = {
             "I": current,
@@ -227,7 +227,7 @@ class _Leg(SimulatedMachine):
         return made
 
     def counts(self, along: Quantities, table: Table) -> dict[str, np.ndarray]:
-        """Not the current about a jump of the voltage or a turn of its sign: nobody knows when between two samples."""
+        """Exclude the current near a jump or a change of sign of the voltage: its time between samples is unknown."""
         if not self.with_voltage:
             return {}
         V, sign = along["V"], along["sgn_I"]
@@ -239,7 +239,7 @@ class _Leg(SimulatedMachine):
     def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
         """An unknown torque that depends on the motion, and an unknown drop."""
         s = recording.signals
-        # A level held has no cells of its own noise, which is in the residual as well
+        # a held level has no cells for its own noise, which is in the residual as well
         calm = signals.smooth(recording.table, s["I"], CALM_S / recording.table.step_s)
         motion = {"q": s["q"], "w": s["w_moving"], "I": calm, "t": s["t"]}
         found = {"torque_Nm": motion}
@@ -248,9 +248,9 @@ class _Leg(SimulatedMachine):
         return found
 
     def terms(self, recordings: Sequence[SimulatedRecording]) -> list[Term]:
-        """The motor's and the gearbox's causes, the spring's bend, and what the sensors can do.
+        """The motor's and the gearbox's causes, the spring's bend, and the sensors' errors.
 
-        Not among them is what the leg's own parameters take up: a scale of the current, all but the bend of sin q.
+        Excluded are effects that the leg's own parameters explain: a scale of the current, all but the bend of sin q.
         """
         top = {
             name: max(float(np.quantile(np.abs(r.signals[name]), 0.98)) for r in recordings)
@@ -268,7 +268,7 @@ def _torque(make: Callable[[dict[str, Array], Shape], Array]) -> Made:
 
 
 def _drop(make: Callable[[dict[str, Array], Shape], Array]) -> Made:
-    """A voltage that the winding does not get."""
+    """A voltage missing at the winding."""
     return lambda r, shape, _: {"drop_V": make(r.signals, shape)}
 
 
@@ -372,7 +372,7 @@ def _angle() -> list[Term]:
 
 
 def _current_shown(top_V: float | None) -> list[Term]:
-    """top_V: None where the current is what drives; then no voltage tells when the duty crosses zero."""
+    """top_V: None where the current is the input; then no voltage shows when the duty crosses zero."""
 
     def shown(make: Callable[[dict[str, Array]], Array]) -> Made:
         return lambda r, *_: {"current_shown_A": make(r.signals)}

@@ -1,4 +1,4 @@
-"""What every reader does with a column: its name, its unit, SI, and a note of what was changed."""
+"""A column in every reader: its name, its unit, its conversion to SI, and a note of each change."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -15,9 +15,9 @@ EPOCH_S = 1e8  # stamps beyond this (three years) are of a calendar; floats woul
 
 @dataclasses.dataclass(frozen=True)
 class Label:
-    """What a column is called in SI, with its unit; None when nothing says the unit.
+    """Name of a column in SI, with its unit; the unit is None when nothing gives it.
 
-    unknown: what the file says of a unit that is not known, where nothing else says the unit.
+    unknown: the file's text for an unknown unit, where nothing else gives the unit.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Label:
 
 
 def mapping_of(texts: list[str]) -> dict[str, str]:
-    """`old=new` pairs as a mapping. UserError for what is no such pair or names one column twice."""
+    """`old=new` pairs as a mapping. UserError for anything else, and for a column named twice."""
     found: dict[str, str] = {}
     for text in texts:
         old, equals, new = text.partition("=")
@@ -40,10 +40,10 @@ def mapping_of(texts: list[str]) -> dict[str, str]:
 
 
 def label(source: str, column: str, unit_text: str | None, mapping: Mapping[str, str]) -> Label:
-    """Name and unit of a column. `unit_text`: what the file says of it beside the name, None when nothing.
+    """Name and unit of a column. `unit_text`: the file's unit outside the name, None when absent.
 
-    The file's word counts before the name's, and both before the name's that `mapping` gives. UserError when that
-    one is of another kind.
+    The file's unit overrides the name's, and both override that of the name in `mapping`. UserError when that one is of
+    another kind.
     """
     stem, unit = units.split(column)
     in_name = unit is not None
@@ -74,7 +74,8 @@ def add(
     resolution: float = 0.0,
     losses: tuple[Loss, ...] = (),
 ) -> None:
-    """Put a column into the dataset, in SI; what was done is recorded there. losses: what was read and is left out."""
+    """Put a column into the dataset, in SI, and record the changes there. losses: samples that were read and left
+    out."""
     if named.name in dataset.channels:
         raise UserError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
     unit = named.unit
@@ -105,7 +106,7 @@ def ends(time_s: Array) -> tuple[float, float]:
 
 
 def from_zero(dataset: Dataset, time_s: Array) -> Array:
-    """Stamps of a calendar counted from the first of them, and a note of it; others as they are."""
+    """Stamps of a calendar counted from the first of them, and a note of it; others unchanged."""
     finite = time_s[np.isfinite(time_s)]
     if not len(finite) or finite[0] < EPOCH_S:
         return time_s

@@ -1,9 +1,9 @@
 """Text tables: a header line with names and units, one row per sample.
 
-Read without a word: a byte order mark, UTF-16, comment lines (#, %, //), a line of units below the header, separators
-comma, semicolon, tab and spaces, decimal commas next to semicolons or tabs or in quotes, stamps in s, ms, us or ns, as
-dates and times in one column or two (stamps.py), as times of the day, or as a spreadsheet's days. A cell without
-content is a time at which this channel has no sample; one that is not a number becomes "not a number" and a finding.
+Accepted: a byte order mark, UTF-16, comment lines (#, %, //), a line of units below the header, separators comma,
+semicolon, tab and spaces, decimal commas next to semicolons or tabs or in quotes, stamps in s, ms, us or ns, as dates
+and times in one column or two (stamps.py), as times of the day, or as a spreadsheet's days. An empty cell is a time
+without a sample of this channel; a cell that is not a number becomes "not a number" and a finding.
 Without a header the columns are column_1, column_2 ..., and `mapping` names them.
 """
 
@@ -24,19 +24,19 @@ COMMENTS = ("#", "%", "//")
 EMPTY = ("", "-", "na", "n/a", "null", "none")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-CLOCKS = ("datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock")  # besides those called time
+CLOCKS = ("datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock")  # in addition to those named time
 SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
-FASTEST_S = 2e-5  # a step below it is none of a machine's, but may be a spreadsheet's part of a day
+FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
 SNIFFED_CELLS = 50
-NAMED_LINES = 3  # of the places of a finding, so many are named
+NAMED_LINES = 3  # number of a finding's places that are named
 LARGEST_BYTES = 2_000_000_000
 MOST_LINES = 3_000_000  # each is kept as text while it is read: some hundred bytes a line
 
 
 def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, time_unit: str | None = None) -> Dataset:
     """The channels of a text table. mapping: {column in the file: name of the channel}; time_unit: of a time column
-    whose name does not say it. UserError for what is no table with a time column.
+    whose name does not give it. UserError for a file that is not a table with a time column.
     """
     path = pathlib.Path(path)
     dataset = Dataset(path.name, {})
@@ -75,7 +75,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
 
 
 def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
-    """(line number, text) of every line that is not empty and no comment."""
+    """(line number, text) of every line that is neither empty nor a comment."""
     try:
         if path.stat().st_size > LARGEST_BYTES:
             raise UserError(f"{path}: {path.stat().st_size} bytes, a text table may have {LARGEST_BYTES}")
@@ -99,7 +99,7 @@ def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
         dataset.repairs.append(Repair("", "encoding", 0, f"the text is read as {encoding}, it is not UTF-8"))
     found = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" \t\r,;")]
     kept = [(number, line) for number, line in found if not line.lstrip().startswith(COMMENTS)]
-    if not kept and found:  # a header behind a comment mark, as numpy writes it, and nothing else
+    if not kept and found:  # a header behind a comment mark, as numpy writes it, and no rows
         raise UserError(f"{path}: the table has comment lines only")
     if not kept:
         raise UserError(f"{path}: the table is empty")
@@ -108,7 +108,7 @@ def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
 
 
 def _header_in_comment(found: list[tuple[int, str]], kept: list[tuple[int, str]]) -> tuple[int, str] | None:
-    """The comment line just above numbers that names as many columns, as numpy.savetxt writes headers."""
+    """The comment line just above numbers with a name for each column, as numpy.savetxt writes headers."""
     separator, _ = _separator(kept)
     first = _cells(kept[0][1], separator)
     if not all(_is_number(cell) or not cell for cell in first):
@@ -157,7 +157,7 @@ def _is_number(cell: str) -> bool:
 def _header(
     dataset: Dataset, rows: list[tuple[int, list[str]]], decimal_comma: bool
 ) -> tuple[list[str], list[str | None], list[tuple[int, list[str]]]]:
-    """(names, what a line of units says of each, the rest of the rows)."""
+    """(names, text of a line of units for each, the rest of the rows)."""
     number, first = rows[0]
     if all(_is_number(cell) or cell.lower() in EMPTY or stamps.is_stamp(cell) for cell in first):
         names = [f"column_{place}" for place in range(1, len(first) + 1)]
@@ -173,7 +173,7 @@ def _header(
     unit_texts: list[str | None] = [None] * len(names)
     if len(rows) > 1:
         second = [cell if units.unit_of(cell) is not None else cell.strip("[]()") for cell in rows[1][1]]
-        # a row in which nothing is a number or a stamp holds units, when it holds one that is known
+        # a row without any number or stamp is a row of units, when it has a known one
         if len(second) == len(names) and not any(_is_number(cell) or stamps.is_stamp(cell) for cell in second if cell):
             if any(cell and units.unit_of(cell) is not None for cell in second):
                 return names, list(second), rows[2:]
@@ -211,7 +211,7 @@ def _time(
     time_unit: str | None,
     decimal_comma: bool,
 ) -> tuple[set[int], Array]:
-    """(indices of the columns that hold time, stamps in s; NaN where a row has none)."""
+    """(indices of the time columns, stamps in s; NaN where a row has none)."""
     split = [units.split(mapping.get(name, name)) for name in names]
     candidates = [k for k, (stem, _) in enumerate(split) if stem.lower() in (*units.TIME_WORDS, *CLOCKS)]
     if not candidates:
@@ -280,7 +280,7 @@ def _counted(
 
 
 def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
-    """The unit of stamps that nothing says: seconds, or a spreadsheet's days where seconds cannot be."""
+    """Unit of stamps without a given one: seconds, or a spreadsheet's days where seconds are impossible."""
     steps = np.diff(time_s[np.isfinite(time_s)])
     usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
     ends = columns.ends(time_s)
@@ -308,7 +308,7 @@ def _whole_numbers(cells: list[str]) -> NDArray[np.int64] | None:
 
 
 def _value(cell: str, decimal_comma: bool) -> float:
-    """The number of a cell; "not a number" for what is none."""
+    """The number of a cell; "not a number" for any other text."""
     try:
         return float(cell.replace(",", ".") if decimal_comma else cell) if "_" not in cell else float("nan")
     except ValueError:
@@ -323,7 +323,7 @@ def _numbers(
     time_s: Array,
     decimal_comma: bool,
 ) -> tuple[Array, np.ndarray, float]:
-    """(values, where there is one, size of the last digit) of a column; what is unreadable is told."""
+    """(values, mask of those that exist, size of the last digit) of a column, with findings for unreadable cells."""
     plain = _plain_numbers(cells, decimal_comma)
     if plain is not None:
         return plain, np.ones(len(plain), dtype=bool), _last_digit(cells)
@@ -350,7 +350,7 @@ def _plain_numbers(cells: list[str], decimal_comma: bool) -> Array | None:
 
 
 def _last_digit(cells: list[str]) -> float:
-    """Size of the finest digit that is written, by a sample of the cells; 0 beside powers of ten."""
+    """Size of the finest written digit, from a sample of the cells; 0 for numbers with exponents."""
     finest = 1.0
     some = cells[:: max(1, len(cells) // 5000)]
     written = [cell for cell in some if cell.lower() not in EMPTY]

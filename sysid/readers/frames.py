@@ -1,10 +1,10 @@
 """Recorded CAN frames as channels, by the messages of a DBC file.
 
-The frames come from whoever can read the recording (candump, BLF, ASC ... are read at the edge of the CAN room): this
-room knows only their numbers. A channel is called Message.signal; the robot's own messages have one signal `value`,
-whose channel is called like the message. A message that comes on several buses is as many channels, called
-can0.Message.signal; `buses` chooses among them. Stamps are those of the recording; a stamp that a message carries
-(`time_ms`) is a channel of its own, Message.time_s, so that the two clocks can be compared.
+The caller reads the recording (candump, BLF, ASC ... are read in `can_bus/edge/`): this package knows only the frames'
+numbers. A channel is called Message.signal; the robot's own messages have one signal `value`, whose channel has the
+message's name. A message on several buses becomes one channel per bus, called can0.Message.signal; `buses` chooses
+among them. Stamps are those of the recording; a stamp inside a message (`time_ms`) is a separate channel,
+Message.time_s, so that the two clocks can be compared.
 """
 
 import pathlib
@@ -20,7 +20,7 @@ from ranger_sim.sysid.readers import columns
 
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
 Key = tuple[str, str, str]  # bus, message, signal
-EXTENDED_BIT = 1 << 31  # keeps extended identifiers apart from standard ones
+EXTENDED_BIT = 1 << 31  # distinguishes extended identifiers from standard ones
 LENGTH_BITS = 15
 MOST_BYTES = 8
 
@@ -32,9 +32,9 @@ def decode(
     mapping: Mapping[str, str] | None = None,
     buses: Collection[str] = (),
 ) -> Dataset:
-    """The signals of all frames that the DBC files know. buses: those whose frames are read; all without any.
+    """The signals of all frames that the DBC files define. buses: those whose frames are read; all when empty.
 
-    UserError when there is none, a bus has no frame, or a file cannot be read.
+    UserError when no frame is defined, a bus has no frame, or a file cannot be read.
     """
     dataset = Dataset(name, {})
     mapping = dict(mapping or {})
@@ -104,7 +104,7 @@ def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
             database: Any = cantools.database.load_file(str(path), database_format="dbc", strict=False)
         except OSError as error:
             raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-        except Exception as error:  # what a broken file makes of cantools is of many kinds
+        except Exception as error:  # a broken file raises many kinds of exceptions in cantools
             said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
             raise UserError(f"{path}: not a DBC file that cantools can read ({said})") from None
         for message in database.messages:
@@ -123,7 +123,7 @@ def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
 def _tell(
     dataset: Dataset, unknown: dict[int, int], broken: dict[str, int], of_message: Mapping[str, list[str]]
 ) -> None:
-    """What was left out, and what came on several buses."""
+    """Findings about frames that were left out, and about messages on several buses."""
     several = {message: buses for message, buses in of_message.items() if len(buses) > 1}
     if several:
         message, buses = next(iter(several.items()))

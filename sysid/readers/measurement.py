@@ -1,4 +1,4 @@
-"""ASAM MDF files (.mf4, .mdf, .dat): what `walk` and `daq` write, and what measurement tools of the CAN world write."""
+"""ASAM MDF files (.mf4, .mdf, .dat): files of `walk` and `daq`, and of measurement tools in the CAN world."""
 
 import contextlib
 import gc
@@ -17,13 +17,13 @@ from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
 
 VALUES_TO_TEXT, RANGES_TO_TEXT = 7, 8  # kinds of conversions that have a text for some raw numbers (MDF 4)
-TRUTH = "plant."  # of a simulated walk: the body's true state, which no instrument sees
+TRUTH = "plant."  # of a simulated walk: the body's true state, which no instrument measures
 
 
 def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, truth: bool = False) -> Dataset:
-    """The numeric channels of a file at the stamps of their groups. truth: the simulated body's own state as well.
+    """The numeric channels of a file at the stamps of their groups. truth: include the simulated body's own state.
 
-    UserError for what asammdf cannot read, or without a channel.
+    UserError for a file that asammdf cannot read, or without a channel.
     """
     path = pathlib.Path(path)
     if not path.is_file():
@@ -38,10 +38,10 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
             found = list(_channels(asammdf.MDF(path), truth))
         except UserError:
             raise
-        except Exception as error:  # what a broken file makes of asammdf is of many kinds
+        except Exception as error:  # a broken file raises many kinds of exceptions in asammdf
             said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         if said:
-            gc.collect()  # a half-made file of the library complains when it is deleted: here, unheard
+            gc.collect()  # a half-made file of the library complains when it is deleted: suppressed here
     if said:
         raise UserError(f"{path}: not a measurement file that asammdf can read ({said})")
     columns.check_mapping(dataset, mapping, [name for name, *_ in found])
@@ -70,7 +70,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
 
 
 def _channels(measurement: Any, truth: bool) -> Iterator[tuple[str, str, Array, Array | None, NDArray[np.bool_]]]:
-    """(name, unit, stamps, values, which of them have a text instead) of every channel that is no group's clock.
+    """(name, unit, stamps, values, mask of texts instead of values) of every channel that is not a group's clock.
 
     The values are None when they are not numbers at all.
     """
@@ -99,9 +99,9 @@ def _channels(measurement: Any, truth: bool) -> Iterator[tuple[str, str, Array, 
 
 
 def _with_texts(conversion: Any, raw: NDArray[Any]) -> tuple[Array | None, NDArray[np.bool_]]:
-    """(numbers or None, which of them have a text instead) of raw values (n,) of which some have a text.
+    """(numbers or None, mask of those with a text instead) of raw values (n,) of which some have a text.
 
-    Where every value that occurs has one, they are states, and their raw numbers are the values.
+    Where every occurring value has one, they are states, and their raw numbers are the values.
     """
     has_text = np.zeros(len(raw), dtype=bool)
     if raw.ndim != 1 or raw.dtype.kind not in "fiub":
@@ -126,13 +126,13 @@ def _with_texts(conversion: Any, raw: NDArray[Any]) -> tuple[Array | None, NDArr
 
 
 def _converted(meaning: Any, raw: NDArray[Any]) -> Array:
-    """Raw values by a conversion; as they are by anything else."""
+    """Raw values by a conversion; unchanged by a conversion of another kind."""
     return np.asarray(meaning.convert(raw) if hasattr(meaning, "convert") else raw, dtype=float).copy()
 
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """The library's log, its complaints at deletion, and what its dependencies announce are not the user's."""
+    """Suppress the library's log, its complaints at deletion, and its dependencies' announcements."""
     logger = logging.getLogger("asammdf")
     level, hook = logger.level, sys.unraisablehook
     with warnings.catch_warnings():

@@ -1,8 +1,8 @@
 """The robot's text logs: `NAME<tab>id<tab>` per variable, then `id<tab>value<tab>robot time in ms` per sample.
 
 `ranger-sim daq --log FILE.txt` writes them, as the robot's own logging program did (docs/robot.md, C6.1), which pads
-its numbers with spaces. The log says no units: the caller passes those it knows. Logs of 2015 have no names; what an id
-means depends on the robot's program of that day, so their channels are called id_14, and a mapping names them.
+its numbers with spaces. The log has no units: the caller passes those it knows. Logs of 2015 have no names; the meaning
+of an id depends on the robot's program of that day, so their channels are called id_14, and a mapping names them.
 """
 
 import pathlib
@@ -15,7 +15,7 @@ from ranger_sim.sysid.dataset import Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.readers import columns
 
 SNIFFED_LINES = 40
-LOG_PART = 0.7  # of these must read as a log's: a few may be torn, as where a radio link broke off
+LOG_PART = 0.7  # part of these that must read as a log's: a few may be torn, as where a radio link broke off
 
 
 def is_one(path: pathlib.Path) -> bool:
@@ -29,7 +29,7 @@ def is_one(path: pathlib.Path) -> bool:
 
 
 def _parts(line: str) -> list[str]:
-    """What lies between the tabs, without the spaces that pad it."""
+    """The texts between the tabs, without the spaces that pad them."""
     return [part.strip() for part in line.split("\t")]
 
 
@@ -53,7 +53,8 @@ def _is_number(text: str) -> bool:
 def read(
     path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None
 ) -> Dataset:
-    """The channels of a log, each at its own stamps. units: {variable: unit}. UserError for what is no such log."""
+    """The channels of a log, each at its own stamps. units: {variable: unit}. UserError for a file that is not a
+    log."""
     path = pathlib.Path(path)
     dataset = Dataset(path.name, {})
     mapping, units = dict(mapping or {}), units or {}

@@ -1,4 +1,4 @@
-"""What the electric balance may lack: brushes, warmth, bridge and supply."""
+"""Effects missing in the electric balance: brushes, warmth, bridge and supply."""
 
 import numpy as np
 

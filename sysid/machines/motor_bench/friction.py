@@ -1,4 +1,4 @@
-"""What friction of motor and gearbox may do beside Coulomb's and the viscous part."""
+"""Friction of motor and gearbox in addition to Coulomb's and the viscous part."""
 
 from collections.abc import Mapping
 

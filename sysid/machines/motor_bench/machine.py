@@ -4,7 +4,7 @@
     mechanical   T = K G I - C_0 sgn w - C_1 w - mu K G |I| sgn w - J dw/dt                   appendix eq. 33, 35
     transmission dtheta_m/dt / G = w                            where the motor's angle is measured as well
 
-K stands in both: what changes one side of it only is a sensor's scale. Near standstill friction may be anything up to
+K is in both: a change of one side of it only is a sensor's scale. Near standstill friction may be anything up to
 its limit (eq. 35), and near zero current so may the brushes' drop: rows whose sign is within the noise do not count.
 """
 
@@ -36,19 +36,19 @@ from ranger_sim.sysid.machines.motor_bench.stand_ins import (
 )
 from ranger_sim.sysid.machines.motor_bench.transmission import transmission
 
-CALM = 20.0  # samples; Gaussian of two speeds that are held against each other
-SLOW = 5.0  # samples; Gaussian of what must not have the noise of a derivative
-TORQUE = 7.0  # samples; its derivative at 5 has noise that makes a lag small by a fifth, at 10 loses what is fast
-FINE = 2.0  # samples; Gaussian of the speed by the angle: its counts are small, and a reversal stays where it was
+CALM = 20.0  # samples; Gaussian of two speeds for their comparison
+SLOW = 5.0  # samples; Gaussian of signals that must not have the noise of a derivative
+TORQUE = 7.0  # samples; at 5 its derivative's noise makes a lag too small by a fifth, at 10 it loses fast changes
+FINE = 2.0  # samples; Gaussian of the speed by the angle: its counts are small, and a reversal keeps its place
 REACH = 4  # samples about a jump or a standstill that do not count: two deviations of the finer Gaussian
 JUMP_IN_STEPS = 0.06  # of the whole range, within one sample
 SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
-# Least own noise of a stand-in, of its difference to what was measured. Three spreads cannot tell less of a current;
-# and a friction that turns its sign within 0.05 rad/s is no cause.
+# Least own noise of a stand-in, of its difference to the measurement. Three spreads cannot estimate less of a current;
+# and a friction that changes its sign within 0.05 rad/s is not a cause.
 OWN_I, OWN_W = 0.3, 0.5
 SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
 SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
-MOST_WAVES = 24  # per turn of the rotor, of the general look
+MOST_WAVES = 24  # per turn of the rotor, in the general tests
 
 
 class MotorBench:
@@ -102,7 +102,7 @@ class MotorBench:
         s["angle"] = table["motor_angle_rad"] if measured else self.gear * signals.integral(table, w)
         if measured:
             _same_motion(table, s["angle"] / self.gear, w)
-        # stand-ins: speed by the angle, current by voltage and speed; neither has the noise of what it stands for
+        # stand-ins: speed by the angle, current by voltage and speed; neither has the noise of the measured column
         s["w"] = signals.derivative(table, s["angle"], FINE) / self.gear if measured else signals.smooth(table, w, FINE)
         s["dw"] = np.gradient(signals.smooth(table, s["w"], SLOW), table.step_s)
         rough = rough_electrics(V, I, s["w"])
@@ -116,7 +116,7 @@ class MotorBench:
         s["dV"] = np.gradient(V, table.step_s)
         steady = no_jump(V, JUMP_IN_STEPS, REACH) & inner(table, int(3.0 * SLOW))
         s["sgn_I"], s["sgn_w"] = mean_sign(s["I"]), mean_sign(s["w"])
-        # what the electric balance is sorted by must not have the voltage's or the current's own noise
+        # the signals that sort the electric balance must not have the voltage's or the current's own noise
         s["I_by_torque"] = signals.smooth(table, current_by_torque(T, I, s), SLOW)
         s["V_by_torque"] = rough[0] * s["I_by_torque"] + rough[1] * s["sgn_I"] + rough[2] * s["w"]
         noise_I = own_noise(s["I"], I, s["I_by_torque"], steady, OWN_I)
@@ -179,7 +179,7 @@ class MotorBench:
         return Recording(table, s, equations, regimes, lags=lags)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """Signals over which each equation is looked at without a cause in mind."""
+        """Signals over which each equation is examined without a cause in mind."""
         s = recording.signals
         of_voltage = {"I": s["I_by_torque"], "V": s["V_by_torque"], "w": s["w"], "t": s["t"]}
         turn = np.remainder(s["angle"] / self.gear, 2.0 * np.pi)
@@ -192,7 +192,7 @@ class MotorBench:
         return {name: made[name] for name in recording.equations}
 
     def features(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """More groups of columns (n, k) for that look: waves over the rotor's angle, also as large as V or I."""
+        """More groups of columns (n, k) for that examination: waves over the rotor's angle, also as large as V or I."""
         s = recording.signals
         groups = {}
         sizes = {"": np.ones_like(s["V"]), " as large as the voltage": s["V"], " as large as the current": s["I"]}
@@ -217,9 +217,9 @@ class MotorBench:
 
 
 def _same_motion(table: Table, angle: Array, w: Array) -> None:
-    """UserError when the rotor's angle over the gear and the speed are not the same motion, or not in one unit.
+    """Raise UserError when the rotor's angle over the gear and the speed are different motions or in different units.
 
-    Twist, slip and lost counts are a part of it; what moves otherwise, or some times as fast, is no fault of a machine.
+    Twist, slip and lost counts are a part of it; other motion, or a multiple of the speed, is not a machine's fault.
     """
     turning, speed = signals.derivative(table, angle, CALM), signals.smooth(table, w, CALM)
     if len(table) < 10 * CALM or not np.std(turning) > 0.0 or not np.std(speed) > 0.0:
@@ -240,7 +240,7 @@ def _same_motion(table: Table, angle: Array, w: Array) -> None:
 
 
 def _one_way(table: Table, induced: Array, w: Array) -> None:
-    """UserError when the voltage that the winding's drop leaves goes against the speed: no motor turns so."""
+    """Raise UserError when the voltage without the winding's drop opposes the speed: no motor turns so."""
     if np.std(induced) > 0.0 and np.std(w) > 0.0 and float(np.corrcoef(induced, w)[0, 1]) < -SAME_MOTION:
         raise UserError(
             f"{table.name}: voltage_V and speed_rad_per_s have opposite signs: what resistance and brushes leave of "
@@ -249,7 +249,7 @@ def _one_way(table: Table, induced: Array, w: Array) -> None:
 
 
 def _regimes(s: Mapping[str, Array], moving: np.ndarray) -> dict[str, np.ndarray]:
-    """Rows by what the machine does: standstill, low speed, cruise, accelerating; signs of rate and power."""
+    """Rows by the machine's state: standstill, low speed, cruise, accelerating; signs of rate and power."""
     speed = np.abs(s["w"])
     top = float(np.quantile(speed, 0.98))
     changing = np.abs(s["dw"]) > float(np.quantile(np.abs(s["dw"]), 0.8))

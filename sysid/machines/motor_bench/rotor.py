@@ -1,4 +1,4 @@
-"""What may go round with the rotor or with the output."""
+"""Effects that are periodic in the turn of the rotor or of the output."""
 
 import numpy as np
 

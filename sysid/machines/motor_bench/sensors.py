@@ -1,4 +1,4 @@
-"""What the bench's instruments may do to what they show."""
+"""Errors of the bench's instruments."""
 
 from collections.abc import Callable, Mapping
 

@@ -1,4 +1,4 @@
-"""Where a bench's rows count, and what stands in for a measured column whose noise would tell of nothing."""
+"""Rows of a bench that count, and stand-ins for measured columns whose noise would bias a fit."""
 
 import math
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ def one_sign(values: Array) -> np.ndarray:
 
 
 def mean_sign(values: Array) -> Array:
-    """(n,) mean sign over each sample, the values being straight lines between."""
+    """(n,) mean sign over each sample, with straight lines between the values."""
     ends = np.concatenate((values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]))
     rise = np.diff(ends)
     crossing = ends[1:] * ends[:-1] < 0.0
@@ -34,7 +34,7 @@ def mean_sign(values: Array) -> Array:
 
 
 def current_by_torque(T: Array, I: Array, s: Mapping[str, Array]) -> Array:  # noqa: E741
-    """Current that the measured torque asks for, by a rough fit of the mechanical balance."""
+    """Current for the measured torque, by a rough fit of the mechanical balance."""
     loaded = -s["sgn_w"] * np.sign(s["I"])
     rest = np.column_stack([s["sgn_w"], s["w"], s["dw"]])
     found = np.linalg.lstsq(np.column_stack([s["I"], loaded * s["I"], rest]), T, rcond=None)[0]
@@ -46,7 +46,7 @@ def current_by_torque(T: Array, I: Array, s: Mapping[str, Array]) -> Array:  # n
 def rough_electrics(V: Array, I: Array, w: Array) -> tuple[float, float, float]:  # noqa: E741
     """(R, V_c, K G) by plain least squares; good enough for a stand-in.
 
-    Only where current surely flows: below the brushes' drop the sign of its noise would make the drop small.
+    Only where current surely flows: below the brushes' drop the sign of its noise would bias the drop low.
     """
     flows = np.abs(I) > FLOWS * float(np.quantile(np.abs(I), 0.98))
     found = np.linalg.lstsq(np.column_stack([I, np.sign(I), w])[flows], V[flows], rcond=None)[0]
@@ -55,19 +55,19 @@ def rough_electrics(V: Array, I: Array, w: Array) -> tuple[float, float, float]:
 
 
 def current_by_voltage(V: Array, w: Array, resistance: float, drop: float, constant: float) -> Array:
-    """What flows by the electric equation: nothing while the driving voltage stays below the brushes' drop."""
+    """Current by the electric equation: zero while the driving voltage stays below the brushes' drop."""
     driving = V - constant * w
     return np.sign(driving) * np.maximum(np.abs(driving) - drop, 0.0) / resistance
 
 
 def spread(difference: Array, where: np.ndarray) -> float:
-    """Standard deviation of most of it: outliers have no say."""
+    """Standard deviation by the median, which ignores outliers."""
     part = difference[where] if np.any(where) else difference
     return float(np.median(np.abs(part - np.median(part)))) / 0.6745
 
 
 def inner(table: Table, reach: int) -> np.ndarray:
-    """False for so many rows at either end of each piece: Gaussians and differences are one-sided there."""
+    """False for `reach` rows at either end of each piece: Gaussians and differences are one-sided there."""
     inner = np.zeros(len(table), dtype=bool)
     for run in table.runs:
         inner[run.start + reach : run.stop - reach] = True
@@ -77,17 +77,17 @@ def inner(table: Table, reach: int) -> np.ndarray:
 def own_noise(value: Array, second: Array, third: Array, where: np.ndarray, least: float) -> float:
     """Standard deviation of a value's own noise, from two others of the same quantity whose noises are independent.
 
-    The three-cornered hat of clocks: half of what the value's differences to both have more than theirs to each other;
-    at least so much of its difference to the second.
+    The three-cornered hat of clocks: half of the excess of the value's two squared differences over that of the others;
+    at least `least` of its difference to the second.
     """
     apart = [spread(one - other, where) ** 2 for one, other in ((value, second), (value, third), (second, third))]
     return math.sqrt(max(0.5 * (apart[0] + apart[1] - apart[2]), least**2 * apart[0]))
 
 
 def no_jump(values: Array, limit: float, reach: int) -> np.ndarray:
-    """True where nothing jumps, also `reach` samples before and after: between two samples nobody knows when it was.
+    """True where nothing jumps, also `reach` samples before and after: a jump's time between samples is unknown.
 
-    A jump is a step larger than `limit` times that which a sine over all values would make in a fiftieth of its period.
+    A jump is a step larger than `limit` times the step of a sine over all values in a fiftieth of its period.
     """
     step = np.abs(np.diff(values, prepend=values[0]))
     sized = limit * (float(np.ptp(values)) or 1.0)

@@ -1,4 +1,4 @@
-"""What may lie between the rotor's angle and the output's speed."""
+"""Effects between the rotor's angle and the output's speed."""
 
 import numpy as np
 

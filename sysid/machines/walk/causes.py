@@ -1,4 +1,4 @@
-"""The causes that a walking log can show: wrong numbers of body and sensors, and effects beside them."""
+"""The causes that a walking log can show: wrong numbers of body and sensors, and additional effects."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -29,11 +29,11 @@ def _both(name: str) -> Change:
 
 
 def _apart(name: str) -> Change:
-    """A number that is larger at the outer leg by as much as it is smaller at the inner one."""
+    """A number that is larger at the outer leg by as much as it is smaller at the inner leg."""
     return ((name.format("outer"), 1.0), (name.format("inner"), -1.0))
 
 
-# cause, place, coefficient, subsystem, what changes, meaning
+# cause, place, coefficient, subsystem, changed fields, meaning
 NUMBERS: tuple[tuple[str, str, str, str, Change, str], ...] = (
     ("geometry", "feet", "foot_height_m", "geometry", _both("ankle_offset_{}_m"),
      "ankle to the sole's centre: a larger one lowers the ankle"),
@@ -68,7 +68,7 @@ ABSOLUTE_LEAN = ("sensor_offset", "outer_leg_angle_rad", "offset_rad", "sensor",
 
 
 def made(recordings: Sequence[WalkRecording]) -> list[Effect]:
-    """All that the recordings' equations can show."""
+    """All causes that the recordings' equations can show."""
     there = {name for recording in recordings for name in recording.equations}
     out = []
     if there & {"floor, outer", "floor, inner", "hip"}:
@@ -122,7 +122,7 @@ def _keeps_sign(change: Change, recording: WalkRecording) -> Callable[[Mapping[s
 
 
 def _depends(rows: Rows) -> bool:
-    """True for the equations that are made of `Numbers`."""
+    """True for the equations that depend on `Numbers`."""
     return rows.letter == "M"
 
 
@@ -152,7 +152,7 @@ def _hip() -> list[Effect]:
 
 
 def _play(leg: str) -> Effect:
-    """A gap between motor and joint: the joint hangs behind by half of it, on the side that the load presses to."""
+    """A gap between motor and joint: the joint lags by half of it, on the side that the load presses to."""
     equation = f"{leg} foot"
 
     def columns(recording: Recording, shape: Shape, _: Values) -> Columns:
@@ -177,7 +177,7 @@ def _play(leg: str) -> Effect:
 
 
 def _electric(motor: str, label: str) -> list[Effect]:
-    """What a drive's power and a winding's voltage have beyond resistance, drop and generator."""
+    """A drive's power and a winding's voltage in addition to resistance, drop and generator."""
 
     def warm(recording: Recording, shape: Shape, _: Values) -> Columns:
         current = recording.table[f"{motor}_current_A"]

@@ -2,15 +2,15 @@
 
     floor       0 = ankle's torque - C dF - moments of everything about the contact point        EQUATIONS 5, 9.1
     legs        0 = both legs about the stance ankle, which needs no torque of the hip
-    hip         what the hip's motor must do = K I - mu K |I| sgn w - C_0 sgn w
+    hip         torque of the hip's motor = K I - mu K |I| sgn w - C_0 sgn w
     outer foot, inner foot   foot in the air: its inertia against cable and return spring
-    closure     at strikes both soles are on the floor: what the gyro gained from one to the next, its bias
+    closure     at strikes both soles are on the floor: the gyro's gain from one to the next, its bias
     hip drive, ...           stage's power = R I^2 + V_c |I| + K w I + gates
     hip winding, ...         V = R I + V_c sgn I + K w
     hip encoders, ...        rate against the angle's derivative
 
-What differs from robot to robot is fitted (a drive's R, K and friction, zeros of motor encoders, the gyro's lag and the
-constant of its integral); what the body file knows is not: its deviation is a cause. `Numbers` says what that is.
+The fit covers differences between robots (a drive's R, K and friction, zeros of motor encoders, the gyro's lag and the
+constant of its integral) and not the body file's numbers: their deviations are causes. `Numbers` lists both.
 """
 
 import dataclasses
@@ -31,22 +31,22 @@ from ranger_sim.sysid.machines.walk.mechanics import LEGS, Course, Left, Motion,
 from ranger_sim.sysid.machines.walk.timebase import even_table, freshness
 
 SMOOTH_S = 0.020  # Gaussian of all courses: stamps of 2 ms leave 0.3 rad/s^2 of noise in the hip's acceleration
-SPACING_S = 3.0 * SMOOTH_S  # of rows that count: nearer ones say the same
+SPACING_S = 3.0 * SMOOTH_S  # of rows that count: nearer ones repeat the information
 AFTER_S, BEFORE_S = 0.150, 0.070  # of a strike that do not count: three Gaussians, and the trailing foot's push before
-UNSURE_S = 0.040  # more on either side where strikes are told by the hip alone
-STEADY_A = 0.6  # between neighbouring samples of a slow current: more, and nobody knows when it changed
+UNSURE_S = 0.040  # more on either side where only the hip indicates strikes
+STEADY_A = 0.6  # between neighbouring samples of a slow current: above it, the time of the change is unknown
 JUMP_REACH = 1.5  # Gaussians about such a jump that do not count
-GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 takes it off (robot.md C3.1); the leg's rate counts the other way
+GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 subtracts it (robot.md C3.1); the leg's rate has the opposite sign
 GYRO_BIAS_REACH_RAD_S = 0.02  # of any sound gyro: its log at rest spans -0.006 to 0.024 (robot.md C6.2)
 LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant itself is fitted
-SIGN_RAD_S = 0.05  # rate over which a sign goes over, as in the plant (EQUATIONS 2.1)
-SIGN_A = 0.05  # current over which the brushes' drop goes over; chosen by us: a few counts of the sensors
-STICKS_RAD_S = 0.3  # about standstill friction may be anything up to its limit (appendix eq. 35)
-SLOW_FOOT_RAD_S = 1.5  # faster, and stamps of a millisecond between motor and joint are two counts of the cable
-COUNT_RAD = 2.0 * np.pi / 8192.0  # of a joint's encoder: less than that of a cable's stretch is not known
+SIGN_RAD_S = 0.05  # rate over which a sign changes, as in the plant (EQUATIONS 2.1)
+SIGN_A = 0.05  # current over which the brushes' drop changes; chosen by us: a few counts of the sensors
+STICKS_RAD_S = 0.3  # near standstill friction may be anything up to its limit (appendix eq. 35)
+SLOW_FOOT_RAD_S = 1.5  # above it, stamps of a millisecond between motor and joint are two counts of the cable
+COUNT_RAD = 2.0 * np.pi / 8192.0  # of a joint's encoder: a cable's stretch is not known better
 ROBUST_ROUNDS = 8
-SPIKE, FEW = 6.0, 0.08  # deviations beyond which single rows do not count, where they are no larger a part than this
-FEWEST_ROWS = 60  # of an equation that says anything
+SPIKE, FEW = 6.0, 0.08  # deviations beyond which single rows do not count, if they are at most this part
+FEWEST_ROWS = 60  # of a usable equation
 
 ANGLES = ("hip_angle_rad", "outer_ankle_angle_rad", "inner_ankle_angle_rad", "outer_motor_angle_rad",
           "inner_motor_angle_rad")  # fmt: skip
@@ -66,7 +66,7 @@ NEEDS = {
 
 @dataclasses.dataclass
 class Rows:
-    """One equation before it is linear: left(numbers) -> (k,) at the rows `where`, and columns that are measured."""
+    """One equation before it is linearised: left(numbers) -> (k,) at the rows `where`, and measured columns."""
 
     name: str
     letter: str
@@ -76,9 +76,9 @@ class Rows:
     left: Callable[[Numbers], Array]
     base: tuple[str, ...] = ()  # fields of Numbers that are fitted
     columns: dict[str, Array] = dataclasses.field(default_factory=dict)  # (n,), by parameter
-    repeats: bool = False  # noise is what differs from stride to stride, else all that the equation leaves
+    repeats: bool = False  # noise is the difference from stride to stride, otherwise the equation's whole residual
     fewest: int = FEWEST_ROWS
-    floor: float = 0.0  # of the noise: what no stride tells, for it is the same in all of them
+    floor: float = 0.0  # of the noise: the part that is the same in all strides, which their differences do not show
 
 
 @functools.cache
@@ -94,19 +94,19 @@ class WalkRecording(Recording):
 
     rows: list[Rows] = dataclasses.field(default_factory=list)
     numbers: Numbers = dataclasses.field(default_factory=lambda: numbers_of("ranger")[0])
-    gyro_bias_rad_s: float = 0.0  # beyond the known one, by closures
-    closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and what the gyro gained since the last, rad/s
+    gyro_bias_rad_s: float = 0.0  # in addition to the known one, by closures
+    closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and the gyro's gain since the last, rad/s
     loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
-    places: np.ndarray | None = None  # (n,) of rows that may count: which of its strides' places it is, else -1
+    places: np.ndarray | None = None  # (n,) of rows that may count: number of their place in the stride, else -1
     seen: dict[str, Array] = dataclasses.field(default_factory=dict)
 
     def slope(self, equation: str, changes: tuple[tuple[str, float], ...]) -> Array:
-        """(n,) minus the derivative of what an equation leaves, on a change of numbers: {field: weight}.
+        """(n,) minus the derivative of an equation's residual, on a change of numbers: {field: weight}.
 
-        As it is in the other strides at the same place: a stride's own would have the noise of its accelerations in
-        common with what the equation leaves, and its square would look like a mass of 3 % too much.
+        The mean over the other strides at the same place: a stride's own derivative would share the noise of its
+        accelerations with the residual, and its square would look like a mass of 3 % too much.
         """
-        if changes == (("leg_lag_drift_s", 1.0),):  # the lag's, as it grows: no stride has the others'
+        if changes == (("leg_lag_drift_s", 1.0),):  # the lag's, as it grows: it differs between the strides
             return self.slope(equation, (("leg_lag_s", 1.0),)) * np.linspace(-1.0, 1.0, len(self.table))
         key = f"{equation} by {changes}"
         if key not in self.seen:
@@ -122,7 +122,7 @@ class WalkRecording(Recording):
 
 
 def _of_others(values: Array, places: np.ndarray) -> Array:
-    """Mean of the other values at the same place; where there is none, the value itself."""
+    """Mean of the other values at the same place; where there are none, the value itself."""
     _, place, count = np.unique(places, return_inverse=True, return_counts=True)
     others = np.bincount(place, values)[place] - values
     return np.where(count[place] > 1, others / np.maximum(count[place] - 1, 1), values)
@@ -150,11 +150,11 @@ class Walk:
         self.parameters = tuple(_known())
 
     def table(self, dataset: Dataset, names: Sequence[str]) -> Table:
-        """The channels, which come at rates of their own, on one time base."""
+        """The channels, which have different rates, on one time base."""
         return even_table(dataset, list(names), (*ANGLES, *LEAN))
 
     def prepare(self, table: Table) -> Recording:
-        """Courses, strikes and every equation whose channels are there; UserError when there is none."""
+        """Courses, strikes and every equation whose channels exist; UserError when no equation has its channels."""
         table = signals.uniform(table)
         recording = WalkRecording(
             table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, lags=(0,), left_over=True
@@ -184,7 +184,7 @@ class Walk:
         return recording
 
     def _motion(self, table: Table, recording: WalkRecording) -> tuple[Motion | None, np.ndarray, np.ndarray]:
-        """Smoothed courses; which leg stands; single stance. No motion without hip, lean and both ankles."""
+        """Smoothed courses; the stance leg; single stance. No motion without hip, lean and both ankles."""
         everywhere = np.ones(len(table), dtype=bool)
         nobody = np.full(len(table), -1)
         if "hip_angle_rad" not in table:
@@ -221,7 +221,7 @@ class Walk:
     def _integrated(
         self, table: Table, touches: Sequence[strikes.Strike], joints: Sequence[Array], recording: WalkRecording
     ) -> Course:
-        """The outer leg's lean by the gyro: in each run a constant, and one bias in all, by the closures at strikes."""
+        """The outer leg's lean by the gyro: a constant in each run, and one bias in all, by the closures at strikes."""
         rate = table["outer_leg_rate_rad_per_s"] + GYRO_BIAS_RAD_S
         lean = np.zeros(len(table))
         for run in table.runs:
@@ -255,7 +255,7 @@ class Walk:
         return _course(table, lean, rate)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """Signals over which each equation is looked at without a cause in mind."""
+        """Signals over which each equation is examined without a cause in mind."""
         s = recording.signals
         out: dict[str, dict[str, Array]] = {}
         for name, equation in recording.equations.items():
@@ -273,7 +273,7 @@ class Walk:
 
 
 def _known() -> list[Known]:
-    """Base parameters of all equations, with limits beyond which no robot is (chosen by us: ten times either way)."""
+    """Base parameters of all equations, with limits that no robot exceeds (chosen by us: ten times either way)."""
     from ranger_sim.sysid.machines.walk.base import PARAMETERS
 
     return list(PARAMETERS)
@@ -285,7 +285,7 @@ def _slope(table: Table, column: Array) -> Array:
 
 
 def _course(table: Table, column: Array, rate: Array | None = None) -> Course:
-    """A column under the Gaussian, with rate, acceleration and that one's rate; `rate`: measured, not its slope."""
+    """A column under the Gaussian, with rate, acceleration and its rate; `rate`: measured, not the column's slope."""
     width = SMOOTH_S / table.step_s
     smooth = signals.smooth(table, column, width)
     first = _slope(table, smooth) if rate is None else signals.smooth(table, rate, width)
@@ -303,7 +303,7 @@ def _inside(table: Table, reach_s: float) -> np.ndarray:
 
 
 def _closing(numbers: Numbers, table: Table, lean: Array, joints: Sequence[Array], places: np.ndarray) -> Array:
-    """What must be added to the outer leg's lean at each strike so that both soles are on the floor, (k,), or nan."""
+    """Correction of the outer leg's lean at each strike so that both soles are on the floor, (k,), or nan."""
     zeros = np.zeros(len(places))
     hip = (table["hip_angle_rad"][places], zeros, zeros, zeros)
     ankles = tuple((joint[places], zeros, zeros, zeros) for joint in joints)
@@ -321,7 +321,7 @@ def _closing(numbers: Numbers, table: Table, lean: Array, joints: Sequence[Array
 
 
 def _thinned(mask: np.ndarray, recording: WalkRecording, spacing_s: float = SPACING_S) -> np.ndarray:
-    """Numbers of rows that are True and at least so far from each other: at the same times after each strike."""
+    """Numbers of rows that are True and at least this far from each other: at the same times after each strike."""
     time_s = recording.table.time_s
     if recording.places is not None:
         return np.flatnonzero(mask & (recording.places >= 0))
@@ -417,7 +417,7 @@ def _foot_left(numbers: Numbers, motion: Motion, leg: int) -> Array:
 
 
 def _current(table: Table, name: str) -> tuple[Array, np.ndarray]:
-    """(current under the Gaussian, rows where it is known): none near a jump between two samples of a slow one."""
+    """(current under the Gaussian, rows where it is known): unknown near a jump between two samples of a slow one."""
     value, fresh = table[name], freshness(table, name)
     known = np.ones(len(value), dtype=bool)
     if np.mean(fresh) < 0.4:
@@ -443,7 +443,7 @@ def _drive_rows(table: Table, single: np.ndarray, recording: WalkRecording) -> l
         current, known = _current(table, f"{motor}_current_A")
         raw, fresh = table[f"{motor}_current_A"], freshness(table, f"{motor}_current_A")
         if table.step_s / max(float(np.mean(fresh)), 1e-9) > 2.0 * SMOOTH_S:
-            continue  # sampled more slowly than it changes: every 60 ms and more of an ankle's push
+            continue  # sampled more slowly than it changes: at intervals of 60 ms and more in an ankle's push
         squares, sizes = signals.smooth(table, raw**2, width), signals.smooth(table, np.abs(raw), width)
         where = _thinned(single & known, recording)
         label = motor.replace("_", " ")
@@ -510,7 +510,7 @@ def _equation(recording: WalkRecording, rows: Rows, numbers: Numbers) -> Equatio
 def _spikes(response: Array, columns: Mapping[str, Array]) -> np.ndarray:
     """Numbers of single rows far outside all others: a foot that brushes the floor, lost or late samples; no effect.
 
-    They are told after a fit of the base by least absolute deviations, which a single row does not draw to itself.
+    A fit of the base by least absolute deviations, which a single row does not attract, shows them.
     """
     left = response - np.median(response)
     names = list(columns)

@@ -1,8 +1,8 @@
-"""What the walking body's equations leave over: balances of torques and closures, for numbers of body and sensors.
+"""Residuals of the walking body's equations: balances of torques and closures, for numbers of body and sensors.
 
 Letters and signs are those of plant/EQUATIONS.md: th a leg's lean, F = th + a - a_zero a foot's angle, h = th_outer -
 th_inner, all positive forward. A residual is a function of all numbers (`Numbers`); the column of a wrong one is its
-derivative, by differences. `s` is the leg that stands, `w` the one that swings.
+derivative, by differences. `s` is the stance leg, `w` the swing leg.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ LEGS = ("outer", "inner")
 
 @dataclasses.dataclass(frozen=True)
 class Numbers:
-    """What may be wrong, as it is believed to be. Sensor errors are 0 and scales 1 when all is well.
+    """Numbers that may be wrong, at their assumed values. Sensor errors are 0 and scales 1 when all is well.
 
     More than 40 fields, because each is one number that a cause of the catalogue changes.
     """
@@ -54,7 +54,7 @@ class Numbers:
     leg_zero_rad: float = 0.0
     leg_scale: float = 1.0
     leg_lag_s: float = 0.0
-    leg_lag_drift_s: float = 0.0  # by which the lag is longer at the recording's end, and shorter at its start
+    leg_lag_drift_s: float = 0.0  # increase of the lag at the recording's end, and decrease at its start
     ankle_zero_outer_rad: float = 0.0
     ankle_zero_inner_rad: float = 0.0
     motor_lag_outer_s: float = 0.0
@@ -93,7 +93,7 @@ class Numbers:
         )
 
 
-Course = tuple[Array, Array, Array, Array]  # a quantity (n,), its rate, its acceleration, and that one's rate
+Course = tuple[Array, Array, Array, Array]  # a quantity (n,), its rate, its acceleration, and the acceleration's rate
 
 
 @dataclasses.dataclass
@@ -122,7 +122,7 @@ class Motion:
 
 @dataclasses.dataclass
 class _Pose:
-    """Both legs as the numbers say they move: leaning angle and foot angle with rates, torque of each ankle."""
+    """Both legs' motion by the numbers: leaning angle and foot angle with rates, torque of each ankle."""
 
     th: list[Course]
     F: list[Course | None]
@@ -131,7 +131,7 @@ class _Pose:
 
 
 def _corrected(course: Course, scale: float, zero: float, lag_s: Array | float) -> Course:
-    """What a sensor should have shown that shows scale x quantity + zero, lag_s late."""
+    """The true reading of a sensor that shows scale x quantity + zero, lag_s late."""
     x, v, a, j = course
     return ((x - zero) / scale + lag_s * v, v / scale + lag_s * a, a / scale + lag_s * j, j)
 
@@ -162,7 +162,7 @@ def _pose(n: Numbers, m: Motion) -> _Pose:
 
 
 def _arc(n: Numbers, F: Array) -> Array:
-    """By how much a foot is beyond an end of its arc (EQUATIONS 4)."""
+    """Angle of a foot beyond an end of its arc (EQUATIONS 4)."""
     return np.where(F > n.arc_toe_rad, F - n.arc_toe_rad, np.where(F < n.arc_heel_rad, F - n.arc_heel_rad, 0.0))
 
 
@@ -173,7 +173,7 @@ def _first_moments(n: Numbers, leg: int, th: Array) -> tuple[Array, Array]:
 
 
 def height_difference(n: Numbers, m: Motion) -> Array:
-    """Outer sole's lowest point above the inner's, 0 while both stand; angles are against the floor's normal."""
+    """Outer sole's lowest point above the inner's, 0 while both are on the floor; angles are against its normal."""
     pose = _pose(n, m)
     heights = []
     for leg, name in enumerate(LEGS):
@@ -188,10 +188,10 @@ def height_difference(n: Numbers, m: Motion) -> Array:
 
 @dataclasses.dataclass
 class Left:
-    """What is left over in single stance on one leg, all (n,), N m; None where channels are missing.
+    """Residuals in single stance on one leg, all (n,), N m; None where channels are missing.
 
-    floor: moments about the contact point; legs: of both legs about the stance ankle; hip_torque: what the hip's motor
-    must do, on h.
+    floor: moments about the contact point; legs: of both legs about the stance ankle; hip_torque: required of the hip's
+    motor, on h.
     """
 
     floor: Array | None
@@ -200,7 +200,7 @@ class Left:
 
 
 def stance(n: Numbers, m: Motion, s: int) -> Left:
-    """Balances while leg `s` stands and the other swings (EQUATIONS 4, 5, 9.1), for all rows as if it did."""
+    """Balances with stance leg `s` and the other swinging (EQUATIONS 4, 5, 9.1), for all rows as if in this stance."""
     w = 1 - s
     pose = _pose(n, m)
     foot = pose.F[s]
@@ -222,7 +222,7 @@ def stance(n: Numbers, m: Motion, s: int) -> Left:
     Fy = n.total_mass_kg * ay + B * ddth + B_w * ddtw + A * dth**2 + A_w * dtw**2
     inertia = getattr(n, f"hip_inertia_{name}_kg_m2") * ddth - A * ax + B * ay
     swinging = getattr(n, f"hip_inertia_{LEGS[w]}_kg_m2") * ddtw - A_w * ax + B_w * ay
-    in_air = pose.F[w]  # its foot's inertia is all that a leg feels of it
+    in_air = pose.F[w]  # only its foot's inertia acts on the leg
     reaction = n.foot_inertia_kg_m2 * in_air[2] if in_air is not None else np.zeros_like(th)
     torque = pose.torque[s]
     floor = legs = None
@@ -245,7 +245,7 @@ def swing_foot(n: Numbers, m: Motion, leg: int) -> Array:
 
 
 def cable_torque(n: Numbers, m: Motion, leg: int) -> Array:
-    """What an ankle's cable pulls, N m, (n,)."""
+    """Pull of an ankle's cable, N m, (n,)."""
     ankle, motor = m.ankle[leg], m.motor[leg]
     assert ankle is not None and motor is not None
     return getattr(n, f"cable_{LEGS[leg]}_Nm_per_rad") * (motor[0] - ankle[0])

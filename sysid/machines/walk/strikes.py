@@ -1,4 +1,4 @@
-"""When feet meet the floor, and which foot stands in between: by contact sensors, or by the jump of the hip's rate."""
+"""Times of foot strikes, and the stance foot in between: from contact sensors, or from the jump of the hip's rate."""
 
 import dataclasses
 
@@ -7,15 +7,15 @@ from scipy import ndimage
 
 from ranger_sim.sysid.dataset import Array, Table
 
-CONTACT_LATE_S = 0.013  # a board tells a strike so late: 5.5 ms of counting (robot.md N4.9), the rest the sole's rise
-SHORTEST_STEP_S, LONGEST_STEP_S = 0.25, 1.2  # others are no steps of a walk
+CONTACT_LATE_S = 0.013  # delay of a board's strike report: 5.5 ms of counting (robot.md N4.9), the rest the sole's rise
+SHORTEST_STEP_S, LONGEST_STEP_S = 0.25, 1.2  # others are not steps of a walk
 LEAST_SPLIT_RAD = 0.15  # between the legs at a strike
-SMOOTH_S = 0.006  # of the rate in which a jump is looked for where there is no contact sensor
+SMOOTH_S = 0.006  # of the rate in which a jump is sought where there is no contact sensor
 
 
 @dataclasses.dataclass(frozen=True)
 class Strike:
-    """time_s of the touch; leg: that touched, 0 outer, 1 inner; run: number of the table's run."""
+    """time_s of the touch; leg that touched: 0 outer, 1 inner; run: number of the table's run."""
 
     time_s: float
     leg: int
@@ -40,7 +40,7 @@ def by_contact(table: Table) -> bool:
 
 
 def standing(table: Table, strikes: list[Strike], after_s: float, before_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """(leg that stands, -1: unknown; True in single stance, so long after and before strikes), both (n,)."""
+    """(stance leg, -1: unknown; True in single stance, outside these times after and before strikes), both (n,)."""
     stands = np.full(len(table), -1)
     single = np.zeros(len(table), dtype=bool)
     for one, other in zip(strikes[:-1], strikes[1:], strict=True):
@@ -54,7 +54,7 @@ def standing(table: Table, strikes: list[Strike], after_s: float, before_s: floa
 
 
 def places(table: Table, strikes: list[Strike], stands: np.ndarray, after_s: float, every_s: float) -> np.ndarray:
-    """(n,) of rows so long after a strike, and every so long after that: a number for this leg and time; -1 elsewhere.
+    """(n,) number of a leg and a time after a strike, for one row every interval after that time; -1 elsewhere.
 
     Rows of one number are repeats: the same place in the strides.
     """
@@ -71,7 +71,7 @@ def places(table: Table, strikes: list[Strike], stands: np.ndarray, after_s: flo
 
 
 def _by_contact(table: Table, run: slice) -> list[tuple[float, int]]:
-    """(time, leg) where a contact sensor says so for the first time while the legs are apart."""
+    """(time, leg) of each first contact by a sensor while the legs are split."""
     found = []
     for leg, name in enumerate(("outer_contact", "inner_contact")):
         on = table[name][run] > 0.5
@@ -84,7 +84,7 @@ def _by_contact(table: Table, run: slice) -> list[tuple[float, int]]:
 
 
 def _by_hip(time_s: Array, hip: Array, step_s: float) -> list[tuple[float, int]]:
-    """(time, leg) of the sharpest jump of the hip's rate in each half swing; its sign tells the foot that is ahead."""
+    """(time, leg) of the sharpest jump of the hip's rate in each half swing; its sign gives the leading foot."""
     rate = np.gradient(ndimage.gaussian_filter1d(hip, SMOOTH_S / step_s), step_s)
     reach = max(1, round(0.012 / step_s))
     jump = np.zeros_like(rate)

@@ -1,8 +1,8 @@
-"""Channels that come at rates of their own, on one even time base, with flags for what was measured there.
+"""Channels of different rates on one even time base, with flags for the measured samples.
 
 A run's log writes a value when it changes, the robot's boards send currents every 22 to 68 ms, a radio link is silent
-for a while: between two samples a value is either held, or it went a straight way, or nobody knows. A table holds
-beside each slow channel a column "NAME fresh", 1.0 where a sample lies and 0.0 elsewhere.
+for a while: between two samples a value is held, or moves in a straight line, or is unknown. A table has, next to each
+slow channel, a column "NAME fresh", 1.0 at a sample and 0.0 elsewhere.
 """
 
 import numpy as np
@@ -11,16 +11,16 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Table
 
 FINEST_STEP_S, COARSEST_STEP_S = 0.002, 0.008
-SLOW_STEPS = 3.0  # of the time base: a channel whose samples lie farther apart is slow
-LOSS_STEPS = 5.0  # of the channel's own: what is silent for longer was lost, unless it stood still
+SLOW_STEPS = 3.0  # of the time base: a channel with more between its samples is slow
+LOSS_STEPS = 5.0  # of the channel's own: longer silences are losses, unless the value did not change
 LOSS_S = 0.025  # shorter silences are bridged: half of the shortest radio gap of the robot's logs (robot.md C6.1)
-STANDS_STILL = 2.5  # of the channel's finest step: it changes by no more over a silence in which nothing happened
+STANDS_STILL = 2.5  # of the channel's finest step: largest change over a silence in which nothing happened
 FRESH = " fresh"
 STATES = ("outer_contact", "inner_contact", "walk_state")  # numbers of states hold until the next
 
 
 def even_table(dataset: Dataset, names: list[str], carrying: tuple[str, ...]) -> Table:
-    """`names` on even stamps. carrying: channels without which nothing can be said, whose losses cut the table."""
+    """`names` on even stamps. carrying: indispensable channels, whose losses cut the table."""
     carriers = [dataset[name] for name in carrying if name in names]
     if not carriers:
         carriers = [dataset[name] for name in names if name not in STATES] or [dataset[name] for name in names]
@@ -55,7 +55,7 @@ def even_table(dataset: Dataset, names: list[str], carrying: tuple[str, ...]) ->
 
 
 def freshness(table: Table, name: str) -> np.ndarray:
-    """(n,) True where this channel was measured: by its flags, or by what holds and straight lines leave of it."""
+    """(n,) True where this channel was measured: by its flags, or by the traces of held values and straight lines."""
     if name + FRESH in table:
         return table[name + FRESH] > 0.5
     value = table[name]
@@ -76,7 +76,7 @@ def _usual_step(channel: Channel) -> float:
 
 
 def _with_holds(channel: Channel) -> tuple[Array, Array]:
-    """Stamps and values with the held value once more before the sample that ends a silence."""
+    """Stamps and values with the held value repeated before the sample that ends a silence."""
     step_s = _usual_step(channel)
     ends = np.flatnonzero(np.diff(channel.time_s) > 2.5 * step_s) + 1
     stamps = np.concatenate((channel.time_s, channel.time_s[ends] - step_s))
@@ -98,7 +98,7 @@ def _lost(channel: Channel, time_s: Array) -> np.ndarray:
 
 
 def _fresh(stamps: Array, time_s: Array, step_s: float) -> Array:
-    """1.0 at the even stamp that is nearest to a sample."""
+    """1.0 at the even stamp nearest to a sample."""
     out = np.zeros(len(time_s))
     place = np.rint((stamps - time_s[0]) / step_s).astype(int)
     out[place[(place >= 0) & (place < len(time_s))]] = 1.0
