@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def check(folder: pathlib.Path) -> None:
-    """UserError if the path already exists with content."""
+    """UserError for an existing file or link, or a folder that is not empty."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UserError(f"new {folder}: it is there already and is no folder")
     if folder.is_dir() and any(folder.iterdir()):

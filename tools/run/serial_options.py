@@ -42,7 +42,7 @@ def add_options(command: Any) -> None:
 
 
 def quirks_of(given: argparse.Namespace) -> Quirks:
-    """The quirks that these options select: drop-outs on the link without notice mean Bluetooth.
+    """The quirks that these options select: drop-outs without `--daq-link` mean Bluetooth.
 
     UserError for options that contradict each other.
     """
