@@ -1,4 +1,4 @@
-"""`ranger-sim body`: which bodies there are, and every number of one with unit, limits and source."""
+"""`ranger-sim body`: the available bodies, and every number of one with unit, limits and source."""
 
 import argparse
 import json
@@ -7,7 +7,7 @@ from typing import Any
 from ranger_sim.plant import body_files
 from ranger_sim.tools.command_line import terminal
 
-WIDE = 120  # columns of a window with room for sources beside their numbers
+WIDE = 120  # columns of a window wide enough for sources next to their numbers
 
 
 def register(commands: Any) -> None:

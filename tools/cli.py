@@ -1,4 +1,4 @@
-"""The command `ranger-sim`: every subcommand is one module of this package (or a room's own `cli`)."""
+"""The command `ranger-sim`: every subcommand is a module of this package (or the `cli` of another package)."""
 
 import argparse
 import contextlib
@@ -16,14 +16,14 @@ EXIT_MISUSE = 2
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser that complains in one line, takes `-1s` for a value, and options by their whole names only."""
+    """An argument parser with one-line errors; accepts `-1s` as a value, and options only by their full names."""
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         super().__init__(*arguments, **{"allow_abbrev": False, **settings})
-        self._negative_number_matcher = NEGATIVE_VALUE  # argparse's own knows -1 and -0.5, not -1s
+        self._negative_number_matcher = NEGATIVE_VALUE  # argparse's own matches -1 and -0.5, not -1s
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As argparse's, but each command refuses what it does not know itself: under its own name, with a hint."""
+        """As argparse's, but each command reports unknown arguments itself: under its own name, with a hint."""
         options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             named = [each.partition("=")[0] for each in unknown if each.startswith("--")]
@@ -33,14 +33,14 @@ class OneLineParser(argparse.ArgumentParser):
         return options, unknown
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """As argparse's, with the names that are near a mistyped one, or else all."""
+        """As argparse's, but lists the names close to a mistyped one, or else all."""
         if action.choices is not None and value not in action.choices:
             known = [str(each) for each in action.choices]
             hint = did_you_mean(str(value), known) or f"available: {', '.join(known)}"
             raise argparse.ArgumentError(action, f"unknown {value!r}; {hint}")
 
     def error(self, message: str) -> NoReturn:
-        """Print what is wrong and where help is; exit code 2."""
+        """Print the error and where to find help; exit code 2."""
         self.exit(EXIT_MISUSE, f"{self.prog}: {printable(message)} (see {self.prog} --help)\n")
 
 
@@ -105,7 +105,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns the process's exit code. A library that is not installed is one line and code 2."""
+    """Run one command; returns the process's exit code. A missing library is one line and code 2."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["help"]:
         words = [*words[1:], "--help"]
@@ -120,7 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def run(arguments: list[str]) -> int:
-    """The same, where every library is there. A user's mistake is one line and code 2."""
+    """As `main`, with every library installed. A user's mistake is one line and code 2."""
     is_own_process = streams.take_over()
     if is_own_process:
         interrupts.end_in_order()
@@ -139,7 +139,7 @@ def run(arguments: list[str]) -> int:
             interrupts.end_at_once()
         print("ranger-sim: interrupted", file=sys.stderr)
         return interrupts.EXIT_INTERRUPTED
-    except OSError as error:  # a full disk, a folder that vanished: of the machine, not of the program
+    except OSError as error:  # a full disk, a folder that vanished: a failure of the machine, not of the program
         place = error.filename or ("standard output" if streams.is_stuck() else None)
         return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
     except MemoryError:
@@ -147,7 +147,7 @@ def run(arguments: list[str]) -> int:
 
 
 def misuse(text: str) -> int:
-    """Say what is wrong, on standard error."""
+    """Print an error on standard error."""
     print(f"ranger-sim: {text}", file=sys.stderr)
     return EXIT_MISUSE
 

@@ -1,4 +1,4 @@
-"""`ranger-sim faults`: every place at which a fault can sit, every mode that it takes, and why it takes no others.
+"""`ranger-sim faults`: every place where a fault can be injected, its modes, and why it has no others.
 
 `python -m ranger_sim.tools.faults` writes the tables of docs/faults.md anew; a test compares them.
 """

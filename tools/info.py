@@ -1,4 +1,4 @@
-"""`ranger-sim info`: what is installed here, and how it runs."""
+"""`ranger-sim info`: the installed versions and how they run."""
 
 import argparse
 import json
@@ -21,7 +21,7 @@ def register(commands: Any) -> None:
 
 
 def facts() -> dict[str, Any]:
-    """Everything the command tells, as plain data."""
+    """Everything that the command reports, as plain data."""
     declared = set(loading.declared_modules())
     return {
         "version": __version__,

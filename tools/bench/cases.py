@@ -1,4 +1,4 @@
-"""What `ranger-sim bench` times: each case runs in a process of its own and returns how much it did per CPU second.
+"""Cases that `ranger-sim bench` times: each runs in a separate process and returns its work per CPU second.
 
 `python -m ranger_sim.tools.bench.cases CASE SECONDS` is that process; it prints the figures as JSON.
 """
@@ -18,14 +18,14 @@ from ranger_sim.foundation import wallclock
 
 SIMULATED = "simulated s per CPU s"
 FRAMES = "frames per CPU s"
-YARDSTICK = "virtual"  # what stands for the machine: everything is also given as a ratio to it
+YARDSTICK = "virtual"  # measures the machine: every figure is also given as a ratio to it
 BUS_FRAMES_PER_S, VIRTUAL_FRAMES_PER_S = 50_000, 1_000  # frames for each second of --seconds, about as much work
-INTERPRETED_SHARE = 10  # the plain sources take so many times as long at least, and get as much less to do
+INTERPRETED_SHARE = 10  # the plain sources take at least this many times as long, and get less work in proportion
 
 
 @dataclass(frozen=True)
 class Case:
-    """One thing that is timed; `measure(seconds)` does it for about `seconds` of virtual time: {"figure": ...}."""
+    """One timed case; `measure(seconds)` runs it for about `seconds` of virtual time: {"figure": ...}."""
 
     title: str
     unit: str
@@ -37,7 +37,7 @@ TICK_S = 1e-3  # the shortest time between two ticks of a Linux kernel
 
 
 def robot(seconds: float, log: str = "none", swap: bool = False) -> dict:
-    """The whole robot for so long, its first second left out; CPU seconds of the stepping loop only."""
+    """The whole robot for `seconds`, without its first second; CPU seconds of the stepping loop only."""
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.scenario import Scenario, StopRule
 
@@ -51,12 +51,12 @@ def robot(seconds: float, log: str = "none", swap: bool = False) -> dict:
 
 
 def used_s(started: float) -> float:
-    """Processor seconds since `started`; not less than a kernel that counts them by its ticks can tell."""
+    """Processor seconds since `started`, at least the resolution of a kernel that counts them in ticks."""
     return max(wallclock.process_cpu_s() - started, TICK_S)
 
 
 def users_law(board: Any) -> Callable[[], None]:
-    """What a user might write: the hip's spring-damper law in floating-point Python, for the firmware's own."""
+    """A law that a user might write: the hip's spring-damper in floating-point Python, replacing the firmware's own."""
     law, limits, loop, readings = board.compliance, board.limits, board.current_control, board.readings
 
     def control() -> None:
@@ -115,7 +115,7 @@ CASES = {
 
 
 def measured(name: str, seconds: float) -> dict:
-    """One case in its own process. RuntimeError with the last line of what it said when it fails."""
+    """One case in a separate process. RuntimeError with the last line of its output when it fails."""
     case = CASES[name]
     environment = {key: value for key, value in os.environ.items() if key != "RANGER_SIM_INTERPRETED"}
     if case.interpreted:

@@ -1,7 +1,7 @@
-"""`ranger-sim bench`: measurements by name. Machines differ and are noisy, so what matters is how figures compare.
+"""`ranger-sim bench`: measurements by name. Machines differ and are noisy, so figures matter only in comparison.
 
-What is timed is measured together: each case several times, in turn, in a process of its own. In every turn
-python-can's `virtual` does its share as well: it stands for the machine, and each figure is compared with it.
+Timed cases are measured together: each several times, in turn, in a separate process. Every turn also times
+python-can's `virtual` as a measure of the machine, and each figure is compared with it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ranger_sim.tools.command_line.help_text import named_lines
 from ranger_sim.tools.command_line.units import number, whole_number
 
 SHOWN = {SIMULATED: "x real time", FRAMES: "frames"}
-EXIT_EXCEEDED = 1  # an answer came later than its bound
+EXIT_EXCEEDED = 1  # a response came later than its bound
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def processes(options: argparse.Namespace, say: Callable[[str], None]) -> list[d
 
 
 def floods(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
-    """The robot under clients that write without end and read nothing."""
+    """The robot under clients that write endlessly and read nothing."""
     from ranger_sim.tools.bench import floods as part
 
     kept = None if options.keep is None else pathlib.Path(options.keep)
@@ -132,7 +132,7 @@ def register(commands: Any) -> None:
 
 
 def machine() -> dict:
-    """What the figures are taken on, and how busy it is."""
+    """The machine that the figures are taken on, and how busy it is."""
     model = platform.processor() or platform.machine()
     cpuinfo = pathlib.Path("/proc/cpuinfo")
     if cpuinfo.exists():
@@ -150,7 +150,7 @@ def machine() -> dict:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure what was named; 0 done, 1 when an answer on the bus came later than its bound."""
+    """Run the named measurements; 0 done, 1 when a response on the bus came later than its bound."""
     for name in options.part:
         if name not in PARTS:
             options.refuse(f"{name!r} is no part; there are {', '.join(PARTS)}")
@@ -188,7 +188,7 @@ def run(options: argparse.Namespace) -> int:
 def timed_together(cases: list[str], runs: int, seconds: float) -> dict:
     """Every case and the yardstick `runs` times, in turn: values, median, extremes, and the ratio to the yardstick.
 
-    The ratio is the median of the turns' ratios: what slows the machine for a while slows both.
+    The ratio is the median of the turns' ratios, because a temporary slowdown of the machine affects both.
     """
     values: dict[str, list[float]] = {name: [] for name in (*cases, YARDSTICK)}
     for turn in range(runs):
@@ -214,7 +214,7 @@ def timed_together(cases: list[str], runs: int, seconds: float) -> dict:
 
 
 def lines_of(figures: dict, runs: int) -> list[str]:
-    """The figures as a table of lines. Simulated seconds are compared by what they cost: frames of the yardstick."""
+    """The figures as lines of a table. Simulated seconds are compared by their cost in frames of the yardstick."""
     lines = [
         f"timed together, {runs} runs of each in turn, each in a process of its own:",
         f"  {'per second of processor time':38} {'median':>9} {'least':>9} {'most':>9}  {'':11}  python-can's virtual",
@@ -229,5 +229,5 @@ def lines_of(figures: dict, runs: int) -> list[str]:
 
 
 def three_digits(value: float) -> str:
-    """Three digits that count, thousands apart."""
+    """Three significant digits, with separated thousands."""
     return f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"

@@ -1,6 +1,6 @@
-"""Who floods: for each door of a robot, and of its panel, programs that use it without end and read nothing.
+"""Flooding programs: for each interface of a robot and its panel, programs that use it endlessly and read nothing.
 
-A way in gives something with a file number, already greeted; a `Flood` says what goes through how many of them.
+A way in returns a connected descriptor, its handshake done; a `Flood` defines what is sent, over how many of them.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from ranger_sim.harness.processes import control
 from ranger_sim.tools.robodaq.codec import write_packet
 
 CHUNK = 1 << 16  # bytes offered at once: what a socket takes
-LET_IN_S = 5.0  # a page waits so long for its place
-LOOK_S = 0.1  # between two looks of programs that only stay
+LET_IN_S = 5.0  # how long a page waits for its place
+LOOK_S = 0.1  # between two checks by programs that only stay connected
 
-# The robot that is flooded: with every door of a robot of Python boards; with a board that runs machine code and a
-# debugger's door at it; with a panel that looks at it.
+# The robot that is flooded: one of Python boards with every interface open; one with a board that runs machine code and
+# a debugger port; one with a panel connected.
 WHOLE, DEBUGGED, SHOWN = "whole", "debugged", "shown"
 
 
 @dataclasses.dataclass(frozen=True)
 class Doors:
-    """Where the robot under test can be reached. gdb, panel: ports, 0 where there is none."""
+    """Addresses of the robot under test. gdb, panel: ports, 0 if not open."""
 
     name: str
     terminal: str = ""
@@ -58,7 +58,7 @@ def attached(doors: Doors, channel: str = "can1") -> socket.socket:
 
 
 def unknown(doors: Doors) -> socket.socket:
-    """A connection to the attach protocol that has not said who it is."""
+    """A connection to the attach protocol that has not identified itself."""
     return _local(wire.SOCKET_PREFIX + doors.name, b"")
 
 
@@ -78,14 +78,14 @@ def viewing(doors: Doors) -> socket.socket:
 
 
 def calibrating(doors: Doors) -> socket.socket:
-    """The XCP master on UDP that has the place."""
+    """The XCP master on UDP that holds the connection."""
     client = stranger(doors)
     client.send(xcp_packets(b"\xff\x00"))
     return client
 
 
 def stranger(doors: Doors) -> socket.socket:
-    """Somebody who sends datagrams to the XCP slave."""
+    """A client that sends datagrams to the XCP slave."""
     client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     client.connect(("127.0.0.1", doors.xcp))
     return client
@@ -104,17 +104,17 @@ def debugging(doors: Doors) -> socket.socket:
 
 
 def debugger(doors: Doors) -> socket.socket:
-    """A debugger that says nothing."""
+    """A debugger that sends nothing."""
     return _distant(doors.gdb, b"")
 
 
 def visiting(doors: Doors) -> socket.socket:
-    """A connection to the panel that says nothing."""
+    """A connection to the panel that sends nothing."""
     return _distant(doors.panel, b"")
 
 
 def page(doors: Doors) -> socket.socket:
-    """A page of the panel, which has been let in."""
+    """A page of the panel that has been admitted."""
     client = _distant(doors.panel, handshake(doors, doors.token))
     client.settimeout(LET_IN_S)
     heard = b""
@@ -128,12 +128,12 @@ def page(doors: Doors) -> socket.socket:
 
 
 def page_of_another_site(doors: Doors) -> socket.socket:
-    """A page that was loaded from elsewhere and has learned the token."""
+    """A page that was loaded from another site and knows the token."""
     return _distant(doors.panel, handshake(doors, doors.token, "http://elsewhere.example"))
 
 
 def page_with_a_wrong_token(doors: Doors) -> socket.socket:
-    """One that guesses."""
+    """A page that guesses the token."""
     return _distant(doors.panel, handshake(doors, "guess"))
 
 
@@ -166,27 +166,27 @@ def _terminal(path: str, greeting: bytes) -> int:
     return number
 
 
-# --- what they say ---------------------------------------------------------------------------------------
+# --- what they send --------------------------------------------------------------------------------------
 
 
 def asked(**request: object) -> bytes:
-    """A line of the supervisor's."""
+    """A request line to the supervisor."""
     return json.dumps(request).encode() + b"\n"
 
 
 def xcp_packets(*packets: bytes) -> bytes:
-    """A datagram of them."""
+    """A datagram of these packets."""
     return b"".join(struct.pack("<HH", len(each), 0) + each for each in packets)
 
 
 def xcp_frame(packet: bytes) -> bytes:
-    """A frame to the slave on the bus, as the attach protocol has it."""
+    """A frame to the slave on the bus, in the attach protocol's format."""
     low, high = struct.unpack("<II", packet.ljust(8, b"\0"))
     return wire.send_record(XCP_MASTER_ID, len(packet), low, high)
 
 
 def handshake(doors: Doors, token: str, origin: str = "") -> bytes:
-    """What a browser says first for a WebSocket (RFC 6455, section 4.1)."""
+    """A browser's opening handshake for a WebSocket (RFC 6455, section 4.1)."""
     return (
         f"GET /socket?token={token} HTTP/1.1\r\nHost: 127.0.0.1:{doors.panel}\r\nUpgrade: websocket\r\n"
         "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
@@ -203,11 +203,11 @@ def message(text: str) -> bytes:
 
 
 def wish(**content: object) -> bytes:
-    """A wish of a page."""
+    """A request of a page."""
     return message(json.dumps(content))
 
 
-# All that a page may want to see at once: 48 channels, each with the most points.
+# Everything that a page may request at once: 48 channels, each with the most points.
 ALL_PLOTS = wish(do="look", plots=[{"channels": list(range(48)), "span": 60, "points": 4000}])
 REQUEST = b"GET /panel.js?token=guess HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
@@ -216,10 +216,10 @@ REQUEST = b"GET /panel.js?token=guess HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
 @dataclasses.dataclass(frozen=True)
 class Flood:
-    """`piece` over and over through `way`; an empty one: connections, opened and kept. clients: as many at once.
+    """`piece` sent repeatedly through `way`; an empty one: connections, opened and kept. clients: how many at once.
 
-    once: what each connection says first. whole: a piece is one datagram. stays: `clients` say `once` and then nothing;
-    who is sent away comes again. robot: which one is flooded.
+    once: sent first on each connection. whole: a piece is one datagram. stays: `clients` send `once` and then nothing;
+    a client that is disconnected reconnects. robot: which one is flooded.
     """
 
     way: Way
@@ -231,7 +231,7 @@ class Flood:
     robot: str = WHOLE
 
 
-PAGES, PLACES = 100, 16  # of a panel: so many ask for one (issue 18), and so many find one
+PAGES, PLACES = 100, 16  # of a panel: this many ask for a place (issue 18), and this many get one
 
 FLOODS = {
     "attach CONTROL take part": Flood(attached, wire.record(wire.CONTROL, bytes([wire.ACTIVATE]))),
@@ -294,9 +294,9 @@ FRAMES_IN_WINDOW = "attach SEND, answers read"
 READ = "feed, 4 viewers that read"
 DRAWN = "panel, 16 pages that show all"
 ALL = "attach, slcan and socketcand at once"
-TOGETHER = (FRAMES_IN_WINDOW, "slcan t", "socketcand send")  # the dearest of each door
+TOGETHER = (FRAMES_IN_WINDOW, "slcan t", "socketcand send")  # the most expensive of each interface
 OF_WHOLE = tuple(name for name, flood in FLOODS.items() if flood.robot == WHOLE)
-# Robot by robot: who comes later starts another one.
+# Grouped by robot, because each change of robot starts a new one.
 NAMES = (
     *(PEACE, BUSY, *OF_WHOLE, FRAMES_IN_WINDOW, READ, ALL),
     *(PEACE_OF[DEBUGGED], *(name for name, flood in FLOODS.items() if flood.robot == DEBUGGED)),
@@ -305,7 +305,7 @@ NAMES = (
 
 
 def robot_of(name: str) -> str:
-    """Which robot is flooded by what has that name."""
+    """The robot that the flood or measurement of this name uses."""
     if name == DRAWN:
         return SHOWN
     if name in FLOODS:
@@ -323,7 +323,7 @@ def burn() -> None:
 
 
 def send_in_window(doors: Doors) -> None:
-    """Frames as fast as the attach protocol lets them go, every answer read: until killed."""
+    """Send frames as fast as the attach protocol allows and read every answer, until killed."""
     client, window, waiting, heard = attached(doors), 64, 0, bytearray()
     while True:
         client.sendall(wire.send_record(0x7FF, 8, 1, 2) * (window - waiting))
@@ -335,7 +335,7 @@ def send_in_window(doors: Doors) -> None:
 
 
 def read(doors: Doors) -> None:
-    """Viewers that take all that the feed has: until killed."""
+    """Run viewers that read everything in the feed, until killed."""
     clients = [viewing(doors) for _ in range(4)]
     while True:
         for number in descriptors.wait([each.fileno() for each in clients], [], 1.0)[0]:
@@ -343,7 +343,7 @@ def read(doors: Doors) -> None:
 
 
 def draw(doors: Doors) -> None:
-    """As many pages as have a place; each wants all, and says at once that it has shown it: until killed."""
+    """Open as many pages as have a place; each requests everything and confirms it at once. Runs until killed."""
     clients = {client.fileno(): client for client in (page(doors) for _ in range(PLACES))}
     for client in clients.values():
         client.sendall(ALL_PLOTS)
@@ -357,14 +357,14 @@ def draw(doors: Doors) -> None:
 
 
 def stay(flood: Flood, doors: Doors) -> None:
-    """So many clients say their word and then nothing: until killed. Who is sent away comes again."""
+    """Keep clients connected that send `once` and then nothing, until killed. A disconnected client reconnects."""
     ends: list[socket.socket | int] = []
     watch = select.poll()
     while True:
         with suppress(OSError):
             while len(ends) < flood.clients:
                 ends.append(_greeted(flood, doors))
-                watch.register(_number(ends[-1]), select.POLLRDHUP)  # that it is sent away, no word of what is said
+                watch.register(_number(ends[-1]), select.POLLRDHUP)  # reports a disconnection, not incoming data
         lost = {number for number, _ in watch.poll(LOOK_S * 1000)}
         for each in [each for each in ends if _number(each) in lost]:
             watch.unregister(_number(each))
@@ -373,7 +373,7 @@ def stay(flood: Flood, doors: Doors) -> None:
 
 
 def pour(flood: Flood, doors: Doors) -> None:
-    """Flood until killed. Where a connection is ended or refused, over a new one."""
+    """Flood until killed. Reconnect where a connection is ended or refused."""
     data = flood.piece if flood.whole else flood.piece * (CHUNK // max(1, len(flood.piece)))
     ends: list[socket.socket | int] = []
     while True:
@@ -415,11 +415,11 @@ def _close(end: socket.socket | int) -> None:
         end.close()
 
 
-Run = tuple[Callable[..., None], tuple]  # what a program runs, and on what
+Run = tuple[Callable[..., None], tuple]  # function that a program runs, and its arguments
 
 
 def programs(name: str, doors: Doors) -> list[Run]:
-    """Who disturbs the robot by that name."""
+    """The programs that disturb the robot under this name."""
     alone: dict[str, Run] = {
         BUSY: (burn, ()),
         FRAMES_IN_WINDOW: (send_in_window, (doors,)),
@@ -437,7 +437,7 @@ def programs(name: str, doors: Doors) -> list[Run]:
 
 @contextmanager
 def flooded(name: str, doors: Doors) -> Iterator[None]:
-    """While it lasts the programs of that name run."""
+    """Run the programs of this name inside the context."""
     context = multiprocessing.get_context("fork")
     running = [context.Process(target=what, args=on, daemon=True) for what, on in programs(name, doors)]
     for each in running:

@@ -1,14 +1,14 @@
 """`ranger-sim bench floods`: the robot in real time while a client writes as fast as it can and reads nothing.
 
-A flood is one way of using one door without end (`flooders.py` has them). Measured are the robot's pace by the wall
-clock, the processor time of the body's process for a second of the robot, and how much the memory of what is flooded
-grew; beside them the same robot left in peace, and beside a program that touches no door and only keeps a processor
-busy, as every flood does too. For a debugger's door the robot has a board that runs an image, which is counted as well,
-and for the panel's doors a panel that looks at it.
+A flood is one way of using one interface endlessly (see `flooders.py`). Measured are the robot's pace by the wall
+clock, the processor time of the body's process per second of the robot, and the memory growth of the flooded process.
+They are compared with the same robot undisturbed, and with one next to a program that uses no interface and only keeps
+a processor busy, as every flood does too. For a debugger port the robot has a board that runs an image, whose process
+is counted as well; for the panel's interfaces a panel shows the robot.
 
-A pace says something only where the undisturbed robot keeps it. A machine with few processors cannot hold ten busy
-programs at real time, so there the robot runs slower (`speed_for`), and each flood is given as a share of the
-undisturbed pace at the same speed.
+A pace is meaningful only if the undisturbed robot keeps it. A machine with few processors cannot run ten busy programs
+in real time, so there the robot runs slower (`speed_for`), and each flood is given as a share of the undisturbed pace
+at the same speed.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from ranger_sim.tools.bench.flooders import (
 )
 
 HELD = 0.99  # share of the undisturbed pace that a flood leaves: issue 16
-PROGRAMS = 10  # boards, body, supervisor, and who floods; chosen by us: with a processor for each, real time is held
-SETTLE_S = 1.0  # from the first bytes of a flood to the first look, and from its end to the next; chosen by us
-PATIENCE_S = 60.0  # for a robot that starts, or ends, on a busy machine
+PROGRAMS = 10  # boards, body, supervisor, and the flooder; chosen by us: with a processor for each, real time is held
+SETTLE_S = 1.0  # from the first bytes of a flood to the first reading, and from its end to the next; chosen by us
+PATIENCE_S = 60.0  # for a robot that starts or ends on a busy machine
 PAGE_KB = os.sysconf("SC_PAGE_SIZE") // 1024
 
 
@@ -56,7 +56,7 @@ WAITS = ":04000000FEFFFFEA16\n:00000001FF\n"
 
 
 class Started:
-    """A program of ours and what it says."""
+    """One of our programs and its output."""
 
     def __init__(self, *words: str) -> None:
         self.said = ""
@@ -67,14 +67,14 @@ class Started:
         )
 
     def hear(self, seconds: float) -> None:
-        """What it says within so long."""
+        """Append its output, waiting at most this long."""
         assert self.process.stderr is not None
         number = self.process.stderr.fileno()
         if descriptors.wait([number], [], seconds)[0]:
             self.said += os.read(number, 1 << 16).decode()
 
     def told(self, pattern: str) -> re.Match[str]:
-        """The first line with that pattern, when it comes."""
+        """Wait for the first line that matches the pattern and return the match."""
         end = wallclock.monotonic_s() + PATIENCE_S
         while not (match := re.search(pattern, self.said)):
             if self.process.poll() is not None or wallclock.monotonic_s() > end:
@@ -97,7 +97,7 @@ class Started:
 
 
 class Robot:
-    """A running `ranger-sim up` with the doors of its kind open, and a panel where that is flooded."""
+    """A running `ranger-sim up` with the interfaces of its kind open, and a panel if that is flooded."""
 
     def __init__(self, speed: float, kind: str = WHOLE) -> None:
         self.kind = kind
@@ -120,7 +120,7 @@ class Robot:
             raise
 
     def _open(self, name: str) -> None:
-        """Find the doors, and wait until all are there."""
+        """Find the interfaces and wait until all are available."""
         if self.kind == WHOLE:
             self.doors = Doors(
                 name,
@@ -132,7 +132,7 @@ class Robot:
         if self.kind == DEBUGGED:
             self.doors = Doors(name, gdb=int(self.up.told(r"target remote :(\d+)")[1]))
             self.up.told("name " + name)
-            with debugging(self.doors) as first:  # the run waits for one, who lets it go
+            with debugging(self.doors) as first:  # the run waits for a debugger, which lets it continue
                 first.recv(1)
         self.status: dict = {}
         end = wallclock.monotonic_s() + PATIENCE_S
@@ -150,11 +150,11 @@ class Robot:
 
     @property
     def ended(self) -> bool:
-        """True when a program of it has ended."""
+        """True when one of its programs has ended."""
         return any(each.process.poll() is not None for each in self.programs)
 
     def moment(self) -> tuple[float, float]:
-        """(wall clock, virtual time) at one instant, s, as the body's process tells it.
+        """(wall clock, virtual time) at the same time, s, as reported by the body's process.
 
         (0, 0) when the robot has ended, or does not answer for PATIENCE_S: a flood may keep the supervisor busy.
         """
@@ -167,21 +167,21 @@ class Robot:
         return 0.0, 0.0
 
     def memory_kb(self) -> tuple[int, int]:
-        """Resident memory of the robot (body's process, supervisor, a board that is debugged), and of the panel."""
+        """Resident memory of the robot (body's process, supervisor, a debugged board) and of the panel, kB."""
         robot = sum(map(_statm, (self.up.process.pid, *self._flooded())))
         return robot, sum(_statm(each.process.pid) for each in self.programs[1:])
 
     def _flooded(self) -> list[int]:
-        """The body's process, and that of a board that is debugged."""
+        """Process of the body, and of a debugged board."""
         boards = [IMAGE_BOARD] if self.kind == DEBUGGED else []
         return [self.status["plant"], *(self.status["boards"][board]["process"] for board in boards)]
 
     def cpu_s(self) -> float:
-        """Processor time of these so far."""
+        """Processor time of these processes so far."""
         return sum(map(kernel.processor_time_s, self._flooded()))
 
     def wait(self, seconds: float) -> None:
-        """Let it run, and read what it says."""
+        """Let it run and read its output."""
         end = wallclock.monotonic_s() + seconds
         while (left := end - wallclock.monotonic_s()) > 0.0:
             for each in self.programs:
@@ -190,7 +190,7 @@ class Robot:
                 return
 
     def close(self) -> None:
-        """End everything."""
+        """End all programs."""
         self.files.close()
 
 
@@ -201,7 +201,7 @@ def _statm(process: int) -> int:
 
 
 def speed_for(processors: int) -> float:
-    """Times real time that a machine with so many processors holds beside a flood: 1 with one for each program.
+    """Times real time that a machine with this many processors holds during a flood: 1 with one for each program.
 
     Two processors of an AMD EPYC held 0.76 of real time undisturbed (23 November 2026); with a quarter of real time
     the robot leaves two thirds of its processor free.
@@ -210,7 +210,7 @@ def speed_for(processors: int) -> float:
 
 
 def measured(name: str, seconds: float, robot: Robot) -> dict:
-    """One flood of so many seconds: pace, processor time per second of the robot, memory."""
+    """One flood of this many seconds: pace, processor time per second of the robot, memory."""
     memory = robot.memory_kb()
     with flooded(name, robot.doors):
         robot.wait(SETTLE_S)
@@ -234,7 +234,7 @@ def measured(name: str, seconds: float, robot: Robot) -> dict:
 
 
 def text_of(row: dict, peace: float) -> str:
-    """A line of the table; `peace`: the pace of the robot left in peace."""
+    """A line of the table; `peace`: the pace of the undisturbed robot."""
     cpu = "-" if row["cpu_per_s"] is None else f"{row['cpu_per_s']:.3f}"
     panel = f", panel {row['panel_mb']:.0f} MB ({row['panel_growth_mb']:+.1f})" if row["panel_mb"] else ""
     share = row["pace"] / peace if peace > 0.0 else 0.0
@@ -247,13 +247,13 @@ def text_of(row: dict, peace: float) -> str:
 
 
 def undisturbed(rows: list[dict], name: str) -> float:
-    """The pace of the same kind of robot left in peace; 0 where that was not measured."""
+    """The pace of the undisturbed robot of the same kind; 0 if not measured."""
     paces = {row["flood"]: row["pace"] for row in rows}
     return float(paces.get(PEACE_OF[robot_of(name)], 0.0))
 
 
 def verdict(rows: list[dict]) -> str:
-    """How many floods left the robot its pace, and the one that took most of it."""
+    """Report how many floods left the robot its pace, and the one that took most of it."""
     floods = [row for row in rows if row["flood"] not in (*PEACE_OF.values(), BUSY)]
     shares = {row["flood"]: row["pace"] / peace for row in floods if (peace := undisturbed(rows, row["flood"])) > 0.0}
     if not shares:

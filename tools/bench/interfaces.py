@@ -10,10 +10,10 @@ SHARE = {"ranger_sim": 1.0, "virtual": 1.0, "udp_multicast": 0.1}
 
 
 def run(frames: int, say: Callable[[str], None]) -> list[dict]:
-    """`frames` through each interface; a line each.
+    """Send `frames` through each interface and report a line for each.
 
-    In one thread three nodes hear each other, rates are per second of processor time. From one process to another
-    (where the interface can) rates are per second of the wall clock.
+    In one thread three nodes receive each other's frames, and rates are per second of processor time. Between processes
+    (where the interface supports it) rates are per second of the wall clock.
     """
     from ranger_sim.can_bus.edge import benchmark
 

@@ -1,4 +1,4 @@
-"""`ranger-sim bench processes`: the robot with a process for each board, at the wall clock's pace and without one."""
+"""`ranger-sim bench processes`: the robot with a process for each board, at the wall clock's pace and unpaced."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ PACES = ("1.0", "max")
 
 
 def walked(speed: str, seconds: float) -> dict:
-    """`ranger-sim up` for so much virtual time: its pace, and per board turns, lateness of slots and damaged messages.
+    """`ranger-sim up` for `seconds` of virtual time: its pace, and per board turns, slot lateness and damaged messages.
 
-    RuntimeError with the last line of what it said when it fails.
+    RuntimeError with the last line of its output when it fails.
     """
     name = f"bench-{os.getpid()}"
     call = [sys.executable, "-m", "ranger_sim", "up", "--name", name, "--speed", speed, "--json", "-"]
@@ -33,7 +33,7 @@ def walked(speed: str, seconds: float) -> dict:
 
 
 def run(seconds: float, say: Callable[[str], None]) -> list[dict]:
-    """Both paces; a line each."""
+    """Measure both paces and report a line for each."""
     rows = []
     for speed in PACES:
         row = walked(speed, seconds)

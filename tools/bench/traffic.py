@@ -1,6 +1,6 @@
-"""How fast the bus is: a load for four of them, every frame checked where it is heard.
+"""How fast the bus is: a load for four of them; every receiver checks every frame.
 
-The load is compiled with the rest, so that the figures are those of the bus.
+The load is compiled like the bus, so that the figures are those of the bus.
 """
 
 import array
@@ -17,7 +17,7 @@ ROBOT_BUSES = 4
 
 @cython.cclass
 class Load:
-    """Nodes on some buses that send all the time and check every frame they hear.
+    """Nodes on some buses that send continuously and check every frame they receive.
 
     Node n of a bus sends identifiers 16 n + 1 ... 16 n + `per_node`, in turn, from its three buffers,
     `nodes_per_bus` * rate frames/s per bus in all; `load` is the share of the bus's bits it aims at,
@@ -66,9 +66,9 @@ class Load:
             self.inboxes.append(queues)
         count = buses * nodes_per_bus
         self.sent = array.array("q", [0]) * (count * per_node)  # running number per identifier
-        self.expected = array.array("q", [0]) * (count * nodes_per_bus * per_node)  # by listener
+        self.expected = array.array("q", [0]) * (count * nodes_per_bus * per_node)  # by receiver
         self.free = array.array("q", [7]) * count  # bit set of free buffers
-        self.word = array.array("q", [0]) * (2 * count)  # next instant to send (ns), identifiers used
+        self.word = array.array("q", [0]) * (2 * count)  # next time to send (ns), identifiers used
 
     @cython.ccall
     @cython.exceptval(check=True)
@@ -122,7 +122,7 @@ class Load:
     @cython.cfunc
     @cython.exceptval(check=True)
     def _drain(self, bus: Bus, b: cython.longlong, n: cython.longlong, inbox: EventQueue) -> cython.void:
-        """What a node heard up to now."""
+        """Check the frames that a node has received so far."""
         sender: cython.longlong
         which: cython.longlong
         place: cython.longlong
@@ -148,7 +148,7 @@ class Load:
 def million_frames(frames: int = 1_000_000, load: float = 1.0, nodes_per_bus: int = 3) -> dict:
     """`frames` over four buses at `load`; every node checks every frame of the others.
 
-    Figures: frames, delivered, lost (asked for but not heard by every other node), out_of_order, cpu_s,
+    Figures: frames, delivered, lost (requested but not received by every other node), out_of_order, cpu_s,
     frames_per_s (of processor time), simulated_s, load_mean, times_real_time.
     """
     traffic = Load(ROBOT_BUSES, nodes_per_bus, load)

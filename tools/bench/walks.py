@@ -35,7 +35,7 @@ KEPT = (
 
 
 def walked(scenario: Scenario, steps: int) -> dict:
-    """One walk of so many steps, or until the robot falls: what is kept of its summary, frames lost, slots overrun."""
+    """One walk of `steps` steps, or until the robot falls: the kept part of its summary, frames lost, slots overrun."""
     with contextlib.closing(Ranger(scenario)) as robot:
         while not robot.run(StopRule(steps=steps), 10.0):
             pass
@@ -48,7 +48,7 @@ def walked(scenario: Scenario, steps: int) -> dict:
 
 
 def run(say: Callable[[str], None]) -> list[dict]:
-    """Walk every case of WALKS; a line each."""
+    """Walk every case of WALKS and report a line for each."""
     rows = []
     for controller, seeds, steps, roughness in WALKS:
         for seed in seeds:

@@ -88,7 +88,7 @@ def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: i
 
 
 def run(options: argparse.Namespace) -> int:
-    """Host the buses until the user has enough; then say what went over them."""
+    """Host the buses until Ctrl-C; then report their traffic."""
     speed = speed_of(options.speed)
     if len(set(options.channel)) != len(options.channel):
         raise UserError(f"bus: a name is given twice in {' '.join(options.channel)}")

@@ -6,7 +6,7 @@ from ranger_sim.harness.campaigns.cases import Case
 
 
 def proof_text(case: Case, result: dict[str, Any]) -> str:
-    """What a run came to, line by line."""
+    """The result of a run, line by line."""
     fault = result.get("fault") or {}
     lines = [
         f"{case.fault or case.settings.text()}: {result['outcome']}" + (f" ({result['why']})" if result["why"] else "")

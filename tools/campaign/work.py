@@ -1,4 +1,4 @@
-"""What `ranger-sim campaign` does once its options are read."""
+"""The work of `ranger-sim campaign` after its options are read."""
 
 import argparse
 import csv
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def check_scheduler(options: argparse.Namespace) -> None:
-    """UserError for options of a Dask scheduler that do not fit together."""
+    """UserError for options of a Dask scheduler that contradict each other."""
     if options.scheduler and options.pool == "local":
         raise UserError("--scheduler and --pool local: a scheduler is Dask's")
     given = [f"--{name.replace('_', '-')}" for name in TLS_FILES if getattr(options, name)]

@@ -1,1 +1,1 @@
-"""What all commands share: how values are typed, options as tables, the console, files written whole."""
+"""Shared by all commands: typed values, tables of options, the console, whole files."""

@@ -1,4 +1,4 @@
-"""`ranger-sim completion SHELL`: what lets a shell finish commands, options and file names, made from the parser."""
+"""`ranger-sim completion SHELL`: a script for a shell to complete commands, options and file names, from the parser."""
 
 import argparse
 import re
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 SHELLS = ("bash", "zsh", "fish")
-FILES = {"FILE", "PROFILE", "DATA", "LOG", "FIGURES", "PAGE"}  # what help calls a value that is, or may be, a file
+FILES = {"FILE", "PROFILE", "DATA", "LOG", "FIGURES", "PAGE"}  # help's names for values that are, or may be, a file
 
 
 def register(commands: Any) -> None:
@@ -21,8 +21,8 @@ def register(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print it."""
-    from ranger_sim.tools.cli import parser  # all commands, this one among them
+    """Print the script."""
+    from ranger_sim.tools.cli import parser  # all commands, including this one
 
     print(script(parser(), options.shell))
     return 0
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
 
 def script(whole: argparse.ArgumentParser, shell: str) -> str:
     """The script of a shell for a command line."""
-    import shtab  # only here
+    import shtab  # imported only here
 
     for action in actions(whole):
         kind = completed(action)
@@ -51,7 +51,7 @@ def actions(whole: argparse.ArgumentParser) -> Iterator[argparse.Action]:
 
 
 def completed(action: argparse.Action) -> str | None:
-    """FILE or DIRECTORY if the value may be one, as help calls it (`NAME|FILE.toml`, `DIR`); None for others."""
+    """FILE or DIRECTORY if the value may be one, by its name in the help (`NAME|FILE.toml`, `DIR`); None for others."""
     words = re.split(r"\W+", action.metavar if isinstance(action.metavar, str) else "")
     if "DIR" in words:
         return "DIRECTORY"

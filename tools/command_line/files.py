@@ -7,7 +7,7 @@ from ranger_sim.foundation.user_error import UserError
 
 
 def writable_folder(name: str | pathlib.Path) -> pathlib.Path:
-    """The folder, made if missing; UserError when nothing can be written there."""
+    """Return the folder, made if missing; UserError if it is not writable."""
     folder = pathlib.Path(name)
     if folder.exists() and not folder.is_dir():
         raise UserError(f"cannot write to {folder}: this is a file, a folder is needed")
@@ -21,7 +21,7 @@ def writable_folder(name: str | pathlib.Path) -> pathlib.Path:
 
 
 def json_target(option: str | None) -> pathlib.Path | None:
-    """The file that `--json` names, its folder made if missing; None without one and for `-`."""
+    """The file that `--json` names, its folder made if missing; None for `-` or without the option."""
     if option in (None, "-"):
         return None
     path = pathlib.Path(option or "")

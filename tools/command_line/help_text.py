@@ -7,7 +7,7 @@ COLUMNS = 79
 
 
 def named_lines(meanings: Mapping[str, str], width: int) -> str:
-    """Names in a column of `width` with their meanings beside them, which go on below where they are long."""
+    """Names in a column of `width`, with their meanings to the right, wrapped if long."""
     margin = " " * (width + 3)
     return "\n".join(
         textwrap.fill(f"  {name:{width}} {meaning}", COLUMNS, subsequent_indent=margin, break_on_hyphens=False)

@@ -1,4 +1,4 @@
-"""Ctrl-C, and the signals by which a system ends programs or a terminal takes its own along: they count as Ctrl-C."""
+"""Ctrl-C, and the signals by which a system ends programs or a terminal hangs up: they count as Ctrl-C."""
 
 import contextlib
 import signal
@@ -11,9 +11,9 @@ EXIT_INTERRUPTED = 130
 
 
 def end_in_order() -> None:
-    """From now on the first of them raises KeyboardInterrupt, so that files and processes are put away.
+    """From now on the first of them raises KeyboardInterrupt, so that files and processes are closed.
 
-    The second ends this process at once, and without a word.
+    The second ends this process at once, without a message.
     """
 
     def note(_number: int, _frame: FrameType | None) -> None:
@@ -24,18 +24,18 @@ def end_in_order() -> None:
 
 
 def end_at_once() -> None:
-    """From now on each of them ends this process, without a word."""
+    """From now on each of them ends this process, without a message."""
     _set(signal.SIG_DFL)
 
 
 def leave_to_parent() -> None:
-    """In a process that another one ends: from now on none of them does anything here."""
+    """In a process that its parent ends: from now on ignore all of them."""
     _set(signal.SIG_IGN)
 
 
 @contextlib.contextmanager
 def noted() -> Iterator[list[bool]]:
-    """Inside, the first of them only fills the list, so that the files are finished; the second one breaks off."""
+    """Inside, the first of them only fills the list, so that the files are finished; the second interrupts."""
     interrupted: list[bool] = []
 
     def note(_number: int, _frame: FrameType | None) -> None:
@@ -52,6 +52,6 @@ def noted() -> Iterator[list[bool]]:
 
 
 def _set(handler: Callable[[int, FrameType | None], Any] | signal.Handlers) -> dict[signal.Signals, Any]:
-    """Give them a handler, as far as they are not ignored (nohup ignores one); what they had before."""
+    """Set a handler for those that are not ignored (nohup ignores one); returns the previous handlers."""
     wanted = [each for each in ENDING if signal.getsignal(each) is not signal.SIG_IGN]
     return {each: signal.signal(each, handler) for each in wanted}

@@ -1,4 +1,4 @@
-"""A library that a command needs and that is not installed: which one, and what installs it here."""
+"""A library that a command needs and that is not installed: its name, and how to install it here."""
 
 import importlib.metadata
 import os
@@ -8,12 +8,12 @@ import sys
 
 from ranger_sim import loading
 
-# where a library is not called as the package that brings it
+# libraries whose import name differs from their package
 PACKAGES = {"can": "python-can", "elftools": "pyelftools", "google": "protobuf", "serial": "pyserial", "vcd": "pyvcd"}
 
 
 def missing(error: ModuleNotFoundError, command: str) -> str | None:
-    """What to say of a failed import, in a line; None for one that is not of a library."""
+    """The message for a failed import, in a line; None if the missing module is not a library."""
     module = (error.name or "").partition(".")[0]
     if not module or module == "ranger_sim" or module in sys.stdlib_module_names:
         return None
@@ -22,9 +22,9 @@ def missing(error: ModuleNotFoundError, command: str) -> str | None:
 
 
 def installs(package: str) -> str:
-    """The command that installs a package into this environment; all of its extra where it belongs to one.
+    """The command that installs a package into this environment, with its whole extra if it belongs to one.
 
-    `make setup` has the whole lock, but installs nothing again that it installed once.
+    `make setup` has the whole lock, but does not reinstall.
     """
     requirements, extra = _requirements(package)
     if extra and _made_by_make():
@@ -33,7 +33,7 @@ def installs(package: str) -> str:
 
 
 def _requirements(package: str) -> tuple[list[str], str]:
-    """(requirements as pip takes them, extra) of a package of ours; itself, where it is not one."""
+    """(requirements as pip takes them, extra) of a package of ours; for others, the package itself."""
     try:
         listed = importlib.metadata.requires("ranger-sim") or []
     except importlib.metadata.PackageNotFoundError:
@@ -64,5 +64,5 @@ def _made_by_make() -> bool:
 
 
 def _shown(path: str) -> str:
-    """A path from here where it is below."""
+    """A path relative to this folder if it is below it."""
     return os.path.relpath(path) if pathlib.Path(path).is_relative_to(pathlib.Path.cwd()) else path

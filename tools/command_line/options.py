@@ -1,4 +1,4 @@
-"""Options of a command as a table: the parser is made from it, and so is the command line that repeats a run."""
+"""Options of a command as a table, used to make the parser and the command line that repeats a run."""
 
 import argparse
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from ranger_sim.tools.command_line.units import Value
 
 @dataclass(frozen=True)
 class Option:
-    """One option: how it is read, and how its value is typed again.
+    """One option: how to parse it, and how to type its value again.
 
-    value: reads its text; None for a switch. repeated: may be given several times, its value is a list.
-    of_run: False for what only says what is kept or shown of a run, so that the same run comes without it.
-    always: typed again even with its default, which may be another one in a later version.
+    value: parses its text; None for a switch. repeated: may be given several times, its value is a list.
+    of_run: False if it only affects which data of a run are kept or shown, not the run itself.
+    always: typed again even with its default, which may change in a later version.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Option:
             command.add_argument(self.name, default=self.default, **settings)
 
     def typed(self, options: argparse.Namespace) -> list[str]:
-        """The words that give it the value that it has in `options`; none for what no words give."""
+        """The words that give it its value in `options`; empty if no words are needed."""
         value = getattr(options, self.key, None)
         if value is None or value is False or (value == self.default and not self.always):
             return []

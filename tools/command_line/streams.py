@@ -1,8 +1,8 @@
 """The standard streams of a command: one layer below print, rich, argparse, warnings and tracebacks.
 
-A reader that leaves (a closed terminal, `| head`) ends nothing: from then on what is written there vanishes, and the
-command finishes its files. Descriptor 1 leads to standard error, so that only Python prints on standard output: what
-a library or a program in C prints is in no result.
+A reader that closes its end (a closed terminal, `| head`) does not end the command: later output is discarded, and the
+command finishes its files. Descriptor 1 leads to standard error, so that only Python prints on standard output: output
+of a library or a program in C does not mix with results.
 """
 
 import contextlib
@@ -15,24 +15,24 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-# What a terminal, a pipe or a socket answers when nothing is at its other end, and a descriptor that was closed.
+# The errors of a terminal, a pipe or a socket without a reader, and of a closed descriptor.
 GONE = (errno.EIO, errno.EPIPE, errno.EBADF, errno.ENXIO, errno.ECONNRESET)
 OUT, ERR = 1, 2
 
-_own: Any = None  # the stream that `take_over` has made
-# Where results go while standard output is for them alone; None: `sys.stdout` takes everything.
+_own: Any = None  # the stream made by `take_over`
+# The stream for results while standard output is reserved for them; None: `sys.stdout` takes everything.
 _results: Any = None
 
 
 class PatientFile(io.FileIO):
-    """A descriptor to write to whose reader may leave; `expendable`: a full disk is no failure either."""
+    """A descriptor to write to whose reader may disconnect; `expendable`: a full disk is not a failure either."""
 
     def __init__(self, descriptor: int, expendable: bool) -> None:
         super().__init__(descriptor, "w", closefd=False)
         self.expendable = expendable
 
     def write(self, data: Any) -> int:
-        """All of it, also where the descriptor does not block; what has no reader counts as written."""
+        """Write all of it, even if the descriptor does not block; bytes without a reader count as written."""
         try:
             while (count := super().write(data)) is None:
                 select.select([], [self], [])
@@ -45,7 +45,7 @@ class PatientFile(io.FileIO):
 
 
 def is_on_disk(descriptor: int) -> bool:
-    """True for a file: an EIO of a disk loses what was to be kept."""
+    """True for a file: an EIO of a disk loses data that were to be kept."""
     try:
         return stat.S_ISREG(os.fstat(descriptor).st_mode)
     except OSError:
@@ -53,10 +53,10 @@ def is_on_disk(descriptor: int) -> bool:
 
 
 def take_over() -> bool:
-    """Give the process its two streams; False, and nothing changed, where another program has replaced them.
+    """Give the process its two streams; False, and no change, if another program has replaced them.
 
-    A descriptor that is closed at the start leads nowhere from now on (the next file would get its number, and what
-    is printed with it). A letter that the stream's encoding has not is written as its escape.
+    A descriptor that is closed at the start leads to /dev/null from now on (else the next file would get its number,
+    and all output with it). A letter that the stream's encoding lacks is written as its escape.
     """
     global _own
     if _own is not None and sys.stdout is _own:
@@ -67,8 +67,8 @@ def take_over() -> bool:
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free: this one
-    own = os.dup(OUT)  # no process that this one starts inherits it
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number: this one
+    own = os.dup(OUT)  # processes that this one starts do not inherit it
     os.dup2(ERR, OUT)
     _own = sys.stdout = sys.__stdout__ = _stream(PatientFile(own, expendable=False), sys.__stdout__)  # type: ignore[misc]
     sys.stderr = sys.__stderr__ = _stream(PatientFile(ERR, expendable=True), sys.__stderr__)  # type: ignore[misc]
@@ -76,7 +76,7 @@ def take_over() -> bool:
 
 
 def _stream(file: PatientFile, previous: Any) -> io.TextIOWrapper:
-    """A stream of text over `file` that buffers and encodes as `previous` does."""
+    """A text stream over `file` with the buffering and encoding of `previous`."""
     is_error = file.fileno() == ERR
     return io.TextIOWrapper(
         io.BufferedWriter(file),
@@ -89,7 +89,7 @@ def _stream(file: PatientFile, previous: Any) -> io.TextIOWrapper:
 
 @contextlib.contextmanager
 def results_alone() -> Iterator[None]:
-    """Inside, standard output takes what `print_result` prints; whatever else is printed goes to standard error."""
+    """Inside, standard output takes only the output of `print_result`; everything else goes to standard error."""
     global _results
     previous, _results = sys.stdout, sys.stdout
     sys.stdout = sys.stderr
@@ -105,7 +105,7 @@ def print_result(text: str) -> None:
 
 
 def result_descriptor() -> int | None:
-    """Where a process that prints this one's result is to print; None: where it prints anyway."""
+    """The descriptor on which a child process is to print this process's result; None: its usual one."""
     stream = _results if _results is not None else sys.stdout
     try:
         return int(stream.fileno())
@@ -114,7 +114,7 @@ def result_descriptor() -> int | None:
 
 
 def is_stuck() -> bool:
-    """True when standard output does not take what waits in it, as on a full disk; what waits is given up."""
+    """True when standard output does not accept its queued bytes, as on a full disk; they are discarded."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -124,7 +124,7 @@ def is_stuck() -> bool:
 
 
 def lead_nowhere(stream: Any) -> None:
-    """Let what is still written to the stream vanish."""
+    """Discard all further output to the stream."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

@@ -1,4 +1,4 @@
-"""The console that commands print on. The streams below it: streams.py."""
+"""The console that commands print on. streams.py has the streams below it."""
 
 import os
 from collections.abc import Sequence
@@ -9,21 +9,21 @@ from rich.measure import Measurement
 from rich.table import Table
 
 UNLIMITED = 10_000  # columns: more than any table of ours
-FILE_COLUMNS = 160  # of lines in a file or a pipe, where nothing is as wide as a window: tables stay whole
+FILE_COLUMNS = 160  # for lines in a file or a pipe, which have no window width: tables stay whole
 
 
 class SteadyConsole(Console):
-    """A console that never hides the cursor: a program that is suspended or killed leaves a terminal that has one."""
+    """A console that never hides the cursor: a suspended or killed program leaves the terminal with one."""
 
     def show_cursor(self, show: bool = True) -> bool:
-        """Leave it as it is."""
+        """Leave the cursor unchanged."""
         return False
 
 
 def console(**settings: Any) -> Console:
-    """A console with these settings of rich's; in a file or a pipe its lines are long, unless COLUMNS says how long.
+    """A console with these settings of rich's; in a file or a pipe its lines are long, unless COLUMNS sets a length.
 
-    What is printed is text, and [brackets] in it are brackets, unless the settings ask for rich's markup.
+    Printed strings are text, and [brackets] in them are brackets, unless the settings enable rich's markup.
     """
     made = SteadyConsole(**{"markup": False, **settings})
     if not made.is_terminal and "COLUMNS" not in os.environ:
@@ -32,9 +32,9 @@ def console(**settings: Any) -> Console:
 
 
 def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:
-    """Print a table with every line whole: in a narrow window columns of `spare` are left out, and that is told.
+    """Print a table with every line whole: in a narrow window columns of `spare` are left out, with a note.
 
-    spare: headings, the first to go first. Where that is not enough, what may wrap is wrapped.
+    spare: headings, the first to go first. If that is not enough, columns that may wrap are wrapped.
     """
     gone = []
     for heading in spare:
@@ -49,5 +49,5 @@ def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:
 
 
 def one_line(heading: str) -> str:
-    """A heading without its break and its unit's brackets."""
+    """A heading without its line break and its unit's brackets."""
     return heading.partition("\n")[0]

@@ -1,7 +1,7 @@
-"""Values as people type them on a command line (60s, 1.5km, 1mm, 70 %, 1e6): the one place that reads and limits them.
+"""Values typed on a command line (60s, 1.5km, 1mm, 70 %, 1e6): the only module that reads and limits them.
 
-Each kind of value is an argparse type. What it refuses is told with the text as typed and the limit; argparse puts
-the option's name in front. `text(value)` writes a value so that it is read back as the very same number.
+Each kind of value is an argparse type. Its errors contain the text as typed and the limit; argparse puts the option's
+name in front. `text(value)` writes a value so that it is read back as the very same number.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from ranger_sim.foundation.quantities import (
 __all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
 __all__ += ["duration_text", "figure", "length_text", "number", "quantity", "whole_number", "word"]
 
-# What starts so is a value and no option: argparse lets `--time -1s` reach its check (`-1` alone would by default).
+# Text of this form is a value, not an option: so `--time -1s` reaches its check (`-1` alone would by default).
 NEGATIVE_VALUE = re.compile(r"-(\.?\d|inf|nan)", re.IGNORECASE)
 SHOWN = 60  # letters of a typed text that a message repeats; chosen by us
 
@@ -32,22 +32,22 @@ class Value(Protocol):
     """One kind of value of the command line."""
 
     def __call__(self, text: str) -> Any:
-        """The value; argparse.ArgumentTypeError says what is wrong with the text."""
+        """The value; argparse.ArgumentTypeError describes an error in the text."""
 
     def text(self, value: Any) -> str:
         """What to type for this value."""
 
 
 def as_typed(text: str) -> str:
-    """A typed text in a message, cut to what fits there."""
+    """A typed text for a message, cut to SHOWN letters."""
     return repr(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
 
 
-@dataclass(frozen=True, eq=False)  # argparse asks for its hash, and a dict has none
+@dataclass(frozen=True, eq=False)  # argparse needs its hash, and a dict has none
 class Quantity:
-    """A number with an optional unit of `units`, in SI; `base` names what no unit means.
+    """A number with an optional unit of `units`, in SI; `base` names the unit of a number without one.
 
-    above: exclusive lower limit; least, most: inclusive ones. What is not finite is refused in any case.
+    above: exclusive lower limit; least, most: inclusive ones. Infinities and NaN are always refused.
     """
 
     units: dict[str, float] = field(default_factory=dict)
@@ -77,7 +77,7 @@ class Quantity:
         return " and ".join(parts) or "finite"
 
     def text(self, value: float) -> str:
-        """Digits that are read back as the very same number; the unit with them where 1 of it is 1 in SI."""
+        """Digits that are read back as the very same number; with the unit if 1 of it is 1 in SI."""
         return f"{value!r}{next((unit for unit, size in self.units.items() if size == 1.0), '')}"
 
 
@@ -114,7 +114,7 @@ class WholeNumber:
 
 @dataclass(frozen=True)
 class Word:
-    """A name or a path: any text but the empty one. `what` is said when it is empty."""
+    """A name or a path: any text but the empty one. `what`: its name in the error for an empty text."""
 
     what: str
 
@@ -155,7 +155,7 @@ def word(what: str) -> Word:
 
 
 def figure(value: float | None, form: str) -> str:
-    """A figure as `form` says ("{:.3f} m"); "none" for one that there is not."""
+    """A figure formatted by `form` ("{:.3f} m"); "none" for None."""
     return "none" if value is None else form.format(value)
 
 

@@ -10,9 +10,9 @@ from ranger_sim.tools.command_line import interrupts
 
 @contextlib.contextmanager
 def workers(jobs: int) -> Iterator[Callable]:
-    """A `map` that runs in so many processes; 1: here. They end when this is left, in the middle of their work as well.
+    """A `map` that runs in `jobs` processes; 1: in this one. They end with the context, even in the middle of work.
 
-    Ctrl-C is for the process that waits for them.
+    Ctrl-C is handled by the process that waits for them.
     """
     if jobs == 1:
         yield map

@@ -1,1 +1,1 @@
-"""`ranger-sim compare-walk`: a walk that the robot logged beside the walk of the emulated robot with its controller."""
+"""`ranger-sim compare-walk`: compare a walk logged by the robot with one of the emulated robot with its controller."""

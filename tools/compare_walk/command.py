@@ -1,4 +1,4 @@
-"""`ranger-sim compare-walk`: its options. What it does stands in work.py, with the libraries that it needs."""
+"""`ranger-sim compare-walk`: its options. Its work is in work.py, with the libraries that it needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `ranger-sim compare-walk` does: read, walk, compare, name, write."""
+"""The work of `ranger-sim compare-walk`: read, walk, compare, name, write."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ EXTENDED = ("extended-body.toml", "extended-model.toml", "extended-controller.to
 
 
 def run(options: argparse.Namespace) -> int:
-    """0 alike, 1 different."""
+    """Compare; 0 alike, 1 different."""
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)
     console = terminal.console(stderr=True, quiet=options.json == "-")
@@ -293,7 +293,7 @@ def write(answer: dict[str, Any], scenario: Scenario, folder: pathlib.Path) -> l
 
 
 def tell(answer: dict[str, Any], console: Console) -> None:
-    """The answer on the screen."""
+    """Print the answer."""
     extended = answer.get("extended_features") if answer["causes"] else None
     table = Table(
         title=f"{answer['log']}, strides {', '.join(map(str, answer['steady']))}, beside {answer['controller']}"

@@ -1,4 +1,4 @@
-"""`ranger-sim diagnose`: its options. What it does stands in work.py, which needs libraries that a walk does not."""
+"""`ranger-sim diagnose`: its options. Its work is in work.py, which needs libraries that a walk does not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of `ranger-sim diagnose`: what is wrong, where it shows, how sure that is, and what to look at."""
+"""The page of `ranger-sim diagnose`: the fault, where it shows, how certain it is, and what to check."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ranger_sim.tools.report.figures import library
 
 HERE = pathlib.Path(__file__).parent
 MOST_RIVALS = 6
-NOTABLE = 0.02  # of a regime's residual that repeats: what lies below is one of the many that chance makes
+NOTABLE = 0.02  # of a regime's residual that repeats: lower shares occur by chance
 
 
 def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = None) -> str:
-    """The page as text. command: that repeats it; files: {name: what it is} that stand beside the page."""
+    """The page as text. command: repeats the diagnosis; files: {name: description} of files next to the page."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=jinja2.select_autoescape(["j2"]),
@@ -67,13 +67,13 @@ def breakable(identifier: str) -> Markup:
 
 
 def named(found: Diagnosis) -> list[tuple[Named, dict[str, Any]]]:
-    """The named effects with what the answer says of each; none when it abstains."""
+    """The named effects with the answer's entry for each; empty when it abstains."""
     causes = found.answer["causes"]
     return list(zip(found.named, causes, strict=True)) if len(found.named) == len(causes) else []
 
 
 def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[str, figures.Sides]) -> dict[str, Any]:
-    """Everything that the page tells of one cause."""
+    """All data on the page about one cause."""
     rivals = sorted(cause["evidence"]["behind"].items(), key=lambda pair: pair[1])[:MOST_RIVALS]
     tied = {tie.name: tie for tie in each.tied}
     looks = {each.effect.name: inspection.look_at(cause["name"], cause["at"])}
@@ -129,7 +129,7 @@ def amplitude(found: Diagnosis, each: Named) -> dict[str, float] | None:
 
 
 def parameters(found: Diagnosis) -> list[dict[str, Any]]:
-    """The machine's own parameters: as the simulation has them and as fitted."""
+    """The machine's own parameters: simulated and fitted values."""
     values = found.answer["evidence"]["parameters"]
     known = {each.name: each for each in found.machine.parameters}
     impossible = found.answer["evidence"]["impossible"]

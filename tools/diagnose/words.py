@@ -1,4 +1,4 @@
-"""What a diagnosis says, in sentences: the same on the console, in the page, and for whoever repairs the machine."""
+"""The sentences of a diagnosis: the same on the console, in the page, and for the person who repairs the machine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ranger_sim.sysid.naming import PAYS, TIE
 
 
 def sentence(found: Diagnosis) -> str:
-    """What is wrong, in one sentence."""
+    """The fault, in one sentence."""
     answer = found.answer
     name = found.machine.name
     if doubts(answer):
@@ -51,7 +51,7 @@ def doubted(answer: dict[str, Any]) -> str:
 
 
 def verdict(answer: dict[str, Any]) -> tuple[str, str]:
-    """(class, headline) of the page."""
+    """(class, headline) for the page."""
     if not answer["detected"]:
         return "sound", "Nothing found"
     if doubts(answer):
@@ -63,7 +63,7 @@ def verdict(answer: dict[str, Any]) -> tuple[str, str]:
 
 
 def told(found: Diagnosis) -> str:
-    """What is wrong in one sentence of plain words, for the top of the page."""
+    """The fault in one sentence of plain words, for the top of the page."""
     answer = found.answer
     if doubts(answer):
         text = doubted(answer)
@@ -98,14 +98,14 @@ def meaning(found: Diagnosis, cause: dict[str, Any]) -> str:
 
 
 def standing(behind: float) -> str:
-    """How far a rival that is no tie is behind, in words; the limits are those of the naming."""
-    if behind < TIE:  # and no tie: the naming asks whether the value can be
+    """How far a rival that is not a tie is behind, in words; the limits are those of the naming."""
+    if behind < TIE:  # and not a tie: the naming checks whether the value is possible
         return "as near, with a value that no machine has"
     return "close" if behind < PAYS else "behind"
 
 
 def next_steps(found: Diagnosis) -> list[str]:
-    """What to measure next; where the diagnosis proposes nothing of its own, what its outcome asks for."""
+    """The next measurements; if the diagnosis proposes none, those that follow from its outcome."""
     answer = found.answer
     steps = list(answer["next_experiment"])
     if steps and not answer["abstained"]:

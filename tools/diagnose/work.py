@@ -1,4 +1,4 @@
-"""The work of `ranger-sim diagnose`: what the simulation gets wrong about measured data, and what mending it gains."""
+"""The work of `ranger-sim diagnose`: errors of the simulation against measured data, and the gain from fixing them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from ranger_sim.tools.recordings import datasets
 
 EXIT_CLEAN, EXIT_FOUND = 0, 1
 MOST_GAPS = 4  # more of them are one line on a screen; report and JSON have all
-LEAST_ROWS = 50  # below, filters are longer than the data; what says anything has some hundreds
+LEAST_ROWS = 50  # below, filters are longer than the data; useful data have some hundreds
 
 
 def run(options: argparse.Namespace) -> int:
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         TimeElapsedColumn(),
         console=screen,
         transient=True,
-        disable=not screen.is_terminal,  # a file or a pipe gets the answer and nothing else
+        disable=not screen.is_terminal,  # a file or a pipe gets only the answer
     )
     with bar:
         task = bar.add_task("recordings", total=1.0)
@@ -75,7 +75,7 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
         replace_file(path, model_file.model_text(found).encode())
         found.answer["model_file"] = str(path)
         for each in model_file.effects_found(found):
-            if each.term is None and found.machine.name in ROBOT:  # others have simulators of their own
+            if each.term is None and found.machine.name in ROBOT:  # other machines have their own simulators
                 found.answer["evidence"].setdefault("without_form", []).append(
                     {"name": each.known.cause, "at": each.known.at, "reason": each.no_form}
                 )
@@ -85,7 +85,7 @@ def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
 
 
 def of_options(options: argparse.Namespace, progress: Progressed = lambda what, share: None) -> Diagnosis:
-    """The diagnosis that a command line asks for."""
+    """The diagnosis for a command line."""
     machine = machine_of(options.experiment, options.gear)
     known = model_file.read(options.model, machine).effects if options.model else []
     experiment, accepted = options.experiment, options.accept_loss
@@ -102,7 +102,7 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
 
 @dataclasses.dataclass(frozen=True)
 class Prepared:
-    """A recording ready for work: its table, what is odd in it, what was repaired, and what became of its samples."""
+    """A prepared recording: its table, its anomalies, its repairs, and the fate of its samples."""
 
     table: Table
     findings: list[Finding]
@@ -130,7 +130,7 @@ def _parted(data: Sequence[Prepared], part: float) -> tuple[list[Prepared], list
 def answer(
     files: Sequence[str], holdout: Sequence[str], experiment: str, holdout_part: float | None = None
 ) -> dict[str, Any]:
-    """What `--json` prints, for programs: files and held-out files, or a part of each, of one experiment."""
+    """The output of `--json`, for programs: files and held-out files, or a part of each, of one experiment."""
     machine = machine_of(experiment)
     data, held = (
         [prepared(datasets.open_recording(path), machine, experiment) for path in each] for each in (files, holdout)
@@ -261,7 +261,7 @@ def _diagnosed(
 
 
 def _no_number(value: Any, place: str = "") -> str:
-    """Where in an answer the first number is that is none; empty without such."""
+    """The place of the first value in an answer that is not a finite number; empty if there is none."""
     if isinstance(value, float):
         return "" if np.isfinite(value) else place
     inside = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
@@ -273,7 +273,7 @@ def _json(answer: Mapping[str, Any]) -> str:
 
 
 def _show(found: Diagnosis, console: Console) -> None:
-    """The answer for a person."""
+    """Print the answer."""
     answer = found.answer
     console.print(words.sentence(found), highlight=False, soft_wrap=True)
     for name in answer["evidence"]["impossible"]:
@@ -291,7 +291,7 @@ def _show(found: Diagnosis, console: Console) -> None:
         )
         findings.append({"recording": longest["recording"], "channel": "", "text": text})
     for word, lines in (("data", findings), ("repaired", answer["data_repairs"])):
-        together: dict[tuple[str, str], list[str]] = {}  # what is said of several channels alike is one line
+        together: dict[tuple[str, str], list[str]] = {}  # identical findings of several channels are one line
         for each in lines:
             together.setdefault((each["recording"], each["text"]), []).append(each["channel"])
         for (recording, text), channels in together.items():

@@ -1,4 +1,4 @@
-"""`ranger-sim diagnose-figures`: its options. What it does stands in work.py, whose libraries a walk does not need."""
+"""`ranger-sim diagnose-figures`: its options. Its work is in work.py, whose libraries a walk does not need."""
 
 import argparse
 from typing import Any

@@ -1,4 +1,4 @@
-"""The simulator of a diagnosis from figures: walks of the emulated robot, and what they showed."""
+"""The simulator of a diagnosis from figures: walks of the emulated robot, and their results."""
 
 import contextlib
 import dataclasses
@@ -23,7 +23,7 @@ LEAST_STEPS = 20  # that a walk is asked for: the summary leaves five of them ou
 PATIENCE_S, PATIENCE_S_PER_STEP = 10.0, 1.8
 STORE = "walks.json"
 
-# name: unit, what it is. Those of a bench need no walk: they are the body's numbers, as somebody would measure them.
+# name: unit, meaning. Those of a bench need no walk: they are the body's numbers as a measurement would give them.
 WALK_FIGURES = {
     "step_length_m": ("m", "mean length of a step"),
     "step_time_s": ("s", "mean time of a step"),
@@ -109,7 +109,7 @@ class Setup:
 
 
 class Walks:
-    """The simulator: outcomes of points, in so many processes; `folder` keeps them, by version and settings."""
+    """The simulator: outcomes of points, in parallel processes; `folder` keeps them, by version and settings."""
 
     def __init__(
         self, setup: Setup, candidates: Sequence[Candidate], jobs: int = 1, folder: pathlib.Path | None = None
@@ -168,7 +168,7 @@ class Order:
     settle_steps: int
 
     def key(self, of_version: str) -> str:
-        """By this its outcome is known."""
+        """The key under which its outcome is stored."""
         return Case(self.settings).key(of_version, {"steps": self.steps, "settle_steps": self.settle_steps})
 
 
@@ -213,7 +213,7 @@ def of_walk(summary: Mapping[str, Any], returned_W: float) -> dict[str, float]:
 
 
 def of_bench(body: BodyParameters) -> dict[str, float]:
-    """What benches would show of a body; means of the legs."""
+    """Results that benches would measure on a body; means of the legs."""
     radius = 0.5 * (body.outer_foot_radius_m + body.inner_foot_radius_m)
     height = radius - 0.5 * (body.outer_ankle_offset_m + body.inner_ankle_offset_m)
     moment = 0.5 * (body.outer_mass_moment_kg_m + body.inner_mass_moment_kg_m)

@@ -1,1 +1,1 @@
-"""Firmware of one's own on a command line: in C, as an image of the chip, with a debugger."""
+"""A user's firmware on the command line: in C, as an image for the chip, with a debugger."""

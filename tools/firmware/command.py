@@ -82,10 +82,10 @@ def register(commands: Any) -> None:
 
 
 def run_build(options: argparse.Namespace) -> int:
-    """Build, and print warnings and the library's place."""
+    """Build, and print warnings and the library's path."""
     if options.target == "lpc2194":
         return run_build_image(options)
-    if options.sanitize and not sanitizers.is_ready():  # a library is looked at when it is built: loaded
+    if options.sanitize and not sanitizers.is_ready():  # a built library is loaded for a check
         return run_sanitized(options, [options.folder])
     firmware = native_boards.build(options.folder, options.sanitize, options.coverage)
     _tell(firmware.warnings)
@@ -94,14 +94,14 @@ def run_build(options: argparse.Namespace) -> int:
 
 
 def _tell(warnings: Sequence[str]) -> None:
-    """The compiler's warnings, a line each."""
+    """Print the compiler's warnings, a line each."""
     console = terminal.console(stderr=True)
     for line in warnings:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def run_build_image(options: argparse.Namespace) -> int:
-    """Build for the chip, and print warnings, sizes and the image's places."""
+    """Build for the chip, and print warnings, sizes and the image's paths."""
     if options.sanitize or options.coverage:
         asked = "--sanitize" if options.sanitize else "--coverage"
         raise UserError(f"{asked}: only on this computer, not with --target {options.target}")
@@ -116,13 +116,13 @@ def run_build_image(options: argparse.Namespace) -> int:
 
 
 def run_include(options: argparse.Namespace) -> int:
-    """For editors, and for compilers of the chip."""
+    """Print the include folder, for editors and for compilers of the chip."""
     print(" ".join(f"-I{folder}" for folder in native_boards.include_folders()))
     return 0
 
 
 def wants_another_process(options: argparse.Namespace) -> bool:
-    """True when --sanitize is asked for in a process that cannot hold sanitizers: `run_sanitized` makes one."""
+    """True when --sanitize is requested in a process that cannot load sanitizers: `run_sanitized` starts one."""
     if not options.sanitize:
         return False
     if not options.firmware:
@@ -136,7 +136,7 @@ def folders_of(options: argparse.Namespace) -> list[str]:
 
 
 def programs_in(folders: list[str]) -> list[sanitizers.Program]:
-    """Every library that was built in the folders."""
+    """Every library built in the folders."""
     return [
         sanitizers.Program(library, pathlib.Path(folder))
         for folder in dict.fromkeys(folders)
@@ -145,7 +145,7 @@ def programs_in(folders: list[str]) -> list[sanitizers.Program]:
 
 
 def coverage_lines(summary: dict) -> list[str]:
-    """How much of each program ran, and which lines did not."""
+    """How much of each program ran, and which of its lines did not."""
     lines = []
     for board, each in summary["firmware"].items():
         ran = each["coverage"]
@@ -161,12 +161,12 @@ def coverage_lines(summary: dict) -> list[str]:
 
 
 def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
-    """The same command in a process that can hold sanitizers; tells what they found, also when it ended by a signal."""
+    """Run the command in a process that can load sanitizers; report their findings, even if it ended by a signal."""
     with tempfile.TemporaryDirectory(prefix="ranger-sim-findings-") as logs:
         place = pathlib.Path(logs)
         command = [sys.executable, "-m", "ranger_sim", *options.arguments]
         parent = os.getpid()
-        # Ctrl-C, and the end of the terminal, come to the run as well, which ends itself.
+        # Ctrl-C and the terminal's hang-up also reach the run, which ends itself.
         before = {each: signal.signal(each, signal.SIG_IGN) for each in (signal.SIGINT, signal.SIGHUP)}
         run = subprocess.Popen(
             command,
@@ -190,7 +190,7 @@ def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
 
 
 def _begin(parent: int, handlers: dict[signal.Signals, Any]) -> None:
-    """In the new process: Ctrl-C reaches it, and it does not outlive the one that waits for it."""
+    """In the new process: Ctrl-C reaches it, and it does not outlive the waiting parent."""
     for each, handler in handlers.items():
         signal.signal(each, handler)
     kernel.die_with_parent(parent)

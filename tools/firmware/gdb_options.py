@@ -1,4 +1,4 @@
-"""`--gdb`: a debugger at a board of a robot that walks."""
+"""`--gdb`: a debugger connected to a board of a walking robot."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ ALLOW_NETWORK = Option(
 
 
 def never() -> bool:
-    """Nobody ends the waiting from here: each board's process is told by its supervisor."""
+    """Return False: the wait does not end from here, because each board's supervisor ends its process."""
     return False
 
 
 def line(door: GdbServer) -> str:
-    """How gdb finds a door."""
+    """The line that tells the user how to connect gdb to a port."""
     host = "" if door.host == "127.0.0.1" else door.host
     open_to_all = (
         "" if loopback(door.host) else ", open to the network: whoever reaches it may do anything to the board"
@@ -53,16 +53,16 @@ def line(door: GdbServer) -> str:
 def debuggers(
     robot: Ranger, options: argparse.Namespace, ends: Callable[[], bool], console: Console
 ) -> Iterator[list[GdbServer]]:
-    """Inside, the doors that were asked for; at the end a line for whoever was sent away.
+    """Open the requested debugger ports inside the context; at the end print a line for each refused client.
 
-    UserError for boards and ports that cannot be had.
+    UserError for boards and ports that are not available.
     """
     if not options.gdb:
         if options.allow_network and not hasattr(options, "socketcand"):
             raise UserError("--allow-network: nothing would listen there; give --gdb BOARD=HOST:PORT with it")
         yield []
         return
-    from ranger_sim.harness.firmware.debuggers import (  # sockets and all: only where they are wanted
+    from ranger_sim.harness.firmware.debuggers import (  # sockets are imported only when needed
         close_doors,
         open_doors,
     )

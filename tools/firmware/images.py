@@ -1,4 +1,4 @@
-"""`--image` of walk and up: firmware images in boards' places."""
+"""`--image` of walk and up: firmware images that replace boards' programs."""
 
 import argparse
 import pathlib
@@ -21,7 +21,7 @@ OPTIONS = (IMAGE,)
 
 
 def images_of(options: argparse.Namespace) -> dict[str, Image]:
-    """The images that were asked for, by board, read."""
+    """Read the requested images, by board."""
     wanted: dict[str, str] = {}
     for text in options.image:
         board, path = image_boards.placed(text)

@@ -1,4 +1,4 @@
-"""The body as another simulator sees it: parameters, inputs, steps, outputs. Knows nothing of FMI.
+"""The body's interface for another simulator: parameters, inputs, steps, outputs. It does not depend on FMI.
 
 Inputs are what the boards put out: the match registers of each motor's PWM unit, its low-side enables, and whether its
 watchdog line moves. Outputs are what the sensors show at the end of a step, and the body itself. One step of the plant
@@ -181,13 +181,13 @@ class ExportedBody:
         self.values[name] = value
 
     def get(self, name: str) -> Any:
-        """The value of a variable now. UserError when the parameters are none of a body."""
+        """The value of a variable now. UserError when the parameters do not describe a possible body."""
         if self.changed:
             self.begin()
         return self.values[name]
 
     def begin(self) -> None:
-        """The body in its pose at time 0, by the parameters. UserError for what they cannot be."""
+        """Put the body in its pose at time 0, by the parameters. UserError for impossible parameters."""
         values = self.values
         of_body = {key: values[f"body.{key}"] for key in body_files.keys()}
         faults = [fault for key, value in of_body.items() if (fault := fault_of(body_files.keys()[key], value))]
@@ -229,9 +229,9 @@ class ExportedBody:
         self._look()
 
     def steps_in(self, time_s: float, length_s: float, start_s: float) -> int:
-        """Steps of the plant from `time_s` on. UserError when that is no whole number, or not where the body is."""
+        """Steps of the plant from `time_s` on. UserError if not whole, or if the body is at another time."""
         here = start_s + self.steps * STEP_S
-        if not abs(time_s - here) <= NEAR_S:  # also what is no number
+        if not abs(time_s - here) <= NEAR_S:  # also true of NaN
             raise UserError(f"a step from {time_s:.9g} s is asked for, the body is at {here:.9g} s")
         count = round(length_s / STEP_S) if math.isfinite(length_s) else 0
         if count < 1 or abs(length_s - count * STEP_S) > NEAR_S:
@@ -242,7 +242,7 @@ class ExportedBody:
         return count
 
     def advance(self, count: int) -> bool:
-        """So many steps with the inputs as they are; False, and nothing moves any more, when the body has fallen."""
+        """Advance by `count` steps with the present inputs; False, and no further motion, when the body has fallen."""
         if self.changed:
             self.begin()
         plant = self.plant
@@ -257,7 +257,7 @@ class ExportedBody:
         return not plant.fell
 
     def _act(self, plant: RangerPlant) -> None:
-        """The inputs at the begin of a step."""
+        """Apply the inputs at the begin of a step."""
         values, now = self.values, plant.time_ns
         if self.holding and not values["held.now"]:
             self.holding = False
@@ -280,7 +280,7 @@ class ExportedBody:
                 plant.imu.receive_byte(now, byte)
 
     def _look(self) -> None:
-        """What the sensors show now, and the body."""
+        """Read the sensors and the body's state."""
         plant, values = self.plant, self.values
         assert plant is not None
         for name, volts in zip(ANALOG_NAMES, plant.analog_end, strict=True):

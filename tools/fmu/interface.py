@@ -59,7 +59,7 @@ def connect(slave: Any, text: str) -> None:
     for name in sorted({"s", *(each.unit for each in body.quantities.values() if each.unit)}):
         found, factor = exponents(name)
         slave.register_units([Unit(name, factor=factor, **found)])
-    # the same body, the same token: who has the unit already sees that
+    # same body, same token: an importer of the unit already sees that
     slave.guid = hashlib.blake2b(f"{__version__}\n{text}".encode(), digest_size=16).hexdigest()
 
 

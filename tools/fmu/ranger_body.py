@@ -1,8 +1,8 @@
 """The functional mock-up unit: `body.ExportedBody` behind pythonfmu3. This file itself goes into the unit.
 
-There it stands in `resources`, with `given.json` beside it (start values of the parameters) and pythonfmu3's own
-files; ranger_sim is what is installed on the machine that runs it. Its constructor must not raise: pythonfmu3 0.3.4
-crashes the importer then. So what goes wrong there is told by the first call that may fail.
+The unit holds it in `resources`, with `given.json` (start values of the parameters) and pythonfmu3's own files;
+ranger_sim is the version installed on the machine that runs it. Its constructor must not raise: pythonfmu3 0.3.4
+crashes the importer then. So the first call that may fail reports an error of the constructor.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GIVEN = "given.json"
 
 
 class _Unusable(dict):
-    """In place of the variables of a unit that could not be made: whoever asks for one is told why."""
+    """Replaces the variables of a unit that could not be made: reading one raises the reason."""
 
     def __init__(self, fault: str) -> None:
         super().__init__()
@@ -60,12 +60,12 @@ class RangerBody(Fmi3Slave):  # type: ignore[misc]  # from a library without typ
         self.start_s = start_time
 
     def enter_initialization_mode(self) -> None:
-        """The place to say that it cannot be used."""
+        """Fail here if the unit is unusable."""
         if self.fault:
             raise RuntimeError(self.fault)
 
     def exit_initialization_mode(self) -> None:
-        """The parameters are what they will be."""
+        """End the setting of parameters: their values are final."""
         self.body.begin()
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:

@@ -1,6 +1,6 @@
 """`ranger-sim identify BENCH`: parameters from a bench's recording, with intervals; `all`: tables 2 and 3.
 
-What does it is imported when it is asked for: a first walk needs no scipy.
+Its work is imported when needed: a first walk needs no scipy.
 """
 
 import argparse
@@ -9,7 +9,7 @@ from typing import Any
 from ranger_sim.tools.command_line.units import number, whole_number
 from ranger_sim.tools.recordings import datasets
 
-# as sysid/identify/registry.py has them; a test holds both together
+# the same as in sysid/identify/registry.py; a test compares them
 BENCHES = {
     "stall": "Motor held: resistance and contact drop",
     "cantilever": "Motor against a brake: torque constant, and all of table 3 at once",
@@ -59,7 +59,7 @@ def register(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify and tell; 1 when a fit was refused."""
+    """Identify and report; 1 when a fit was refused."""
     from ranger_sim.tools.identify import work
 
     return work.run(options)

@@ -1,6 +1,6 @@
-"""What `ranger-sim identify` does.
+"""The work of `ranger-sim identify`.
 
-Without --data the virtual bench records, and the truth stands beside what was found.
+Without --data the virtual bench records, and results are shown next to the true values.
 """
 
 import argparse
@@ -41,10 +41,10 @@ UNEXPLAINED_TEXT = (
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify and tell; 1 when a fit was refused."""
+    """Identify and report; 1 when a fit was refused."""
     target = files.json_target(options.json)
     folder = files.writable_folder(options.out) if options.out else None
-    # with --json - the JSON is all that standard output gets
+    # with --json - standard output gets only the JSON
     console = terminal.console(markup=True, highlight=False, stderr=options.json == "-")
     if options.gear <= 0.0 or not math.isfinite(options.gear):
         raise UserError(f"--gear {options.gear!r}: it must be above 0")
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def write(told: dict, options: argparse.Namespace, target: pathlib.Path | None) -> None:
-    """The JSON where --json wants it."""
+    """Write the JSON to the target of --json."""
     if options.json is None:
         return
     text = json.dumps(told, indent=2, allow_nan=False)
@@ -105,7 +105,7 @@ def known_of(text: str) -> Parameter:
 
 
 def machine_with(options: argparse.Namespace, console: Console) -> coverage.Machine:
-    """The robot that the virtual benches measure, with the terms of --model; what a bench does not have is told."""
+    """The robot that the virtual benches measure, with the terms of --model; reports terms that a bench lacks."""
     if options.model is None:
         return coverage.ROBOT
     if options.data is not None:
@@ -125,15 +125,15 @@ def machine_with(options: argparse.Namespace, console: Console) -> coverage.Mach
 def recorded(
     name: str, path: pathlib.Path, mapping: dict[str, str], console: Console, accepted: float = losses.ACCEPTED
 ) -> Dataset:
-    """A user's recording of a bench; what is odd in a series of samples is reported.
+    """A user's recording of a bench; anomalies in a series of samples are reported.
 
-    accepted: share of a channel's samples that may be lost. UserError when more is.
+    accepted: share of a channel's samples that may be lost. UserError if more are.
     """
     data = readers.read(path, mapping)
     if name in ("pendulum", "ankle-sine"):  # the others are single readings
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(str(path), findings)
-        if name == "ankle-sine":  # the legs of a pendulum may each have stamps of their own
+        if name == "ankle-sine":  # the legs of a pendulum may have separate stamps
             data = repairs.mend(data, findings, [each for each in data.channels if each.startswith(("target", "cmd"))])
         for finding in data.findings if name == "ankle-sine" else findings:
             if finding.severity != "note":
@@ -145,7 +145,7 @@ def recorded(
 def identify_one(
     options: argparse.Namespace, machine: coverage.Machine, known: list[Parameter], console: Console
 ) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
-    """One bench: recordings, what to tell, fits by title."""
+    """One bench: recordings, report, fits by title."""
     bench = bench_of(options.bench)
     tell = before(console)
     if options.data is not None:
@@ -208,7 +208,7 @@ def identify_all(
 
 
 def before(console: Console) -> Any:
-    """What is printed before each fit: identifiability."""
+    """Printed before each fit: identifiability."""
     return lambda line: console.print(f"[dim]{escape(line)}[/dim]")
 
 
@@ -218,7 +218,7 @@ def asked(names: Iterable[str]) -> list[str]:
 
 
 def print_fit(console: Console, found: Fit, truth: dict[str, float]) -> None:
-    """A table of the machine's parameters, or why there is none."""
+    """A table of the machine's parameters, or the reason for its absence."""
     if found.refused:
         console.print(f"[red]refused[/red]: {escape(found.refused)}")
         for name in asked(found.names):
@@ -306,7 +306,7 @@ def csv_of(data: Dataset) -> str:
 
 
 def run_coverage(options: argparse.Namespace, console: Console) -> dict:
-    """N machines by the virtual benches: intervals counted, beside what a binomial allows."""
+    """N machines on the virtual benches: intervals counted, compared with the limits of a binomial."""
     if options.coverage < 1 or options.data is not None or options.model is not None or options.bench != ALL:
         raise UserError("--coverage N: N must be 1 or more, of the bench all, without --data and --model")
     bar = Progress(

@@ -1,1 +1,1 @@
-"""`ranger-sim new`: a project for a machine of one's own. What it writes are the `.j2` files beside this one."""
+"""`ranger-sim new`: a project for a user's own machine, written from the `.j2` files in this package."""

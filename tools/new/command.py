@@ -1,4 +1,4 @@
-"""`ranger-sim new DIR`: a project for a machine of one's own, whose first test passes at once."""
+"""`ranger-sim new DIR`: a project for a user's own machine, whose first test passes at once."""
 
 import argparse
 import pathlib
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def check(folder: pathlib.Path) -> None:
-    """UserError for a place at which something is."""
+    """UserError for an existing file or link, or a folder that is not empty."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise UserError(f"new {folder}: it is there already and is no folder")
     if folder.is_dir() and any(folder.iterdir()):
@@ -88,7 +88,7 @@ def write(project: pathlib.Path, name: str) -> None:
 
 
 def take_over(project: pathlib.Path, folder: pathlib.Path) -> None:
-    """The finished project becomes `folder`; into an empty one, in which a shell may stand, its parts move."""
+    """Rename the project to `folder`; into an empty one, in which a shell may be running, move its parts."""
     if not folder.exists():
         project.rename(folder)
         return

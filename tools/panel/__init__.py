@@ -1,1 +1,1 @@
-"""`ranger-sim panel`: RoboDAQ and the robot's front panel in a browser (README.md has the room's plan)."""
+"""`ranger-sim panel`: RoboDAQ and the robot's front panel in a browser (README.md has the package's design)."""

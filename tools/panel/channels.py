@@ -1,8 +1,8 @@
-"""Channels as the page plots them: what one is, a memory of bounded size for a running robot, and fewer points.
+"""Channels as the page plots them: their description, a bounded memory for a running robot, and decimation.
 
-A plot has some thousand pixels and an hour of 500 Hz has 1.8 million samples. So time is cut into buckets of equal
-width, which begin at whole multiples of it, and of each the lowest and highest value is shown: no spike is lost, and
-nothing flickers when the window moves on.
+A plot has some thousand pixels and an hour of 500 Hz has 1.8 million samples. So time is divided into buckets of equal
+width, which begin at whole multiples of it, and the plot shows the lowest and highest value of each: no spike is lost,
+and nothing flickers when the window moves on.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 Times = NDArray[np.float64]
 Values = NDArray[np.float32]
 
-# Of a running robot: every sample of the last minute, and extremes of so long (s) for so long (s). Chosen by us: a
-# window of an hour has fewer columns of pixels. The 436 channels of Ranger are 105 MB fine and 67 MB in extremes.
+# Of a running robot: every sample of the last minute, and extremes over these widths (s) for these times (s). Chosen by
+# us: a window of an hour has fewer columns of pixels. The 436 channels of Ranger are 105 MB fine and 67 MB in extremes.
 FINE_S = 60.0
 COARSE_S = ((0.1, 600.0), (1.0, 3600.0))
-GAP_PERIODS = 2.5  # so many usual periods without a sample are a gap
+GAP_PERIODS = 2.5  # this many usual periods without a sample are a gap
 
 
 @dataclasses.dataclass(frozen=True)
 class Channel:
-    """One quantity. group: whose it is (a board, or the body). states: names of its numbers, if it is a state."""
+    """One quantity. group: its owner (a board, or the body). states: names of its numbers, if it is a state."""
 
     name: str
     unit: str
@@ -34,13 +34,13 @@ class Channel:
     states: dict[int, str] = dataclasses.field(default_factory=dict)
 
     def content(self) -> dict[str, Any]:
-        """As the page gets it."""
+        """Its description for the page."""
         return dataclasses.asdict(self)
 
 
 @dataclasses.dataclass(frozen=True)
 class Trace:
-    """What a plot draws of one channel. x, low, high: (n,), NaN in low and high where there is a gap.
+    """The plotted points of one channel. x, low, high: (n,), NaN in low and high where there is a gap.
 
     high is None: low holds the samples themselves.
     """
@@ -54,12 +54,12 @@ EMPTY = Trace(np.empty(0), np.empty(0, np.float32), None)
 
 
 def thinned(times: Times, values: Values, begin: float, end: float, points: int, period: float | None) -> Trace:
-    """The samples from `begin` to `end` (s) in at most `points` buckets, or as they are where they are few.
+    """The samples from `begin` to `end` (s) in at most `points` buckets, or unchanged if they are few.
 
-    times (n,), rising; values (n,). period: usual distance of two samples; None: the value stands until the next one.
+    times (n,), rising; values (n,). period: usual distance of two samples; None: the value holds until the next one.
     """
     first, last = np.searchsorted(times, (begin, end))
-    first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines go on beyond the edge
+    first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines continue beyond the edge
     times, values = times[first:last], values[first:last]
     if len(times) == 0 or end <= begin or points < 1:
         return EMPTY
@@ -81,7 +81,7 @@ def thinned(times: Times, values: Values, begin: float, end: float, points: int,
 
 
 def _bridged(values: Values, width: float, period: float) -> Values:
-    """Buckets that are empty for less than a gap have the value before them."""
+    """Fill buckets that are empty for less than a gap with the value before them."""
     there = ~np.isnan(values)
     before = np.maximum.accumulate(np.where(there, np.arange(len(values)), 0))
     near = (np.arange(len(values)) - before) * width < GAP_PERIODS * period
@@ -89,7 +89,7 @@ def _bridged(values: Values, width: float, period: float) -> Values:
 
 
 def _with_gaps(times: Times, values: Values, period: float) -> Trace:
-    """Every sample, and a point of nothing in every gap."""
+    """Every sample, and a NaN point in every gap."""
     gaps = np.flatnonzero(np.diff(times) > GAP_PERIODS * period)
     x = np.insert(times, gaps + 1, times[gaps] + period)
     low = np.insert(values, gaps + 1, np.float32(np.nan))
@@ -97,12 +97,12 @@ def _with_gaps(times: Times, values: Values, period: float) -> Trace:
 
 
 def _standing(times: Times, values: Values, begin: float, end: float, points: int) -> Trace:
-    """A quantity that is told when it changes: steps, from the samples around and in the window."""
+    """A quantity sampled on change: steps, from the samples around and in the window."""
     if len(times) <= points:
-        final = np.append(np.diff(times) > 0, True)  # of several at one instant
+        final = np.append(np.diff(times) > 0, True)  # of several at one time
         times, values = times[final], values[final]
         x = np.repeat(times, 2)[1:]
-        x[1::2] = np.nextafter(x[1::2], -np.inf)  # the value before: a plot has one point at an instant
+        x[1::2] = np.nextafter(x[1::2], -np.inf)  # the value before: a plot has one point per time
         low = np.repeat(values, 2)[:-1]
         if times[-1] < end:
             x, low = np.append(x, end), np.append(low, values[-1])
@@ -110,7 +110,7 @@ def _standing(times: Times, values: Values, begin: float, end: float, points: in
     width = (end - begin) / points
     edges = np.floor(begin / width) * width + np.arange(points + 2) * width
     at = np.searchsorted(times, edges, side="right")
-    before = np.clip(at[:-1] - 1, 0, None)  # the value that stands when the bucket begins
+    before = np.clip(at[:-1] - 1, 0, None)  # the value at the start of the bucket
     starts = np.minimum(at[:-1], len(values) - 1)
     inside = at[1:] > at[:-1]
     low, high = values[before].copy(), values[before].copy()
@@ -144,7 +144,7 @@ class Memory:
         """Rows: times (n,), rising, later than all before; values (n, columns)."""
         if len(times) == 0:
             return
-        if self.newest is not None and times[0] <= self.newest:  # another robot, or it was started anew
+        if self.newest is not None and times[0] <= self.newest:  # another robot, or it was restarted
             self.__init__(self.columns, self.period_s, self.fine_s)  # type: ignore[misc]
         self.fine.append(times, values)
         self.newest = float(times[-1])
@@ -152,12 +152,12 @@ class Memory:
             extremes.append(times, values)
 
     def trace(self, column: int, begin: float, end: float, points: int) -> Trace:
-        """One column of a window: from the samples where they reach back so far, else from the narrowest extremes."""
+        """One column of a window: from the samples if they reach back far enough, else from the narrowest extremes."""
         times, values = self.fine.rows()
         if len(times) == 0:
             return EMPTY
         first = [times[0], *(extremes.first() for extremes in self.coarse)]
-        reaches = [0.0, *(extremes.width_s for extremes in self.coarse)]  # what begins so much earlier is no older
+        reaches = [0.0, *(extremes.width_s for extremes in self.coarse)]  # a begin earlier by this is not older
         for level, oldest in enumerate(first):
             older = (first[k] < oldest - reaches[k] for k in range(level + 1, len(first)))
             if begin >= oldest or not any(older):
@@ -199,7 +199,7 @@ class _Extremes:
             self.bucket = int(numbers[-1])
 
     def first(self) -> float:
-        """Where the oldest one begins, s; there is one."""
+        """The begin of the oldest bucket, s; there must be one."""
         return float(self.low.rows()[0][0])
 
     def trace(self, column: int, begin: float, end: float, points: int) -> Trace:
@@ -210,7 +210,7 @@ class _Extremes:
 
 
 class _Rows:
-    """The last `most` rows in one piece: twice the room, and the newer half moves to the front when it is full."""
+    """The last `most` rows, contiguous: a buffer of twice the size, whose newer half moves to the front when full."""
 
     def __init__(self, columns: int, most: int) -> None:
         self.most = most

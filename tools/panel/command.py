@@ -1,4 +1,4 @@
-"""`ranger-sim panel`: what is to be shown, and where the browser finds it."""
+"""`ranger-sim panel`: choose the source and serve it to the browser."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ranger_sim.harness.processes import kernel
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.units import number, whole_number, word
 
-PORT = 8311  # chosen by us: among those that IANA has given to nobody
+PORT = 8311  # chosen by us: among the ports that IANA has not assigned
 HERE = "127.0.0.1"
-START_S = 60.0  # an interpreted robot takes so long to be there
+START_S = 60.0  # an interpreted robot takes this long to start
 LOOK_S = 0.05
 END_S = 10.0
-GIVES_WAY = 5  # steps of nice(2) behind the robot's processes; chosen by us: a third of their weight
+GIVES_WAY = 5  # steps of nice(2) below the robot's processes; chosen by us: a third of their weight
 
 
 def register(commands: Any) -> None:
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     if options.align and len(options.recordings) != 2:
         raise UserError("panel: --align lays two recordings over each other")
     for library in ("uvicorn", "starlette", "h11", "websockets"):
-        importlib.import_module(library)  # before anything is started
+        importlib.import_module(library)  # before any process starts
     address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(listening(address, options.http_port))
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
-    """What is to be shown."""
+    """The source that the options select."""
     if options.recordings:
         from ranger_sim.tools.panel.recording import Event, RecordingSource
 
@@ -115,7 +115,7 @@ def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def own_robot(say: Any) -> Iterator[Any]:
-    """A robot that walks in real time until the panel ends, however that ends."""
+    """A robot that walks in real time until the panel ends, for any reason."""
     from ranger_sim.tools.panel.robot import RobotSource
 
     name, parent = f"panel-{os.getpid()}", os.getpid()
@@ -125,7 +125,7 @@ def own_robot(say: Any) -> Iterator[Any]:
             command,
             stdout=subprocess.DEVNULL,
             stderr=said,
-            start_new_session=True,  # Ctrl-C is ours
+            start_new_session=True,  # this process handles Ctrl-C
             preexec_fn=lambda: kernel.die_with_parent(parent),
         )
         try:
@@ -157,7 +157,7 @@ def own_robot(say: Any) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def listening(address: str, port: int) -> Iterator[socket.socket]:
-    """A socket for the browser's requests. UserError when it cannot be had."""
+    """A socket for the browser's requests. UserError if unavailable."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     # TCP is named because asyncio sends small messages at once (TCP_NODELAY) only then; else each picture waits 40 ms.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
@@ -172,7 +172,7 @@ def listening(address: str, port: int) -> Iterator[socket.socket]:
 
 
 def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
-    """Until Ctrl-C, or the robot has ended and everybody has left."""
+    """Serve until Ctrl-C, or until the robot has ended and all pages have disconnected."""
     from ranger_sim.tools.panel.server import PanelServer, new_token
 
     address, port = listener.getsockname()[:2]
@@ -193,7 +193,7 @@ def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
 
 
 def http_server(panel: Any) -> Any:
-    """What serves it (uvicorn.Server)."""
+    """The HTTP server (uvicorn.Server)."""
     import uvicorn
 
     from ranger_sim.tools.panel.server import LONGEST_WISH
@@ -205,7 +205,7 @@ def http_server(panel: Any) -> Any:
         access_log=False,
         ws="websockets-sansio",
         ws_max_size=LONGEST_WISH,
-        ws_per_message_deflate=False,  # it would cost both sides more than the kilobytes of a picture do
+        ws_per_message_deflate=False,  # it would cost both sides more than it saves on the kilobytes of a picture
         ws_ping_interval=10.0,
         ws_ping_timeout=20.0,
         timeout_graceful_shutdown=1,

@@ -1,4 +1,4 @@
-"""A selection as a file: the samples of some channels in a window, as they came."""
+"""A selection as a file: the samples of some channels in a window, as received."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ranger_sim.tools.panel.source import Source
 
 
 def as_csv(source: Source, channels: list[int], begin: float, end: float) -> bytes:
-    """A row for each sample: time (s), channel, unit, value. Channels have time stamps of their own."""
+    """A row for each sample: time (s), channel, unit, value. Each channel has its own time stamps."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(("time_s", "channel", "unit", "value"))
@@ -28,7 +28,7 @@ def as_csv(source: Source, channels: list[int], begin: float, end: float) -> byt
 
 
 def as_mf4(source: Source, channels: list[int], begin: float, end: float) -> bytes:
-    """ASAM MDF 4: a group for each channel, with unit and meaning. UserError when there is no sample."""
+    """ASAM MDF 4: a group for each channel, with unit and meaning. UserError without samples."""
     from asammdf import MDF, Signal
 
     signals = []

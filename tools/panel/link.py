@@ -1,4 +1,4 @@
-"""The page's source for the main brain's data link on a serial port: emulated or the real robot's."""
+"""The page's source for the main brain's data link on a serial port: the emulated or the real robot's."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from ranger_sim.tools.robodaq.session import OWN, Session
 LOOK_S = 0.01
 MOST_CHOSEN = CHANNELS - len(OWN)
 MOST_POINTS = 60_000  # kept of each variable: two minutes of a fast one
-USUAL_OF = 50  # points whose median distance is the usual one, until the robot has told its lists
+USUAL_OF = 50  # points whose median distance is the usual one, until the robot has sent its lists
 SLOWEST_S = 0.5  # the slow list comes round in a third of a second (robot.md N4.15)
 STEP_S = 1e-3  # the clock of the robot's stamps
-NOTHING_S = 1e-4  # a point of nothing stands so long after the last one before a gap
+NOTHING_S = 1e-4  # a NaN point is this long after the last one before a gap
 NO_SLOTS = (
     "The data link brings no slots one by one. What the boards tell of them themselves are the channels "
     "…_EXECUTION_TIME and …_MAX_EXECUTION_TIME."
@@ -38,9 +38,9 @@ NOTHING = np.full(1, np.nan, np.float32)
 
 
 class Kept:
-    """The newest points of one variable. after_gap: 1 where nothing came for too long before the point.
+    """The newest points of one variable. after_gap: 1 if the time before the point was too long.
 
-    stands: it is told when it is written, and stands until then; else it is sampled.
+    stands: the variable is sent when written and holds its value until the next; else it is sampled.
     """
 
     def __init__(self, stands: bool) -> None:
@@ -50,7 +50,7 @@ class Kept:
         self.after_gap = array.array("b")
 
     def add(self, time_s: float, value: float, after_gap: bool) -> None:
-        """A point at a time that is later than all before."""
+        """Add a point later than all before."""
         if self.stands and not after_gap and self.times and time_s - self.times[-1] > STEP_S:
             self._append(time_s - STEP_S, self.values[-1], False)
         self._append(time_s, value, after_gap)
@@ -64,13 +64,13 @@ class Kept:
         self.after_gap.append(after_gap)
 
     def is_late(self, time_s: float) -> bool:
-        """So long after the last point that it is a gap, by the usual distance of the last ones."""
+        """True if the time since the last point is a gap, judged by the usual distance of recent points."""
         near = np.diff(np.asarray(self.times[-USUAL_OF:]))
         usual_s = min(float(np.median(near)), SLOWEST_S) if len(near) else SLOWEST_S
         return bool(self.times) and time_s - self.times[-1] > GAP_PERIODS * usual_s
 
     def trace(self, begin: float, end: float, points: int) -> Trace:
-        """What a plot shows of a window: lines from gap to gap."""
+        """The points that a plot shows of a window: lines from gap to gap."""
         times, values = np.array(self.times), np.array(self.values, np.float32)
         starts = [0, *np.flatnonzero(np.array(self.after_gap)).tolist()]
         found: list[Trace] = []
@@ -81,9 +81,9 @@ class Kept:
 
 
 def unbroken(times: Times, values: Values, begin: float, end: float, points: int) -> Trace:
-    """A window of points that come now often, now rarely, without a gap, in at most `points` buckets."""
+    """A gapless window of unevenly spaced points, in at most `points` buckets."""
     first, last = np.searchsorted(times, (begin, end))
-    first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines go on beyond the edge
+    first, last = max(0, int(first) - 1), min(len(times), int(last) + 1)  # lines continue beyond the edge
     times, values = times[first:last], values[first:last]
     if len(times) <= 2 * points or end <= begin:
         return Trace(times, values, None)
@@ -99,7 +99,7 @@ def unbroken(times: Times, values: Values, begin: float, end: float, points: int
 
 
 def joined(pieces: list[Trace]) -> Trace:
-    """Pieces one after another, with nothing between them."""
+    """Pieces one after another, with gaps between them."""
     pieces = [piece for piece in pieces if len(piece.x)]
     if not pieces:
         return EMPTY
@@ -113,9 +113,9 @@ def joined(pieces: list[Trace]) -> Trace:
 
 
 class LinkSource(Source):
-    """What comes over `port`. UserError when it cannot be opened."""
+    """The data received over `port`. UserError when it cannot be opened."""
 
-    late_s = 2.0  # the slow list comes round in a third of a second, and whether it is late is known later
+    late_s = 2.0  # the slow list comes round in a third of a second, and its lateness is known only later
     can = frozenset({"live", "parameters", "errors", "link"})
 
     def __init__(self, port: str) -> None:
@@ -134,7 +134,7 @@ class LinkSource(Source):
         self._begin()
 
     def _begin(self) -> None:
-        """Nothing is known yet of this robot, or of the time since it got its power anew."""
+        """Reset: nothing is known yet of this robot, or of the time since its latest power-up."""
         regular = published_hz()
         self.kept = [Kept(number not in regular) for number in self.place]
         self.stamps: dict[int, int] = {}
@@ -157,8 +157,8 @@ class LinkSource(Source):
         kept, time_s = self.kept[self.place[number]], self._seconds(stamp)
         if self.stamps.get(number) == stamp and self.session.clock_ms is not None:
             if not kept.stands:
-                return  # the slow list brings a point again that has come by another
-            time_s = self._seconds(self.session.clock_ms) - STEP_S  # written long ago, and so it is still
+                return  # the slow list repeats a point that another list has already sent
+            time_s = self._seconds(self.session.clock_ms) - STEP_S  # written long ago and still valid
         self.stamps[number] = stamp
         if kept.times and time_s <= kept.times[-1]:
             return
@@ -168,7 +168,7 @@ class LinkSource(Source):
         kept.add(time_s, value if np.isfinite(value) else np.nan, after_gap)
 
     async def run(self) -> None:
-        """Carry bytes until the port is lost."""
+        """Transfer bytes until the port is lost."""
         loop = asyncio.get_running_loop()
         unsent = b""
         try:
@@ -182,10 +182,10 @@ class LinkSource(Source):
             self.lost = f"the port is lost: {reason_of(fault)}"
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self.port.close()
 
-    # --- what is shown --------------------------------------------------------------------------------------
+    # --- displays -------------------------------------------------------------------------------------------
 
     def span(self) -> tuple[float, float]:
         clock = self.session.clock_ms
@@ -193,7 +193,7 @@ class LinkSource(Source):
         return (max(0.0, end - 120.0), end)
 
     def want(self, channels: list[int]) -> None:
-        """The plots of a page show these: the robot is asked to send them often."""
+        """The plots of a page show these channels: ask the robot to send them often."""
         wanted = tuple(sorted(set(channels)))
         if wanted != self.wanted:
             self.wanted = wanted
@@ -249,7 +249,7 @@ class LinkSource(Source):
         }
 
     def _with_seconds(self, row: dict[str, Any]) -> dict[str, Any]:
-        """A row of the link's rates, its last gap in the page's time."""
+        """A row of the link's rates, with its last gap in the page's time."""
         return {**row, "last_s": None if row["last_ms"] is None else self._seconds(row["last_ms"])}
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:

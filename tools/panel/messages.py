@@ -1,16 +1,16 @@
-"""What server and page say to each other over the one WebSocket, version 3 (README.md has the page's side).
+"""Messages between server and page over the one WebSocket, version 3 (README.md describes the page's side).
 
 From the page: text, JSON objects with `do`. To the page: binary, a head of 16 bytes and a body, little-endian.
 
     head    version (u8), kind (u8), plot (u16), channels (u16), flags (u16), points (u32), 0 (u32)
     TEXT    the body is JSON
-    TRACES  of one plot: its end (f64) and span (f64), s, and in the head what it wants as points; flags FOLLOWS (it
-            goes on with time; else it is a held window) and ANEW (all of it; else what is new since the last such
-            message, and some of what was sent already). Then per channel its number (u32), flags (u32), points (u32),
+    TRACES  of one plot: its end (f64) and span (f64), s, and in the head its wanted number of points; flags FOLLOWS
+            (the plot follows time; else a held window) and ANEW (all of it; else what is new since the last such
+            message, and part of what was already sent). Then per channel its number (u32), flags (u32), points (u32),
             0 (u32); then x (f64), low (f32), high (f32, only with ENVELOPE), padded to 8 bytes; NaN is a gap
     POSE    time (f64), then angles and lengths of the robot (f32), as the channels of `pose` in HELLO say
-    PICTURE all that one picture has: messages as above, so many as the head says as points, each behind its length
-            (u32) and 0 (u32), and padded to 8
+    PICTURE all messages of one picture, as above; the head has their number as points. Each follows its length (u32)
+            and 0 (u32), and is padded to 8
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PART_HEAD = struct.Struct("<II")
 
 @dataclasses.dataclass(frozen=True)
 class Window:
-    """What a plot shows: the `span` seconds before `end`, in `points` points. flags: FOLLOWS, ANEW."""
+    """The window of a plot: the `span` seconds before `end`, in `points` points. flags: FOLLOWS, ANEW."""
 
     end: float
     span: float
@@ -46,7 +46,7 @@ class Window:
 
 
 def text(content: Any) -> bytes:
-    """A message of JSON; numbers that do not exist are null."""
+    """A JSON message; infinities and NaN become null."""
     body = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
     return HEAD.pack(VERSION, TEXT, 0, 0, 0, len(body), 0) + body
 
@@ -70,7 +70,7 @@ def traces(plot: int, window: Window, channels: Sequence[int], found: Sequence[T
 
 
 def pose(time_s: float, values: Sequence[float]) -> bytes:
-    """Where the robot's parts are."""
+    """The positions of the robot's parts."""
     return (
         HEAD.pack(VERSION, POSE, 0, 0, 0, len(values), 0)
         + struct.pack("<d", time_s)
@@ -79,7 +79,7 @@ def pose(time_s: float, values: Sequence[float]) -> bytes:
 
 
 def picture(parts: Sequence[bytes]) -> bytes:
-    """What belongs together, as one message: many small ones cost server and page a wake each."""
+    """Parts as one message, because many small ones cost server and page a wake-up each."""
     whole = [HEAD.pack(VERSION, PICTURE, 0, 0, 0, len(parts), 0)]
     for part in parts:
         whole += [PART_HEAD.pack(len(part), 0), part, bytes(-len(part) % 8)]

@@ -1,4 +1,4 @@
-"""The page's source for what was recorded: a run's folder, MF4, RoboDAQ's text, CSV, or frames with their DBC files."""
+"""The page's source for recordings: a run's folder, MF4, RoboDAQ's text, CSV, or frames with their DBC files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ranger_sim.tools.panel.inside.recorded import NO_SLOTS, TOLD_SLOTS, Decoded
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose, known_states
 from ranger_sim.tools.recordings import datasets
 
-TRUTH = "plant."  # begins the names of what only a simulation knows of the body
+TRUTH = "plant."  # begins the names of quantities that only a simulation knows of the body
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Event:
 
     @classmethod
     def typed(cls, text: str) -> Event:
-        """`FSM_HIP = 3`, `hip_rad < -0.2`. UserError for what does not read so."""
+        """Parse `FSM_HIP = 3`, `hip_rad < -0.2`. UserError for other text."""
         found = re.fullmatch(r"\s*(\S+?)\s*([=<>])\s*(\S+)\s*", text)
         try:
             value = float(found[3]) if found else math.nan
@@ -45,7 +45,7 @@ class Event:
         return cls(found[1], found[2], value)
 
     def first(self, dataset: Dataset) -> float:
-        """When it happens first, s; not at the beginning, where it may have been so for long. UserError: never."""
+        """Its first time, s; not at the beginning, where it may have held for long. UserError if never."""
         channel = dataset.channels.get(self.channel) or dataset.channels.get(TRUTH + self.channel)
         if channel is None:
             raise UserError(f"{dataset.name}: there is no channel {self.channel}")
@@ -57,9 +57,9 @@ class Event:
 
 
 class RecordingSource(Source):
-    """One or two recordings, the second laid over the first: `shift_s` later, after `align` has come at one instant.
+    """One or two recordings, the second overlaid on the first: `shift_s` later, after aligning the events of `align`.
 
-    UserError for what cannot be read, or an event that is in one of them never.
+    UserError for an unreadable recording, or one in which the event never occurs.
     """
 
     def __init__(
@@ -105,14 +105,14 @@ class RecordingSource(Source):
             self.pose_names = KNOWN_POSE
 
     async def run(self) -> None:
-        """Go through the logs of frames, which may take a minute for an hour of them."""
+        """Read the logs of frames, which may take a minute for an hour of them."""
         self.is_coming = True
         for part in self.inside:
             await part.run()
         self.is_coming = False
 
     def close(self) -> None:
-        """Give the logs back."""
+        """Close the logs."""
         for part in self.inside:
             part.close()
 
@@ -175,7 +175,7 @@ class RecordingSource(Source):
 
 
 def read(path: str, databases: Sequence[str], frames: Decoded | None) -> Dataset:
-    """The channels of one recording, those of a simulated body among them. frames: keeps them where it has some."""
+    """The channels of one recording, including a simulated body's. frames: receives its frames, if it has any."""
     if (pathlib.Path(path) / run_folder.VARIABLES).is_file():
         return run_folder.read(path, truth=True)
     each_frame = None if frames is None else frames.take
@@ -185,7 +185,7 @@ def read(path: str, databases: Sequence[str], frames: Decoded | None) -> Dataset
 def inside_of(
     path: pathlib.Path, dataset: Dataset, frames: Decoded | None, shift_s: float, end_s: float, is_second: bool
 ) -> Decoded | RunLogs:
-    """What one recording keeps beside its channels."""
+    """The data that one recording keeps in addition to its channels."""
     group = f" ({path.name})" if is_second else ""
     if frames is None or not frames.words:
         return RunLogs(path, dataset, group, shift_s, end_s)

@@ -1,4 +1,4 @@
-"""The page's source for a robot that `up` runs: the feed shows it, `ctl` carries out what is wished."""
+"""The page's source for a robot that `up` runs: the feed supplies the data, `ctl` carries out requests."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ REQUESTS = frozenset({"key", "set", "pause", "resume", "restart", "fault", "clea
 
 
 class RobotSource(Source):
-    """The robot that runs under `name`. UserError when there is none, or it speaks another version."""
+    """The robot that runs under `name`. UserError for an unknown name or another protocol version."""
 
     can = frozenset({"live", "keys", "parameters", "pace", "faults", "restart", "frames", "panel", "boards", "errors"})
 
@@ -103,10 +103,10 @@ class RobotSource(Source):
                 raise UserError(f"the robot named {self.name} shows itself to {peers.LIMITS['feed'].peers} already")
             self.incoming += data
 
-    # --- what comes -----------------------------------------------------------------------------------------
+    # --- incoming data --------------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Take in what comes until the robot ends."""
+        """Receive data until the robot ends."""
         self.connection.setblocking(False)
         reader, writer = await asyncio.open_connection(sock=self.connection, limit=READ_BYTES)
         asking = asyncio.create_task(self._ask_status())
@@ -126,7 +126,7 @@ class RobotSource(Source):
             self.lost = f"the robot {self.name} has ended"
 
     async def _ask_status(self) -> None:
-        """The supervisor's view, some times a second: in a thread, because it may take its time."""
+        """Poll the supervisor's status some times a second: in a thread, because the reply may be slow."""
         while True:
             try:
                 self.status = await asyncio.to_thread(control.ask, self.name, {"do": "status"})
@@ -137,7 +137,7 @@ class RobotSource(Source):
     def _take(self, kind: int, body: bytes) -> None:
         if kind == records.STATE:
             self.shown = json.loads(body)
-            for bus in self.buses:  # all that had begun by then has been told
+            for bus in self.buses:  # every frame that had begun by then has been received
                 bus.passed(self.shown["time_ns"])
                 bus.more_errors = self.shown["bus_errors"][bus.name] - self.frames[bus.name].total.get(ERROR, 0)
         elif kind == records.GAP:
@@ -161,12 +161,12 @@ class RobotSource(Source):
 
     def _take_words(self, rows: Any) -> None:
         words = rows[:, 1:][:, self.identifiers]
-        values = words.astype(np.float32)  # of whole numbers above 2^24 the last digits
+        values = words.astype(np.float32)  # whole numbers above 2^24 lose their last digits
         raw = np.ascontiguousarray(words.astype(np.uint32))
         values[:, self.floats] = raw[:, self.floats].view(np.float32)
         values[:, self.signed] = raw[:, self.signed].view(np.int32)
         self.word_rows.append((rows[:, 0] - self.start_ns) * 1e-9, values)
-        for number in self.table_errors:  # what reaches the table without a bus
+        for number in self.table_errors:  # errors that reach the table without a bus
             if ERRORS[number] in ON_NO_BUS:
                 for word, time_ns in changes(rows[:, 1 + number], rows[:, 0], self.table_errors[number]):
                     self.errors.note(word, (time_ns - self.start_ns) * 1e-9)
@@ -177,7 +177,7 @@ class RobotSource(Source):
         bus.take(rows)
         self.errors.note_frames(rows, self.start_ns)
 
-    # --- what is shown --------------------------------------------------------------------------------------
+    # --- displays -------------------------------------------------------------------------------------------
 
     def span(self) -> tuple[float, float]:
         end = self.body_rows.newest or 0.0
@@ -237,7 +237,7 @@ class RobotSource(Source):
         }
 
     def _cost_of_transport(self) -> float | None:
-        """Energy from the battery over weight and distance (appendix 1); None before a step."""
+        """Energy from the battery divided by weight and distance (appendix 1); None before a step."""
         distance_m = self.shown.get("distance_m", 0.0)
         if not distance_m > 0.0:
             return None

@@ -1,9 +1,9 @@
 """The page and its WebSocket, on this machine unless the user says otherwise. A page never slows the robot.
 
-A page gets a picture while it paints the one before, and no more until it has shown that: a slow page gets fewer, and
-one that is dead gets two.
-Whoever asks must have the token, in the address or in the cookie that the first visit leaves; a page of another site
-is refused by its Origin, also when its name was made to lead here.
+A page receives a picture while it paints the previous one, and the next only after it has shown that: a slow page gets
+fewer, and a dead one gets two.
+A client must have the token, in the address or in the cookie that the first visit sets. A page of another site is
+refused by its Origin, even if its name was made to resolve to this machine.
 """
 
 from __future__ import annotations
@@ -40,24 +40,24 @@ TYPES = {
 }
 COOKIE = "ranger-sim-panel"
 
-# Chosen by us: what a page may take.
+# Limits on a page, chosen by us.
 PLACES = 16  # pages at a time: each costs a picture 30 times a second
-AHEAD = 2  # pictures that a page was sent and has not shown: one is painted while the next is made
-PICTURE_S = 1 / 33  # so that 30 in a second remain where some are late
+AHEAD = 2  # pictures sent to a page and not yet shown: one is painted while the next is made
+PICTURE_S = 1 / 33  # so that 30 in a second remain if some are late
 STATE_S = 0.2
-LONGEST_WISH = 1 << 16  # bytes: a parameter set by name has below 20,000
+LONGEST_WISH = 1 << 16  # bytes: setting a parameter by name takes below 20,000
 WISHES_PER_S = 50.0
 BURST = 100.0
 MOST_PLOTS = 24
 MOST_CHANNELS = 48  # of all plots of a page, as RoboDAQ
 MOST_POINTS = 4000
-PATIENCE_S = 30.0  # without a sign of the page
+PATIENCE_S = 30.0  # without a message from the page
 CLOSE_POLICY, CLOSE_FULL, LEFT = 1008, 1013, 1006  # RFC 6455 and its registry
-BROKEN = {1002, 1003, 1007, 1009}  # the same: who is told so did not speak WebSocket, or too much at once
+BROKEN = {1002, 1003, 1007, 1009}  # the same registry: the client did not speak WebSocket, or sent too much at once
 
 
 def place_of(origin: str) -> str:
-    """Host and port of an Origin; empty for one that has none."""
+    """Host and port of an Origin; empty if it has none."""
     try:
         return urlsplit(origin).netloc
     except ValueError:  # brackets that hold no address
@@ -65,7 +65,7 @@ def place_of(origin: str) -> str:
 
 
 class PanelServer:
-    """Serves one source. `app` is the ASGI application; `log` hears what the user should know."""
+    """Serves one source. `app` is the ASGI application; `log` receives messages for the user."""
 
     def __init__(self, source: Source, token: str, hosts: tuple[str, ...], log: Callable[[str], None]) -> None:
         self.source = source
@@ -88,17 +88,17 @@ class PanelServer:
 
     @contextlib.asynccontextmanager
     async def life(self, app: Starlette) -> Any:
-        """The source runs as long as the server."""
+        """Run the source as long as the server."""
         self.feeding = asyncio.create_task(self.source.run())
         try:
             yield
         finally:
             self.feeding.cancel()
 
-    # --- who may ask ----------------------------------------------------------------------------------------
+    # --- access ---------------------------------------------------------------------------------------------
 
     def fault_of(self, asked: HTTPConnection) -> str | None:
-        """Why this request is not served; None when it is."""
+        """The reason to refuse this request; None if it is served."""
         host = asked.headers.get("host", "")
         if host.rpartition(":")[0].strip("[]") not in self.hosts:
             return "another host's name"
@@ -109,7 +109,7 @@ class PanelServer:
         return None if hmac.compare_digest(token.encode(), self.token.encode()) else "a wrong token"
 
     async def page(self, request: Request) -> Response:
-        """The page; its first visit leaves the token in a cookie."""
+        """The page; the first visit sets the token as a cookie."""
         fault = self.fault_of(request)
         if fault is not None:
             return self.refusal(fault)
@@ -156,22 +156,22 @@ class PanelServer:
         return Response(data, media_type="application/octet-stream", headers=headers)
 
     def refusal(self, fault: str) -> Response:
-        """Told and counted."""
+        """Count a refused request and return the response."""
         self.refuse(fault)
         return PlainTextResponse(f"{fault}: the address that `ranger-sim panel` printed has the right one\n", 403)
 
     def refuse(self, fault: str) -> None:
-        """Count it; the first of a kind is told."""
+        """Count it; log the first of its kind."""
         self.refused[fault] += 1
         if self.refused[fault] == 1:
             self.log(f"panel: a request with {fault} was refused; others of this kind are counted")
 
     def want(self) -> None:
-        """Tell the source what all pages show."""
+        """Report to the source which channels all pages show."""
         self.source.want(sorted({channel for session in self.sessions for channel in session.wanted}))
 
     async def socket(self, socket: WebSocket) -> None:
-        """One page, until it leaves or is sent away with a reason."""
+        """Serve one page until it disconnects or is closed with a reason."""
         fault = self.fault_of(socket)
         if fault is None and len(self.sessions) >= PLACES:
             fault = f"no place free ({PLACES} pages)"
@@ -189,7 +189,7 @@ class PanelServer:
             reason = await session.serve()
         finally:
             self.sessions.discard(session)
-            self.connections.ends(socket.client)  # also where what it has not taken stands before the reason
+            self.connections.ends(socket.client)  # even if unread data are queued before the reason
         if reason:
             self.refuse(reason)
             with contextlib.suppress(Exception):
@@ -200,25 +200,25 @@ FILES = frozenset(path.name for path in PAGE.iterdir() if path.suffix in TYPES) 
 
 
 class Session:
-    """One page: what it wants to see, and what it was shown."""
+    """One page: what it requests, and what it has shown."""
 
     def __init__(self, source: Source, socket: WebSocket, wants: Callable[[], None]) -> None:
         self.source = source
-        self.wants = wants  # called when its plots are others
+        self.wants = wants  # called when the channels of its plots change
         self.socket = socket
         self.plots: dict[int, Plot] = {}
-        self.wanted: set[int] = set()  # channels of its plots, also of those that another view hides
+        self.wanted: set[int] = set()  # channels of its plots, including those that another view hides
         self.at: float | None = None  # the page's cursor; None: the newest
-        self.unshown = 0  # pictures that it was sent and has not shown
-        self.shown = asyncio.Event()  # it has shown one
-        self.changed = asyncio.Event()  # it wants to see something else
+        self.unshown = 0  # pictures sent and not yet shown
+        self.shown = asyncio.Event()  # the page has shown one
+        self.changed = asyncio.Event()  # the page requests something else
         self.wishes = BURST
         self.wished_s = 0.0
         self.next_state_s = 0.0
         self.sending = asyncio.Lock()
 
     async def serve(self) -> str:
-        """Until it leaves; returns why it had to, or nothing."""
+        """Serve until the page disconnects; returns why it was closed, or ""."""
         showing: asyncio.Task[None] | None = None
         try:
             await self.send(messages.text({"hello": self.source.hello(), "version": messages.VERSION}))
@@ -227,7 +227,7 @@ class Session:
                 try:
                     async with asyncio.timeout(PATIENCE_S):
                         text = await self.socket.receive_text()
-                except (RuntimeError, KeyError):  # it has left, or it sent bytes
+                except (RuntimeError, KeyError):  # it has disconnected, or it sent bytes
                     return ""
                 if showing.done():
                     showing.result()
@@ -244,17 +244,17 @@ class Session:
                 await asyncio.gather(showing, return_exceptions=True)
 
     async def send(self, message: bytes) -> None:
-        """One message at a time. TimeoutError: the page takes nothing any more. WebSocketDisconnect: it has left."""
+        """Send one message at a time. TimeoutError: the page no longer reads. WebSocketDisconnect: it has left."""
         async with asyncio.timeout(PATIENCE_S), self.sending:
             try:
                 await self.socket.send_bytes(message)
-            except RuntimeError as gone:  # the server has closed it meanwhile, for a frame that is none
+            except RuntimeError as gone:  # the server has closed it meanwhile because of an invalid frame
                 raise WebSocketDisconnect(LEFT) from gone
 
-    # --- what the page says ---------------------------------------------------------------------------------
+    # --- requests of the page -------------------------------------------------------------------------------
 
     async def hear(self, text: str) -> str:
-        """One message of the page; returns why it must leave, or nothing."""
+        """Handle one message of the page; returns the reason to close it, or ""."""
         now_s = asyncio.get_running_loop().time()
         self.wishes = min(BURST, self.wishes + WISHES_PER_S * (now_s - self.wished_s))
         self.wished_s = now_s
@@ -277,11 +277,11 @@ class Session:
         return ""
 
     async def carry_out(self, wish: dict[str, Any]) -> dict[str, Any]:
-        """What the page wishes. UserError for what cannot be."""
+        """Carry out a request of the page. UserError for an impossible one."""
         what = wish.get("do")
         if what == "shown":
             if self.unshown > 0:
-                self.wishes += 1.0  # it keeps the pace, and is no request
+                self.wishes += 1.0  # a confirmation that keeps the pace is not counted as a request
                 self.unshown -= 1
             self.shown.set()
             return {}
@@ -294,7 +294,7 @@ class Session:
         return await self.source.request(wish)
 
     def look(self, wish: dict[str, Any]) -> None:
-        """All plots of the page, and its cursor."""
+        """Set all plots of the page, and its cursor."""
         plots = wish.get("plots")
         if not isinstance(plots, list) or len(plots) > MOST_PLOTS:
             raise UserError(f"look: a list of up to {MOST_PLOTS} plots is expected")
@@ -322,10 +322,10 @@ class Session:
         self.at = seconds(wish.get("at"), "at")
         self.changed.set()
 
-    # --- what the page sees ---------------------------------------------------------------------------------
+    # --- data for the page ----------------------------------------------------------------------------------
 
     async def show(self) -> None:
-        """Pictures, as fast as the page takes them, on the average 33 in a second at most."""
+        """Send pictures as fast as the page shows them, on average at most 33 a second."""
         loop = asyncio.get_running_loop()
         live = "live" in self.source.can
         due_s = loop.time()
@@ -337,7 +337,7 @@ class Session:
             while self.unshown >= AHEAD:
                 self.shown.clear()
                 await self.shown.wait()
-            due_s = max(due_s + PICTURE_S, loop.time() - PICTURE_S)  # one that was late may be made up for, not more
+            due_s = max(due_s + PICTURE_S, loop.time() - PICTURE_S)  # makes up for one late picture, not more
             if live and self.at is None and not self.source.lost:
                 await asyncio.sleep(max(0.0, due_s - loop.time()))
             else:
@@ -346,7 +346,7 @@ class Session:
                         await self.changed.wait()
 
     def picture(self, now_s: float) -> list[bytes]:
-        """What one picture has, as messages."""
+        """The messages of one picture."""
         begin, end = self.source.span()
         found = []
         for number, plot in self.plots.items():
@@ -356,7 +356,7 @@ class Session:
         pose = self.source.pose(self.at)
         if pose is not None:
             found.append(messages.pose(*pose))
-        if self.at is not None:  # what stands there; the traces have the extremes of a pixel's time
+        if self.at is not None:  # the values at the cursor; the traces have the extremes over a pixel's time
             channels = sorted({channel for plot in self.plots.values() for channel in plot.channels})
             values = dict(zip(channels, self.source.values(channels, self.at), strict=True))
             found.append(messages.text({"values": values, "at": self.at}))
@@ -370,7 +370,7 @@ class Session:
 class Plot:
     """A plot of the page: `begin` to `end`, or the last `span` seconds while both are None.
 
-    told: the newest instant when the page last got it, s; None before the first time.
+    told: the newest time when the page last received it, s; None before the first time.
     """
 
     def __init__(self, channels: list[int], begin: float | None, end: float | None, span: float, points: int) -> None:
@@ -379,13 +379,14 @@ class Plot:
         self.told: float | None = None
 
     def wish(self) -> tuple[Any, ...]:
-        """What the page wants to see; another wish is shown anew."""
+        """The page's settings of this plot; if they change, the plot is sent whole."""
         return self.channels, self.begin, self.end, self.span, self.points
 
     def next(self, newest: float, late_s: float) -> tuple[float, int, messages.Window]:
-        """What the page does not have: where it begins (s), in how many points, and the window it belongs to.
+        """The part that the page does not have: its begin (s), its number of points, and the window it belongs to.
 
-        What may have come late, up to `late_s` before the last message, is sent again, and the point that was not full.
+        Samples that may have arrived late, up to `late_s` before the last message, are sent again, and so is the last
+        point, which was not complete.
         """
         if self.begin is not None and self.end is not None:
             return self.begin, self.points, messages.Window(self.end, self.end - self.begin, self.points, 0)
@@ -400,7 +401,7 @@ class Plot:
 
 
 def channels_of(wanted: Any, source: Source) -> list[int]:
-    """Numbers of channels that are there. UserError for anything else."""
+    """Check channel numbers. UserError for anything but numbers of existing channels."""
     if not isinstance(wanted, list):
         raise UserError("channels: a list of numbers is expected")
     for each in wanted:
@@ -410,7 +411,7 @@ def channels_of(wanted: Any, source: Source) -> list[int]:
 
 
 def seconds(value: Any, what: str) -> float | None:
-    """A time of a message, s; None where there is none. UserError for what is no finite number."""
+    """A time in a message, s; None if absent. UserError for anything but a finite number."""
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > 1e9:
@@ -419,12 +420,12 @@ def seconds(value: Any, what: str) -> float | None:
 
 
 def points_of(value: Any) -> int:
-    """How many points a plot can show."""
+    """The number of points that a plot can show."""
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_POINTS:
         raise UserError(f"points: {str(value)[:20]} is not 1 to {MOST_POINTS}")
     return value
 
 
 def new_token() -> str:
-    """A word that nobody guesses; what it is changes nothing of any run."""
+    """An unguessable token; its value does not affect any run."""
     return os.urandom(16).hex()

@@ -1,4 +1,4 @@
-"""What the page shows: one model for a running robot, a data link and a recording."""
+"""The data that the page shows: one model for a running robot, a data link and a recording."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values
 
-# Where the robot's parts are, from what it knows itself: legs as its program of 2011 or those of 2015 and 2016 estimate
-# them, feet by the ankles' encoders. Angles against gravity, rad; robot.md N4.17, C1.
+# The pose of the robot's parts as the robot itself knows it: legs as estimated by its program of 2011 or those of 2015
+# and 2016, feet by the ankles' encoders. Angles against gravity, rad; robot.md N4.17, C1.
 LEGS = (("E_LO_ANGLE", "E_LI_ANGLE"), ("EST_STATE_TH0", "EST_STATE_TH1"))
 ANKLES = ("MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE")
 # between leg and foot, of the body `ranger` (plant/mechanics/parameters.py); 1.60, 1.63: robot.md N5
 ANKLE_ZERO_RAD = 1.68
 KNOWN_POSE = ("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad")
-# As the body has them, where a body is simulated; rad, m, N, A.
+# The simulated body's own values; rad, m, N, A.
 TRUE_POSE = (
     *("leg_outer_rad", "leg_inner_rad", "foot_outer_rad", "foot_inner_rad", "hip_x_m", "hip_y_m"),
     *("outer_Fx_N", "outer_Fy_N", "inner_Fx_N", "inner_Fy_N", "hip_A", "outer_A", "inner_A", "steering_A"),
@@ -27,32 +27,32 @@ TRUE_POSE = (
 
 
 class Source:
-    """`channels`, and what can be done with them: `can` names it, the page shows nothing else.
+    """`channels`, and the supported operations: `can` names them, and the page shows no others.
 
     keys, parameters, pace, faults, restart: requests of these kinds are carried out. frames, panel, boards, errors: the
-    state has them. live: time passes by itself.
+    state has them. live: the source's time advances by itself.
     """
 
     title = ""
-    late_s = 0.25  # how much later than the newest something else may come; also what a trigger looks back
+    late_s = 0.25  # how much later than the newest data other data may arrive; a trigger also looks back this far
     can: frozenset[str] = frozenset()
     pose_names: tuple[str, ...] = ()
 
     def __init__(self) -> None:
         self.channels: list[Channel] = []
         self.geometry: dict[str, Any] = {}
-        self.lost = ""  # why nothing more will come
-        self.is_coming = False  # what was recorded is still being read
-        self.listed: list[dict[str, Any]] = []  # the channels as a page gets them, once one has come
+        self.lost = ""  # why no more data will arrive
+        self.is_coming = False  # a recording is still being read
+        self.listed: list[dict[str, Any]] = []  # the channels as sent to a page, cached
 
     async def run(self) -> None:
-        """Take in what comes, until nothing more does."""
+        """Receive data until there are no more."""
 
     def want(self, channels: list[int]) -> None:
-        """All pages together show these channels."""
+        """Set the channels that all pages together show."""
 
     def span(self) -> tuple[float, float]:
-        """(begin, end) of what can be shown, s."""
+        """(begin, end) of the available data, s."""
         return (0.0, 0.0)
 
     def trace(self, channel: int, begin: float, end: float, points: int) -> Trace:
@@ -60,27 +60,27 @@ class Source:
         return EMPTY
 
     def samples(self, channel: int, begin: float, end: float) -> tuple[Times, Values]:
-        """(times, values) of a window as they came, for a file."""
+        """(times, values) of a window as received, for a file."""
         return EMPTY.x, EMPTY.low
 
     def values(self, wanted: list[int], at: float | None) -> list[float | None]:
-        """Of these channels at an instant (None: the newest); None where there is none."""
+        """Values of these channels at a time (None: the newest); None where unknown."""
         return [None] * len(wanted)
 
     def pose(self, at: float | None) -> tuple[float, list[float]] | None:
-        """(time, values of `pose_names`) at an instant; None: nothing is known of it."""
+        """(time, values of `pose_names`) at a time; None if unknown."""
         return None
 
     def state(self, at: float | None) -> dict[str, Any]:
-        """What is in no channel: boards, buses, panel, errors, frames, faults; missing: why slots or buses are not."""
+        """State without channels: boards, buses, panel, errors, frames, faults; missing: why no slots or buses."""
         return {}
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
-        """Carry out a wish of the page that goes to the robot. UserError says why not."""
+        """Carry out a request of the page to the robot. UserError with the reason if refused."""
         raise UserError("a recording takes no requests")
 
     def hello(self) -> dict[str, Any]:
-        """What the page must know at its beginning."""
+        """Data that the page needs at its start."""
         self.listed = self.listed or [channel.content() for channel in self.channels]
         return {
             "title": self.title,
@@ -96,7 +96,7 @@ class Source:
 
 
 def known_pose(values: dict[str, float | None]) -> list[float] | None:
-    """KNOWN_POSE out of the variables LEGS and ANKLES; None where one of them is not known.
+    """KNOWN_POSE from the variables LEGS and ANKLES; None if one of them is unknown.
 
     A robot's program leaves the other program's estimates at 0.
     """
@@ -134,7 +134,7 @@ def group_of(name: str) -> str:
 
 @functools.cache
 def fault_rows() -> dict[str, Any]:
-    """{places: what can be faulted; modes: how, by kind of place}."""
+    """{places: where a fault can be injected; modes: available modes, by kind of place}."""
     from ranger_sim.harness.faults.catalogue import MODES
     from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 
@@ -147,7 +147,7 @@ def fault_rows() -> dict[str, Any]:
 
 @functools.cache
 def slots_us() -> dict[str, float]:
-    """{board: its slot, us} of those that have slots."""
+    """{board: slot length, us} of the boards that have slots."""
     return {board.name: board.slot_us for board in datatable.load().boards if board.slot_us}
 
 
@@ -160,7 +160,7 @@ def error_rows() -> dict[int, tuple[str, str]]:
 @functools.cache
 def known_states() -> dict[str, dict[int, str]]:
     """{variable: {number: state}} of our main brain's program, which has the record walk's numbers: for a source that
-    does not tell them itself.
+    does not report them itself.
     """
     with contextlib.closing(Ranger()) as robot:
         return {variable: state_names(robot, machine) for machine, variable in STATE_VARIABLES.items()}

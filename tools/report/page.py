@@ -130,12 +130,12 @@ def rows_of(file: coverage.FileCounts) -> list[tuple[int, str, str, str]]:
 
 
 def of_the_robot(what: str) -> str:
-    """What was measured on the real robot, as it stands beside a figure."""
+    """The real robot's measured value, to be shown next to a figure."""
     return f"the robot: {ROBOT[what]}"
 
 
 def tiles(summary: dict) -> list[dict]:
-    """The key figures, beside the real robot's."""
+    """The key figures, with the real robot's."""
     delay = summary["heel_strike_delay_ms"]
     rows = (
         ("steps", f"{summary['steps']:,}", None),

@@ -1,1 +1,1 @@
-"""The computer's side of the robot's data link: reads points, writes parameters, keeps logs. No clock of its own."""
+"""The computer's side of the robot's data link: reads points, writes parameters, keeps logs. It uses no clock."""

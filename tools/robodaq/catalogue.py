@@ -1,4 +1,4 @@
-"""What the logging program knows of the robot: names, values and errors of its master table."""
+"""The logging program's knowledge of the robot: names, values and errors of its master table."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def match(pattern: str) -> list[Variable]:
 
 
 def value_of(number: int, word: int) -> float | int:
-    """The number that a point's word stands for."""
+    """The number that a point's word encodes."""
     return value_of_word(all_variables.TYPES[number], word)
 
 
 def text_of(number: int, word: int) -> str:
-    """The shortest decimal that gives the word back."""
+    """The shortest decimal that converts back to the same word."""
     value = value_of(number, word)
     if all_variables.TYPES[number] != "f32":
         return str(value)

@@ -1,4 +1,4 @@
-"""Bytes of the data link as the computer sees them (robot.md N4.15).
+"""Bytes of the data link from the computer's side (robot.md N4.15).
 
 From the robot: segments of 92 bytes, nine points of identifier, value word and stamp in ms, and the sum of these 90
 bytes plus 1. To the robot: packets of 8 bytes, identifier, value word, and the sum of the six plus 1. Big-endian.
@@ -42,9 +42,9 @@ def segment(points: list[Point]) -> bytes:
 class SegmentDecoder:
     """Finds segments in a stream that has neither start bytes nor escapes.
 
-    In step, a segment is taken by its checksum; out of step, it must name only known identifiers as well, because one
-    of some thousand places in a stream has a right sum by chance. `bad_checksums`: how often the step was lost;
-    `skipped_bytes`: what belongs to no segment; `unknown_points`: identifiers beyond the table, left out.
+    In step, a segment is accepted by its checksum; out of step, it must also contain only known identifiers, because
+    one of some thousand positions in a stream has a right sum by chance. `bad_checksums`: how often the step was lost;
+    `skipped_bytes`: bytes outside segments; `unknown_points`: points with identifiers beyond the table, left out.
     """
 
     def __init__(self, last_id: int) -> None:
@@ -57,7 +57,7 @@ class SegmentDecoder:
         self.unknown_points = 0
 
     def feed(self, data: bytes) -> list[Point]:
-        """The points of every segment that these bytes complete."""
+        """The points of every segment completed by these bytes."""
         buffer = self.buffer
         buffer += data
         points: list[Point] = []

@@ -1,7 +1,7 @@
 """`ranger-sim daq`: log a robot over its serial line, see its errors, read and write its parameters.
 
-It ends after `--time`; without it when everything that was asked (`--read`, `--write`, `--load`, `--save`) is done; and
-when nothing was asked, with Ctrl-C.
+It ends after `--time`; without it when every request (`--read`, `--write`, `--load`, `--save`) is done; without any
+request, with Ctrl-C.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 
     from ranger_sim.tools.robodaq.codec import Point
 
-LOOK_S = 0.02  # between two looks at the port when nothing comes
-SHOW_S = 0.25  # between two pictures on a terminal
-LINE_S = 5.0  # between two lines where there is no terminal
-TIMEOUT_S = 10.0  # for what was asked and does not come
+LOOK_S = 0.02  # between two polls of the port when no data arrive
+SHOW_S = 0.25  # between two updates of the picture on a terminal
+LINE_S = 5.0  # between two lines without a terminal
+TIMEOUT_S = 10.0  # for a request without an answer
 SHOWN_CHANNELS, SHOWN_ERRORS = 16, 6  # lines of the picture
 
 
@@ -113,7 +113,7 @@ def register(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do what was asked; 0 done, 1 the port was lost or something was not answered, 130 interrupted."""
+    """Carry out the requests; 0 done, 1 the port was lost or a request was not answered, 130 interrupted."""
     json_file = json_target(options.json)
     session = Session()
     asked = Asked(session, options)  # everything is checked before the port is opened
@@ -139,7 +139,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 class Asked:
-    """What the command line wants of the robot. UserError for a name, value or file that is none."""
+    """The requests of the command line. UserError for an invalid name, value or file."""
 
     def __init__(self, session: Session, options: argparse.Namespace) -> None:
         self.fast = [row for pattern in options.fast for row in catalogue.match(pattern)]
@@ -168,11 +168,11 @@ class Asked:
         self.asked_to_read = False
 
     def anything(self) -> bool:
-        """True when something was asked that can be finished."""
+        """True if there is a request that can be completed."""
         return bool(self.written or self.read or self.save)
 
     def after_writing(self, session: Session) -> bool:
-        """When everything is written, ask for values, so that the new ones come back; True when all is done."""
+        """When everything is written, request the values to read them back; True when all is done."""
         if session.writes:
             return False
         if not self.asked_to_read:
@@ -190,7 +190,7 @@ def work(
     view: View,
     interrupted: list[bool],
 ) -> str:
-    """Carry bytes until it is over; returns why the port was lost, or nothing."""
+    """Transfer bytes until the session is over; returns why the port was lost, or nothing."""
     started = now = answered = wallclock.monotonic_s()
     unsent = b""
     left = len(session.writes) + len(session.reads)
@@ -220,7 +220,7 @@ def work(
 
 
 class View:
-    """Errors as lines as they come; on a terminal a picture below them, elsewhere now and then a line."""
+    """Prints errors as they occur; on a terminal a picture below them, elsewhere a line at intervals."""
 
     def __init__(self, session: Session, asked: Asked, options: argparse.Namespace) -> None:
         self.session = session
@@ -236,7 +236,7 @@ class View:
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
-        """While it lasts the picture stands on the terminal."""
+        """Show the picture on the terminal inside the context."""
         if self.console.is_terminal and not self.console.quiet:
             with Live(self.picture(self.started), console=self.console, auto_refresh=False, transient=True) as live:
                 self.live = live
@@ -245,7 +245,7 @@ class View:
             yield
 
     def update(self, now: float) -> None:
-        """New errors, and the picture when it is due."""
+        """Print new errors, and the picture when it is due."""
         while self.session.new_errors:
             line, count = self.session.new_errors.popleft()
             self.console.print(
@@ -315,7 +315,7 @@ def finish(
     lost: str,
     interrupted: bool,
 ) -> int:
-    """Save, print what was read, say what was not answered."""
+    """Save, print the values read, report unanswered requests."""
     view.update(wallclock.monotonic_s())
     view.points_per_s = session.points / max(1e-9, wallclock.monotonic_s() - view.started)
     words = {name: session.values.get(all_variables.ID_OF[name]) for name in (*asked.read, *asked.saved)}
@@ -359,6 +359,6 @@ def finish(
 
 
 def json_number(name: str, word: int) -> float | int | None:
-    """The value of a word as JSON has it, which knows neither infinity nor "not a number"."""
+    """The value of a word for JSON, which has neither infinity nor NaN."""
     value = catalogue.value_of(all_variables.ID_OF[name], word)
     return value if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""What a session keeps: RoboDAQ's text format, and the measurement format of `ranger-sim walk` (ASAM MDF 4)."""
+"""Logs of a session: RoboDAQ's text format, and the measurement format of `ranger-sim walk` (ASAM MDF 4)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ranger_sim.tools.robodaq.codec import Point
 
 
 class Log(Protocol):
-    """Hears every point; `close` finishes the file."""
+    """Receives every point; `close` finishes the file."""
 
     path: pathlib.Path
 
@@ -44,9 +44,9 @@ class TextLog:
 
 
 class MeasurementLog:
-    """One channel per variable at the instants at which its value was written; the file is made at the end.
+    """One channel per variable at the times at which its value was written; the file is written at the end.
 
-    A value that was never written (stamp 0), that comes again, or whose stamp lies before the last one is left out:
+    A value never written (stamp 0), a repeated one, or one whose stamp lies before the last one is left out, because
     time runs forward in this format.
     """
 
@@ -87,7 +87,7 @@ class MeasurementLog:
 
 
 def open_log(name: str) -> Log:
-    """A log by the ending of its name: .txt or .mf4."""
+    """A log whose format follows from the name's ending: .txt or .mf4."""
     path = pathlib.Path(name)
     if path.suffix not in (".txt", ".mf4"):
         raise UserError(f"--log {name}: the name must end in .txt (RoboDAQ's text) or .mf4 (ASAM MDF 4)")

@@ -1,6 +1,6 @@
 """Sets of parameters as files: tab-separated (name, id, value), or a controller's .toml.
 
-A .toml that is saved names a base set and holds what differs from it, so that `ranger-sim walk --controller` takes it.
+A saved .toml names a base set and holds the differences from it, so that `ranger-sim walk --controller` accepts it.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def load(name: str) -> dict[str, float]:
 
 
 def check_target(name: str) -> pathlib.Path:
-    """Where a set is to be saved: .txt or .toml in a folder that is there."""
+    """The path for saving a set: .txt or .toml in an existing folder."""
     path = pathlib.Path(name)
     if path.suffix not in (".txt", ".toml"):
         raise UserError(f"--save {name}: the name must end in .txt (tab-separated) or .toml (controller)")
@@ -79,7 +79,7 @@ def as_table(words: dict[str, int]) -> str:
 
 
 def as_controller(words: dict[str, int], base: str) -> str:
-    """What differs from the set `base`, each with the reason that the format asks for."""
+    """The differences from the set `base`, each with the reason that the format requires."""
     values = controllers.load(base).values
     changed = {
         name: catalogue.text_of(parameters.find(name).id, word)

@@ -1,10 +1,10 @@
-"""The link's three lists: what is on each, what each promises, what came of it, and where it did not.
+"""Rates of the link's three lists: their variables, the promised rate of each, the received rate, and gaps.
 
 The robot sends in cycles: every variable of the fast list that is new, one of the medium list, the next one of all
-(robot.md N4.15). Each look at a variable is a step, and so is the return; a slot of the main brain has ten of them at
-most. So the lists' lengths say how many cycles a second there are at full speed, and that is what a list promises: a
-fast variable comes once in a cycle, a medium one once in as many cycles as there are medium ones, any other once in as
-many as there are variables. No variable comes oftener than its board publishes it.
+(robot.md N4.15). Each check of a variable is a step, and so is the return; a slot of the main brain has at most ten of
+them. So the lists' lengths determine how many cycles a second there are at full speed, and that is a list's promise: a
+fast variable is sent once in a cycle, a medium one once in as many cycles as there are medium ones, any other once in
+as many as there are variables. No variable is sent more often than its board publishes it.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ STEPS_PER_S = 10 / 0.002  # of the main brain's slots of 2 ms
 RETURN_STEPS = 1
 VARIABLES = all_variables.ID_OF_LAST + 1
 BIN_MS = 500
-BINS = 10  # rates are those of the last 5 s of the robot's time (chosen by us: the slow list comes round several times)
-GAP_PERIODS = 2.5  # as the plots have it: so many periods without a point are a gap
+BINS = 10  # rates cover the last 5 s of the robot's time (chosen by us: the slow list comes round several times)
+GAP_PERIODS = 2.5  # as in the plots: this many periods without a point are a gap
 FAST_LIST, MEDIUM_LIST, SLOW_LIST = "fast", "medium", "slow"
 LISTS = (FAST_LIST, MEDIUM_LIST, SLOW_LIST)
 
@@ -39,9 +39,9 @@ def lists_of(words: list[float]) -> tuple[list[int], list[int]]:
 
 
 def promised_hz(fast: int, medium: int, least: bool = False) -> dict[str, float]:
-    """{list: points per second of one of its variables}, of lists of these lengths at full speed.
+    """{list: points per second of one of its variables}, for lists of these lengths at full speed.
 
-    least: each look at the medium list goes through all of it, because nothing in it is new.
+    least: each check of the medium list goes through all of it, because nothing in it is new.
     """
     looks = medium if least else min(medium, 1)
     cycles_hz = STEPS_PER_S / (fast + looks + 1 + RETURN_STEPS)
@@ -49,19 +49,19 @@ def promised_hz(fast: int, medium: int, least: bool = False) -> dict[str, float]
 
 
 def published_hz() -> dict[int, float]:
-    """{identifier: how often its board publishes it}, of those that are published regularly."""
+    """{identifier: rate at which its board publishes it}, for regularly published variables."""
     own_ms = {row.id: row.period_ms for row in load().variables}
     return {number: 1000.0 / float(period) for number, period in own_ms.items() if period}
 
 
 class Rates:
-    """Counts what a session brings, by variable and by the robot's time; `take` hears every point after the session."""
+    """Counts a session's points by variable and robot time; pass every point to `take` after the session."""
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self.bins: collections.deque[Any] = collections.deque(maxlen=BINS + 1)  # the last one is being filled
         self.bin = 0
-        self.words: list[float] | None = None  # of the channels, as far as the robot has told them
+        self.words: list[float] | None = None  # of the channels, as far as the robot has sent them
         self.list_of: dict[int, str] = {}
         self.promised_hz = np.zeros(VARIABLES)
         self.patience_ms = np.full(VARIABLES, np.inf)
@@ -73,11 +73,11 @@ class Rates:
 
     @property
     def know(self) -> bool:
-        """The robot has told its lists."""
+        """True when the robot has sent its lists."""
         return self.words is not None
 
     def take(self, point: Point) -> bool:
-        """One point came; True when its variable had not come for longer than its list promises."""
+        """Count one point; True if the time since its variable's last point exceeds the limit of its list."""
         now_ms, number = self.session.clock_ms, point.number
         if now_ms is None or number >= VARIABLES:
             return False
@@ -95,7 +95,7 @@ class Rates:
         return True
 
     def _step_to(self, number: int) -> None:
-        """Bins without a point are part of the rate; a clock that went back, or far ahead, begins anew."""
+        """Advance to a bin; bins without a point count too. A clock that jumped back or far ahead restarts the bins."""
         if not self.bins or not 0 <= number - self.bin <= BINS:
             if not self.bins or number < self.bin:
                 self.came_ms.clear()
@@ -107,7 +107,7 @@ class Rates:
         self.bin = number
 
     def _learn(self) -> None:
-        """The lists as the robot has them, from what it tells of its channels; other lists are measured anew."""
+        """Update the lists from the channel values that the robot sends; changed lists are measured anew."""
         told = self.session.values
         numbers = range(FIRST_CHANNEL, FIRST_CHANNEL + CHANNELS)
         words = [float(value_of_word("f32", told[number][0])) if number in told else 0.0 for number in numbers]
@@ -122,7 +122,7 @@ class Rates:
             which = self.list_of.get(number, SLOW_LIST)
             own_hz = self.published_hz.get(number)
             if own_hz is None or which == SLOW_LIST:
-                # what nobody publishes regularly may be new or not: for certain it comes by the slow list
+                # a variable not published regularly may be new or not: only the slow list is certain to send it
                 self.promised_hz[number], sure_hz = full[SLOW_LIST], least[SLOW_LIST]
             else:
                 self.promised_hz[number], sure_hz = min(full[which], own_hz), min(least[which], own_hz)
@@ -138,9 +138,9 @@ class Rates:
         return np.sum(whole, axis=0) / (len(whole) * BIN_MS * 1e-3) if whole else np.zeros(VARIABLES)
 
     def rows(self, numbers: list[int]) -> list[dict[str, Any]]:
-        """Of these variables: list, rate and promise (Hz), gaps, the longest (ms), when the latest ended (ms).
+        """For each variable: list, rate and promise (Hz), gaps, the longest (ms), when the latest ended (ms).
 
-        regular: its board publishes it at a rate of its own; one that is not comes oftener when it is written.
+        regular: its board publishes it at a fixed rate; any other is sent more often when it is written.
         """
         rates = self.rates_hz()
         return [
@@ -158,7 +158,7 @@ class Rates:
         ]
 
     def lists(self) -> list[dict[str, Any]]:
-        """Of each list: variables, points per second that came and that it promises, gaps of all its variables."""
+        """For each list: variables, received and promised points per second, gaps of all its variables."""
         found = []
         rows = self.rows(list(range(VARIABLES)))
         for which in LISTS:
@@ -178,5 +178,5 @@ class Rates:
         return found
 
     def chosen(self) -> list[int]:
-        """What is on the fast and the medium list, as the robot has told."""
+        """The variables on the fast and the medium list, as sent by the robot."""
         return sorted(self.list_of, key=lambda number: (LISTS.index(self.list_of[number]), number))

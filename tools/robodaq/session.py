@@ -1,7 +1,7 @@
-"""One session with a robot: what came, what is wanted, what is not answered yet.
+"""One session with a robot: received values, pending requests, unanswered writes.
 
-Bytes go in by `receive`, bytes to send come out of `outgoing`; the caller tells the time, in s. So the same session
-works on a port with the wall clock, and in a test on virtual time.
+Pass received bytes to `receive`, send the bytes from `outgoing`; the caller supplies the time, in s. So the same
+session works on a port with the wall clock, and in a test on virtual time.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from ranger_sim.tools.robodaq.codec import Point, SegmentDecoder, write_packet
 TIMESTAMP = all_variables.ID_OF["TIMESTAMP"]
 ERRORS = all_variables.ID_OF["ERROR_LABVIEW"]
 FIRST_CHANNEL = all_variables.ID_OF["LV_CH_0"]
-# Two channels are the session's own: the robot's time shows gaps, and errors come as soon as there are some.
+# The session itself uses two channels: the robot's time reveals gaps, and errors are sent as soon as they occur.
 OWN = (TIMESTAMP + MEDIUM, ERRORS + FAST)
 GAP_MS = 50  # the logs of the real robot have radio gaps of 50 ms and more (robot.md C6.1)
 # The robot takes 499 bytes in 22 ms and answers by its slow list, in about a third of a second at full speed.
 UNANSWERED_MAX = 40  # packets of 8 bytes under way at a time: 320 bytes
-REPEAT_S = 2.0  # a packet not confirmed by then may have been lost: it is sent again (chosen by us)
+REPEAT_S = 2.0  # a packet not confirmed within this time may have been lost: it is sent again (chosen by us)
 HALF = 1 << 31
 
 
 @dataclasses.dataclass
 class ErrorLine:
-    """One error of one board: how often it came, and the robot's time (ms) of the last one."""
+    """One error of one board: its count, and the robot's time (ms) of the last one."""
 
     board: str
     code: int
@@ -45,7 +45,7 @@ class ErrorLine:
 
 @dataclasses.dataclass
 class _Write:
-    """A packet to send until its value comes back."""
+    """A packet to send until its value is received back."""
 
     number: int
     word: int
@@ -54,9 +54,9 @@ class _Write:
 
 
 class Session:
-    """`points` hears every point; `errors` is {(board, code): ErrorLine}, the latest at the end.
+    """`points` is called with every point; `errors` is {(board, code): ErrorLine}, the latest at the end.
 
-    `values`: {identifier: (word, stamp)} of what came last; `counts`: how often each came.
+    `values`: {identifier: (word, stamp)} of the last point; `counts`: number of points of each.
     """
 
     def __init__(self, hear: Callable[[Point], None] | None = None) -> None:
@@ -75,14 +75,14 @@ class Session:
         self.new_errors: collections.deque[tuple[ErrorLine, int]] = collections.deque()
         self._last_error: tuple[int, int] | None = None
         self.selection: tuple[int, ...] = ()  # words wanted in the channels, as numbers
-        self.writes: dict[int, _Write] = {}  # by identifier, in the order of the wish
+        self.writes: dict[int, _Write] = {}  # by identifier, in the order of the requests
         self.reads: set[int] = set()
         self.sent_packets = 0
 
-    # --- what is wanted ---------------------------------------------------------------------------------
+    # --- requests ---------------------------------------------------------------------------------------
 
     def select(self, fast: Iterable[Variable], medium: Iterable[Variable]) -> None:
-        """Let the robot send these faster than the rest; UserError when the channels do not suffice."""
+        """Make the robot send these more often than the rest; UserError if the channels do not suffice."""
         own = {TIMESTAMP, ERRORS}
         often = dict.fromkeys(row.id for row in fast if row.id not in own)
         rarer = dict.fromkeys(row.id for row in medium if row.id not in own and row.id not in often)
@@ -100,7 +100,7 @@ class Session:
             self._want(FIRST_CHANNEL + place, word_of_value("f32", value))
 
     def write(self, name: str, value: float, place: str = "") -> None:
-        """Set a parameter; UserError when it is none, or the value is outside its limits."""
+        """Set a parameter; UserError for anything but a parameter, or a value outside its limits."""
         row = parameters.parameter(name)
         self._want(row.id, parameters.checked_word(row, value, place))
 
@@ -110,11 +110,11 @@ class Session:
         self.reads.discard(number)
 
     def read(self, name: str) -> None:
-        """Wait for a fresh value of a variable."""
+        """Wait for a new value of a variable."""
         self.reads.add(parameters.find(name).id)
 
     def pending(self) -> list[str]:
-        """Names that were written or asked for and not answered yet; channels as one."""
+        """Names that were written or requested and not answered yet; channels count as one."""
         names = [all_variables.NAMES[n] for n in (*self.writes, *self.reads)]
         return list(dict.fromkeys("channels" if name.startswith("LV_CH_") else name for name in names))
 
@@ -138,7 +138,7 @@ class Session:
         return out
 
     def receive(self, data: bytes, now_s: float) -> int:
-        """Bytes of the robot; returns how many points they brought."""
+        """Process bytes from the robot; returns the number of points in them."""
         if data:
             self.bytes_in += len(data)
             self.last_byte_s = now_s
@@ -163,7 +163,7 @@ class Session:
             self.hear(point)
 
     def _pass_time(self, number: int, stamp: int) -> None:
-        """The newest stamp is the robot's time; a jump of it is a gap, a step back a new start of the robot."""
+        """Advance the robot's time to the newest stamp; a jump is a gap, a step back a restart of the robot."""
         if self.clock_ms is None:
             if number == TIMESTAMP:
                 self.clock_ms = stamp
@@ -171,7 +171,7 @@ class Session:
         ahead = (stamp - self.clock_ms) & 0xFFFFFFFF
         if ahead < HALF:
             self.clock_ms = stamp
-            # before time is a channel it comes with the slow list only, and says nothing about gaps
+            # before time is a channel only the slow list sends it, and it does not reveal gaps
             if ahead >= GAP_MS and self.selection and FIRST_CHANNEL not in self.writes:
                 self.gaps += 1
                 self.longest_gap_ms = max(self.longest_gap_ms, ahead)
@@ -182,7 +182,7 @@ class Session:
             self._write_selection()
 
     def _note_error(self, word: int, stamp: int) -> None:
-        """The slow list brings the last error again and again: only a new one counts."""
+        """Count an error word if it is new: the slow list repeats the last error."""
         if word == 0 or (word, stamp) == self._last_error:
             return
         self._last_error = (word, stamp)
@@ -199,13 +199,13 @@ class Session:
     # --- for displays -----------------------------------------------------------------------------------
 
     def state(self, now_s: float) -> str:
-        """In a word: silent, out of step, or receiving."""
+        """One word: silent, out of step, or receiving."""
         if self.last_byte_s is None or now_s - self.last_byte_s > 1.0:
             return "silent"
         return "receiving" if self.decoder.in_step else "out of step"
 
     def counters(self) -> dict[str, int]:
-        """Whole numbers by name."""
+        """Counters by name."""
         return {
             "segments": self.decoder.segments,
             "points": self.points,

@@ -1,1 +1,1 @@
-"""`ranger-sim walk`, `up` and `ctl`: what can be asked of a run, what is watched, and the folder that it leaves."""
+"""`ranger-sim walk`, `up` and `ctl`: options of a run, its checks, and the folder that it writes."""

@@ -1,9 +1,9 @@
-"""The folder of one run: whose it is, what in it is complete, and what becomes of it when the run breaks off.
+"""The folder of one run: its owner, which of its files are complete, and its state when the run is interrupted.
 
-While a run lasts, the folder holds `incomplete.json` and the files that grow, with `.partial` in their names. A file
-that is whole gets its own name. At the end `incomplete.json` becomes `summary.json`, last of all: where that stands,
-the run has ended and every other file is its own. After anything else, a full disk or a kill -9, what is there is named
-as what it is.
+While a run lasts, the folder holds `incomplete.json` and the growing files, with `.partial` in their names. A whole
+file gets its own name. At the end `incomplete.json` becomes `summary.json`, last of all: if that exists, the run has
+ended and every other file belongs to it. After anything else, a full disk or a kill -9, the names show which files are
+partial.
 """
 
 import contextlib
@@ -24,37 +24,37 @@ BUS_LOGS = ("can1.log", "can2.log", "can3.log", "can4.log")
 VARIABLES = "variables.mf4"
 REPORT = "report.html"
 LCOV = "lcov.info"
-FILES = (*BUS_LOGS, VARIABLES, REPORT, LCOV)  # beside the summary
+FILES = (*BUS_LOGS, VARIABLES, REPORT, LCOV)  # in addition to the summary
 # Bytes that incomplete.json takes from the disk at the start, so that a summary (some 20 kB) fits into it when the disk
 # is full at the end. Chosen by us.
 RESERVED = 65_536
 BROKEN_OFF = "the run has not ended, or was broken off: what is here is as far as it came"
-FAILURES = (OSError, MemoryError)  # of the machine: a file then stays partial, and the run goes on
+FAILURES = (OSError, MemoryError)  # of the machine: a file then stays partial, and the run continues
 
 
 def printed_name(board: str) -> str:
-    """The file of what the program in C of a board has printed."""
+    """The file for the output of a board's program in C."""
     return f"printed-{board}.txt"
 
 
 def partial(name: str) -> str:
-    """What a file is called as long as it is not whole."""
+    """The name of a file until it is whole."""
     stem, dot, suffix = name.rpartition(".")
     return f"{stem}.partial{dot}{suffix}"
 
 
 def cause_of(error: BaseException) -> str:
-    """A failure of the machine in its own words."""
+    """A failure of the machine as text."""
     if isinstance(error, MemoryError):
         return "out of memory"
     return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
 
 
 class RunFolder:
-    """One run's folder. A context manager: left by an exception, it says so in `incomplete.json`.
+    """One run's folder. A context manager: if left by an exception, it records that in `incomplete.json`.
 
-    What an older run left goes first: files of the names above, and only where a record of ours says that it was a run.
-    UserError for a folder in which a file of such a name is somebody else's, or in which another run is writing.
+    Files of an older run are removed first: only those of the names above, and only if a record of ours marks a run.
+    UserError for a folder in which a file of such a name is not from a run, or in which another run is writing.
     tell: called with a line for every file that could not be finished.
     """
 
@@ -71,16 +71,16 @@ class RunFolder:
 
     def __exit__(self, _kind: Any, error: BaseException | None, _trace: Any) -> None:
         if not self.is_done:
-            with contextlib.suppress(*FAILURES):  # what could not be kept is no reason to hide the error itself
+            with contextlib.suppress(*FAILURES):  # a failure to record it must not hide the error itself
                 why = f"{type(error).__name__}: {error}" if error is not None else BROKEN_OFF
                 self._write_record({**self._record(), "ended": why})
         os.close(self.lock)
 
     @contextlib.contextmanager
     def file(self, name: str) -> Iterator[pathlib.Path]:
-        """Write the file `name` to the path that is given; it gets its name when it is whole.
+        """Yield the path to write the file `name` to; it gets its name when it is whole.
 
-        A failure of the machine is told and noted, and hinders nothing else.
+        A failure of the machine is reported and recorded, and does not affect anything else.
         """
         path = self.begin(name)
         try:
@@ -91,7 +91,7 @@ class RunFolder:
             self.done(name)
 
     def begin(self, name: str) -> pathlib.Path:
-        """Where `name` grows until it is `done` or has `failed`."""
+        """The path at which `name` grows until it is `done` or has `failed`."""
         self.files[name] = "incomplete"
         return self.path / partial(name)
 
@@ -101,17 +101,17 @@ class RunFolder:
         self.files[name] = "complete"
 
     def failed(self, name: str, error: BaseException, until: str = "") -> None:
-        """`name` stays as far as it came."""
+        """`name` stays partial."""
         self.files[name] = f"incomplete: {cause_of(error)}{until}"
         self.tell(f"{self.path / partial(name)}: {cause_of(error)}: the file ends there{until}")
 
     @property
     def is_complete(self) -> bool:
-        """True when no file that was begun is missing anything."""
+        """True when every file that was begun is complete."""
         return all(state == "complete" for state in self.files.values())
 
     def finish(self, summary: dict) -> None:
-        """Write the summary, told what is complete, in its reserved place, and give the folder its final state."""
+        """Write the summary, with the complete files, in its reserved place, and give the folder its final state."""
         summary.update(complete=self.is_complete, files=self.files)
         self._write_record(summary)
         try:
@@ -120,7 +120,7 @@ class RunFolder:
             raise UserError(f"{self.path / SUMMARY}: {cause_of(error)}; the summary is in {OPEN}") from None
         self.is_done = True
 
-    # --- whose it is ----------------------------------------------------------------------------------------
+    # --- ownership ------------------------------------------------------------------------------------------
 
     def _claim(self) -> None:
         record = self.path / OPEN
@@ -158,7 +158,7 @@ class RunFolder:
                 f"{self.path / foreign[0]}: is there, and of no run that this folder tells of; "
                 "remove it or choose another folder"
             )
-        # the summary first: from here on nothing says that the rest is a whole run
+        # the summary first: from here on nothing marks the rest as a whole run
         for name in there:
             (self.path / name).unlink()
 

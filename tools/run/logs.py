@@ -10,12 +10,12 @@ from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.records.logbook import decoded
 from ranger_sim.tools.run.folder import BUS_LOGS, FAILURES, VARIABLES, RunFolder, printed_name
 
-Takers = dict[str, Callable[[Any], None]]  # of rows, by the stream that they come from
+Takers = dict[str, Callable[[Any], None]]  # of rows, by the stream that supplies them
 Close = Callable[[], None]
 
 
 class Part:
-    """One file of the logs, fed by some of the recorder's streams: {stream: what takes its rows}."""
+    """One file of the logs, fed by some of the recorder's streams: {stream: function that takes its rows}."""
 
     def __init__(self, name: str, takers: Takers, close: Close) -> None:
         self.name = name
@@ -25,9 +25,9 @@ class Part:
 
 
 class RunLogs:
-    """Files that take what the robot's recorder hands over. What cannot be written is told once, the run goes on.
+    """Files that take the rows of the robot's recorder. A write error is reported once, and the run continues.
 
-    follow: from now on, as it comes; otherwise at the end, what the robot's log then has kept.
+    follow: write from now on, as rows arrive; otherwise at the end, from the robot's log.
     """
 
     def __init__(self, robot: Any, folder: RunFolder, follow: bool) -> None:
@@ -42,7 +42,7 @@ class RunLogs:
                     robot.logbook.listen(stream, functools.partial(self._take, part, stream))
 
     def finish(self) -> None:
-        """Write the rest, or everything that was kept, and finish every file."""
+        """Write the remaining or all kept rows, and finish every file."""
         if self.follows:
             self.robot.logbook.flush()
         else:
@@ -86,7 +86,7 @@ class RunLogs:
 
 
 class PrintedFiles:
-    """What the programs in C of a run print, in its folder: a file for each board that prints something."""
+    """Output of a run's programs in C, in its folder: a file for each board that prints something."""
 
     def __init__(self, printed: Printed, folder: RunFolder) -> None:
         self.folder = folder
@@ -143,7 +143,7 @@ def variables_part(robot: Any, path: pathlib.Path) -> tuple[Takers, Close]:
 
 
 def write_frames(robot: Any, folder: pathlib.Path) -> None:
-    """What the robot's log kept of the frames, into `folder`: one file per bus. OSError when that cannot be."""
+    """Write the frames in the robot's log into `folder`: one file per bus. OSError on failure."""
     for name, bus in zip(BUS_LOGS, robot.buses, strict=True):
         takers, close = frame_part(bus.name, folder / name)
         for rows in robot.logbook.kept(bus.name):

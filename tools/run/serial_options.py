@@ -42,7 +42,7 @@ def add_options(command: Any) -> None:
 
 
 def quirks_of(given: argparse.Namespace) -> Quirks:
-    """The switches that these options ask for: drop-outs without a word on the link mean Bluetooth.
+    """The quirks that these options select: drop-outs without `--daq-link` mean Bluetooth.
 
     UserError for options that contradict each other.
     """
@@ -55,7 +55,7 @@ def quirks_of(given: argparse.Namespace) -> Quirks:
 
 
 def wanted(given: argparse.Namespace) -> bool:
-    """True when something outside is to be connected: the robot then runs at the pace of the wall clock."""
+    """True when an external program is to be connected: the robot then runs at the pace of the wall clock."""
     return bool(given.daq_port or given.imu_port or given.imu_offer)
 
 

@@ -1,4 +1,4 @@
-"""What a healthy walk has not: one line for each, for the terminal and for the top of the report."""
+"""Deviations from a healthy walk: one line for each, for the terminal and for the top of the report."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ HEALTHY = (
 
 
 def lines(summary: dict, floor_friction: float) -> list[str]:
-    """All of it but how the walk ended, by its summary. floor_friction: what the floor gives, over the normal force."""
+    """All lines except how the walk ended, from its summary. floor_friction: the floor's, over the normal force."""
     return [
         *(f"{board}: the board failed" for board in summary["failed_boards"]),
         *floor(summary["oddities"], floor_friction),
@@ -22,7 +22,7 @@ def lines(summary: dict, floor_friction: float) -> list[str]:
 
 
 def ending(summary: dict) -> Iterator[str]:
-    """How it ended, if it ended badly."""
+    """How the walk ended, if it ended badly."""
     if summary["battery"]["empty"]:
         yield f"batteries: {summary['fall_cause']}"
     elif summary["fell"]:
@@ -33,13 +33,13 @@ def ending(summary: dict) -> Iterator[str]:
 
 
 def floor(seen: dict, floor_friction: float) -> Iterator[str]:
-    """What the contact of feet and floor did that a real floor could not, or that a walk should not need."""
+    """Behaviour of feet and floor that is impossible for a real floor, or that a walk should not need."""
     if seen["tensile_strikes"]:
         worst = seen["tensile_impulse_min_Ns"]
         yield f"{times(seen['tensile_strikes'], 'strike')} pulled at the floor, to {worst:.2f} N s"
     if seen["pull_s"]:
         yield f"the floor pulled at a foot for {seen['pull_s'] * 1e3:.0f} ms, to {seen['normal_force_min_N']:.1f} N"
-    # Of a contact that limits friction, the worst ratio is the limit itself, but for rounding.
+    # If a contact limits friction, the worst ratio is the limit itself, except for rounding.
     ratio = seen["friction_ratio_max"]
     if ratio is not None and ratio > floor_friction * (1.0 + 1e-6):
         yield f"friction of {ratio:.2f} times the normal force; the floor gives {floor_friction:.2f}"
@@ -56,7 +56,7 @@ def floor(seen: dict, floor_friction: float) -> Iterator[str]:
 
 
 def boards(summary: dict) -> Iterator[str]:
-    """What buses, slots and the strike detector lost."""
+    """Losses of buses, slots and the strike detector."""
     for bus, can in summary["can"].items():
         for key, one in (("lost", "frame lost"), ("queue_full", "frame refused by a full queue"), ("errors", "error")):
             if can[key]:
@@ -73,7 +73,7 @@ def boards(summary: dict) -> Iterator[str]:
 
 
 def errors(counts: dict, time_s: float) -> Iterator[str]:
-    """Errors that boards noted beyond those of a healthy walk of so long a time."""
+    """Errors that boards noted beyond those of a healthy walk of the same length."""
     for board, names in normal_errors.beyond(RANGER, counts, time_s).items():
         yield f"errors of {board}: " + ", ".join(f"{name} x {count}" for name, count in names.items())
 

@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from ranger_sim.harness.timeline import Timeline
     from ranger_sim.tools.run.logs import RunLogs
 
-PLAIN_S = 2.0  # between two lines where there is no terminal
-# Fields of a request, as ctl gives them, and what each is called there.
+PLAIN_S = 2.0  # between two lines without a terminal
+# Fields of a request, as ctl gives them, and the name of each there.
 FIELDS = {
     "restart": {"board": "BOARD"},
     "key": {"key": "N"},

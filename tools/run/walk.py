@@ -1,4 +1,4 @@
-"""`ranger-sim walk`: let the robot walk, watch it, keep what it did."""
+"""`ranger-sim walk`: run the robot, watch it, keep its logs."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ if TYPE_CHECKING:
 __all__ = ["walk", "write_frames"]
 
 DEFAULT_STEPS = 100
-EXIT_INCOMPLETE = 2  # a file that was asked for is not whole: the disk is full
-SLICE_S = 0.05  # virtual seconds between two looks at the screen and at Ctrl-C
-TELL_EVERY_S = 60.0  # of the wall clock: a line of progress where there is no screen to draw it on (chosen by us)
-PACED_SLICE_S = 0.005  # the same when a serial port is connected: so long at most a byte waits
+EXIT_INCOMPLETE = 2  # a requested file is not whole: the disk is full
+SLICE_S = 0.05  # virtual seconds between two checks of the screen and of Ctrl-C
+TELL_EVERY_S = 60.0  # of the wall clock: a line of progress if there is no screen to draw it on (chosen by us)
+PACED_SLICE_S = 0.005  # the same when a serial port is connected: the longest time that a byte waits
 
 
 def register(commands: Any) -> None:
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def profile_of(options: argparse.Namespace, console: Console) -> Profile | None:
-    """The profile that was asked for; in lockstep all its boards run here, and its buses inside."""
+    """The requested profile; in lockstep all its boards run here, and its buses inside."""
     if options.profile is None:
         return None
     profile = load_profile(options.profile)
@@ -159,7 +159,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
 
 
 def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firmware]:
-    """The firmware in C that was asked for, by board, compiled."""
+    """The requested firmware in C, by board, compiled."""
     wanted: dict[str, str] = {}
     for text in options.firmware:
         board, folder = native_boards.placed(text)
@@ -169,7 +169,7 @@ def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firm
     if options.coverage and not wanted:
         raise UserError("--coverage: there is no firmware in C in this run; --firmware BOARD=DIR gives a board one")
     if options.coverage:
-        coverage.gcov()  # told before anything runs
+        coverage.gcov()  # reports an error before anything runs
     firmware = {
         board: native_boards.build(folder, options.sanitize, options.coverage) for board, folder in wanted.items()
     }
@@ -199,7 +199,7 @@ def printed_by(firmware: dict[str, Firmware], console: Console) -> Iterator[Prin
         try:
             yield printed
         except BaseException:
-            printed.finish()  # what a program said before it failed
+            printed.finish()  # output of a program before it failed
             raise
 
 
@@ -212,7 +212,7 @@ def finish_printed(printed: Printed | None, kept: PrintedFiles | None) -> None:
 
 
 def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
-    """Arm the faults; with `proof` all of them beside one golden run without any."""
+    """Arm the faults; with `proof`, also a golden run without any, in parallel."""
     if proof and not wanted:
         raise UserError("--proof: there is no --fault to hold against the walk without it")
     if wanted:
@@ -228,7 +228,7 @@ def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
 
 
 def claimed(options: argparse.Namespace, stop: StopRule, console: Console) -> RunFolder:
-    """The folder that was asked for, for this run alone. What is wrong with a run must have been told before."""
+    """The requested folder, for this run alone. Errors in a run's options must have been reported before."""
 
     def tell(line: str) -> None:
         console.print(line, highlight=False, soft_wrap=True)
@@ -252,14 +252,14 @@ def finish(
     json_file: pathlib.Path | None,
     console: Console,
 ) -> bool:
-    """Print the summary and write the files that were asked for; False when one of them is not complete."""
+    """Print the summary and write the requested files; False when one of them is not complete."""
     if options.json != "-":
         print_summary(summary, robot.plant.parameters.floor_friction, console)
     summary.update(complete=folder is None, files={})
     try:
         if folder is not None:
             write_files(robot, summary, folder, logs, console)
-    finally:  # whatever becomes of the folder
+    finally:  # even if the folder fails
         text = json.dumps(summary, indent=2)
         if options.json == "-":
             streams.print_result(text)
@@ -278,7 +278,7 @@ def finish(
 def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:
     """Run until the stop rule, a fall, empty batteries, or Ctrl-C (at least one slice, so that files have something).
 
-    paced: not faster than the wall clock, because something outside takes part.
+    paced: not faster than the wall clock, because an external program takes part.
     """
     started = wallclock.monotonic_s()
     with Progress(
@@ -320,7 +320,7 @@ def progress_text(robot: Ranger, stop: StopRule, wall_s: float) -> str:
     left = clock_text(wall_s * (1.0 - share) / share) if share > 0.0 else "?"
     charge = max(0.0, robot.plant.electrics.battery.charge)
     factor = robot.time_s / wall_s if wall_s > 0.0 else 0.0
-    return (  # what a narrow screen cuts off stands last
+    return (  # a narrow screen cuts off the last part
         f"{length_text(robot.distance_m)}, {robot.steps} steps, {left} left; {clock_text(robot.time_s)} "
         f"at {speed:.2f} m/s, {factor:.1f} x real time, battery {100.0 * charge:.0f} %"
     )
@@ -348,7 +348,7 @@ def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs |
 
 
 def print_summary(summary: dict, floor_friction: float, console: Console) -> None:
-    """The walk in a few lines: what it did, then what a healthy one has not."""
+    """The walk in a few lines: its results, then the deviations from a healthy walk."""
     console.print(
         f"{summary['steps']} steps, {length_text(summary['distance_m'])} in {duration_text(summary['time_s'])}, "
         f"{end_text(summary)}; "

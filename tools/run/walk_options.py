@@ -1,4 +1,4 @@
-"""What can be asked of a walk: one table, from which its parser and the command that repeats it are made."""
+"""Options of a walk: one table, from which its parser and the command that repeats it are made."""
 
 import argparse
 import shlex
@@ -167,7 +167,7 @@ def add_walk_options(command: Any) -> None:
 
 
 def stop_of(given: argparse.Namespace) -> StopRule | None:
-    """The end that was asked for, if one was."""
+    """The requested end, if any."""
     if given.steps is None and given.time is None and given.distance is None:
         return None
     return StopRule(given.steps, given.time, given.distance)
@@ -182,7 +182,7 @@ def log_of(given: argparse.Namespace) -> str:
 
 
 def scenario_of(given: argparse.Namespace) -> Scenario:
-    """The scenario that was asked for."""
+    """The requested scenario."""
     return Scenario(
         controller=given.controller,
         body=given.body,

@@ -1,1 +1,1 @@
-"""`ranger-sim slots` and `trace`: who needs a board's time, and the timeline of a run."""
+"""`ranger-sim slots` and `trace`: use of a board's time, and the timeline of a run."""

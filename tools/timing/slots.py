@@ -1,4 +1,4 @@
-"""`ranger-sim slots`: who needs how much of a board's slots, line by line as its firmware's table."""
+"""`ranger-sim slots`: the time that each function needs of a board's slots, line by line as in its firmware's table."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ranger_sim.tools.command_line.units import TIMES, number, quantity, whole_n
 
 EXIT_DONE, EXIT_OVERRAN = 0, 1
 USUAL_TIME_S = 4.0  # the robot is let go after half of it and walks the rest (chosen by us: seconds of computing)
-# What comes before is not usual: the main brain's first slot sends every command once
+# The time before is not usual: the main brain's first slot sends every command once
 FIRST_SECONDS = 0.1
 
 
@@ -96,7 +96,7 @@ def seen(robot: Ranger, names: list[str], options: argparse.Namespace) -> dict[s
 
 
 def run_facts(robot: Ranger, options: argparse.Namespace) -> dict:
-    """What the figures that were seen come from."""
+    """The run that the measured figures come from."""
     return {"seed": options.seed, "time_s": round(robot.time_s, 6), "steps": robot.steps, "ended": robot.ended}
 
 
@@ -136,12 +136,12 @@ def function_facts(board: str, bound: FunctionBound, ran: Statistics | None) -> 
 
 
 def interrupt_facts(ran: Statistics | None) -> dict | None:
-    """What was seen of a source."""
+    """The measured figures of an interrupt source."""
     return None if ran is None else {"served": ran.calls, "most": ran.most, "latency_us": ran.latency_ns / 1000}
 
 
 def row_facts(view: SlotView) -> dict | None:
-    """What was seen of the slots of a view."""
+    """The measured figures of the slots of a view."""
     if not len(view):
         return None
     worst = view.worst()
@@ -155,7 +155,7 @@ def row_facts(view: SlotView) -> dict | None:
     }
 
 
-# ---- as a person reads it
+# ---- text output
 
 
 def show(board: dict, ran: dict | None, console: Console, whole: bool) -> None:
@@ -226,7 +226,7 @@ def row_table(board: dict) -> Table:
 
 
 def interrupt_table(board: dict) -> Table:
-    """What interrupts can take in a slot."""
+    """The most time that interrupts can take in a slot."""
     table = Table(box=None, pad_edge=False)
     table.add_column("interrupt")
     for title in ("in a slot", "each", "together", "most seen", "latency seen"):
@@ -247,7 +247,7 @@ def interrupt_table(board: dict) -> Table:
 
 
 def notes(board: dict, ran: dict | None) -> list[str]:
-    """What the figures rest on."""
+    """The basis of the figures."""
     lines = []
     saw = board["seen"]
     if ran is not None and saw is not None:

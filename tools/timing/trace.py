@@ -1,4 +1,4 @@
-"""`ranger-sim trace`: look at a timeline; and the options `--trace` of the commands that run a robot."""
+"""`ranger-sim trace`: view a timeline; and the options `--trace` of the commands that run a robot."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.timeline import Timeline
 
-LONGEST_NAP_S = 1.0  # so that Ctrl-C is never late; chosen by us
-SHOWN_S = 0.02  # around the instant: ten slots of the main brain, chosen by us
-KEPT_S = 1.0  # what a page for offline use holds of a long trace: some 10 MB
+LONGEST_NAP_S = 1.0  # so that Ctrl-C acts soon; chosen by us
+SHOWN_S = 0.02  # around the time: ten slots of the main brain, chosen by us
+KEPT_S = 1.0  # the part of a long trace in a page for offline use: some 10 MB
 
 
 OPTIONS = (
@@ -48,18 +48,18 @@ OPTIONS = (
 
 
 def add_options(command: Any) -> None:
-    """The options of every command that runs a robot and can keep its timeline."""
+    """The options of every command that runs a robot and can record its timeline."""
     group = command.add_argument_group("timeline", "what happened, to be looked at with `ranger-sim trace open`")
     add_all(group, OPTIONS)
 
 
 def paths_of(given: argparse.Namespace) -> list[pathlib.Path]:
-    """The files that were asked for."""
+    """The requested files."""
     return [pathlib.Path(name) for name in given.trace]
 
 
 def check(given: argparse.Namespace) -> None:
-    """UserError, before anything runs, for a file that cannot be."""
+    """UserError, before anything runs, for an impossible file."""
     if given.trace_last and not given.trace:
         raise UserError("--trace-last needs --trace FILE")
     for path in paths_of(given):
@@ -69,7 +69,7 @@ def check(given: argparse.Namespace) -> None:
 
 
 def attach(robot: Ranger, given: argparse.Namespace) -> Timeline | None:
-    """A timeline on `robot` when one was asked for. UserError for a file that cannot be."""
+    """Attach a timeline to `robot` if requested. UserError for an impossible file."""
     check(given)
     if not given.trace:
         return None
@@ -79,7 +79,7 @@ def attach(robot: Ranger, given: argparse.Namespace) -> Timeline | None:
 
 
 def write(timeline: Timeline | None, given: argparse.Namespace, console: Console) -> None:
-    """The files that were asked for."""
+    """Write the requested files."""
     if timeline is None:
         return
     with console.status("writing the timeline ..."):
@@ -153,13 +153,13 @@ def open_page(given: argparse.Namespace, moment: Any) -> int:
 
 
 def address(name: str, begin_ns: int, end_ns: int) -> str:
-    """What the browser opens: Perfetto's viewer, told where the trace is and what to show of it."""
+    """The address for the browser: Perfetto's viewer, with the trace's address and the time range to show."""
     source = urllib.parse.quote(f"http://127.0.0.1:{PORT}/{urllib.parse.quote(name)}", safe="")
     return f"{VIEWER}/#!/?url={source}&visStart={begin_ns}&visEnd={end_ns}"
 
 
 def serve(file: pathlib.Path, begin_ns: int, end_ns: int, with_browser: bool) -> int:
-    """Until the viewer has fetched the trace, or Ctrl-C."""
+    """Serve until the viewer has fetched the trace, or Ctrl-C."""
     try:
         server = TraceServer(file)
     except OSError as error:

@@ -1,8 +1,8 @@
-"""One trace, shown over HTTP to Perfetto's viewer in a browser of this machine; `foundation/peers.py` has the rule.
+"""Serve one trace over HTTP to Perfetto's viewer in a browser of this machine; `foundation/peers.py` has the rule.
 
-One request of each connection is answered, and the connection closed. No page but the viewer's may read the trace: the
-Origin and Host that a browser sends must be the viewer and this machine, so that a page of another site, also one whose
-name was made to lead here, gets nothing.
+The server answers one request per connection and closes it. Only the viewer's page may read the trace: the Origin and
+Host that a browser sends must be the viewer and this machine, so that a page of another site, even one whose name
+resolves to this machine, receives nothing.
 """
 
 import pathlib
@@ -14,10 +14,10 @@ from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, LIMITS, REASONS, Door, Peer, SocketStream
 
 VIEWER = "https://ui.perfetto.dev"
-# The only port from which Perfetto's viewer may read: its Content-Security-Policy names that of trace_processor.
+# The only port from which Perfetto's viewer may read: its Content-Security-Policy names trace_processor's port.
 PORT = 9001
 HERE = "127.0.0.1"
-# The viewer takes a long trace in pieces and works on each before it takes the next; chosen by us.
+# The viewer fetches a long trace in pieces and processes each before it requests the next; chosen by us.
 TOLERATED_S = 60.0
 END_OF_HEAD = b"\r\n\r\n"  # RFC 9112, section 2.1
 OK, NO_CONTENT, BAD_REQUEST, FORBIDDEN, NOT_FOUND, NOT_ALLOWED, UNAVAILABLE = (
@@ -32,7 +32,7 @@ OK, NO_CONTENT, BAD_REQUEST, FORBIDDEN, NOT_FOUND, NOT_ALLOWED, UNAVAILABLE = (
 
 
 class Visitor(Peer):
-    """One connection; with `body`, `left` bytes of the file still follow what is in `outgoing`."""
+    """One connection; with `body`, `left` bytes of the file still follow the bytes in `outgoing`."""
 
     def __init__(self, connection: socket.socket) -> None:
         super().__init__(SocketStream(connection))
@@ -40,7 +40,7 @@ class Visitor(Peer):
         self.left = 0
 
     def write(self, limit: int) -> None:
-        """As every peer; the next piece of the file is read when the one before is out."""
+        """Write as any peer; read the next piece of the file when the previous one is sent."""
         super().write(limit)
         if self.body is not None and not self.outgoing:
             piece = self.body.read(min(limit, self.left))
@@ -49,7 +49,7 @@ class Visitor(Peer):
 
 
 class TraceServer(Door[Visitor]):
-    """Serves one file on loopback; `served`: a visitor has taken all of it. OSError when the port cannot be had."""
+    """Serves one file on loopback; `served`: a client has read all of it. OSError if the port is not available."""
 
     tolerated_s = TOLERATED_S
 
@@ -69,7 +69,7 @@ class TraceServer(Door[Visitor]):
         self.port = int(listener.getsockname()[1])
 
     def turn(self, patience_s: float) -> None:
-        """Wait for something to happen, and see to it."""
+        """Wait for an event and handle it."""
         if self.left_over:
             patience_s = 0.0
         elif self.knocking:
@@ -82,20 +82,20 @@ class TraceServer(Door[Visitor]):
         return Visitor(connection)
 
     def _takes_part(self, peer: Visitor) -> bool:
-        """Who is being answered keeps its place."""
+        """A client whose answer is being sent keeps its place."""
         return peer.ending
 
     def _apology(self, reason: str) -> bytes:
         return _head(UNAVAILABLE if reason == FULL else BAD_REQUEST, {"Warning": f'199 - "{REASONS[reason]}"'})
 
     def _take(self, peer: Visitor) -> bool:
-        """The request, if its head has come whole; a body of it is not read."""
+        """Handle the request if its head is complete; its body is not read."""
         end = peer.incoming.find(END_OF_HEAD)
         if end < 0:
             return False
         lines = bytes(peer.incoming[:end]).decode("latin-1").split("\r\n")
         peer.incoming.clear()
-        peer.ending = True  # closed when the answer is out
+        peer.ending = True  # closed when the answer is sent
         fields = {name.strip().lower(): value.strip() for name, _, value in (line.partition(":") for line in lines[1:])}
         method, _, rest = lines[0].partition(" ")
         target, _, version = rest.rpartition(" ")
@@ -103,7 +103,7 @@ class TraceServer(Door[Visitor]):
             peer.answer(_head(BAD_REQUEST))
         elif fields.get("origin", VIEWER) != VIEWER or not self._is_here(fields.get("host", "")):
             peer.answer(_head(FORBIDDEN))
-        elif method == "OPTIONS":  # may a page of the internet ask here? It may GET
+        elif method == "OPTIONS":  # a browser asks if a page of the internet may send requests: it may GET
             peer.answer(_head(NO_CONTENT, {"Access-Control-Allow-Methods": "GET"}))
         elif method != "GET":
             peer.answer(_head(NOT_ALLOWED, {"Allow": "GET, OPTIONS"}))
@@ -114,11 +114,11 @@ class TraceServer(Door[Visitor]):
         return True
 
     def _is_here(self, host: str) -> bool:
-        """True for what a browser calls this machine; "" is a program that did not say."""
+        """True for this machine's names in a browser; "" is a program that sent no Host."""
         return host in ("", f"{HERE}:{self.port}", f"localhost:{self.port}")
 
     def _show(self, peer: Visitor) -> None:
-        """The file, as long as it is now."""
+        """Send the file, at its present length."""
         try:
             peer.body = self.file.open("rb")
             peer.left = self.file.stat().st_size
@@ -128,7 +128,7 @@ class TraceServer(Door[Visitor]):
         peer.answer(_head(OK, {"Content-Type": "application/octet-stream"}, peer.left))
 
     def drop(self, peer: Visitor) -> None:
-        """Close; it was served when everything went out."""
+        """Close; the file was served if everything was sent."""
         if peer.body is not None:
             peer.body.close()
             peer.body = None
@@ -137,7 +137,7 @@ class TraceServer(Door[Visitor]):
 
 
 def _head(status: str, fields: dict[str, str] | None = None, length: int = 0) -> bytes:
-    """The head of an answer; each says that Perfetto's viewer alone may read it, from a page of the internet too."""
+    """The head of an answer; each allows only Perfetto's viewer to read it, even from a page of the internet."""
     told = {
         "Access-Control-Allow-Origin": VIEWER,
         "Access-Control-Allow-Private-Network": "true",

@@ -1,4 +1,4 @@
-"""`ranger-sim vm -- COMMAND`: run something where SocketCAN is, on a host that has none."""
+"""`ranger-sim vm -- COMMAND`: run a command with SocketCAN on a host that has none."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def register(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run it; the exit code is the command's."""
+    """Run the command; returns its exit code."""
     for name in options.shared:
         if not pathlib.Path(name).is_dir():
             raise UserError(f"--shared {name!r}: this is no folder")

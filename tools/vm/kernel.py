@@ -16,13 +16,13 @@ from ranger_sim.foundation.user_error import UserError
 INSTALL_SCRIPT = pathlib.Path(__file__).with_name("install-packages.sh")
 FOLDER_VARIABLE = "RANGER_SIM_VM_KERNEL"
 
-# What the guest loads, by the kernel's names; what these depend on is added.
+# Modules that the guest loads, by the kernel's names; their dependencies are added.
 MODULES = (
     "virtio_pci",  # the devices below
     "virtio_console",  # standard output and error of the command
     "9pnet_virtio",  # the host's files
     "9p",
-    "overlay",  # what is written over them stays in the guest's memory
+    "overlay",  # keeps writes over the host's files in the guest's memory
     "can_raw",
     "can_bcm",
     "can_gw",
@@ -32,14 +32,14 @@ MODULES = (
     "slcan",
     "kvaser_pci",
 )
-# Compressions of module files and what takes them off.
+# Compressions of module files and the functions that undo them.
 UNPACK: dict[str, Callable[[bytes], bytes]] = {
     ".ko": lambda data: data,
     ".ko.xz": lzma.decompress,
     ".ko.gz": gzip.decompress,
     ".ko.zst": lambda data: subprocess.run(["zstd", "-dc"], input=data, capture_output=True, check=True).stdout,
 }
-# Not modules in every kernel: built in, they have no file.
+# Not modules in every kernel: if built in, they have no file.
 MAY_BE_BUILT_IN = {"virtio_pci", "virtio_console", "9pnet_virtio", "9p", "overlay", "can_bcm", "can_gw", "can_isotp"}
 OPTIONAL = {"vxcan", "slcan"}
 
@@ -54,7 +54,7 @@ class Kernel:
 
 
 def own_folder() -> pathlib.Path:
-    """Where the install script unpacks a kernel for the virtual machine, beside none that is installed."""
+    """The folder into which the install script unpacks a kernel for the machine, separate from installed ones."""
     cache = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     return pathlib.Path(cache).expanduser() / "ranger-sim" / "kernel"
 
@@ -66,7 +66,7 @@ def candidates() -> list[pathlib.Path]:
 
 
 def find() -> Kernel:
-    """The newest usable kernel; UserError with the reason for each that is not, and what to run."""
+    """The newest usable kernel; UserError with the reason against each other one, and the command to run."""
     faults = []
     for folder in candidates():
         trees = sorted((folder / "lib" / "modules").glob("*/kernel"), key=lambda tree: version_key(tree.parent.name))
@@ -86,12 +86,12 @@ def find() -> Kernel:
 
 
 def version_key(version: str) -> list[int]:
-    """6.1.0-10 is newer than 6.1.0-9."""
+    """A sort key: 6.1.0-10 is newer than 6.1.0-9."""
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
 def load_order(tree: pathlib.Path) -> tuple[tuple[str, bytes], ...]:
-    """MODULES of one kernel and what they depend on, dependencies first; LookupError names one that is not there."""
+    """MODULES of one kernel and their dependencies, dependencies first; LookupError names a missing one."""
     files: dict[str, pathlib.Path] = {}
     for path in tree.rglob("*.ko*"):
         files[path.name.partition(".")[0].replace("-", "_")] = path
@@ -115,6 +115,6 @@ def load_order(tree: pathlib.Path) -> tuple[tuple[str, bytes], ...]:
 
 
 def dependencies(module: bytes) -> list[str]:
-    """The modules that one needs: the `depends=` entry of its .modinfo section."""
+    """The dependencies of a module: the `depends=` entry of its .modinfo section."""
     found = re.search(rb"\0depends=([\w,-]*)\0", module)
     return [name.replace("-", "_") for name in found.group(1).decode().split(",") if name] if found else []

@@ -1,4 +1,4 @@
-"""The virtual machine as a child process: what its command prints comes out here, and it never outlives us."""
+"""The virtual machine as a child process: it passes on its command's output, and ends with its parent at the latest."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from ranger_sim.tools.vm import kernel, ramdisk
 QEMU = "qemu-system-x86_64"
 BUSYBOX_PLACES = ("/bin/busybox", "/usr/bin/busybox", "/usr/lib/busybox/bin/busybox-static")
 CONSOLE = "console"
-CONSOLE_LINES = 12  # the last ones, shown when the machine did not come up
+CONSOLE_LINES = 12  # the last ones, shown when the machine did not start
 SET_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG, prctl(2)
 C_LIBRARY = ctypes.CDLL(None, use_errno=True)
 
-EXIT_TIME_LIMIT = 124  # as the command `timeout` has it
-# Software emulation: it works everywhere, also where /dev/kvm is there and hangs. 256 MiB of translated code.
+EXIT_TIME_LIMIT = 124  # as for the command `timeout`
+# Software emulation: it works everywhere, even where /dev/kvm exists and hangs. 256 MiB of translated code.
 ACCELERATOR = "tcg,thread=multi,tb-size=256"
 
 
 @dataclasses.dataclass(frozen=True)
 class Guest:
-    """What the machine is made of. shared: folders of the host that the guest may write to."""
+    """Parts of the machine. shared: folders of the host that the guest may write to."""
 
     memory_MiB: int = 2048  # chosen by us, because a pytest of the robot fits four times
-    # One: to wake a second one under emulation takes milliseconds on a busy host (a message between two processes and
+    # One: waking a second one under emulation takes milliseconds on a busy host (a message between two processes and
     # back took 7 ms with two processors, 0.2 ms with one).
     processors: int = 1
     time_limit_s: float = 600.0
@@ -48,7 +48,7 @@ class Guest:
 
 @dataclasses.dataclass(frozen=True)
 class Ended:
-    """How a run ended: exit code of the command, s until it began (None: it never did), s until it was over."""
+    """How a run ended: exit code of the command, s until it began (None: it never did), s until it ended."""
 
     code: int
     boot_s: float | None
@@ -61,10 +61,10 @@ Write = Callable[[int, bytes], None]
 def run(
     command: Sequence[str], environment: Mapping[str, str], folder: pathlib.Path, guest: Guest, write: Write
 ) -> Ended:
-    """Run `command` in the guest, in `folder`, with `environment` and no other.
+    """Run `command` in the guest, in `folder`, with only `environment`.
 
-    `write(1, data)` gets what the command writes to standard output, `write(2, data)` what goes to standard error
-    (and the guest's console, if wanted). UserError: something is missing here, or the machine stopped by itself.
+    `write(1, data)` receives the command's standard output, `write(2, data)` its standard error (and the guest's
+    console, if requested). UserError if a file is missing here, or the machine stopped by itself.
     """
     qemu = shutil.which(QEMU)
     if qemu is None:
@@ -96,7 +96,7 @@ def run(
             stdout=numbers[CONSOLE],
             stderr=numbers[CONSOLE],
             pass_fds=[memory, *numbers.values()],
-            start_new_session=True,  # Ctrl-C is for us
+            start_new_session=True,  # this process handles Ctrl-C
             preexec_fn=die_with_parent,
         )
         stack.callback(stop, process)
@@ -106,18 +106,18 @@ def run(
 
 
 def die_with_parent() -> None:
-    """In the child: the kernel ends it when the process that started it is gone, however that ended."""
+    """In the child: the kernel ends it when the process that started it ends, for any reason."""
     C_LIBRARY.prctl(SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
 
 
 def stop(process: subprocess.Popen[bytes]) -> None:
-    """Everything of the guest is in its memory: switching it off leaves nothing behind."""
+    """Kill the machine: everything of the guest is in its memory, so nothing is left behind."""
     process.kill()
     process.wait()
 
 
 def static_busybox() -> pathlib.Path:
-    """A busybox that needs no libraries; UserError when there is none."""
+    """A busybox that needs no libraries; UserError if not found."""
     for place in BUSYBOX_PLACES:
         path = pathlib.Path(place)
         if path.exists() and b"ld-linux" not in path.read_bytes()[:4096]:  # a dynamic one names its loader early
@@ -154,7 +154,7 @@ def arguments(
 
 
 class Attendant:
-    """Reads what the machine says until its command is over, it stops, or the time is up."""
+    """Reads the machine's output until its command is over, it stops, or the time is up."""
 
     def __init__(
         self, sockets: Mapping[str, socket.socket], end: bytes, guest: Guest, started_s: float, write: Write
@@ -165,18 +165,18 @@ class Attendant:
         self.write = write
         self.boot_s: float | None = None
         self.code: int | None = None
-        self.received = dict.fromkeys(sockets, b"")  # of each port what is not yet used
+        self.received = dict.fromkeys(sockets, b"")  # of each port, data not yet processed
         self.open = {ramdisk.OUTPUT: 1, ramdisk.ERRORS: 2}
         self.selector = selectors.DefaultSelector()
         for name, each in sockets.items():
             self.selector.register(each, selectors.EVENT_READ, name)
 
     def seconds(self) -> float:
-        """Since the machine was started."""
+        """Seconds since the machine was started."""
         return wallclock.monotonic_s() - self.started_s
 
     def attend(self) -> Ended:
-        """Until the exit code and the ends of both streams are here; UserError when the machine stops before."""
+        """Read until the exit code and the ends of both streams have arrived; UserError if the machine stops before."""
         with self.selector:
             while self.code is None or self.open:
                 left = self.guest.time_limit_s - self.seconds()
@@ -197,7 +197,7 @@ class Attendant:
         return Ended(self.code, self.boot_s, self.seconds())
 
     def take(self, name: str, data: bytes) -> None:
-        """Data of one port."""
+        """Process data of one port."""
         self.received[name] += data
         if name in self.open:
             self.pass_on(name)
@@ -215,7 +215,7 @@ class Attendant:
             self.received[name] = self.received[name][-8192:]
 
     def pass_on(self, name: str, everything: bool = False) -> None:
-        """Write what cannot be part of the end mark."""
+        """Write the data that cannot be part of the end mark."""
         waiting = self.received[name]
         number = self.open[name]
         if waiting.endswith(self.end):

@@ -12,7 +12,7 @@ CONTROL, OUTPUT, ERRORS = "control", "output", "errors"  # names of the ports to
 APPLETS = ("cat", "chroot", "echo", "insmod", "ln", "mkdir", "mkfifo", "mount", "printf", "sh", "unshare")
 
 # The host's root, read-only, under a layer of memory: the command sees the host's files and may write anywhere.
-# The command runs among its own process numbers, so nothing that it leaves behind keeps the pipes open.
+# The command has a separate process namespace, so that no process it leaves behind keeps the pipes open.
 INIT = r"""#!/bin/sh
 export PATH=/bin
 mount -t proc proc /proc
@@ -61,7 +61,7 @@ while true; do cat /ports/control; done
 
 
 def init_script(end: str, shared: Mapping[str, str]) -> str:
-    """The first process's script. `end`: what closes both streams; `shared`: {tag: folder that the guest may write}."""
+    """The first process's script. `end`: closes both streams; `shared`: {tag: folder that the guest may write}."""
     folders = [
         f"mkdir -p /root{shlex.quote(folder)} && mount -t 9p "
         f"-o trans=virtio,version=9p2000.L,msize=512000 {tag} /root{shlex.quote(folder)} || exit"
@@ -71,7 +71,7 @@ def init_script(end: str, shared: Mapping[str, str]) -> str:
 
 
 def command_script(command: Sequence[str], folder: str, environment: Mapping[str, str]) -> str:
-    """What runs inside the host's root: the command in `folder` with `environment` and no other."""
+    """The script inside the host's root: the command in `folder` with only `environment`."""
     lines = [f"cd {shlex.quote(folder)} || exit 126"]
     words = [f"{name}={value}" for name, value in sorted(environment.items())]
     lines.append(f"exec env -i {shlex.join(words)} {shlex.join(command)}")
@@ -79,7 +79,7 @@ def command_script(command: Sequence[str], folder: str, environment: Mapping[str
 
 
 def build(busybox: pathlib.Path, modules: tuple[tuple[str, bytes], ...], init: str, command: str) -> bytes:
-    """The archive that the kernel unpacks, not compressed: under emulation unpacking costs more than reading."""
+    """The archive that the kernel unpacks, uncompressed: under emulation unpacking costs more than reading."""
     archive = Archive()
     for folder in ("bin", "dev", "lower", "modules", "ports", "proc", "root", "sys", "upper"):
         archive.add(folder, stat.S_IFDIR | 0o755)
@@ -117,5 +117,5 @@ class Archive:
 
 
 def padded(part: bytes) -> bytes:
-    """Filled with zeros to a multiple of four bytes."""
+    """Pad with zeros to a multiple of four bytes."""
     return part + bytes(-len(part) % 4)

@@ -1,1 +1,1 @@
-"""What is inside a robot at an instant, running or recorded: slots of boards, load of buses, frames, errors."""
+"""The inside of a robot at a given time, running or recorded: slots of boards, load of buses, frames, errors."""

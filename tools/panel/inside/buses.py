@@ -1,4 +1,4 @@
-"""Buses of a source: their frames and load at an instant, and the load as a channel beside what it was for."""
+"""Buses of a source: their frames and load at a given time, and the load as a channel next to other signals."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class Frames(Protocol):
     """Frames of a bus, in memory or in a file."""
 
     def until(self, until_ns: int | None, most: int) -> Any:
-        """The last rows not later than an instant."""
+        """The last rows not later than `until_ns`."""
 
     def within(self, first_ns: int, until_ns: int) -> int | None:
-        """How many came between two instants."""
+        """The number of frames between two times."""
 
     def counts(self, until_ns: int | None, keys: list[int]) -> list[int | None]:
-        """How many there were of each kind until an instant; None: not known yet."""
+        """The count of each kind up to `until_ns`; None: not known yet."""
 
 
 class Bus:
-    """One bus. start_ns: the stamp of its frames at the source's time 0; bit_per_s: None where nobody knows it.
+    """One bus. start_ns: the stamp of its frames at the source's time 0; bit_per_s: None if unknown.
 
-    more_errors: error frames that are known otherwise than by rows, beyond those of the rows; None: nobody knows.
+    more_errors: number of error frames known from elsewhere, beyond those in the rows; None if unknown.
     """
 
     def __init__(
@@ -50,23 +50,23 @@ class Bus:
         self.more_errors: int | None = 0
 
     def channels(self) -> list[Channel]:
-        """What a plot may show of it."""
+        """The channels that a plot may show of it."""
         if self.load is None:
             return []
         return [Channel(f"load_{self.name}", "%", f"{self.name}: share of the 10 ms before that was taken", GROUP)]
 
     def take(self, rows: Any) -> None:
-        """These have passed."""
+        """Add frames that have passed."""
         if self.load is not None:
             self._note(*self.load.take(logbook.decoded(rows)))
 
     def passed(self, until_ns: int) -> None:
-        """Nothing else has passed until then."""
+        """No other frame has passed before this time."""
         if self.load is not None:
             self._note(*self.load.passed(until_ns))
 
     def gap(self) -> None:
-        """Frames were missed here."""
+        """Frames were missed at this time."""
         if self.load is not None:
             self.load.gap()
 
@@ -74,14 +74,14 @@ class Bus:
         self.memory.append(times, 100.0 * shares[:, np.newaxis])
 
     def value(self, at: float | None) -> float | None:
-        """Of the window that had ended last, %; None: that is not known."""
+        """Load of the last window that had ended, %; None if unknown."""
         row = self.memory.row(np.inf if at is None else at)
         return None if row is None or (at is not None and at - row[0] > 2 * WINDOW_S) else float(row[1][0])
 
     def content(self, at: float | None, now_s: float) -> dict[str, Any]:
-        """Of the 10 ms and of the second before an instant (None: now): load in %, frames, and error frames until then.
+        """The 10 ms and the second before a time (None: now): load in %, frames, and error frames up to it.
 
-        "load" and "of_second" are None where nothing is known.
+        "load" and "of_second" are None if unknown.
         """
         end_s = now_s if at is None else at
         end_ns = self.start_ns + round(end_s * 1e9)
@@ -96,7 +96,7 @@ class Bus:
         }
 
     def listed(self, at: float | None) -> list[dict[str, Any]]:
-        """The last frames until an instant, the newest first, with what they carry."""
+        """The last frames up to a time, the newest first, decoded."""
         until_ns = None if at is None else self.start_ns + round(at * 1e9)
         rows = self.frames.until(until_ns, FRAMES_SHOWN)
         return listed(rows, lambda keys: self.frames.counts(until_ns, keys), self.start_ns, self.read)

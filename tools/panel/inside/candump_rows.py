@@ -1,4 +1,4 @@
-"""Logs of candump as rows of frames, many lines at once; what is not in their usual form is read line by line."""
+"""Logs of candump as rows of frames, many lines at once; lines in another form are read one by one."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from ranger_sim.can_bus.edge.candump import frame_of_line
 from ranger_sim.foundation.user_error import UserError
 
-# A usual line, `(0000000012.345678) can1 0A1#0011223344556677`: places of its digits, counted from its first letter,
-# those behind the interface from its last.
+# A usual line, `(0000000012.345678) can1 0A1#0011223344556677`: positions of its digits, counted from the first letter;
+# positions after the interface are counted from the last.
 SECONDS, FRACTION = slice(1, 11), slice(12, 18)
 IDENTIFIER, DATA = slice(-20, -17), slice(-16, None)
 MARKS = ((0, "("), (11, "."), (18, ")"), (19, " "), (-21, " "), (-17, "#"))
@@ -31,7 +31,7 @@ HEXADECIMAL = _hexadecimal()
 
 
 def rows_of(text: bytes) -> Any:
-    """Rows (inside/frames.py) of whole lines, in their order. UserError for a line that is none of a log."""
+    """Rows (inside/frames.py) of whole lines, in their order. UserError for a line that is not part of a log."""
     letters = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero(letters == NEWLINE)
     if not text.endswith(b"\n"):
@@ -62,7 +62,7 @@ def rows_of(text: bytes) -> Any:
 
 
 def _usual(lines: Any) -> tuple[Any, Any]:
-    """(rows, which of them are right) of lines of one length that end with eight bytes of data."""
+    """(rows, mask of the valid ones) of lines of equal length that end with eight bytes of data."""
     digits = HEXADECIMAL[lines]
     good = np.ones(len(lines), bool)
     for place, mark in MARKS:
@@ -79,9 +79,9 @@ def _usual(lines: Any) -> tuple[Any, Any]:
 
 @functools.cache
 def _weights(length: int) -> Any:
-    """What each letter of a line counts: (length, 5), in seconds, microseconds, identifier and the words of the data.
+    """Weight of each letter of a line: (length, 5), in seconds, microseconds, identifier and the words of the data.
 
-    Floats, because their products are quick, and exact for what has less than 53 bits.
+    Floats, because their products are fast; exact for values below 53 bits.
     """
     weights = np.zeros((length, 5))
     weights[SECONDS, 0] = 10.0 ** np.arange(10)[::-1]

@@ -1,4 +1,4 @@
-"""Errors of boards by code: how often, when, and how often until an instant; those of a healthy walk apart."""
+"""Errors of boards by code: count, times, and count up to a given time; separate from those of a healthy walk."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.tools.panel.inside.frames import keys_of
 from ranger_sim.tools.panel.source import error_rows
 
-# {identifier of the variable in which a board tells its errors: its name}
+# {identifier of the variable in which a board reports its errors: its name}
 ERRORS = {
     all_variables.ID_OF[name]: name.removeprefix("ERROR_")
     for name in all_variables.ID_OF
     if name.startswith("ERROR_") and name.removeprefix("ERROR_") in all_variables.BOARD_NAMES.values()
 }
-ON_NO_BUS = ("CSR", "MB")  # the router's and the main brain's own errors reach the table without one
+ON_NO_BUS = ("CSR", "MB")  # errors of the router and the main brain themselves reach the table without a bus
 MOST_TIMES = 100_000  # kept of each error; chosen by us: 1.6 MB, an hour of an error 28 times a second
 
 
@@ -31,10 +31,10 @@ class ErrorList:
 
     def __init__(self) -> None:
         self.rows: dict[tuple[int, int], dict[str, Any]] = {}
-        self.times: dict[tuple[int, int], tuple[array.array[float], array.array[int]]] = {}  # instants, counts then
+        self.times: dict[tuple[int, int], tuple[array.array[float], array.array[int]]] = {}  # times, counts then
 
     def note(self, word: int, time_s: float) -> None:
-        """An error word came at this time of the robot."""
+        """Record an error word at this time of the robot."""
         code, board, count = parts_of_error_word(word)
         if code == 0:
             return
@@ -48,14 +48,14 @@ class ErrorList:
             del times[:MOST_TIMES], counts[:MOST_TIMES]
 
     def note_frames(self, rows: Any, start_ns: int) -> None:
-        """The error words among frames (rows of a robot's bus)."""
+        """Record the error words among frames (rows of a robot's bus)."""
         for row in rows[np.isin(keys_of(rows), list(ERRORS))]:
             self.note(int(row[1]) >> 12, (int(row[0]) - start_ns) * 1e-9)
 
     def content(self, now_s: float, at: float | None = None) -> list[dict[str, Any]]:
-        """As the page gets it, in the order of their first times, so that a row keeps its place.
+        """The rows for the page, in the order of their first times, so that a row keeps its place.
 
-        until: how often until `at`; None where that is not kept.
+        until: the count up to `at`; None if that is not kept.
         """
         found = []
         for (board, code), row in self.rows.items():
@@ -75,7 +75,7 @@ class ErrorList:
 
 
 def changes(words: Any, times: Any, before: int) -> Iterator[tuple[int, Any]]:
-    """(word, time) of every change to another word than none."""
+    """(word, time) of every change to a word that reports an error."""
     for place in np.flatnonzero(np.diff(words, prepend=before)):
         if words[place]:
             yield int(words[place]), times[place]

@@ -1,7 +1,7 @@
-"""Frames as rows, as a robot's record has them (harness/records/logbook.py): the last ones in memory, how they read.
+"""Frames as rows, as in a robot's record (harness/records/logbook.py): the recent ones in memory, and their decoding.
 
 row     time_ns, word 0 << 12 | flags << 4 | bus, word 1 << 29 | identifier
-key     what is counted as one kind of frame: the identifier, EXTENDED with a long one; ERROR for error frames
+key     one kind of frame for counting: the identifier, EXTENDED with a long one; ERROR for error frames
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FIELDS = {
     for name in dir(frame)
     if name.startswith("FIELD_")
 }
-# (identifier, flags, data) -> (name, what it says)
+# (identifier, flags, data) -> (name, decoded value)
 Reading = Callable[[int, int, bytes], tuple[str, float | str | None]]
 
 
@@ -42,15 +42,15 @@ def keys_of(rows: Any) -> Any:
 
 
 def counted(rows: Any) -> list[tuple[int, int]]:
-    """(key, how many) of each kind among frames."""
+    """(key, count) of each kind among frames."""
     keys, counts = np.unique(keys_of(rows), return_counts=True)
     return list(zip(keys.tolist(), counts.tolist(), strict=True))
 
 
 class RecentFrames:
-    """The last `most` frames of one bus, and how many of each kind there were in all.
+    """The last `most` frames of one bus, and the total count of each kind.
 
-    Twice the room, and the newer half moves to the front when it is full.
+    The buffer holds twice as many; when it is full, the newer half moves to the front.
     """
 
     def __init__(self, most: int) -> None:
@@ -60,7 +60,7 @@ class RecentFrames:
         self.total: dict[int, int] = {}
 
     def append(self, rows: Any) -> None:
-        """Frames that are later than all before. Where they are not, time began anew, and what was is forgotten."""
+        """Append frames later than all before. If they are earlier, time restarted, and older frames are dropped."""
         if not len(rows):
             return
         if self.used and rows[0, 0] < self.kept[self.used - 1, 0]:
@@ -80,24 +80,24 @@ class RecentFrames:
         return self.used if until_ns is None else int(np.searchsorted(self.kept[: self.used, 0], until_ns, "right"))
 
     def until(self, until_ns: int | None, most: int) -> Any:
-        """The last frames not later than an instant (None: of all), up to `most` rows."""
+        """The last frames not later than `until_ns` (None: of all), up to `most` rows."""
         place = self._place(until_ns)
         return self.kept[max(0, place - most) : place]
 
     def within(self, first_ns: int, until_ns: int) -> int | None:
-        """How many came later than the one and not later than the other instant; None: that is not kept."""
+        """The number of frames later than `first_ns` and not later than `until_ns`; None if not kept."""
         if not self.used or first_ns < self.kept[0, 0]:
             return None
         return self._place(until_ns) - self._place(first_ns)
 
     def counts(self, until_ns: int | None, keys: list[int]) -> list[int | None]:
-        """How many there were of each kind until an instant, since the first that was told."""
+        """The count of each kind up to `until_ns`, since the first frame received."""
         later = keys_of(self.kept[self._place(until_ns) : self.used])
         return [self.total.get(key, 0) - int(np.count_nonzero(later == key)) for key in keys]
 
 
 def listed(rows: Any, counts: Callable[[list[int]], list[int | None]], start_ns: int, read: Reading) -> list[dict]:
-    """Frames as the page shows them, the newest first. counts: how many of each kind until the newest of them."""
+    """Frames as the page shows them, the newest first. counts: count of each kind up to the newest of them."""
     rows = np.ascontiguousarray(rows[::-1])
     keys = keys_of(rows).tolist()
     kinds = sorted(set(keys))
@@ -124,7 +124,7 @@ def listed(rows: Any, counts: Callable[[list[int]], list[int | None]], start_ns:
 
 
 def of_the_robot(number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
-    """A frame by the robot's own table: a variable and its value."""
+    """Decode a frame by the robot's own table: a variable and its value."""
     if flags & (FLAG_EXTENDED | FLAG_REMOTE) or number not in all_variables.TYPES:
         return "", None
     value = value_of_word(all_variables.TYPES[number], int.from_bytes(data[:4], "little"))
@@ -132,5 +132,5 @@ def of_the_robot(number: int, flags: int, data: bytes) -> tuple[str, float | str
 
 
 def of_nobody(number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
-    """A frame of which nothing is known."""
+    """Decode a frame of an unknown bus: no name, no value."""
     return "", None

@@ -1,7 +1,7 @@
-"""How much of a bus is taken, from the frames that passed on it: in windows of 10 ms, as its own meter has them.
+"""Bus load from the frames that passed: in windows of 10 ms, like the bus's own meter.
 
-To the bit where stamps are whole nanoseconds; a recording in microseconds puts up to 3 bits of 30,000 into the window
-beside. Of an error frame only the shortest form is known, so that a disturbed bus is shown a little emptier than it is.
+Exact to the bit if stamps are whole nanoseconds; a recording in microseconds puts up to 3 bits of 30,000 into the
+adjacent window. Of an error frame only the shortest form is known, so the load of a disturbed bus is slightly too low.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ NOTHING: tuple[Times, Values] = (np.empty(0), np.empty(0, np.float32))
 
 
 class Load:
-    """The share of each window, as frames are told. Instants count from `start_ns`, a window is stamped by its end.
+    """The load of each window, computed as frames arrive. Times count from `start_ns`; a window's stamp is its end.
 
-    edge: number of the window that is open; None before the first frame, and after a gap.
+    edge: number of the open window; None before the first frame, and after a gap.
     """
 
     def __init__(self, bit_per_s: int, start_ns: int) -> None:
@@ -35,7 +35,7 @@ class Load:
         self.open_bits = 0.0
 
     def take(self, frames: dict[str, Any]) -> tuple[Times, Values]:
-        """(end of the window in s, its share 0 ... 1) of the windows that are over since the frames before these.
+        """(end of the window in s, its load 0 ... 1) of the windows that have ended since the previous call.
 
         frames: as `logbook.decoded` has them, in order of time.
         """
@@ -47,11 +47,11 @@ class Load:
         sums = np.cumsum(bits)
         at = np.maximum.accumulate(np.stack((first, free), axis=1).ravel())
         taken = np.stack((sums - bits, sums), axis=1).ravel()
-        if self.edge is not None and first[0] < self.edge - 1:  # time began anew
+        if self.edge is not None and first[0] < self.edge - 1:  # time restarted
             self.gap()
         if self.edge is None:
             self.edge = int(np.ceil(first[0]))
-        before = float(np.interp(self.edge, at, taken)) - self.open_bits  # what lies before the edge is no more wanted
+        before = float(np.interp(self.edge, at, taken)) - self.open_bits  # data before the edge are no longer needed
         last = max(self.edge, int(np.floor(at[-1])))
         ends = np.arange(self.edge + 1, last + 1)
         reached = np.interp(ends, at, taken)
@@ -61,7 +61,7 @@ class Load:
         return ends_s(ends), shares.astype(np.float32)
 
     def passed(self, until_ns: int) -> tuple[Times, Values]:
-        """The same after a silence: nothing but what was told has begun before this instant."""
+        """As `take`, after a silence: no frames but those already given began before this time."""
         last = (until_ns - self.start_ns) // WINDOW_NS
         if self.edge is None or last <= self.edge:
             return NOTHING
@@ -72,22 +72,22 @@ class Load:
         return ends_s(ends), shares
 
     def gap(self) -> None:
-        """Frames were missed: windows begin anew with the first whole one."""
+        """Frames were missed: restart with the first whole window."""
         self.edge, self.open_bits = None, 0.0
 
 
 def ends_s(numbers: Any) -> Times:
-    """Where windows end, s."""
+    """The ends of windows, s."""
     return np.asarray(numbers * (WINDOW_NS * 1e-9), np.float64)
 
 
 def bits_of(frames: dict[str, Any]) -> tuple[Any, Any]:
-    """(bits for which each frame takes the bus, with its intermission; those behind its stamp)."""
+    """(bits for which each frame occupies the bus, including its intermission; bits after its stamp)."""
     bits = np.empty(len(frames["time_ns"]), np.int64)
     names = ("identifier", "flags", "word0", "word1")
     identifiers, flags, lows, highs = (np.ascontiguousarray(frames[name]) for name in names)
     fill_frame_bits(identifiers, flags, lows, highs, bits)
     is_error = frames["flags"] & FLAG_ERROR != 0
-    reached = np.where(frames["word1"] > 0, frames["word1"] + 1, 0)  # of the frame, where the error was detected
+    reached = np.where(frames["word1"] > 0, frames["word1"] + 1, 0)  # bits of the frame before the error was detected
     bits = np.where(is_error, ERROR_BITS + reached, bits) + INTERMISSION_BITS
     return bits, np.where(is_error, 0, BEHIND_BITS) + INTERMISSION_BITS

@@ -1,4 +1,4 @@
-"""Frames of a bus in a log on disk: known piece by piece, of which two are in memory."""
+"""Frames of a bus in a log on disk, indexed in pieces, of which two are in memory."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ranger_sim.tools.panel.inside.frames import counted, nothing
 
 PIECE_BYTES = 1 << 20  # chosen by us: some seconds of a bus, read in some ten milliseconds
 PIECES_KEPT = 2
-Piece = tuple[int, int, Any]  # offset of its first and behind its last byte, rows
+Piece = tuple[int, int, Any]  # offset of its first byte and of the one after its last, rows
 
 
 class LogFrames:
-    """A log of candump with one bus, in order of time. UserError for one that cannot be read.
+    """A candump log of one bus, in order of time. UserError if unreadable.
 
-    `read` and `add` in turn go through it; what is asked for is answered of what was added so far. A frame stands at
-    its microsecond, the log's own resolution: up to 1 us before the instant at which the bus had it.
+    Alternating `read` and `add` go through it; answers cover what was added so far. A frame's time is its microsecond
+    in the log, the log's own resolution: up to 1 us before the time at which the bus had it.
     """
 
     def __init__(self, path: pathlib.Path) -> None:
@@ -32,18 +32,18 @@ class LogFrames:
         except OSError as error:
             raise UserError(f"{path}: the frame log cannot be read ({error.strerror})") from None
         self.size = os.fstat(self.file.fileno()).st_size
-        self.offset = 0  # what is before it was added
+        self.offset = 0  # everything before it was added
         self.newest_ns: int | None = None
         self.total: dict[int, int] = {}
         self.starts: list[tuple[int, int]] = []  # of each piece: bytes
         self.first_ns: list[int] = []
-        self.before: list[int] = []  # frames before it
+        self.before: list[int] = []  # frames before each piece
         self.before_by_key: list[dict[int, int]] = []
         self.frames = 0
         self.cached: dict[int, Any] = {}
 
     def read(self) -> Piece | None:
-        """The next piece; None behind the last one. Changes nothing, so that another thread may do it."""
+        """The next piece; None after the last one. Changes no state, so that another thread may call it."""
         while self.offset < self.size:
             text = os.pread(self.file.fileno(), PIECE_BYTES, self.offset)
             end = self.offset + len(text)
@@ -61,7 +61,7 @@ class LogFrames:
             raise UserError(f"{self.path}: {error}") from None
 
     def add(self, piece: Piece) -> None:
-        """This piece has been read."""
+        """Add a piece that has been read."""
         begin, self.offset, rows = piece
         if not len(rows):
             return
@@ -89,7 +89,7 @@ class LogFrames:
         return rows
 
     def _place(self, until_ns: int | None) -> tuple[int, int]:
-        """(number of the piece, rows of it that are not later); -1: all are later."""
+        """(number of the piece, its rows that are not later); -1: all are later."""
         number = len(self.starts) - 1 if until_ns is None else bisect.bisect_right(self.first_ns, until_ns) - 1
         if number < 0:
             return -1, 0
@@ -97,12 +97,12 @@ class LogFrames:
         return number, len(rows) if until_ns is None else int(np.searchsorted(rows[:, 0], until_ns, "right"))
 
     def _is_open(self, until_ns: int | None) -> bool:
-        """More may come until this instant from what was not read yet."""
+        """True if the part not yet read may contain frames up to this time."""
         is_over = self.newest_ns is not None and until_ns is not None and until_ns < self.newest_ns
         return self.offset < self.size and not is_over
 
     def until(self, until_ns: int | None, most: int) -> Any:
-        """The last frames not later than an instant (None: of all), up to `most` rows."""
+        """The last frames not later than `until_ns` (None: of all), up to `most` rows."""
         number, end = self._place(until_ns)
         if number < 0:
             return nothing()
@@ -113,14 +113,14 @@ class LogFrames:
         return np.concatenate(found[::-1])
 
     def within(self, first_ns: int, until_ns: int) -> int | None:
-        """How many came later than the one and not later than the other instant; None: that is not in the log."""
+        """The number of frames later than `first_ns` and not later than `until_ns`; None if not in the log."""
         if not self.starts or first_ns < self.first_ns[0] or self._is_open(until_ns):
             return None
         (early, early_rows), (late, late_rows) = self._place(first_ns), self._place(until_ns)
         return self.before[late] + late_rows - self.before[early] - early_rows
 
     def counts(self, until_ns: int | None, keys: list[int]) -> list[int | None]:
-        """How many there were of each kind until an instant, since the log's beginning; None: it is not read so far."""
+        """The count of each kind up to `until_ns`, since the log's beginning; None if not read that far."""
         if self._is_open(until_ns):
             return [None] * len(keys)
         number, end = self._place(until_ns)
@@ -131,5 +131,5 @@ class LogFrames:
         return [before.get(key, 0) + there.get(key, 0) for key in keys]
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         self.file.close()

@@ -1,4 +1,4 @@
-"""What recordings keep of the inside: the logs of a run's folder, and the frames of a recording with DBC files."""
+"""The inside of a robot in recordings: the logs of a run's folder, and the frames of a recording with DBC files."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ NO_RATE_OF_PROFILE = "The walk had a profile, whose bit rates its log does not t
 
 
 class RunLogs:
-    """Frames and errors of a walk's folder, or errors alone of a recording of variables.
+    """Frames and errors of a walk's folder, or only the errors of a recording of variables.
 
-    group: behind the names of buses; shift_s: so much later; end_s: until then it is looked at.
-    They come while `run` does, so that an hour of them opens at once.
+    group: appended to the names of buses; shift_s: added to all times; end_s: latest time shown.
+    `run` reads the logs step by step, so that a folder of an hour opens at once.
     """
 
     def __init__(self, folder: pathlib.Path, dataset: Dataset, group: str, shift_s: float, end_s: float) -> None:
@@ -54,14 +54,14 @@ class RunLogs:
         self.missing = NO_FRAMES if not self.logs else NO_RATE_OF_PROFILE if rate is None else ""
         self.trouble = ""
         self.is_read = not self.logs
-        for board in ERRORS.values():  # without logs of the buses, all of them as far as the table has them
+        for board in ERRORS.values():  # without logs of the buses, all errors as far as the table has them
             channel = dataset.channels.get(f"ERROR_{board}")
             if channel is not None and (board in ON_NO_BUS or not self.logs):
                 for word, time_s in changes(channel.value.astype(np.int64), channel.time_s, 0):
                     self.errors.note(word, float(time_s) + shift_s)
 
     async def run(self) -> None:
-        """Go through the logs, all of them at one pace."""
+        """Read the logs, all of them at the same pace."""
         try:
             waiting = list(zip(self.logs, self.buses, strict=True))
             while waiting:
@@ -79,12 +79,12 @@ class RunLogs:
         self.is_read = True
 
     def close(self) -> None:
-        """Give the logs back."""
+        """Close the logs."""
         for log in self.logs:
             log.close()
 
     def note(self) -> str:
-        """What of it is not there (yet)."""
+        """What is missing (so far), as text."""
         if self.trouble:
             return self.trouble
         if not self.is_read:
@@ -96,7 +96,7 @@ class RunLogs:
 class Decoded:
     """The frames of a recording that is read with DBC files, in memory with 24 bytes each.
 
-    Each goes through `take`; after the last one `done`.
+    Pass each frame to `take`; call `done` after the last one.
     """
 
     missing = NO_RATE
@@ -118,7 +118,7 @@ class Decoded:
         words.extend((time_ns, low << 12 | flags << 4, high << 29 | identifier))
 
     def done(self, group: str, shift_s: float) -> None:
-        """All have passed. Their time 0 is that of the channels."""
+        """All frames have been taken. Their time 0 is that of the channels."""
         first_ns = self.first_ns or 0
         start_ns = (first_ns if first_ns * 1e-9 > columns.EPOCH_S else 0) - round(shift_s * 1e9)
         for name, words in self.words.items():
@@ -131,31 +131,31 @@ class Decoded:
         self.words.clear()
 
     def read(self, number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
-        """A frame by the DBC files."""
+        """Decode a frame by the DBC files."""
         message = self.messages.get(number | (frames.EXTENDED_BIT if flags & FLAG_EXTENDED else 0))
         if message is None:
             return "", None
         try:
             signals = message.decode(data, decode_choices=False)
-        except Exception:  # too short, or a multiplexer's value that has no signals: of many kinds
+        except Exception:  # too short, or a multiplexer value without signals: many exception types
             return message.name, None
         if len(signals) == 1:
             return message.name, float(next(iter(signals.values())))
         return message.name, ", ".join(f"{name} {float(value):g}" for name, value in signals.items())
 
     async def run(self) -> None:
-        """All of them are there from the beginning."""
+        """Return at once: all frames are available from the beginning."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Nothing to close."""
 
     def note(self) -> str:
-        """What of it is not there."""
+        """What is missing, as text."""
         return self.missing
 
 
 def profile_of(folder: pathlib.Path) -> str | None:
-    """The profile of buses and boards with which a walk was made, as its summary has it; None: the usual ones."""
+    """The profile of buses and boards of a walk, from its summary; None: the usual ones."""
     try:
         summary = json_text.loads((folder / SUMMARY).read_bytes(), SUMMARY)
     except (OSError, json_text.JsonError):

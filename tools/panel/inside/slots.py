@@ -1,6 +1,6 @@
-"""The slots of a running robot's boards: what each took of its time, how late it came, in the last minutes.
+"""Slots of a running robot's boards: how much time each took and how late it was, in the last minutes.
 
-They are channels as well, so that a plot has them beside what they were for.
+They are channels as well, so that a plot shows them with the other signals.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from ranger_sim import datatable
 from ranger_sim.tools.panel.channels import Channel, Memory
 
 GROUP = "slots"
-KEPT_S = 120.0  # slot by slot; chosen by us: 40 MB for the boards of Ranger. Before that the longest of 0.1 s
-STATISTICS_S = 1.0  # median, 99 % and longest are of so long before the instant
-ROW_WORDS = 3  # of the feed: instant (ns), cycles, lateness (ns)
+KEPT_S = 120.0  # every slot; chosen by us: 40 MB for the boards of Ranger. Before that the longest of each 0.1 s
+STATISTICS_S = 1.0  # median, 99 % and longest cover this long before the cursor's time
+ROW_WORDS = 3  # of the feed: time (ns), cycles, lateness (ns)
 NS, US = 1e-9, 1e6
 
 
 class BoardSlots:
-    """Of one board: `memory` has the time that slots took and their lateness, us, by the instant of their tick."""
+    """One board: `memory` has its slots' duration and lateness, us, by the time of their tick."""
 
     def __init__(self, name: str, hz: float) -> None:
         self.name = name
@@ -29,14 +29,14 @@ class BoardSlots:
         self.memory = Memory(2, self.slot_us / US, KEPT_S)
 
     def channels(self) -> list[Channel]:
-        """What a plot may show of them, in the order of the memory's columns."""
+        """The channels that a plot may show of them, in the order of the memory's columns."""
         return [
             Channel(f"slot_{self.name}_us", "µs", f"{self.name}: time that a slot took, of {self.slot_us} µs", GROUP),
             Channel(f"late_{self.name}_us", "µs", f"{self.name}: how late a slot was by the wall clock", GROUP),
         ]
 
     def take(self, data: bytes, start_ns: int) -> None:
-        """Rows of the feed (harness/feed/FEED.md)."""
+        """Add rows of the feed (harness/feed/FEED.md)."""
         rows = np.frombuffer(data, np.int64).reshape(-1, ROW_WORDS)
         values = np.empty((len(rows), 2), np.float32)
         values[:, 0] = np.where(rows[:, 1] > 0, rows[:, 1] * self.us_per_cycle, np.nan)  # 0: it never ended
@@ -44,7 +44,7 @@ class BoardSlots:
         self.memory.append(((rows[:, 0] - start_ns) * NS).astype(np.float64), values)
 
     def content(self, at: float | None) -> dict[str, Any] | None:
-        """Of the slot that had ended last at an instant (None: now), and of the second before; None: nothing is kept.
+        """The last slot that had ended at a time (None: now), and the second before; None without data.
 
         {"begun_s", "used_us", "late_us", "used": {"median", "most", "worst"}, "late": the same}; most: 99 of 100.
         """
@@ -59,7 +59,7 @@ class BoardSlots:
 
 
 def statistics(values: Any) -> dict[str, float] | None:
-    """Median, what 99 of 100 do not exceed, and the largest; None without a value."""
+    """Median, the value that 99 of 100 do not exceed, and the largest; None without a value."""
     there = values[~np.isnan(values)]
     if len(there) == 0:
         return None
@@ -68,5 +68,5 @@ def statistics(values: Any) -> dict[str, float] | None:
 
 
 def number(value: Any) -> float | None:
-    """A number for the page; None for none."""
+    """A number for the page; None for NaN."""
     return float(value) if np.isfinite(value) else None
