@@ -221,7 +221,7 @@ def markdown() -> str:
     kinds: dict[str, list[Place]] = {}
     for place in CATALOGUE.places.values():
         kinds.setdefault(place.kind, []).append(place)
-    return "\n".join(line for kind, places in kinds.items() for line in kind_lines(kind, places))
+    return "\n".join(line for kind, places in sorted(kinds.items()) for line in kind_lines(kind, places))
 
 
 def kind_lines(kind: str, places: list[Place]) -> list[str]:

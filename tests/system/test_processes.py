@@ -420,7 +420,7 @@ def test_ctrl_c_finishes_the_files_as_walk_does(up, tmp_path):
         (["--speed", "fast"], "'fast' is not a number, or max"),
         (["--processor", "99"], "processor is 99, allowed are"),
         (["--name", "a b"], "name is 'a b', allowed are"),
-        (["--xcp-can", "can5"], "can1"),
+        (["--xcp-can", "can5"], "did you mean 'can4'"),
         (["--xcp-udp", "65536"], "65535"),
     ],
 )
