@@ -35,7 +35,10 @@ def wire(*frames, now_us=0.0, since_us=0.0):
             if each.bus == bus and each.time_ns >= since_ns and (identifiers is None or each.identifier in identifiers)
         ]
 
-    observed = Made(keeper=Made(frames=kept, names=RANGER, check=lambda bus, since_ns: None), note=lambda *figure: noted.append(figure))
+    observed = Made(
+        keeper=Made(frames=kept, names=RANGER, check=lambda bus, since_ns: None),
+        note=lambda *figure: noted.append(figure),
+    )
     return Wire(observed, "can1", since_us * 1e-6, now_us * 1e-6), noted
 
 
