@@ -53,7 +53,7 @@ lint: $(VENV)/.tools
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check --quiet .
 	rm -rf build/typed
-	CC=false $(RUN) setup.py -q build_py --build-lib build/typed 2>/dev/null
+	@mkdir -p build && CC=false $(RUN) setup.py -q build_py --build-lib build/typed 2>build/typed.log || (cat build/typed.log; false)
 	$(RUN) -m mypy
 
 bench: $(VENV)/.walk

@@ -2,6 +2,7 @@
 
 import contextlib
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
@@ -18,6 +19,8 @@ def end_in_order() -> None:
 
     def note(_number: int, _frame: FrameType | None) -> None:
         end_at_once()
+        # an object that was half made when the signal arrived, such as an event loop, fails when it is deleted
+        sys.unraisablehook = lambda _failure: None
         raise KeyboardInterrupt
 
     _set(note)
