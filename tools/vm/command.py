@@ -84,6 +84,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def write_all(number: int, data: bytes) -> None:
-    """Write everything to a file descriptor."""
+    """Write everything to standard output (1) or standard error (2)."""
+    stream = sys.stdout if number == 1 else sys.stderr
     while data:
-        data = data[os.write(number, data) :]
+        data = data[os.write(stream.fileno(), data) :]
