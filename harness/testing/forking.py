@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import functools
 import gc
 import io
 import os
@@ -36,6 +37,7 @@ PLACES = ("setup", "runtest", "teardown")  # what pytest calls of an item, one i
 PHASES = ("setup", "call", "teardown")
 END = "end"
 GRACE_S = 3.0  # for a child to leave its phase when the parent does not wait any more (a time limit); chosen by us
+OWN_LIMIT_S = 0.2  # for a child to report the same time limit by itself; chosen by us
 STALE_S = 60.0  # a wait without a limit is cut into pieces of this length
 HEAD = 8  # bytes before a message: its length
 
@@ -271,12 +273,17 @@ class Child:
         return self._reply(None)
 
     def interrupted(self, reason: BaseException) -> dict[str, Any] | None:
-        """Raise `reason` in its phase; returns what it sends, None after ending it when that takes too long."""
-        self.channel.send({"raise": sendable(reason)})
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self.process, signal.SIGINT)
+        """Raise `reason` in its phase; returns what it sends, None after ending it when that takes too long.
+
+        A time limit is set in both processes: the child's own, which expires at about the same time, goes first.
+        """
         try:
-            reply = self._reply(GRACE_S)
+            reply = self._reply(OWN_LIMIT_S)
+            if reply is None:
+                self.channel.send({"raise": sendable(reason)})
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(self.process, signal.SIGINT)
+                reply = self._reply(GRACE_S)
         except Exception:  # the parent was interrupted in the middle of a message
             reply = None
         if reply is None:
@@ -394,10 +401,18 @@ def run_phase(item: pytest.Item, when: Any, interruptible: Interruptible) -> dic
     hook, config = item.ihook, item.config
     run = getattr(hook, f"pytest_runtest_{when}")
     more = {"nextitem": None} if when == "teardown" else {}
+
+    def phase() -> Any:
+        return run(item=item, **more)
+
+    if when == "call":  # not the plugins around the test: they may be at work on what it has raised
+        body = item.runtest
+        item.runtest = lambda: interruptible.run(body)  # type: ignore[method-assign]
+        work = phase
+    else:
+        work = functools.partial(interruptible.run, phase)
     try:
-        call = CallInfo.from_call(
-            lambda: interruptible.run(lambda: run(item=item, **more)), when, pytest.exit.Exception
-        )
+        call = CallInfo.from_call(work, when, pytest.exit.Exception)
         report = hook.pytest_runtest_makereport(item=item, call=call)
         hook.pytest_report_teststatus(report=report, config=config)  # a test whose subtests failed fails by this
     except pytest.exit.Exception as end:

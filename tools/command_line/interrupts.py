@@ -3,6 +3,7 @@
 import contextlib
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
@@ -19,8 +20,10 @@ def end_in_order() -> None:
 
     def note(_number: int, _frame: FrameType | None) -> None:
         end_at_once()
-        # an object that was half made when the signal arrived, such as an event loop, fails when it is deleted
+        # an object that was half made when the signal arrived fails when it is deleted (an event loop), or warns
+        # (a coroutine that no loop had taken yet)
         sys.unraisablehook = lambda _failure: None
+        warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         raise KeyboardInterrupt
 
     _set(note)
