@@ -15,12 +15,8 @@ if TYPE_CHECKING:
 LARGEST_PERIOD_MS = 10**9
 
 
-def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Message], int, list[str]]:
-    """(messages, bit rate in bit/s, names of those without a cycle time) of a DBC file.
-
-    Period: GenMsgCycleTime, in ms; deadline the same; no jitter; every node sends its frames by priority. Bit rate: as
-    given, else the file's attribute Baudrate. UserError for a file that cannot be read or is not classic CAN.
-    """
+def load(path: pathlib.Path) -> Database:
+    """The database of a DBC file. UserError for a file that cannot be read or holds no CAN messages."""
     import cantools  # imported only here: half a second
 
     try:
@@ -32,7 +28,17 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
         raise UserError(f"{path}: not a DBC file that cantools can read: {said}") from None
     if not isinstance(database, cantools.database.can.Database):
         raise UserError(f"{path}: holds no CAN messages")
-    rate = bit_rate if bit_rate is not None else _baudrate(database)
+    return database
+
+
+def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Message], int, list[str]]:
+    """(messages, bit rate in bit/s, names of those without a cycle time) of a DBC file.
+
+    Period: GenMsgCycleTime, in ms; deadline the same; no jitter; every node sends its frames by priority. Bit rate: as
+    given, else the file's attribute Baudrate. UserError for a file that cannot be read or is not classic CAN.
+    """
+    database = load(path)
+    rate = bit_rate if bit_rate is not None else bit_rate_of(database)
     if rate is None:
         raise UserError(f"{path}: says nothing of the bit rate (attribute Baudrate); give --bit-rate")
     messages = []
@@ -51,7 +57,7 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     return messages, rate, silent
 
 
-def _baudrate(database: Database) -> int | None:
+def bit_rate_of(database: Database) -> int | None:
     """The network's attribute Baudrate: bit/s, or kbit/s as many tools write it."""
     attributes = getattr(database.dbc, "attributes", None) or {}
     value = getattr(attributes.get("Baudrate"), "value", None)

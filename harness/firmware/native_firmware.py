@@ -18,13 +18,14 @@ VERSION_FILE = "ranger_table.h"
 class Firmware:
     """A folder of firmware, built. `warnings` of the compiler; `sanitize`, `coverage`: how it was built.
 
-    table: folder of the generated C that it was compiled with. counts: folder for what ran, with `coverage`.
+    table: folder of the generated C that it was compiled with; None for a program without a master table. counts:
+    folder for what ran, with `coverage`.
     """
 
     folder: pathlib.Path
     library: pathlib.Path
     manifest: manifests.Manifest
-    table: pathlib.Path
+    table: pathlib.Path | None
     warnings: tuple[str, ...] = ()
     was_made: bool = True
     sanitize: bool = False
@@ -54,7 +55,7 @@ def build(
     """Compile a folder of firmware, with the generated C of the tables that it names, unless it is up to date.
 
     The manifest's `master` gives the place of that C; without it, it is in `table`. UserError when it was not made from
-    the present master files.
+    the present master files. A manifest that names no tables needs neither.
     """
     manifest = manifests.load(folder)
     place = place_of_tables(manifest, table)
@@ -68,16 +69,18 @@ def build_image(folder: str | pathlib.Path, table: pathlib.Path | None = None) -
     return image_build.build_image(manifest, table_sources(manifest, place_of_tables(manifest, table)))
 
 
-def place_of_tables(manifest: manifests.Manifest, table: pathlib.Path | None) -> pathlib.Path:
-    """The folder of the generated C."""
+def place_of_tables(manifest: manifests.Manifest, table: pathlib.Path | None) -> pathlib.Path | None:
+    """The folder of the generated C; None where the firmware is compiled without any."""
     place = table if manifest.master is None else fresh_c(manifest.master)
-    if place is None:
+    if place is None and manifest.tables:
         raise UserError(f"{manifest.folder}: firmware.master is missing: the folder of the master table")
     return place
 
 
-def table_sources(manifest: manifests.Manifest, place: pathlib.Path) -> compiling.Addition:
+def table_sources(manifest: manifests.Manifest, place: pathlib.Path | None) -> compiling.Addition:
     """The generated C of the tables that a manifest names."""
+    if place is None:
+        return compiling.Addition((), ())
     sources = []
     for name in manifest.tables:
         source = place / f"{name.lower()}_table.c"

@@ -33,9 +33,9 @@ class TableBoard(NativeBoard):
         elif hardware is not None:  # a manifest cannot describe what a person sees of the board
             given = dataclasses.replace(given, panel=hardware.panel)
         NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, given, record)
-        wanted = table_version(firmware.table) if version is None else version
+        wanted = table_version(firmware.table) if version is None and firmware.table is not None else version
         compiled = self.library.table_version()
-        if compiled is not None and compiled != wanted:
+        if compiled is not None and wanted is not None and compiled != wanted:
             raise UserError(
                 f"{firmware.library}: compiled with version 0x{compiled:08X} of the master table, "
                 f"this robot has 0x{wanted:08X}: build it again"

@@ -41,6 +41,16 @@ def register(commands: Any) -> None:
         epilog="docs/how-to/machine.md goes through it; examples/servo is a larger one.",
     )
     command.add_argument("folder", metavar="DIR", help="a folder that is not there yet, or is empty")
+    command.add_argument(
+        "--from",
+        dest="dbc",
+        type=pathlib.Path,
+        metavar="FILE.dbc",
+        help="boards, messages and tests from the nodes and messages of a DBC file",
+    )
+    command.add_argument(
+        "--bit-rate", type=int, metavar="BIT/S", help="with --from: of the bus, where the file has no Baudrate (500000)"
+    )
     command.set_defaults(run=run)
 
 
@@ -53,12 +63,16 @@ def run(options: argparse.Namespace) -> int:
             f"new {options.folder!r}: a folder's name of letters, digits, spaces and ._- is needed, 60 at most"
         )
     check(folder)
+    if options.dbc is None and options.bit_rate is not None:
+        raise UserError("new --bit-rate: belongs to --from FILE.dbc")
+    files = {} if options.dbc is None else files_of_dbc(options.dbc, options.bit_rate, name)
     try:
         folder.resolve().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".ranger-sim-new-", dir=folder.resolve().parent) as making:
-            write(pathlib.Path(making) / "project", name)
+            project = pathlib.Path(making) / "project"
+            write_files(project, files) if files else write(project, name)
             check(folder)
-            take_over(pathlib.Path(making) / "project", folder)
+            take_over(project, folder)
     except OSError as error:
         raise UserError(f"new {folder}: {error.filename or folder}: {error.strerror}") from None
     print(f"{folder}: written. cd {folder}; pytest")
@@ -85,6 +99,28 @@ def write(project: pathlib.Path, name: str) -> None:
     for path, text in WRITTEN.items():
         (project / path).write_text(text, encoding="utf-8")
     generate.write(load_table(project / "table"), project / "table" / "generated")
+
+
+def files_of_dbc(dbc: pathlib.Path, bit_rate: int | None, name: str) -> dict[str, str]:
+    """The files of a project for the boards of a DBC file, with a copy of that file."""
+    from ranger_sim.tools.new import from_dbc
+
+    if bit_rate is not None and not 10_000 <= bit_rate <= 3_000_000:
+        raise UserError(f"new --bit-rate {bit_rate}: 10000 to 3000000 bit/s")
+    network = from_dbc.read(dbc, bit_rate)
+    files = from_dbc.files(network, name, dbc)
+    files[f"{network.stem}.dbc"] = dbc.read_bytes().decode("cp1252", "replace")
+    print(f"{dbc}: {len(network.nodes)} boards, {len(network.messages)} messages, {network.bit_rate} bit/s")
+    for line in network.left_out:
+        print(f"{dbc}: left out: {line}")
+    return files
+
+
+def write_files(project: pathlib.Path, files: dict[str, str]) -> None:
+    """Write a project's files, {path: text}."""
+    for path, text in (files | WRITTEN).items():
+        (project / path).parent.mkdir(parents=True, exist_ok=True)
+        (project / path).write_text(text, encoding="utf-8", newline="")
 
 
 def take_over(project: pathlib.Path, folder: pathlib.Path) -> None:
