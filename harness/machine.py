@@ -1,4 +1,4 @@
-"""Any machine: boards, buses and a plant, wired by tables, on one clock. Ranger is one (harness/ranger.py).
+"""Any machine: boards, buses and a plant, wired by tables, on one clock. Ranger is one (ranger/robot.py).
 
     machine = Machine(
         plant=Servo(),

@@ -25,9 +25,10 @@ MAY_IMPORT = {
     "plant": {"foundation"},
     "firmware_sim": {"foundation", "can_bus"},
     "boards": {"foundation", "firmware_sim", "datatable"},
-    "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"},
+    "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "ranger"},
+    "ranger": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness"},
     "sysid": {"foundation", "plant"},
-    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
+    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "ranger", "sysid"},
 }
 # The same inside a room, for those of its rooms that stand above one another.
 INSIDE = {
@@ -267,12 +268,12 @@ OF_ANY_MACHINE = (
 ONLY_RANGERS = (
     "ranger_sim.boards",
     "ranger_sim.datatable.generated",
-    "ranger_sim.harness.conditions",
-    "ranger_sim.harness.faults.places",
+    "ranger_sim.ranger.conditions",
+    "ranger_sim.ranger.faults.places",
     "ranger_sim.harness.faults.ranger_",
-    "ranger_sim.harness.ranger",
-    "ranger_sim.harness.scenario",
-    "ranger_sim.harness.wiring.ranger",
+    "ranger_sim.ranger.robot",
+    "ranger_sim.ranger.scenario",
+    "ranger_sim.ranger.wiring",
     "ranger_sim.plant.electrics",
     "ranger_sim.plant.mechanics",
     "ranger_sim.plant.ranger",

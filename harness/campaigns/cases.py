@@ -11,12 +11,12 @@ from typing import Any
 from ranger_sim import __version__, datatable, loading
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns.subjects import own_machine
-from ranger_sim.harness.campaigns.walks import WALKS
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.walks import WALKS
 
 # What decides the outcome of a run: the sources and data of these packages.
-ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness")
+ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "ranger")
 SOURCES = {".py", ".pxd", ".toml", ".csv"}
 
 

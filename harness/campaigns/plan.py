@@ -21,7 +21,7 @@ from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
 from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
 from ranger_sim.harness.faults.catalogue import Catalogue
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.scenario import Scenario
 
 TEXTS = ("title", "description", "fault_module")
 TABLES = (*TEXTS, "walk", "machine", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")

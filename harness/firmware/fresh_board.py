@@ -3,7 +3,7 @@
 from typing import Any
 
 from ranger_sim.harness.outside import bus_schedule
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 Message = tuple[Any, ...]
 

@@ -32,7 +32,7 @@ from ranger_sim.harness.outside.bus_schedule import (
     passes_of,
     robots_table,
 )
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 FOLDER = pathlib.Path(__file__).resolve().parents[2] / "profiles"
 SCHEDULES = "schedules"

@@ -20,10 +20,10 @@ from ranger_sim.foundation.events import NEVER, PIN_EDGE, STAGE_PINS, UART_BYTE
 from ranger_sim.foundation.peers import LIMITS, Terminal, read_ready, write_ready
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.ranger.robot import Ranger
 
 POLL_NS = 1_000_000  # between two polls of a port: half a slot of the main brain
 AHEAD_NS = 20_000_000  # bytes read at once last at most this long on the robot's side; the rest waits in the port

@@ -27,7 +27,7 @@ from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.step_watch import StepWatch
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 RESET = 1  # mode of a bus node
 

@@ -16,7 +16,7 @@ from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.endpoint import Endpoint
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Audience
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 FAILED = 4  # exit code: the board's program raised
 

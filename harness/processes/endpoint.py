@@ -71,7 +71,7 @@ from ranger_sim.harness.processes.places import (
     URGENT,
     WATCHED,
 )
-from ranger_sim.harness.wiring.ranger import HEAR_IN_SLOTS
+from ranger_sim.ranger.wiring import HEAR_IN_SLOTS
 
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.stage import Audience

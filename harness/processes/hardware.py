@@ -10,7 +10,7 @@ from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, Ev
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.outside.rest_bus import RestBus
 from ranger_sim.harness.outside.supervision import Watch
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 CHECK_NS = 10_000_000  # between two checks for missing frames
 CONTROLLER = 1

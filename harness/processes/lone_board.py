@@ -14,7 +14,7 @@ from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.settings import Settings
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
 

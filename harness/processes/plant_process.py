@@ -8,7 +8,6 @@ from typing import Any
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.processes.pace import Pace
@@ -16,8 +15,9 @@ from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.requests import MOST_FAULTS
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
-from ranger_sim.harness.scenario import StopRule
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.scenario import StopRule
 
 SLICE_S = 0.0005  # virtual time between two readings of the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep

@@ -4,7 +4,7 @@ import dataclasses
 import os
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 NEVER, ON_FAILURE = "never", "on-failure"
 SLOWEST, FASTEST = 1e-4, 1000.0  # times real time; chosen by us

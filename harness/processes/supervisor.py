@@ -29,8 +29,8 @@ from ranger_sim.harness.processes.guard import is_awaited
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.requests import Request
 from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
-from ranger_sim.harness.scenario import StopRule
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.scenario import StopRule
 
 PLANT = "plant"
 LOOK_S = 0.2  # between two polls of boards and updates of the screen

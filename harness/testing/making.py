@@ -86,7 +86,7 @@ def made(order: Order) -> Any:
     machine = order.fresh()
     observed = observe(machine)
     if order.trace:
-        from ranger_sim.harness.timeline import Timeline
+        from ranger_sim.ranger.timeline import Timeline
 
         observed.timeline = Timeline(machine, TRACED_S)
     if order.warmed_up:

@@ -21,11 +21,11 @@ import pytest
 
 if TYPE_CHECKING:
     from ranger_sim.harness.machine import Machine
-    from ranger_sim.harness.ranger import Ranger
-    from ranger_sim.harness.testing.bench import BoardAlone, BusAlone
     from ranger_sim.harness.testing.forking import ForkedTest
     from ranger_sim.harness.testing.health import Expected, Health
     from ranger_sim.harness.testing.making import Order
+    from ranger_sim.ranger.robot import Ranger
+    from ranger_sim.ranger.testing.bench import BoardAlone, BusAlone
 
 FIXTURES = ("ranger", "machine")  # that give a whole machine, monitored
 SCOPES = ("function", "class", "module", "package", "session")
@@ -184,7 +184,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     if COUNTING not in config.stash:
         return
     from ranger_sim.firmware_sim.native import coverage
-    from ranger_sim.harness.testing.robots import counted
+    from ranger_sim.ranger.testing.robots import counted
 
     files = counted(pathlib.Path(config.stash[COUNTING]))
     path = pathlib.Path(option(config, "coverage"))
@@ -233,7 +233,7 @@ def order_for(node: Any, config: pytest.Config, fixture: str = "ranger") -> Orde
     if option(config, "seed"):
         wanted["seed"] = int(option(config, "seed"))
     if fixture == "ranger":
-        from ranger_sim.harness.testing.robots import order_of
+        from ranger_sim.ranger.testing.robots import order_of
 
         return order_of(wanted)
     from ranger_sim.harness.testing.making import machine_order
@@ -312,8 +312,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         try:
             expected = expected_of(item)
             if uses_ranger(item):
-                from ranger_sim.harness import ranger_names
-                from ranger_sim.harness.wiring import ranger as wiring
+                from ranger_sim.ranger import names as ranger_names
+                from ranger_sim.ranger import wiring
 
                 expected.check(ranger_names.RANGER, wiring.BOARDS)
             reason = missing(backend_of(item), things)
@@ -620,8 +620,8 @@ def board(request: pytest.FixtureRequest) -> Iterator[BoardAlone]:
 
 def board_alone(mark: pytest.Mark, config: pytest.Config) -> BoardAlone:
     """The board of a mark."""
-    from ranger_sim.harness.testing.bench import BoardAlone
-    from ranger_sim.harness.testing.robots import built
+    from ranger_sim.ranger.testing.bench import BoardAlone
+    from ranger_sim.ranger.testing.robots import built
 
     wanted = dict(mark.kwargs)
     if "firmware" in wanted:
@@ -633,7 +633,7 @@ def board_alone(mark: pytest.Mark, config: pytest.Config) -> BoardAlone:
 def can_bus(request: pytest.FixtureRequest) -> Iterator[BusAlone]:
     """A single bus with the test's own nodes: `can_bus.node("a")`."""
     from ranger_sim.foundation.user_error import UserError
-    from ranger_sim.harness.testing.bench import BusAlone
+    from ranger_sim.ranger.testing.bench import BusAlone
 
     mark = request.node.get_closest_marker("can_bus")
     wrong = ""

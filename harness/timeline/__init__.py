@@ -1,5 +1,1 @@
-"""One timeline of a run: slots, interrupts, frames and their paths, signals, states, faults and the body."""
-
-from ranger_sim.harness.timeline.timeline import Timeline
-
-__all__ = ["Timeline"]
+"""Timelines of a run: their model, what any machine shows in them, and the formats of their files."""

@@ -3,8 +3,8 @@
 import pytest
 
 from ranger_sim import Ranger, Scenario, UserError
-from ranger_sim.harness.conditions import ConditionNotMetError, condition
 from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.ranger.conditions import ConditionNotMetError, condition
 
 STEP_NS = 250_000  # of the plant: conditions are looked at between two of its steps
 

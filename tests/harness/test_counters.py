@@ -5,8 +5,8 @@ import json
 import pytest
 
 from ranger_sim.boards.counters import as_dict, from_dict
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from types import SimpleNamespace as Made
 import pytest
 
 from ranger_sim.datatable.generated import errors as error_table
-from ranger_sim.harness.records import summary
+from ranger_sim.ranger.records import summary
 
 S = 1_000_000_000
 

@@ -6,10 +6,10 @@ import dataclasses
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.firmware import image_boards
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.timeline.timeline import Timeline
+from ranger_sim.ranger.firmware import image_boards
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.timeline.timeline import Timeline
 from tests.firmware_sim.lpc2194.programs import image_of, words_of
 
 

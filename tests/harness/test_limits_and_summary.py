@@ -7,8 +7,8 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import plan
-from ranger_sim.harness.records import summary
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.records import summary
+from ranger_sim.ranger.scenario import Scenario
 
 RANGE = {"slope": {"low": 0.0, "high": 0.1}}
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from ranger_sim.foundation.events import PIN_EDGE, EventQueue
-from ranger_sim.harness.operator import FRAME_NS, PIN_ORDER, Operator
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.operator import FRAME_NS, PIN_ORDER, Operator
 
 START = 5_000_000_000
 POSE = {"stance": "inner", "lean_rad": -0.1, "hip_angle_rad": 0.2, "outer_ankle_rad": 1.5, "inner_ankle_rad": 0.5}

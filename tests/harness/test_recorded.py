@@ -7,8 +7,8 @@ import pytest
 
 from ranger_sim import datatable
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.harness.conditions import STATE_VARIABLES
-from ranger_sim.harness.records.recorded import Recorded
+from ranger_sim.ranger.conditions import STATE_VARIABLES
+from ranger_sim.ranger.records.recorded import Recorded
 
 START_NS = 3_000_000_000
 MS = 1_000_000

@@ -13,9 +13,9 @@ from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.control import ControlServer, address
 from ranger_sim.harness.processes.requests import Request, admitted
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.testing.process_robot import ProcessRobot
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.testing.process_robot import ProcessRobot
 
 LIMIT = LIMITS["control"]
 

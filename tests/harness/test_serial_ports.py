@@ -17,9 +17,9 @@ from ranger_sim.foundation.events import NEVER, PIN_EDGE, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import serial_ports
 from ranger_sim.harness.outside.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant.sensors.imu import Imu
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.examples import examples
 
 BYTE_NS = 10_000

@@ -20,8 +20,8 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.numbers import float_of_word
 from ranger_sim.harness.outside import serial_ports
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools import cli
 from ranger_sim.tools.robodaq import command as daq
 from ranger_sim.tools.robodaq.codec import write_packet

@@ -11,9 +11,9 @@ from typing import Any
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import body_files
 from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.sysid.figures.question import Candidate, Outcome, Point
 from ranger_sim.tools.command_line.files import replace_file
 from ranger_sim.tools.command_line.workers import workers

@@ -13,7 +13,7 @@ from ranger_sim.tools.command_line.options import Option, add_all
 from ranger_sim.tools.command_line.units import word
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.ranger.robot import Ranger
 
 
 PORT = word("a port, or pty")

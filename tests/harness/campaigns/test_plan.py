@@ -211,7 +211,7 @@ def test_the_campaigns_that_come_with_the_project_can_be_read(path):
 
 
 def test_the_sensors_campaign_has_every_sensor_and_every_mode_that_it_takes():
-    from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+    from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
     CATALOGUE.load()
     found = {case.fault.partition("@")[0] for case in plan.load(ROOT / "campaigns" / "sensors.toml").cases()}

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.plant import body_files
 from ranger_sim.plant import wiring_points as point
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from tests.harness.faults.bench import PlantBench
 
 MOTORS = {"MCH": point.HIP, "MCFO": point.OUTER_ANKLE, "MCFI": point.INNER_ANKLE, "MCSI": point.STEERING}

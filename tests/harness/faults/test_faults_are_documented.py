@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 PAGE = pathlib.Path(__file__).resolve().parents[3] / "docs/faults.md"
 PARAMETER = re.compile(r"`(\w+)`([^`()]*)\((\S+) to (\S+?)(?: [^()]*)?\)")

@@ -4,8 +4,8 @@ from types import SimpleNamespace as Made
 
 import pytest
 
-from ranger_sim.harness.faults import actuators
 from ranger_sim.plant import wiring_points as point
+from ranger_sim.ranger.faults import actuators
 
 
 def fault(kind=actuators.WeakMotor, number=point.HIP, duty=0.5, is_open=False, outer_rate=3.0):

@@ -11,8 +11,8 @@ import struct
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import places
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults import places
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from tests.harness.faults.bench import PlantBench
 
 START, END, LAST = 80, 160, 260  # steps: 20, 40 and 65 ms

@@ -6,11 +6,12 @@ from types import SimpleNamespace as Made
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import imu, power
+from ranger_sim.harness.faults import imu
 from ranger_sim.harness.faults.fault import Place
 from ranger_sim.harness.faults.sensor import ROWS, Quantity
 from ranger_sim.plant.electrics.battery import Battery, BatteryParameters
 from ranger_sim.plant.sensors.imu import PACKET_BYTES, SET_MODE
+from ranger_sim.ranger.faults import power
 
 S = 1_000_000_000
 # 2 cells of 3, 3.5 and 4 V: 6 V empty, 7 V at half, 8 V full; two packs of 1 ohm together 0.5

@@ -11,9 +11,9 @@ import pytest
 from ranger_sim import Ranger, Scenario
 from ranger_sim.foundation.events import PIN_OUTPUT
 from ranger_sim.foundation.row_stream import RowStream
-from ranger_sim.harness.feed.server import FeedServer
-from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.outside.profile import Profile
+from ranger_sim.ranger.feed import FeedServer
+from ranger_sim.ranger.firmware import native_boards
 from tests.firmware_sim.native.support import COMPILER
 
 FACE = pathlib.Path(__file__).parent / "face"

@@ -13,8 +13,8 @@ from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_CYCLES, CO
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.harness.processes.apart import Apart
+from ranger_sim.ranger.feed import FeedServer
 
 SECONDS = 0.1
 

@@ -9,9 +9,9 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.testing.backends import BACKENDS, OFFERS, MissingError, missing
-from ranger_sim.harness.testing.outside_robot import vcan_buses
-from ranger_sim.harness.testing.process_robot import BoardLostError
-from ranger_sim.harness.testing.robots import assert_healthy, new_robot
+from ranger_sim.ranger.testing.outside_robot import vcan_buses
+from ranger_sim.ranger.testing.process_robot import BoardLostError
+from ranger_sim.ranger.testing.robots import assert_healthy, new_robot
 from tests.harness.testing.project import pytest_in, write
 
 ON_VIRTUAL = """\
@@ -102,7 +102,7 @@ def test_time_on_interfaces_outside_is_released_by_the_wall_clock(tmp_path):
 
 
 def test_a_machine_without_vcan_is_told_what_it_lacks(monkeypatch):
-    monkeypatch.setattr("ranger_sim.harness.testing.outside_robot.Path.exists", lambda path: path.name == "vcan1")
+    monkeypatch.setattr("ranger_sim.ranger.testing.outside_robot.Path.exists", lambda path: path.name == "vcan1")
     with pytest.raises(MissingError, match="backend vcan: this machine has no vcan0, vcan2, vcan3 .`ranger-sim vm"):
         vcan_buses()
 

@@ -7,8 +7,8 @@ from ranger_sim.boards.modules.front_panel import DISPLAY_ENABLE
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import ConditionNotMetError
-from ranger_sim.harness.testing.bench import BoardAlone, BusAlone
+from ranger_sim.ranger.conditions import ConditionNotMetError
+from ranger_sim.ranger.testing.bench import BoardAlone, BusAlone
 
 RAD_PER_COUNT = 2 * 3.141592653589793 / 8192  # 13 bits a turn
 HIP_ZERO = 4590

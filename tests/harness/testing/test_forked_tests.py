@@ -4,8 +4,8 @@ import importlib.util
 
 import pytest
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.harness.testing.project import pytest_in, write
 
 TESTS = """\

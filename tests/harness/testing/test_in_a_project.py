@@ -90,7 +90,7 @@ def test_the_plugin_imports_nothing_of_the_robot_before_a_fixture_does(tmp_path)
 import sys
 
 def test_what_is_imported():
-    heavy = {"numpy", "scipy", "can", "rich", "asammdf", "plotly", "cython", "ranger_sim.harness.ranger"}
+    heavy = {"numpy", "scipy", "can", "rich", "asammdf", "plotly", "cython", "ranger_sim.ranger.robot"}
     assert heavy & set(sys.modules) == set()
     inside = [name for name in sys.modules if name.startswith("ranger_sim.")]
     assert "ranger_sim.harness.testing.plugin" in inside

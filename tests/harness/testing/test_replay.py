@@ -8,12 +8,12 @@ import pytest
 from ranger_sim.can_bus.edge.candump import CandumpWriter
 from ranger_sim.can_bus.edge.messages import message_of_frame
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.testing.bench import BoardAlone
 from ranger_sim.harness.testing.frames import Frame
-from ranger_sim.harness.testing.replay import read_log
 from ranger_sim.harness.testing.wire import observe
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.testing.bench import BoardAlone
+from ranger_sim.ranger.testing.replay import read_log
 
 
 @pytest.fixture(scope="module")

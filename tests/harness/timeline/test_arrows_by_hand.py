@@ -10,10 +10,11 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim import activity
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
-from ranger_sim.harness.timeline import flows, perfetto_file, perfetto_reader
-from ranger_sim.harness.timeline.frames import BusFrames, frame_name
+from ranger_sim.harness.timeline import perfetto_file, perfetto_reader
 from ranger_sim.harness.timeline.model import Counter, Events, Instant, Instants, Slices, changes, runs
 from ranger_sim.harness.timeline.processors import Processor
+from ranger_sim.ranger.timeline import flows
+from ranger_sim.ranger.timeline.frames import BusFrames, frame_name
 
 
 def numbers(*values):

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from ranger_sim.harness.timing.robot_figures import EXECUTION_TIME_US, INSTRUCTIONS, REZEROING_US, cycles_of
+from ranger_sim.ranger.timing.robot_figures import EXECUTION_TIME_US, INSTRUCTIONS, REZEROING_US, cycles_of
 
 ROBOT = pathlib.Path(__file__).resolve().parents[3] / "docs/robot.md"
 COLUMNS = {"MCH": 1, "MCFI": 2, "MCSI": 3}

@@ -1,8 +1,8 @@
 """A robot with its data link in this process, on virtual time: what it sends goes to a session, or is lost."""
 
 from ranger_sim.harness.outside import serial_ports
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 LOOK_S = 0.005
 

@@ -1,7 +1,7 @@
 """The whole robot, wired: seven boards, four buses, one link, one body.
 
 `Ranger.__init__` builds the plant and the boards; harness/machine.py connects them and the buses by the tables of
-harness/wiring/ranger.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
+ranger/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
 from __future__ import annotations
@@ -36,29 +36,29 @@ from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.quantities import Duration
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
 from ranger_sim.harness.faults.error_rows import StateWord
-from ranger_sim.harness.faults.error_watch import ErrorWatch
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.firmware import image_boards, native_boards
 from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.machine import Machine
-from ranger_sim.harness.operator import Operator
 from ranger_sim.harness.outside import bus_schedule
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.processes.guard import DEADLINE_S
 from ranger_sim.harness.processes.kinds import SET_WORD
-from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.records.strike_watch import StrikeWatch
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.timing.machine_slots import MachineSlots
 from ranger_sim.harness.waiting import Wanted
-from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.harness.wiring.imu_wire import ImuWire
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.faults.error_watch import ErrorWatch
+from ranger_sim.ranger.firmware import image_boards, native_boards
+from ranger_sim.ranger.names import RANGER
+from ranger_sim.ranger.operator import Operator
+from ranger_sim.ranger.records.strike_watch import StrikeWatch
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.apart import Apart
@@ -195,7 +195,7 @@ class Ranger(Machine):
         """
         crystal = self._stream(name)[0]
         if name in self.firmware:
-            from ranger_sim.harness.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
+            from ranger_sim.ranger.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
             with self._printing(name):
                 board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
@@ -204,7 +204,7 @@ class Ranger(Machine):
                 self._watch(board)
             return board
         if name in self.images:
-            from ranger_sim.harness.firmware.robot_image_board import (
+            from ranger_sim.ranger.firmware.robot_image_board import (
                 RobotImageBoard,  # only here: a processor, and ELF files
             )
 
@@ -307,7 +307,7 @@ class Ranger(Machine):
         self.operator.act(end_ns)
 
     def condition(self, wanted: Wanted) -> Condition:
-        """The condition described by `wanted` (harness/conditions.py)."""
+        """The condition described by `wanted` (ranger/conditions.py)."""
         return condition(wanted)
 
     @property
@@ -411,7 +411,7 @@ class Ranger(Machine):
 
     def recorded(self) -> Any:
         """What the log kept, as arrays: a `harness.recorded.Recorded`."""
-        from ranger_sim.harness.records.recorded import Recorded
+        from ranger_sim.ranger.records.recorded import Recorded
 
         return Recorded(self)
 
@@ -457,6 +457,6 @@ class Ranger(Machine):
 
     def summary(self) -> dict:
         """The walk in numbers: what `--json` prints."""
-        from ranger_sim.harness.records import summary
+        from ranger_sim.ranger.records import summary
 
         return summary.of(self)

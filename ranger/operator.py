@@ -7,7 +7,7 @@ from typing import Any
 
 from ranger_sim.foundation.events import PIN_EDGE, STAGE_PINS
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 PIN_ORDER = STAGE_PINS * 256 + 128
 

@@ -7,11 +7,11 @@ import numpy as np
 from ranger_sim.boards.modules.motor_output import PERIOD_COUNTS
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.events import PIN_OUTPUT, PWM_UPDATE
-from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
-from ranger_sim.harness.timeline.frames import NUMPY_TYPES
 from ranger_sim.harness.timeline.model import Counter, Slices, changes, runs
-from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.plant.ranger import SAMPLES
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names
+from ranger_sim.ranger.timeline.frames import NUMPY_TYPES
 
 
 def variables(rows: np.ndarray, zero_ns: int) -> list[Counter]:

@@ -10,10 +10,10 @@ from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.harness.outside.profile import Profile
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.testing.backends import PROCESSES, MissingError
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 
 class BoardLostError(AssertionError):

@@ -8,11 +8,11 @@ from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, MainBrainSspLink, Ro
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.events import ORDER_INTERRUPTS, SSP_SEGMENT, SSP_START
-from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.frames import Frame, frame_type
+from ranger_sim.ranger.names import RANGER
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.testing.bench import BoardAlone
+    from ranger_sim.ranger.testing.bench import BoardAlone
 
 PERIOD_NS = 200_000  # between two exchanges (robot.md N1.6)
 LAST_ID = 2031  # the highest identifier of the link

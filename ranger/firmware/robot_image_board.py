@@ -8,7 +8,7 @@ from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.datatable.generated import csr, mcfi, mcfo, mch, mcsi, ui
 from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
 from ranger_sim.firmware_sim.lpc2194.image import Image
-from ranger_sim.harness.firmware.image_boards import hardware_of
+from ranger_sim.ranger.firmware.image_boards import hardware_of
 
 TABLES: dict[str, Any] = {"MCH": mch, "MCFO": mcfo, "MCFI": mcfi, "MCSI": mcsi, "UI": ui, "CSR": csr}
 

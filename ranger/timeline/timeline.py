@@ -12,10 +12,11 @@ from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.records.activity import activity_of
 from ranger_sim.harness.step_watch import StepWatch
-from ranger_sim.harness.timeline import files, flows, frames, happenings, signals
+from ranger_sim.harness.timeline import files, happenings
 from ranger_sim.harness.timeline.model import Events
 from ranger_sim.harness.timeline.processors import Processor
 from ranger_sim.harness.timeline.row_store import RowStore
+from ranger_sim.ranger.timeline import flows, frames, signals
 
 LINK_COLUMNS = 5  # a row of SspWire: ns, from the slave, header, two words
 OUTPUT_COLUMNS = 5  # a row of BoardWires: ns, kind, three numbers

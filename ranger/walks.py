@@ -4,10 +4,10 @@ import dataclasses
 from typing import Any
 
 from ranger_sim.harness.campaigns.outcomes import CRITERIA, Band, against_fallen, classify, deviation
-from ranger_sim.harness.conditions import condition
 from ranger_sim.harness.faults.evidence import Record
 from ranger_sim.harness.faults.proof import Proof, damage, gait
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.conditions import condition
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 
 class Walks:

@@ -48,17 +48,17 @@ from ranger_sim.foundation.events import (
 from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text
 from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import ConditionNotMetError
-from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.firmware.native_firmware import Firmware
-from ranger_sim.harness.ranger import BOARD_CLASSES, BUS_BIT_RATE
-from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.figures import Figure, Observed
 from ranger_sim.harness.testing.frames import Frame, FrameKeeper, frame_type
-from ranger_sim.harness.testing.links import Link, link_of
 from ranger_sim.harness.testing.wire import Wire
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.conditions import ConditionNotMetError
+from ranger_sim.ranger.firmware import native_boards
+from ranger_sim.ranger.names import RANGER
+from ranger_sim.ranger.robot import BOARD_CLASSES, BUS_BIT_RATE
+from ranger_sim.ranger.testing.links import Link, link_of
 
 # A board or node runs at most this many bits ahead of a bus: a frame without data has passed its receivers after
 # 41 bits or more, so nothing arrives in a receiver's past.
@@ -388,7 +388,7 @@ class BoardAlone(Bench):
 
     def _board_in_c(self, firmware: Firmware, crystal: Crystal) -> Any:
         """The board with a program in C, first tried in another process."""
-        from ranger_sim.harness.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
+        from ranger_sim.ranger.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
         name = self.name
 
@@ -404,7 +404,7 @@ class BoardAlone(Bench):
     # --- inputs ------------------------------------------------------------------------------------------
 
     def pin(self, name: str) -> Pin:
-        """A digital pin, named as in harness/wiring/ranger.py: `board.pin("limit_switch_left").set(1)`."""
+        """A digital pin, named as in ranger/wiring.py: `board.pin("limit_switch_left").set(1)`."""
         pins = wiring.PINS.get(self.name, {})
         pin = Pin(self, name, self._place("pin", name, pins))
         pin.log = self.pin_log[pin.number]
@@ -453,7 +453,7 @@ class BoardAlone(Bench):
         `frames`: of replay.read_log. The board's own publications are left out, because it sends them again. The frames
         must be of buses that the board is on.
         """
-        from ranger_sim.harness.testing.replay import into_board
+        from ranger_sim.ranger.testing.replay import into_board
 
         return into_board(self, frames)
 
@@ -470,7 +470,7 @@ class BoardAlone(Bench):
 
     def errors(self) -> dict[str, int]:
         """How often it recorded each error, by name."""
-        from ranger_sim.harness.records.summary import errors
+        from ranger_sim.ranger.records.summary import errors
 
         return errors(self.chip.counters())
 

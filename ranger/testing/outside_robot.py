@@ -16,10 +16,10 @@ from ranger_sim.harness.outside.machine import Pace, leave_out
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.outside import move_bus
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.backends import HARDWARE, VCAN, MissingError
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 
 class OutsideRobot(Ranger):

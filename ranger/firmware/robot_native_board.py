@@ -7,9 +7,9 @@ from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.native.native_board import Started
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.firmware.native_boards import PLACES, hardware_of, table_version
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.table_board import TableBoard
+from ranger_sim.ranger.firmware.native_boards import PLACES, hardware_of, table_version
 
 
 class RobotNativeBoard(TableBoard):

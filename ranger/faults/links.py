@@ -6,7 +6,7 @@ from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 LINK = "serial link"
 SERIAL = "serial line"

@@ -12,10 +12,10 @@ from typing import Any
 from ranger_sim import datatable
 from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, SocketStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
-from ranger_sim.harness.faults.power import PowerlessBoard
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.records.summary import energy
+from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names
+from ranger_sim.ranger.faults.power import PowerlessBoard
+from ranger_sim.ranger.records.summary import energy
 
 LOOK_NS = 20_000_000  # virtual time between two polls: 50 pictures a second at real time
 STATE_NS = 100_000_000

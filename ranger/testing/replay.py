@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 from ranger_sim.can_bus.edge.logs import read_log as read_frames
 from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.frames import Frame, frame_type
+from ranger_sim.ranger.names import RANGER
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.testing.bench import BoardAlone
+    from ranger_sim.ranger.testing.bench import BoardAlone
 
 LOST = 0.01  # of a recording's frames: with more lost the traffic is different
 

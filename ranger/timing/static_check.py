@@ -44,7 +44,7 @@ from ranger_sim.firmware_sim.vic import (
 from ranger_sim.foundation.events import CAN_RX, PIN_EDGE, SSP_SEGMENT, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import bus_schedule, profile
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 RATED_SPEED_RPM = 6300  # of a motor without load at 12 V (robot.md B2)
 MOTOR_GEAR = {"MCH": 66.0, "MCFO": 34.0, "MCFI": 34.0}  # robot.md B2: from motor to joint

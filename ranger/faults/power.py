@@ -9,10 +9,10 @@ from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.faults.reach import emulated, reaching_into, wake_buses
 from ranger_sim.harness.firmware.fresh_board import first_outputs, fresh_board, pass_on
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 BATTERY = "battery"
 SUPPLY = "board supply"

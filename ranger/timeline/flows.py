@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS
-from ranger_sim.harness.timeline.frames import BusFrames
 from ranger_sim.harness.timeline.model import Slices
 from ranger_sim.harness.timeline.processors import Processor
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.timeline.frames import BusFrames
 
 ROUTER, MAIN_BRAIN = "CSR", "MB"
 RECEIVE_TASK = "can_rx_dispatch_all"

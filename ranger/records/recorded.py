@@ -9,7 +9,7 @@ import numpy as np
 from ranger_sim import datatable
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
+from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names
 
 
 @dataclasses.dataclass

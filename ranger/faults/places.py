@@ -1,4 +1,4 @@
-"""Every place of the robot for the faults of this package, from the tables of harness/wiring/ranger.py.
+"""Every place of the robot for the faults of this package, from the tables of ranger/wiring.py.
 
 A place is named by the board that receives its signal, or whose motor it belongs to, and by its function there.
 """
@@ -26,9 +26,9 @@ from ranger_sim.harness.faults.kinds import (
     SUPPLY_VOLTAGE,
     WORD,
 )
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.plant import wiring_points as point
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 # Each encoder of the plant's list: name at its board, what it is, joint, edges of channel A per turn.
 ENCODERS = {

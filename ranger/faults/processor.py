@@ -12,10 +12,10 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import chosen, name_parameter
-from ranger_sim.harness.faults.power import Restart
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.faults.reach import emulated, reaching_into
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.faults.power import Restart
 
 PROCESSOR = "processor"
 RECEIVE_RING = 63  # frames that a satellite's ring holds (robot.md N4.14: 64 places, of which one stays empty)

@@ -19,14 +19,14 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.firmware_sim.native.coverage import FileCounts
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.outside.profile import load as load_profile
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, check_backend
 from ranger_sim.harness.testing.health import Expected, Health
 from ranger_sim.harness.testing.making import made
+from ranger_sim.ranger.firmware import native_boards
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 ABOUT = "firmware.json"  # next to counts: their firmware
 SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
@@ -40,7 +40,7 @@ OTHERS = (
 class Order:
     """The description of a robot. Equal orders give equal robots, so one that has been warmed up can serve for another.
 
-    warmed_up: a condition of harness/conditions.py that holds before the test begins; empty for a new robot.
+    warmed_up: a condition of ranger/conditions.py that holds before the test begins; empty for a new robot.
     speed: virtual seconds per second where time is released by the wall clock.
     """
 
@@ -84,11 +84,11 @@ class Order:
         if firmware and self.backend in (VCAN, HARDWARE):
             raise UserError(f"backend {self.backend}: firmware in C runs on the backends {SIM} and {PROCESSES}")
         if self.backend == PROCESSES:
-            from ranger_sim.harness.testing.process_robot import ProcessRobot
+            from ranger_sim.ranger.testing.process_robot import ProcessRobot
 
             return ProcessRobot(self.scenario, self.log, self.quirks, profile, firmware)
         if self.backend in (VCAN, HARDWARE):
-            from ranger_sim.harness.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
+            from ranger_sim.ranger.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
 
             outside = vcan_buses() if self.backend == VCAN else buses_of_profile(profile)
             return OutsideRobot(self.scenario, self.log, self.quirks, profile, outside, self.speed)

@@ -19,7 +19,6 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.names import meant
-from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.waiting import (
     COMPARED,
     NOTED,
@@ -32,8 +31,9 @@ from ranger_sim.harness.waiting import (
     Waiting,
     instant,
 )
-from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.plant.ranger import SAMPLES
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.names import RANGER
 
 __all__ = ["STATE_VARIABLES", "Condition", "ConditionNotMetError", "ErrorNoted", "Waiting", "condition", "state_names"]
 

@@ -1,0 +1,1 @@
+"""The robot in tests: its backends, single boards and buses, replays."""
