@@ -213,15 +213,14 @@ class Ranger(Machine):
             return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)
         return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
 
+    def waits_for_slots(self, board: Any) -> bool:
+        """Not a board with a firmware image, whose handlers are unknown, nor a program in C whose handlers may send."""
+        return board.name not in self.images and (board.name not in self.firmware or board.scheduler.announces)
+
     def _connect(self) -> None:
         """Connect every wire of the tables, and what only Ranger has: the serial link and the inertial unit."""
         Machine._connect(self)
         loop, boards = self.loop, self.boards
-        for name in wiring.HEAR_IN_SLOTS:
-            if name in self.images:
-                continue  # what its handlers do is unknown
-            if name not in self.firmware or boards[name].scheduler.announces:  # else its handlers may send
-                loop.hears_in_its_slots(boards[name])
         loop.connect_link(boards["CSR"], boards["MB"], EXCHANGE_NS, empty_segment())
         board = boards[wiring.IMU_BOARD]
         loop.connect_serial_device(ImuWire(self.plant.imu, board, wiring.IMU_UART), board, wiring.IMU_UART)
@@ -372,9 +371,9 @@ class Ranger(Machine):
         UserError for a name that is not a parameter, and for a value beyond its limits or that is not a number.
         """
         row = parameters.parameter(name)
-        self._write_word(row.id, parameters.checked_word(row, value))
+        self.write_word(row.id, parameters.checked_word(row, value))
 
-    def _write_word(self, number: int, word: int) -> None:
+    def write_word(self, number: int, word: int) -> None:
         """Write to the main brain's table, stamped by its clock; through the channel if in another process."""
         if self.loop.board("MB").apart:
             self.loop.board("MB").send(SET_WORD, self.loop.time, number, word)
@@ -409,8 +408,14 @@ class Ranger(Machine):
         view: MachineSlots = Machine.slots(self, board)
         return view
 
+    def timeline(self, last_s: float | None = None) -> Any:
+        """A `ranger.timeline.Timeline` that keeps the last `last_s` seconds of virtual time, or everything."""
+        from ranger_sim.ranger.timeline import Timeline
+
+        return Timeline(self, last_s)
+
     def recorded(self) -> Any:
-        """What the log kept, as arrays: a `harness.recorded.Recorded`."""
+        """What the log kept, as arrays: a `ranger.records.recorded.Recorded`."""
         from ranger_sim.ranger.records.recorded import Recorded
 
         return Recorded(self)
@@ -429,6 +434,12 @@ class Ranger(Machine):
             )
             for machine, variable in STATE_VARIABLES.items()
         }
+
+    def admitted(self, line: bytes) -> Any:
+        """The request in a line of JSON (ranger/requests.py). UserError, of one line, for any other line."""
+        from ranger_sim.ranger import requests
+
+        return requests.admitted(line)
 
     def fell_ns(self) -> int:
         return int(self.plant.record.fall_time_ns) if self.plant.fell else -1

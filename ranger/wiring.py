@@ -88,6 +88,7 @@ IMU_BOARD, IMU_UART = "UI", user_interface.IMU_UART
 
 MOTOR_BOARDS = ("MCH", "MCFO", "MCFI", "MCSI")
 RANGER = Wiring(
+    hear_in_slots=HEAR_IN_SLOTS,
     can=CAN,
     encoders=ENCODERS,
     analog=ANALOG,

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from ranger_sim.boards.counters import as_dict, from_dict
+from ranger_sim.boards.counters import RangerCounters
+from ranger_sim.firmware_sim.counters import as_dict, from_dict
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario, StopRule
 
@@ -30,7 +31,7 @@ def test_every_board_says_what_it_counted(counted):
 
 def test_counters_are_the_same_after_their_way_through_json(counted):
     for board in counted.values():
-        assert from_dict(json.loads(json.dumps(as_dict(board)))) == board
+        assert from_dict(RangerCounters, json.loads(json.dumps(as_dict(board)))) == board
 
 
 @pytest.mark.parametrize("part", ["slots", "link", "router"])
@@ -38,7 +39,7 @@ def test_a_counter_that_is_missing_or_has_another_name_is_refused(counted, part)
     found = as_dict(counted["CSR"])
     count = found[part].popitem()
     with pytest.raises(TypeError, match=count[0]):
-        from_dict(found)
+        from_dict(RangerCounters, found)
     found[part]["renamed"] = count[1]
     with pytest.raises(TypeError, match="renamed"):
-        from_dict(found)
+        from_dict(RangerCounters, found)

@@ -12,7 +12,7 @@ from ranger_sim.datatable import parameters
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.control import ControlServer, address
-from ranger_sim.harness.processes.requests import Request, admitted
+from ranger_sim.ranger.requests import Request, admitted
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.ranger.testing.process_robot import ProcessRobot
@@ -112,7 +112,7 @@ class Robot:
     def __init__(self, name):
         self.requests = []
         self.silent = False
-        self.server = ControlServer(name, self.obey)
+        self.server = ControlServer(name, admitted, self.obey)
 
     def obey(self, number, request):
         self.requests.append((number, request))
@@ -223,4 +223,4 @@ def test_a_second_robot_of_a_name_is_told(robot):
     name = robot.server.listener.getsockname()[1:].decode().rpartition("/")[2]
     assert address(name).endswith(name)
     with pytest.raises(UserError, match=f"a robot named {name} is already running"):
-        ControlServer(name, robot.obey)
+        ControlServer(name, admitted, robot.obey)

@@ -24,13 +24,13 @@ from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.processes.plant_process import sent_away
-from ranger_sim.harness.processes.requests import admitted, can_be_armed
 from ranger_sim.harness.processes.settings import FASTEST, NEVER, ON_FAILURE, SLOWEST, Settings, one_processor
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
 from ranger_sim.ranger import wiring
 from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from ranger_sim.ranger.feed import FeedServer
+from ranger_sim.ranger.requests import admitted, can_be_armed
 from ranger_sim.tools import faults
 from ranger_sim.tools.buses import server_options
 from ranger_sim.tools.command_line import interrupts, terminal
@@ -221,6 +221,7 @@ def run(options: argparse.Namespace) -> int:
         real_time=not options.no_real_time,
         name=options.name,
         processor=processor(options.processor),
+        boards=wiring.BOARDS,
     )
     if options.out:
         writable_folder(options.out)

@@ -31,7 +31,7 @@ def how_to_find_the_plugin():
         [sys.executable, "-c", HAS_ENTRY_POINT],
         cwd=os.sep, env=environment(), capture_output=True, text=True, timeout=LIMIT_S, check=True,
     )  # fmt: skip
-    return [] if int(done.stdout) else ["-p", "ranger_sim.harness.testing.plugin"]
+    return [] if int(done.stdout) else ["-p", "ranger_sim.ranger.testing.plugin"]
 
 
 def environment():

@@ -93,7 +93,7 @@ def test_what_is_imported():
     heavy = {"numpy", "scipy", "can", "rich", "asammdf", "plotly", "cython", "ranger_sim.ranger.robot"}
     assert heavy & set(sys.modules) == set()
     inside = [name for name in sys.modules if name.startswith("ranger_sim.")]
-    assert "ranger_sim.harness.testing.plugin" in inside
+    assert "ranger_sim.ranger.testing.plugin" in inside
     assert {name.split(".")[1] for name in inside} <= {"loading", "harness"}
 """,
     )

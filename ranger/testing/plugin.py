@@ -427,7 +427,7 @@ def cut_traceback(error: Exception) -> None:
 
     if not isinstance(error, UserError):
         return
-    rooms = tuple(f"{loading.PACKAGE / room}{os.sep}" for room in ("harness", "foundation", "datatable"))
+    rooms = tuple(f"{loading.PACKAGE / room}{os.sep}" for room in ("harness", "ranger", "foundation", "datatable"))
     entries = []
     entry = error.__traceback__
     while entry is not None:

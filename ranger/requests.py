@@ -15,12 +15,12 @@ from ranger_sim.datatable.parameters import shown
 from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.fault import Fault
+from ranger_sim.harness.processes.plant_process import MOST_FAULTS
 from ranger_sim.ranger import wiring
 from ranger_sim.ranger.conditions import ErrorNoted
 from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 KEYS = 6  # of the robot's panel: 0 ... 5
-MOST_FAULTS = 255  # of one run, by request; chosen by us: each that waits is checked in every step of the body
 
 
 @dataclasses.dataclass(frozen=True)
