@@ -12,7 +12,7 @@ from ranger_sim.datatable.loader import load_table
 from ranger_sim.tools import cli
 from ranger_sim.tools.new import command
 from tests.firmware_sim.native.support import COMPILER
-from tests.harness.testing.project import environment, how_to_find_the_plugin
+from tests.ranger.testing.project import environment, how_to_find_the_plugin
 
 
 def everything(folder):

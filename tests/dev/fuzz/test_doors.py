@@ -3,7 +3,6 @@
 import pytest
 
 from dev.fuzz import Finding, doors
-from ranger_sim.harness.processes import control
 from ranger_sim.ranger.requests import Request
 
 

@@ -9,6 +9,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import plan
 from ranger_sim.ranger.records import summary
 from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.walks import REFERENCE
 
 RANGE = {"slope": {"low": 0.0, "high": 0.1}}
 
@@ -32,7 +33,7 @@ def test_a_scenario_takes_both_limits_and_refuses_what_is_beyond(name, low, high
 
 
 def made(**data):
-    return plan.of_data({"title": "test", "vary": RANGE, **data}, "test.toml")
+    return plan.of_data({"title": "test", "vary": RANGE, **data}, "test.toml", REFERENCE)
 
 
 def test_a_search_without_numbers_has_twelve_runs_and_four_rounds_of_six():

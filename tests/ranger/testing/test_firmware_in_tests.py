@@ -7,7 +7,7 @@ import pytest
 
 from tests.firmware_sim.native.support import COMPILER, folder_with
 from tests.firmware_sim.native.test_sanitizers import LINES, MANIFEST, PROGRAM, has_sanitizers
-from tests.harness.testing.project import pytest_in, write
+from tests.ranger.testing.project import pytest_in, write
 
 pytestmark = pytest.mark.skipif(
     not COMPILER or shutil.which("addr2line") is None, reason="no C compiler and addr2line here"

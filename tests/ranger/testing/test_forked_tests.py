@@ -6,7 +6,7 @@ import pytest
 
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
-from tests.harness.testing.project import pytest_in, write
+from tests.ranger.testing.project import pytest_in, write
 
 TESTS = """\
 import os

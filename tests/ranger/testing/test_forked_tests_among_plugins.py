@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tests.harness.testing.project import environment, how_to_find_the_plugin, pytest_in, write
+from tests.ranger.testing.project import environment, how_to_find_the_plugin, pytest_in, write
 
 # What popular plugins do, in a few lines: run a test again by pytest's own `runtestprotocol`, as pytest-rerunfailures;
 # limit its time by an alarm that fails it, as pytest-timeout; note outcomes for fixtures, as pytest's documentation.

@@ -12,7 +12,7 @@ from ranger_sim.harness.testing.backends import BACKENDS, OFFERS, MissingError, 
 from ranger_sim.ranger.testing.outside_robot import vcan_buses
 from ranger_sim.ranger.testing.process_robot import BoardLostError
 from ranger_sim.ranger.testing.robots import assert_healthy, new_robot
-from tests.harness.testing.project import pytest_in, write
+from tests.ranger.testing.project import pytest_in, write
 
 ON_VIRTUAL = """\
 title = "can1 on python-can's own virtual interface"

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.timeline import files, perfetto_reader
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
-from ranger_sim.ranger.timeline import Timeline, files, flows, perfetto_reader
+from ranger_sim.ranger.timeline import Timeline, flows
 
 perfetto_trace_pb2 = pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.harness.testing.project import ROOT, pytest_in, write
+from tests.ranger.testing.project import ROOT, pytest_in, write
 
 LAW = """\
 def compliant_control(robot):
@@ -94,7 +94,7 @@ def test_what_is_imported():
     assert heavy & set(sys.modules) == set()
     inside = [name for name in sys.modules if name.startswith("ranger_sim.")]
     assert "ranger_sim.ranger.testing.plugin" in inside
-    assert {name.split(".")[1] for name in inside} <= {"loading", "harness"}
+    assert {name.split(".")[1] for name in inside} <= {"loading", "harness", "ranger"}
 """,
     )
     done = pytest_in(tmp_path)
