@@ -87,5 +87,6 @@ def _value(kind: Any, found: Any) -> Any:
     if dataclasses.is_dataclass(kind) and isinstance(kind, type) and found is not None:
         return from_dict(kind, found)
     if typing.get_origin(kind) is list:
-        return [_value(*typing.get_args(kind), each) for each in found]
+        [item] = typing.get_args(kind)
+        return [_value(item, each) for each in found]
     return found

@@ -1,0 +1,5 @@
+"""The old name of `ranger_sim.ranger.firmware.native_boards`, until the next version."""
+
+from ranger_sim.foundation import moved
+
+__getattr__ = moved.attributes(__name__, "ranger_sim.ranger.firmware.native_boards")
