@@ -32,8 +32,8 @@ test: $(VENV)/.all
 
 # The rooms' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
 # minutes so, programs that keep a pace, and what compares both modes already.
-PLAIN = $(addprefix tests/,foundation datatable can_bus firmware_sim boards plant harness/test_counters.py \
-	harness/test_imu_wire.py harness/test_profile.py harness/test_requests.py harness/test_supervision.py)
+PLAIN = $(addprefix tests/,foundation datatable can_bus firmware_sim boards plant ranger/test_counters.py \
+	harness/test_imu_wire.py harness/test_profile.py ranger/test_requests.py harness/test_supervision.py)
 NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_2015.py boards/test_original_images.py \
 	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/walking/test_walking.py)
 

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from ranger_sim.firmware_sim.counters import CanCounters, ProcessorCounters, ProgramCounters, SlotCounters
+from ranger_sim.firmware_sim.counters import CanCounters, ProcessorCounters, ProgramCounters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,21 +87,3 @@ def of_router(router: Any) -> RouterCounters:
         own_lost=router.own_lost,
         unroutable=router.unroutable,
     )
-
-
-def as_dict(counters: RangerCounters) -> dict:
-    """Numbers, lists and dictionaries of them, as JSON can carry them."""
-    return dataclasses.asdict(counters)
-
-
-def from_dict(found: dict) -> RangerCounters:
-    """The same from what `as_dict` gave; TypeError when a name is missing or strange."""
-    link, router, processor = found["link"], found["router"], found["processor"]
-    nested: dict[str, Any] = {
-        "slots": SlotCounters(**found["slots"]),
-        "can": [CanCounters(**each) for each in found["can"]],
-        "link": None if link is None else LinkCounters(**link),
-        "router": None if router is None else RouterCounters(**router),
-        "processor": None if processor is None else ProcessorCounters(**processor),
-    }
-    return RangerCounters(**{**found, **nested})

@@ -6,7 +6,7 @@ python docs/schedules_table.py
 import pathlib
 
 from ranger_sim.firmware_sim.vic import FIQ
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 from ranger_sim.tools.command_line.files import replace_file
 
 PAGE = pathlib.Path(__file__).parent / "reference/schedules.md"

@@ -137,7 +137,7 @@ def way_from(way: Way, frame: int) -> dict | None:
 def record() -> dict:
     """Walk, and keep the way of one hip angle with all that happened around it."""
     from ranger_sim import Ranger, Scenario
-    from ranger_sim.harness.timeline import Timeline
+    from ranger_sim.ranger.timeline import Timeline
 
     robot = Ranger(Scenario())
     robot.until(f"step {STEP}", within="10 s")

@@ -1,6 +1,11 @@
 """What a board counted, by name. A board says it itself (`Board.counters`), whether it runs here or elsewhere."""
 
 import dataclasses
+import types
+import typing
+from typing import Any, TypeVar
+
+Counters = TypeVar("Counters")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,3 +67,26 @@ class ProgramCounters(BoardCounters):
 
     time_ms: int = 0
     errors: list[int] = dataclasses.field(default_factory=list)
+
+
+def as_dict(counters: Any) -> dict[str, Any]:
+    """Counters as numbers, lists and dictionaries of them, as JSON can carry them."""
+    return dataclasses.asdict(counters)
+
+
+def from_dict(kind: type[Counters], found: dict[str, Any]) -> Counters:
+    """Counters of the class `kind` from what `as_dict` gave; TypeError for a name that is missing or unknown."""
+    types_of = typing.get_type_hints(kind)
+    return kind(**{name: _value(types_of.get(name), each) for name, each in found.items()})
+
+
+def _value(kind: Any, found: Any) -> Any:
+    """A field of the type `kind`: a number, counters, a list of either, or None."""
+    if isinstance(kind, types.UnionType) and found is not None:
+        [kind] = (each for each in kind.__args__ if each is not types.NoneType)
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type) and found is not None:
+        return from_dict(kind, found)
+    if typing.get_origin(kind) is list:
+        [item] = typing.get_args(kind)
+        return [_value(item, each) for each in found]
+    return found

@@ -1,4 +1,4 @@
-"""Any machine: boards, buses and a plant, wired by tables, on one clock. Ranger is one (harness/ranger.py).
+"""Any machine: boards, buses and a plant, wired by tables, on one clock. Ranger is one (ranger/robot.py).
 
     machine = Machine(
         plant=Servo(),
@@ -109,7 +109,8 @@ class Machine:
         loop, wiring = self.loop, self.wiring
         place = {name: number for number, name in enumerate(self.boards)}
         for name in wiring.hear_in_slots:
-            loop.hears_in_its_slots(self._wired(name))
+            if self.waits_for_slots(self._wired(name)):
+                loop.hears_in_its_slots(self.boards[name])
         for wire in wiring.encoders:
             pins = (wiring.number(wire.board, wire.pin_a), wiring.number(wire.board, wire.pin_b))
             loop.connect_encoder(self._part("encoders", wire.encoder), self._wired(wire.board), *pins)
@@ -130,6 +131,10 @@ class Machine:
             self._wired(bridge.board)
             pins3 = [wiring.number(bridge.board, pin) for pin in bridge[2:]]
             loop.wires[place[bridge.board]].connect_drive(self._part("bridges", bridge.bridge), *pins3)
+
+    def waits_for_slots(self, board: Any) -> bool:
+        """Whether the program of a board in `hear_in_slots` is known to wait for its tasks; subclasses override it."""
+        return True
 
     def _wired(self, name: str) -> Any:
         """A board that the wiring names."""
@@ -290,6 +295,10 @@ class Machine:
         from ranger_sim.harness.testing.wire import wire_of
 
         return wire_of(self, bus, since_s)
+
+    def timeline(self, last_s: float | None = None) -> Any:
+        """A timeline that keeps the last `last_s` seconds of virtual time, or everything; None: it has none."""
+        return None
 
     def inject(
         self,

@@ -1,7 +1,7 @@
 """Waiting for something in a machine: a condition is checked between two steps of its plant.
 
 This module has the conditions of any machine: a time ("12.3 s"), a quantity of its body ("angle_rad > 0.5"), an
-error that a board records ("error FOLLOWING from CONTROL"), its end, a function. Ranger's own: harness/conditions.py.
+error that a board records ("error FOLLOWING from CONTROL"), its end, a function. Ranger's own: ranger/conditions.py.
 """
 
 import array

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from ranger_sim.foundation.user_error import UserError
     from ranger_sim.harness.outside.profile import Profile
     from ranger_sim.harness.outside.profile import load as load_profile
-    from ranger_sim.harness.ranger import Ranger
-    from ranger_sim.harness.scenario import Scenario, StopRule
+    from ranger_sim.ranger.robot import Ranger
+    from ranger_sim.ranger.scenario import Scenario, StopRule
 
 __all__ = ["Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "load_profile"]
 __version__ = "0.1.0"
@@ -41,9 +41,9 @@ __version__ = "0.1.0"
 _PLACES = {
     "Profile": ("harness.outside.profile", "Profile"),
     "Quirks": ("boards.quirks", "Quirks"),
-    "Ranger": ("harness.ranger", "Ranger"),
-    "Scenario": ("harness.scenario", "Scenario"),
-    "StopRule": ("harness.scenario", "StopRule"),
+    "Ranger": ("ranger.robot", "Ranger"),
+    "Scenario": ("ranger.scenario", "Scenario"),
+    "StopRule": ("ranger.scenario", "StopRule"),
     "UserError": ("foundation.user_error", "UserError"),
     "load_profile": ("harness.outside.profile", "load"),
 }

@@ -25,9 +25,10 @@ MAY_IMPORT = {
     "plant": {"foundation"},
     "firmware_sim": {"foundation", "can_bus"},
     "boards": {"foundation", "firmware_sim", "datatable"},
-    "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"},
+    "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim"},
+    "ranger": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness"},
     "sysid": {"foundation", "plant"},
-    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
+    "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "ranger", "sysid"},
 }
 # The same inside a room, for those of its rooms that stand above one another.
 INSIDE = {
@@ -43,7 +44,7 @@ ONLY_IN = {
     "serial": ("harness/", "tools/"),
     "asammdf": ("tools/", "harness/", "sysid/readers/"),
     "plotly": ("tools/",),
-    "pytest": ("harness/testing/",),
+    "pytest": ("harness/testing/", "ranger/testing/"),
     "_pytest": ("harness/testing/forking.py",),
     "rich": ("tools/", "datatable/cli.py"),
     "time": ("foundation/wallclock.py",),
@@ -256,37 +257,74 @@ def fields_set(node):
     }
 
 
-# What of the harness is any machine's: loaded in a fresh process, it brings nothing that only Ranger has.
-OF_ANY_MACHINE = (
-    "faults.buses", "faults.catalogue", "faults.edges", "faults.error_rows", "faults.evidence", "faults.frames",
-    "faults.network_places", "faults.proof", "faults.twin", "faults.voltages", "firmware.native_firmware",
-    "firmware.table_board", "lockstep", "machine", "names", "normal_errors", "outside.machine", "records.logbook",
-    "records.vital_signs", "testing.frames", "testing.health", "testing.making", "testing.plugin", "testing.wire",
-    "timing.machine_slots", "timing.slots", "waiting", "wiring.wires",
-)  # fmt: skip
-ONLY_RANGERS = (
-    "ranger_sim.boards",
-    "ranger_sim.datatable.generated",
-    "ranger_sim.harness.conditions",
-    "ranger_sim.harness.faults.places",
-    "ranger_sim.harness.faults.ranger_",
-    "ranger_sim.harness.ranger",
-    "ranger_sim.harness.scenario",
-    "ranger_sim.harness.wiring.ranger",
-    "ranger_sim.plant.electrics",
-    "ranger_sim.plant.mechanics",
-    "ranger_sim.plant.ranger",
-    "ranger_sim.plant.walking",
+# What only the robot has, in packages that the harness may import. All of boards/ and ranger/ it may not (MAY_IMPORT).
+ONLY_THE_ROBOTS = tuple(
+    f"ranger_sim.{name}"
+    for name in (
+        "boards",
+        "datatable.generated",
+        "plant.electrics",
+        "plant.mechanics",
+        "plant.ranger",
+        "plant.walking",
+        "ranger",
+    )
 )
 
 
-def test_what_is_any_machines_brings_nothing_of_ranger():
-    program = (
-        "import importlib, sys\n"
-        f"for name in {OF_ANY_MACHINE!r}:\n"
-        "    importlib.import_module('ranger_sim.harness.' + name)\n"
-        f"    found = [each for each in sys.modules if each.startswith({ONLY_RANGERS!r})]\n"
-        "    assert not found, (name, found)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr.splitlines()[-1]
+def is_only_the_robots(name):
+    """Whether a module, or a name in one, is of those that only the robot has."""
+    return f"{name}.".startswith(tuple(f"{each}." for each in ONLY_THE_ROBOTS))
+
+
+def imported_names(nodes):
+    """Dotted names that imports among `nodes` of a syntax tree bring: modules, and names in them."""
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def at_import(node):
+    """The nodes that run when a module is imported: not those in functions, nor those for type checkers."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
+            continue
+        if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            yield child
+            yield from at_import(child)
+
+
+def module_files():
+    """{name: path} of every module of the packages."""
+    found = {}
+    for path in sources():
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        found[".".join(("ranger_sim", *(parts[:-1] if parts[-1] == "__init__" else parts)))] = path
+    return found
+
+
+def test_the_harness_names_nothing_that_only_the_robot_has():
+    faults = []
+    for path in (ROOT / "harness").rglob("*.py"):
+        names = imported_names(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        faults += [f"{path.relative_to(ROOT)} imports {name}" for name in names if is_only_the_robots(name)]
+    assert not faults, "\n".join(faults)
+
+
+def test_the_harness_brings_nothing_that_only_the_robot_has():
+    """Importing it, with all that its modules import in turn."""
+    files = module_files()
+    came_by = {name: "" for name in files if name.startswith("ranger_sim.harness")}
+    assert len(came_by) > 100
+    ahead = list(came_by)
+    while ahead:
+        importer = ahead.pop()
+        for name in imported_names(at_import(ast.parse(files[importer].read_text(encoding="utf-8")))):
+            module = name if name in files else name.rpartition(".")[0]
+            if module in files and module not in came_by:
+                came_by[module] = importer
+                ahead.append(module)
+    faults = [f"{importer} imports {name}" for name, importer in came_by.items() if is_only_the_robots(name)]
+    assert not faults, "\n".join(faults)

@@ -25,6 +25,7 @@ OWN_FOLDERS = (
     "harness",
     "plant",
     "profiles",
+    "ranger",
     "sysid",
     "tools",
 )

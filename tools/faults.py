@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ranger_sim.harness.faults.catalogue import MODES
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.options import Option
 from ranger_sim.tools.command_line.units import word

@@ -21,8 +21,8 @@ from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 SLICE_NS = 1_000_000
 CASES_PER_SLICE = 8

@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import places
 from ranger_sim.harness.processes.channel import SLOT_WORDS
 from ranger_sim.harness.processes.lone_board import LoneBoard
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 
 BOARD = "MCSI"
 TURN_NS = 500_000  # one slot of that board

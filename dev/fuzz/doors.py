@@ -29,7 +29,7 @@ from ranger_sim.foundation.events import STAGE_BUS, EventQueue
 from ranger_sim.foundation.peers import Door
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.processes.control import ControlServer, address
-from ranger_sim.harness.processes.requests import Request
+from ranger_sim.ranger.requests import Request, admitted
 
 RATE = 1_000_000
 POLL_NS = 500_000
@@ -153,7 +153,7 @@ class Fuzz:
         self.attach = AttachServer(name, buses)
         self.terminal = SlcanServer("can1", self.taps)
         self.tcp = SocketcandServer(buses, 0)
-        self.control = ControlServer(name, self.obey)
+        self.control = ControlServer(name, admitted, self.obey)
         self.doors: tuple[Door[Any], ...] = (self.attach, self.terminal, self.tcp, self.control)
         for door in self.doors:
             door.clock = lambda: self.now_ns * 1e-9

@@ -28,9 +28,9 @@ from dev.fuzz import Connection, Finding
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.feed.server import FeedServer
-from ranger_sim.harness.processes.requests import admitted
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.feed import FeedServer
+from ranger_sim.ranger.requests import admitted
+from ranger_sim.ranger.robot import Ranger
 from ranger_sim.tools.panel.command import http_server
 from ranger_sim.tools.panel.connections import MOST
 from ranger_sim.tools.panel.robot import RobotSource

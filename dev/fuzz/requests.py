@@ -20,13 +20,13 @@ from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import MODES
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.feed.server import FeedServer
-from ranger_sim.harness.processes import requests
 from ranger_sim.harness.processes.plant_process import PlantRun
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger import requests
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.feed import FeedServer
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 SLICE_S = 0.002
 CASES_PER_SLICE = 8

@@ -19,8 +19,8 @@ from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.xcp.udp import LOOK_NS, MAX_CTO, MAX_DTO, WAITING, XcpUdpServer
+from ranger_sim.ranger.robot import Ranger
 
 HEADER = struct.Struct("<HH")
 FIRST_COMMAND = 0xC0  # of ASAM MCD-1 XCP part 2; lower codes are not commands

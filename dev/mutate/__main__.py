@@ -46,7 +46,7 @@ MAP_LIMIT_S = 900
 NOTICED = (KILLED, TIMEOUT)
 # Tests of a package that are elsewhere, because they use another package's interface.
 ALSO = {
-    "datatable": ("tests/harness/test_requests.py", "tests/tools/robodaq/test_robodaq.py"),
+    "datatable": ("tests/ranger/test_requests.py", "tests/tools/robodaq/test_robodaq.py"),
     "can_bus": ("tests/dev/fuzz/test_can.py", "tests/tools/buses/test_bus.py"),
     "plant": ("tests/oracle/test_known_answers.py",),
     "sysid": ("tests/blind/test_generator.py", "tests/tools/diagnose/test_bad_data.py", "tests/tools/test_identify.py"),

@@ -26,8 +26,8 @@ from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, PIN_EDGE, PWM_UPDATE, TX_SENT
 from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.harness.firmware import native_boards
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.firmware import native_boards
+from ranger_sim.ranger.robot import Ranger
 
 FOLDER = pathlib.Path(__file__).resolve().parent
 SLOT_NS = 500_000

@@ -4,23 +4,18 @@ import dataclasses
 import hashlib
 import json
 import math
-import pathlib
-import tempfile
 from typing import Any
 
 from ranger_sim import __version__, datatable, loading
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.campaigns.subjects import own_machine
-from ranger_sim.harness.campaigns.walks import WALKS
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.harness.campaigns.subjects import subject_of
 
 # What decides the outcome of a run: the sources and data of these packages.
-ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness")
+ROOMS = ("foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "ranger")
 SOURCES = {".py", ".pxd", ".toml", ".csv"}
 
 
-def version(machine: str = "") -> str:
+def version(machine: str) -> str:
     """Package version, table hash and digest of the sources: results of another version are not this one's.
 
     machine: as of Settings; its own files count as well.
@@ -38,9 +33,9 @@ def version(machine: str = "") -> str:
 class Settings:
     """What is set before power-up.
 
-    walk: fields of Scenario; controller, body: single values over those of the sets that `walk` names; costs:
-    {"MCH.mc_compliant_control": factor} on the modelled cycles of a task. machine: FILE.py:NAME of the user's own one
-    (subjects.py); `walk` then has its keywords. Empty: Ranger.
+    walk: keywords of the machine; controller, body: of Ranger, single values over those of the sets that `walk` names;
+    costs: {"MCH.mc_compliant_control": factor} on the modelled cycles of a task. machine: reference of its subject
+    (subjects.py): FILE.py:NAME of a user's own one, or MODULE:NAME.
     """
 
     walk: dict[str, Any] = dataclasses.field(default_factory=dict)
@@ -67,7 +62,7 @@ class Settings:
 
     def robot(self) -> Any:
         """A new robot, or machine, with these settings. UserError for settings that it does not have."""
-        robot = self.subject.machine(self.walk) if self.machine else self._ranger()
+        robot = self.subject.new(self)
         for task, factor in self.costs.items():
             board, _, entry = task.partition(".")
             if board not in robot.boards:
@@ -80,35 +75,6 @@ class Settings:
                 raise UserError(f"campaign: cost.{task} is {factor:g}, a factor of 0 or more is expected")
             found.cost, found.per_item = round(found.cost * factor), round(found.per_item * factor)
         return robot
-
-    def _ranger(self) -> Ranger:
-        with tempfile.TemporaryDirectory(prefix="ranger-sim-campaign-") as name:
-            folder = pathlib.Path(name)
-            walk = dict(self.walk)
-            if self.controller:
-                base = walk.get("controller", Scenario.controller)
-                walk["controller"] = written(folder / "controller.toml", base, self.controller, "reasons")
-            if self.body:
-                base = walk.get("body", Scenario.body)
-                walk["body"] = written(folder / "body.toml", base, self.body, "sources")
-            try:
-                return Ranger(Scenario(**walk))
-            except TypeError as error:
-                raise UserError(f"campaign: walk: {error}") from None
-
-
-def subject_of(machine: str) -> Any:
-    """The subject of Settings.machine."""
-    return own_machine(machine) if machine else WALKS
-
-
-def written(path: pathlib.Path, base: str, values: dict[str, float], explained: str) -> str:
-    """Write a parameter file over `base` with these values; returns its name."""
-    lines = [f"base = {json.dumps(str(base))}", "", "[parameters]"]
-    lines += [f"{name} = {value!r}" for name, value in values.items()]
-    lines += ["", f"[{explained}]", *(f'{name} = "set by a campaign"' for name in values)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return str(path)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band
 from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.evidence import Evidence, Record
-from ranger_sim.harness.faults.proof import Difference, Healthy, Proof, Reaction, false_alarms, gait, prove
+from ranger_sim.harness.faults.proof import Difference, Healthy, Proof, Reaction, false_alarms, prove
 from ranger_sim.harness.machine import GRID_NS, Machine
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.stop_rule import StopRule
@@ -315,7 +315,7 @@ def healthy_walks(settings: Settings, seeds: list[int], watch: Watch) -> Result:
             records.append(golden.record)
     starts = [round(each * 1e9) for each in starts_s]
     count, total, which = false_alarms(records, starts) if len(records) > 1 else (0, 0, [])
-    gaits = [] if settings.machine else [dataclasses.asdict(gait(record, starts[-1])) for record in records]
+    gaits = settings.subject.gaits(records, starts[-1])
     return {
         "healthy": Healthy.of(records).as_dict(),
         "seeds": [seed for seed in seeds if seed not in falls],

@@ -13,31 +13,20 @@ from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.quantities import LENGTHS, SHARES, in_base_units, nanoseconds
+from ranger_sim.foundation.quantities import in_base_units, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.campaigns.cases import Case, Settings, subject_of
+from ranger_sim.harness.campaigns.cases import Case, Settings
 from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
-from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
+from ranger_sim.harness.campaigns.outcomes import OUTCOMES, severity
 from ranger_sim.harness.campaigns.statistics import CONFIDENCE, INTERVALS, Stopping
+from ranger_sim.harness.campaigns.subjects import is_number as number
+from ranger_sim.harness.campaigns.subjects import subject_of
 from ranger_sim.harness.faults.catalogue import Catalogue
-from ranger_sim.harness.scenario import Scenario
 
 TEXTS = ("title", "description", "fault_module")
 TABLES = (*TEXTS, "walk", "machine", "watch", "band", "healthy", "vary", "faults", "tolerance", "sample", "search")
-# Keys of [walk] and, with several values, of [vary]: the field of Scenario, and its units.
-WALK: dict[str, tuple[str, dict[str, float] | None]] = {
-    "controller": ("controller", None),
-    "body": ("body", None),
-    "seed": ("seed", None),
-    "slope": ("slope_rad", {"rad": 1.0, "deg": math.pi / 180.0}),
-    "floor_roughness": ("floor_roughness_m", LENGTHS),
-    "model": ("model_file", None),
-    "battery": ("battery_charge", SHARES),
-    "battery_capacity": ("battery_capacity_Wh", {"Wh": 1.0}),
-}
 PREFIXES = ("controller.", "body.", "cost.")
-OWN_PREFIXES = ("machine.", "cost.")  # of a user's machine
 MOST_RUNS = 1_000_000
 MOST_CHECKED = 10_000  # texts of one fault that are read before anything runs; of more, only this many
 
@@ -150,7 +139,7 @@ class Plan:
     sample: Sample | None = None
     search: Search | None = None
     fault_module: str | None = None  # a user's file of modes and places
-    machine: str = ""  # FILE.py:NAME of the user's own, whose keywords `walk` has; empty: Ranger
+    machine: str = ""  # reference of the subject (subjects.py), whose keywords `walk` has
 
     @property
     def subject(self) -> Any:
@@ -189,10 +178,8 @@ class Plan:
         """The run at one value per axis. UserError when a fault's text is not in the catalogue."""
         walk, controller, body, costs = dict(self.walk), {}, {}, {}
         for name, value in point.items():
-            if self.machine and (name == "seed" or name.startswith("machine.")):
-                walk[name.removeprefix("machine.")] = value
-            elif not self.machine and name in WALK:
-                walk[WALK[name][0]] = walk_value(name, value, self.path)
+            if field := self.subject.field(name):
+                walk[field] = walk_value(self.subject, name, value, self.path)
             elif name.startswith("controller."):
                 controller[name.partition(".")[2]] = float(value)
             elif name.startswith("body."):
@@ -242,9 +229,9 @@ def shown(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def walk_value(name: str, value: Any, path: str) -> Any:
-    """A value of [walk] in the unit of the scenario's field."""
-    units = WALK[name][1]
+def walk_value(subject: Any, name: str, value: Any, path: str) -> Any:
+    """A value of [walk] in the unit of the subject's field."""
+    units = subject.units(name)
     if units is None or not isinstance(value, str):
         return value
     number = in_base_units(value, units)
@@ -256,24 +243,27 @@ def walk_value(name: str, value: Any, path: str) -> Any:
 # --- reading --------------------------------------------------------------------------------------------------------
 
 
-def load(name: str | pathlib.Path) -> Plan:
-    """The plan in a file."""
+def load(name: str | pathlib.Path, walks: str = "") -> Plan:
+    """The plan in a file; `walks`: reference of the subject of one without [machine]."""
     path = pathlib.Path(name)
-    return of_data(toml_file.load(path, "campaign file"), str(path))
+    return of_data(toml_file.load(path, "campaign file"), str(path), walks)
 
 
-def of_data(data: dict[str, Any], path: str) -> Plan:
-    """The plan in a file's content."""
+def of_data(data: dict[str, Any], path: str, walks: str = "") -> Plan:
+    """The plan in a file's content; `walks`: reference of the subject of one without [machine]."""
     only(data, TABLES, path)
-    machine, fields = machine_of(data, path)
+    own, fields = machine_of(data, path)
+    machine = own or walks
+    if not machine:
+        raise UserError(f"{path}: [machine] is missing")
     subject = subject_of(machine)
     module = module_of(data, path, subject)
-    if not machine:
+    if not own:
         walk = table(data, "walk", path)
-        only(walk, tuple(WALK), f"{path}: [walk]")
-        fields = {WALK[name][0]: walk_value(name, value, path) for name, value in walk.items()}
-    check_settings(Settings(fields, machine=machine), f"{path}: [{'machine' if machine else 'walk'}]")
-    axes = axes_of(data, path, machine)
+        only(walk, tuple(subject.keys), f"{path}: [walk]")
+        fields = {subject.field(name): walk_value(subject, name, value, path) for name, value in walk.items()}
+    check_settings(Settings(fields, machine=machine), f"{path}: [{'machine' if own else 'walk'}]")
+    axes = axes_of(data, path, subject)
     sample = sample_of(data, path)
     search = search_of(data, path)
     if sample and search:
@@ -309,7 +299,7 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
         title=text(data, "title", path, pathlib.Path(path).stem),
         description=text(data, "description", path, ""),
         walk=fields,
-        watch=watch_of(data, path, machine),
+        watch=watch_of(data, path, subject),
         healthy_seeds=tuple(seeds),
         axes=axes,
         tolerances=tolerances,
@@ -359,8 +349,6 @@ def module_of(data: dict[str, Any], path: str, subject: Any) -> str | None:
 def check_settings(settings: Settings, where: str) -> None:
     """UserError, naming `where`, for settings from which no robot can be made."""
     try:
-        if not settings.machine:
-            Scenario(**settings.walk)
         settings.robot().close()
     except UserError as error:
         raise UserError(f"{where}: {error}") from None
@@ -369,7 +357,7 @@ def check_settings(settings: Settings, where: str) -> None:
 def check_axes(plan: Plan) -> None:
     """UserError for a value of [vary] with which no robot can be made, before anything is run: names, and both ends."""
     for name, values in plan.axes.items():
-        if not is_setting(name, plan.machine):
+        if not plan.subject.is_setting(name):
             continue
         some = ends(values) if not isinstance(ends(values)[0], str) else values
         for value in some:  # type: ignore[union-attr]
@@ -413,22 +401,15 @@ def names_in(fault: str, path: str) -> set[str]:
         raise UserError(f"{path}: fault {fault!r}: {error}") from None
 
 
-def is_setting(name: str, machine: str) -> bool:
-    """Whether an axis is a setting from before power-up, and not a name in a fault's text."""
-    if machine:
-        return name == "seed" or name.startswith(OWN_PREFIXES)
-    return name in WALK or name.startswith(PREFIXES)
-
-
-def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, list[Any] | Range]:
+def axes_of(data: dict[str, Any], path: str, subject: Any) -> dict[str, list[Any] | Range]:
     """[vary], and the faults of [[faults]] as its axis `fault`."""
     axes: dict[str, list[Any] | Range] = {}
     for name, values in flattened(table(data, "vary", path)).items():
-        axes[name] = values_of(name, values, path)
+        axes[name] = values_of(subject, name, values, path)
     groups = data.get("faults", [])
     if not isinstance(groups, list):
         raise UserError(f"{path}: faults = {groups!r}: tables [[faults]] are expected")
-    listed = [fault for group in groups for fault in faults_of(group, path, subject_of(machine).catalogue)]
+    listed = [fault for group in groups for fault in faults_of(group, path, subject.catalogue)]
     if listed:
         if "fault" in axes:
             raise UserError(f"{path}: [vary] fault and [[faults]]: one of them")
@@ -437,17 +418,9 @@ def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, lis
     for fault in axes.get("fault", []):  # type: ignore[union-attr]
         used |= names_in(fault, path)
     for name in axes:
-        if name == "fault" or name in used or is_setting(name, machine):
+        if name == "fault" or name in used or subject.is_setting(name):
             continue
-        if machine:
-            raise UserError(
-                f"{path}: [vary] {name}: it is no setting (seed, machine.KEYWORD, cost.BOARD.TASK) and no fault's text "
-                f"has {{{name}}}"
-            )
-        raise UserError(
-            f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
-            f"body.PARAMETER, cost.BOARD.TASK) and no fault's text has {{{name}}}"
-        )
+        raise UserError(f"{path}: [vary] {name}: it is no {subject.settings_text} and no fault's text has {{{name}}}")
     return axes
 
 
@@ -463,10 +436,10 @@ def flattened(values: dict[str, Any], before: str = "") -> dict[str, Any]:
     return found
 
 
-def values_of(name: str, values: Any, path: str) -> list[Any] | Range:
+def values_of(subject: Any, name: str, values: Any, path: str) -> list[Any] | Range:
     """The values of one axis."""
     if isinstance(values, dict) and name != "fault":
-        return range_of(name, values, path)
+        return range_of(subject, name, values, path)
     listed = values if isinstance(values, list) else [values]
     kinds: tuple[type, ...] = (str, int, float)
     expected = "a list of values, or { low, high },"
@@ -479,11 +452,15 @@ def values_of(name: str, values: Any, path: str) -> list[Any] | Range:
     return listed
 
 
-def range_of(name: str, values: dict[str, Any], path: str) -> Range:
+def range_of(subject: Any, name: str, values: dict[str, Any], path: str) -> Range:
     """{ low, high, log } or { low, high, step }, with the units that [walk] takes."""
     where = f"{path}: [vary] {name}"
     only(values, ("low", "high", "log", "step"), where)
-    values = {key: walk_value(name, value, path) if name in WALK else value for key, value in values.items()}
+    values = (
+        {key: walk_value(subject, name, value, path) for key, value in values.items()}
+        if subject.field(name)
+        else values
+    )
     low, high = values["low"], values["high"]
     log, step = bool(values.get("log", False)), values.get("step")
     if not (number(low) and number(high)) or not low < high or (log and low <= 0.0):
@@ -493,11 +470,6 @@ def range_of(name: str, values: dict[str, Any], path: str) -> Range:
     if log or not number(step) or not 0.0 < step <= high - low or (high - low) / step >= MOST_RUNS:
         raise UserError(f"{where}: step = {step!r}: above 0 and at most high - low is expected, without log")
     return Range(low, high, False, step)
-
-
-def number(value: Any) -> bool:
-    """Whether a value of a file is a number."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def faults_of(group: Any, path: str, catalogue: Catalogue) -> Iterator[str]:
@@ -539,35 +511,16 @@ def matches(name: str, listed: list[str]) -> bool:
     return any(fnmatch.fnmatchcase(name, each) for each in listed)
 
 
-def watch_of(data: dict[str, Any], path: str, machine: str = "") -> Watch:
+def watch_of(data: dict[str, Any], path: str, subject: Any) -> Watch:
     """[watch] and [band]."""
-    subject = subject_of(machine)
     found = table(data, "watch", path)
     only(found, ("after", "from", "patience", "limit"), f"{path}: [watch]")
     times = {f"{name}_s": nanoseconds(value, f"{path}: [watch] {name}") * 1e-9 for name, value in found.items()}
     for name in ("after", "limit"):
         if times.get(f"{name}_s") == 0.0:
             raise UserError(f"{path}: [watch] {name} = {found[name]!r}: it must be above 0")
-    band = table(data, "band", path)
-    if machine:
-        for name, value in band.items():
-            if not number(value) or not 0.0 < value < math.inf:
-                raise UserError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
-        try:
-            subject.check_band(band)
-        except UserError as error:
-            raise UserError(f"{path}: {error}") from None
-        usual = {"after_s": subject.after_s, "from_s": subject.from_s, "patience_s": subject.patience_s}
-        return Watch(**{**usual, **times}, band={name: float(value) for name, value in band.items()})
-    names = tuple(field.name for field in dataclasses.fields(Band))
-    only(band, names, f"{path}: [band]")
-    shares = {}
-    for name, value in band.items():
-        share = in_base_units(value, SHARES) if isinstance(value, str) else value
-        if share is None or not number(share) or not 0.0 < share < 10.0:
-            raise UserError(f"{path}: [band] {name} = {value!r}: a share such as 0.15 or '15 %' is expected")
-        shares[name] = float(share)
-    return Watch(**times, band=Band(**shares))
+    band = subject.band(table(data, "band", path), path)
+    return Watch(**{**subject.usual, **times}, band=band)
 
 
 def tolerances_of(data: dict[str, Any], path: str) -> Iterator[Tolerance]:

@@ -1,4 +1,4 @@
-"""The machine that a campaign runs: Ranger's walks, or a user's machine, `[machine] make = "servo.py:new"`.
+"""The machine that a campaign runs: one of an installed module, or a user's, `[machine] make = "servo.py:new"`.
 
 A subject makes the machine, has its faults and conditions, and judges a run against the golden one. The outcomes are
 the same for all (outcomes.py); "the gait" differs: for a user's machine it is the quantities of its body in [band],
@@ -11,6 +11,7 @@ import functools
 import hashlib
 import importlib
 import inspect
+import math
 import pathlib
 import sys
 from collections.abc import Callable, Mapping
@@ -72,6 +73,33 @@ class OwnMachine:
             raise UserError(f"machine {self.file}: there is no function or class {self.name!r} in it")
         return found
 
+    keys: Mapping[str, tuple[str, dict[str, float] | None]] = {}  # of a plan's table [walk]: it has none
+    settings_text = "setting (seed, machine.KEYWORD, cost.BOARD.TASK)"
+
+    def is_setting(self, name: str) -> bool:
+        """Whether an axis is a setting from before power-up, and not a name in a fault's text."""
+        return name == "seed" or name.startswith(("machine.", "cost."))
+
+    def field(self, name: str) -> str:
+        """The keyword of `make` that an axis sets; empty for an axis that sets none."""
+        return name.removeprefix("machine.") if name == "seed" or name.startswith("machine.") else ""
+
+    def units(self, name: str) -> dict[str, float] | None:
+        """The units of a setting that may have one."""
+        return None
+
+    def new(self, settings: Any) -> Any:
+        """A new one with a case's settings."""
+        return self.machine(settings.walk)
+
+    def walk_options(self, settings: Any) -> list[str] | None:
+        """The options of `ranger-sim walk` that make it; None: that command does not have it."""
+        return None
+
+    def gaits(self, records: list[Record], since_ns: int) -> list[dict[str, float]]:
+        """The gait of each record: none."""
+        return []
+
     def machine(self, settings: Mapping[str, Any]) -> Any:
         """A new one with these keywords. UserError for a keyword that `make` does not take."""
         try:
@@ -105,6 +133,22 @@ class OwnMachine:
             if path.suffix in SOURCES and not {"build", "runs", "__pycache__"} & set(inside.parts):
                 total.update(inside.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
         return total.hexdigest()
+
+    def band(self, band: Mapping[str, Any], path: str) -> dict[str, float]:
+        """[band] of a plan, in the quantities' units. UserError for what it cannot be."""
+        for name, value in band.items():
+            if not is_number(value) or not 0.0 < value < math.inf:
+                raise UserError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
+        try:
+            self.check_band(band)
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        return {name: float(value) for name, value in band.items()}
+
+    @property
+    def usual(self) -> dict[str, float]:
+        """Of [watch], where the plan does not set it."""
+        return {"after_s": self.after_s, "from_s": self.from_s, "patience_s": self.patience_s}
 
     def check_band(self, band: Mapping[str, float]) -> None:
         """UserError for a quantity that its body does not have."""
@@ -154,7 +198,15 @@ def farthest(there: np.ndarray, here: np.ndarray, golden: Record, record: Record
     return float(np.abs(here[:common] - there[:common])[window].max()) if window.any() else 0.0
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value of a file is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 @functools.cache
-def own_machine(reference: str) -> OwnMachine:
-    """The machine of a reference, made ready once per process."""
+def subject_of(reference: str) -> Any:
+    """The subject of a reference, made ready once per process: FILE.py:NAME of a user's machine, or MODULE:NAME."""
+    module, _, name = reference.rpartition(":")
+    if all(part.isidentifier() for part in module.split(".")) and not module.endswith(".py"):
+        return getattr(importlib.import_module(module), name)
     return OwnMachine(reference)

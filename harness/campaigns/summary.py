@@ -10,7 +10,7 @@ from typing import Any
 from ranger_sim.harness.campaigns.cases import Case
 from ranger_sim.harness.campaigns.engine import Campaign
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, SEVERITY, severity
-from ranger_sim.harness.campaigns.plan import WALK, Plan, Range, Tolerance
+from ranger_sim.harness.campaigns.plan import Plan, Range, Tolerance
 from ranger_sim.harness.campaigns.statistics import (
     INTERVALS,
     Share,
@@ -309,19 +309,13 @@ def worst_row(plan: Plan, row: Row) -> dict[str, Any]:
 def replay(plan: Plan, row: Row) -> str:
     """A command that runs the case again from power-up."""
     case, result = row
-    if not case.fault or plan.machine or case.settings.controller or case.settings.body or case.settings.costs:
+    options = plan.subject.walk_options(case.settings)
+    if not case.fault or options is None:
         return f"ranger-sim campaign {shlex.quote(plan.path)} --replay {result['key']}"
     parts = ["ranger-sim", "walk", "--fault", case.fault]
     if plan.fault_module is not None:
         parts += ["--fault-module", plan.fault_module]
-    options = {"slope_rad": "--slope", "floor_roughness_m": "--floor-roughness", "model_file": "--model"}
-    for name, (field, _) in WALK.items():
-        value = case.settings.walk.get(field)
-        if value is not None:
-            parts += [
-                options.get(field, "--" + name.replace("_", "-")),
-                str(value),  # every digit, to repeat the same run
-            ]
+    parts += options
     began = (result.get("fault") or {}).get("activated_s")
     since_s = plan.watch.from_s if began is None else began
     parts += ["--time", f"{since_s + plan.watch.after_s:.3f}s"]

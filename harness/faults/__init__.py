@@ -1,1 +1,1 @@
-"""Faults at physical places of the robot, with proof that they acted."""
+"""Faults at physical places of a machine, with proof that they acted."""

@@ -1,7 +1,7 @@
 """The possible faults of a machine: its places, every mode, and which mode a place takes.
 
 A mode belongs to kinds of places, not to a machine: a fault of an encoder's edges applies to those of any machine.
-Ranger's places, and the modes that only it has, are in ranger_catalogue.py.
+Ranger's places, and the modes that only it has, are in ranger/faults/.
 """
 
 import difflib
@@ -16,8 +16,8 @@ from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.fault import Fault, Place
 from ranger_sim.harness.waiting import Condition, Wanted
 
-# Modules of this package whose modes any machine's places may take.
-GENERAL = ("edges", "voltages", "frames", "buses")
+# Modules whose modes any machine's places may take.
+GENERAL = tuple(f"ranger_sim.harness.faults.{name}" for name in ("edges", "voltages", "frames", "buses"))
 
 Kind = TypeVar("Kind", bound=Fault)
 
@@ -39,7 +39,7 @@ def mode(kind: type[Kind]) -> type[Kind]:
 
 
 class Catalogue:
-    """The places of a machine, by name. `condition` makes its conditions; modules: of this package, that have its modes
+    """The places of a machine, by name. `condition` makes its conditions; modules: names of those that have its modes
     (and add places, in the order in which they are listed). `hint`: the command that lists it all, for messages.
     """
 
@@ -59,7 +59,7 @@ class Catalogue:
     def load(self) -> None:
         """Load its modes: import the modules. A second call does nothing."""
         for name in self.modules:
-            importlib.import_module(f"ranger_sim.harness.faults.{name}")
+            importlib.import_module(name)
 
     @property
     def places(self) -> dict[str, Place]:

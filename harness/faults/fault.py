@@ -69,7 +69,7 @@ class WholeNumber(Parameter):
 class Place:
     """Where a fault can sit. `name` as typed ("MCH.joint_encoder"); `kind` decides which modes are possible.
 
-    `details`: what the modes of this kind need in order to find it on a robot, from harness/wiring/ranger.py.
+    `details`: what the modes of this kind need in order to find it on a robot, from ranger/wiring.py.
     """
 
     name: str

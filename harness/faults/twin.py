@@ -22,7 +22,7 @@ LENGTH_BYTES = 8
 
 
 class Twin:
-    """Twin of `robot`, a `harness.ranger.Ranger`, from now on. UserError for one not wholly in this process."""
+    """Twin of `robot`, a `ranger.robot.Ranger`, from now on. UserError for one not wholly in this process."""
 
     def __init__(self, robot: Any) -> None:
         if robot.polled:

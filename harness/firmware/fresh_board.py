@@ -3,7 +3,6 @@
 from typing import Any
 
 from ranger_sim.harness.outside import bus_schedule
-from ranger_sim.harness.wiring import ranger as wiring
 
 Message = tuple[Any, ...]
 
@@ -19,9 +18,9 @@ def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> 
     if robot.profile is not None:
         bus_schedule.apply(board, robot.profile.schedules())
     loop, plant = robot.loop, robot.plant
-    for analog in wiring.ANALOG:
+    for analog in robot.wiring.analog:
         if analog.board == name:
-            channel = wiring.ANALOG_INPUTS[name][analog.input]
+            channel = robot.wiring.number(name, analog.input)
             board.analog.follow(channel, loop.step_times, plant.analog_start, plant.analog_end, analog.voltage)
     return board
 

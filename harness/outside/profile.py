@@ -21,7 +21,7 @@ import pathlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ranger_sim.datatable.model import ROUTER, Table
+from ranger_sim.datatable.model import ROLES, ROUTER, Table
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside.bus_schedule import (
@@ -32,7 +32,6 @@ from ranger_sim.harness.outside.bus_schedule import (
     passes_of,
     robots_table,
 )
-from ranger_sim.harness.wiring import ranger as wiring
 
 FOLDER = pathlib.Path(__file__).resolve().parents[2] / "profiles"
 SCHEDULES = "schedules"
@@ -261,13 +260,19 @@ def available() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
+def boards_of(table: Table) -> tuple[str, ...]:
+    """The boards that run firmware: satellites first, then the router and the main brain."""
+    found = sorted(table.boards, key=lambda board: ROLES.index(board.role))
+    return tuple(board.name for board in found if board.firmware)
+
+
 @functools.cache
 def default() -> Profile:
     """The real robot's profile: every board emulated, its own bit rate, every board sending as its firmware does."""
     table = robots_table()
     schedule = full_schedule()
     buses = {name: BusProfile(name, None, None, table.bit_rates[name.upper()], FULL, schedule, {}) for name in BUSES}
-    boards = dict.fromkeys(wiring.BOARDS, EMULATED)
+    boards = dict.fromkeys(boards_of(table), EMULATED)
     return Profile("default", "", "the robot as it is", "", boards, buses)
 
 
@@ -298,17 +303,15 @@ def load(
     content = reader.content(path)
     if content is None:
         raise ProfileError(faults)
-    known = tuple(wiring.BOARDS)
     buses_known: tuple[str, ...] = BUSES
     if table is None:
         table = robots_table()
     else:
-        known = tuple(board.name for board in table.boards if board.firmware)
         buses_known = tuple(bus.lower() for bus in table.channels)
     reader.only(content, ("title", "description", "boards", "buses"), "")
     title = reader.text(content, "title") or path.stem
     description = reader.text(content, "description") or ""
-    boards = _boards(reader, reader.table(content, "boards"), known)
+    boards = _boards(reader, reader.table(content, "boards"), boards_of(table))
     buses = _buses(reader, reader.table(content, "buses"), path.parent, table, interfaces or _interfaces, buses_known)
     _together(reader, boards, buses, table)
     if faults:

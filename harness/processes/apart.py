@@ -27,7 +27,6 @@ from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.step_watch import StepWatch
-from ranger_sim.harness.wiring import ranger as wiring
 
 RESET = 1  # mode of a bus node
 
@@ -50,7 +49,7 @@ class Apart:
         self.used = processor_for_this_worker()
         self.settings = Settings(speed=None, real_time=False, processor=self.used)
         words, doubles = stage = new_stage()
-        place = {name: number for number, name in enumerate(wiring.BOARDS)}
+        place = {name: number for number, name in enumerate(robot.boards)}
         self.blocks = {name: Block(name, place[name], words_shown(robot.boards[name])) for name in names}
         self.ended = False
         self.deaths: list[dict[str, Any]] = []

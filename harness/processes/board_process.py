@@ -16,7 +16,6 @@ from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.endpoint import Endpoint
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Audience
-from ranger_sim.harness.wiring import ranger as wiring
 
 FAILED = 4  # exit code: the board's program raised
 
@@ -57,7 +56,7 @@ def serve(
     door: the endpoint for a debugger of this board; the board that was built waits for one.
     """
     kernel.begin_process(f"ranger-{name}", settings)
-    place = wiring.BOARDS.index(name)
+    place = list(robot.boards).index(name)
     board = robot.boards[name]
     if robot.printed is not None and name in robot.firmware:
         robot.printed.lead(name)
@@ -79,6 +78,7 @@ def serve(
             os.environ[coverage.PREFIX] = str(board.counts)  # for a crash, which writes them as well
     if block.table_words:
         board.move_memory(block.table())
+    in_slots = name in robot.wiring.hear_in_slots
     wires = [
         (number, wire.word) for number, wire in enumerate(robot.loop.word_wires) if wire.board is robot.boards[name]
     ]
@@ -86,7 +86,7 @@ def serve(
     words, doubles = stage
     audience = Audience(words, doubles, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
     try:
-        endpoint = Endpoint(board, block, stage, audience, place)  # gives the board another outbox
+        endpoint = Endpoint(board, block, stage, audience, place, in_slots)  # gives the board another outbox
         pass_on(said, board.outbox, 0)
         if door is not None:
             hold = Hold(block, stage)

@@ -8,7 +8,6 @@ from typing import Any
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import LIMITS, REASONS, Door, Peer, SocketStream, connected
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes.requests import Request, admitted
 
 ANSWER_S = 10.0  # a client waits so long
 LONGEST_ANSWER = 1 << 20  # bytes; a status has below 10,000
@@ -30,10 +29,12 @@ class Client(Peer):
 class ControlServer(Door[Client]):
     """The supervisor's endpoint: `obey(number of the client, request)` receives every admitted request.
 
-    The answer to a request that is not admitted (`requests.py`) is its fault; it goes no further.
+    `admitted(line)` returns the request of a line, or raises UserError.
+
+    The answer to a request that is not admitted is its fault; it goes no further.
     """
 
-    def __init__(self, name: str, obey: Callable[[int, Request], None]) -> None:
+    def __init__(self, name: str, admitted: Callable[[bytes], Any], obey: Callable[[int, Any], None]) -> None:
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             listener.bind(address(name))
@@ -43,6 +44,7 @@ class ControlServer(Door[Client]):
         listener.listen(LIMITS["control"].peers)
         listener.setblocking(False)
         super().__init__("control", listener)
+        self.admitted = admitted
         self.obey = obey
         self.clients: dict[int, Client] = {}
         self.seen = 0
@@ -69,7 +71,7 @@ class ControlServer(Door[Client]):
         del peer.incoming[: end + 1]
         peer.waits = True
         try:
-            request = admitted(line)
+            request = self.admitted(line)
         except UserError as fault:
             self.not_admitted += 1
             self.answer(peer.number, {"error": str(fault)})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import cython
 
-from ranger_sim.boards.counters import as_dict
+from ranger_sim.firmware_sim.counters import as_dict
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.scheduler import SlotScheduler
 from ranger_sim.foundation import wallclock
@@ -71,7 +71,6 @@ from ranger_sim.harness.processes.places import (
     URGENT,
     WATCHED,
 )
-from ranger_sim.harness.wiring.ranger import HEAR_IN_SLOTS
 
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.stage import Audience
@@ -111,7 +110,7 @@ class Endpoint:
     can_wait: cython.longlong
     promised: cython.longlong
 
-    def __init__(self, board, shared, stage, audience, place) -> None:
+    def __init__(self, board, shared, stage, audience, place, in_slots) -> None:
         shared.check(place)
         self.board = board
         self.out = EventQueue()
@@ -132,7 +131,7 @@ class Endpoint:
         self.counts_errors = hasattr(board, "errors")
         self.runs_c = hasattr(board, "write_counts")
         self.activity: object = ActivityStore(board, shared.words)
-        self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
+        self.can_wait = SLOT_KINDS if in_slots else 0
         self.promised = 0
         self.clock: object = wallclock.monotonic_ns
         self.pending = EventQueue(64)

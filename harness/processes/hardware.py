@@ -10,7 +10,6 @@ from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, Ev
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.outside.rest_bus import RestBus
 from ranger_sim.harness.outside.supervision import Watch
-from ranger_sim.harness.wiring import ranger as wiring
 
 CHECK_NS = 10_000_000  # between two checks for missing frames
 CONTROLLER = 1
@@ -52,7 +51,7 @@ class HardwareInTheLoop:
         self.nodes: dict[str, RestNode] = {}
         self.next_check_ns = robot.start_ns
         external = {bus.name: bus for bus in outside}
-        order = STAGE_BUS * 256 + 16 * len(wiring.BOARDS)  # after every board
+        order = STAGE_BUS * 256 + 16 * len(robot.boards)  # after every board
         for bus in robot.buses:
             if bus.name in external and profile.external():
                 external[bus.name].sinks.append(self._hear(bus.name))

@@ -14,7 +14,6 @@ from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.settings import Settings
-from ranger_sim.harness.wiring import ranger as wiring
 
 PATIENCE_S = 60.0  # a turn takes some microseconds; the rest is for a busy machine
 
@@ -25,7 +24,7 @@ class LoneBoard:
     def __init__(self, robot: Any, name: str, patience_s: float = PATIENCE_S) -> None:
         self.name = name
         self.patience_s = patience_s
-        place = wiring.BOARDS.index(name)
+        place = list(robot.boards).index(name)
         self.block = Block(name, place, 0)
         self.words = self.block.words
         self.code: int | None = None

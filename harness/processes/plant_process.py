@@ -5,19 +5,14 @@ import socket
 from collections.abc import Callable
 from typing import Any
 
-from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.processes import kernel, places
-from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.processes.pace import Pace
 from ranger_sim.harness.processes.remote_board import RemoteBoard
-from ranger_sim.harness.processes.requests import MOST_FAULTS
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.stage import Stage
-from ranger_sim.harness.scenario import StopRule
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.harness.stop_rule import StopRule
 
 SLICE_S = 0.0005  # virtual time between two readings of the wall clock: one slot of a motor board
 FAST_SLICE_S = 0.005  # the same when there is no pace to keep
@@ -25,6 +20,7 @@ STATUS_S = 0.1  # wall clock between two reports to the supervisor
 NAP_S = 0.002  # after serving an external connection, before polling it again while virtual time waits
 LONGEST_WAIT_S = 0.1  # so that the supervisor sees that the process is alive
 ORDERS_LIMIT = 64  # keys and parameters at one time of the robot: a paused robot keeps them; chosen by us
+MOST_FAULTS = 255  # of one run, by request; chosen by us: each that waits is checked in every step of the body
 KEY_HOLD_NS = 200_000_000  # a firm press
 MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
@@ -59,7 +55,7 @@ class PlantRun:
         show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
         self.remotes = {
             name: RemoteBoard(robot.boards[name], blocks[name], show, place, name == "MB")
-            for place, name in enumerate(wiring.BOARDS)
+            for place, name in enumerate(robot.boards)
         }
         for remote in self.remotes.values():
             loop.replace(remote)
@@ -186,13 +182,13 @@ class PlantRun:
 
     def set_parameter(self, name: str, word: int) -> None:
         """Write a parameter into the main brain's table now; the supervisor's endpoint has checked it."""
-        self.remotes["MB"].send(SET_WORD, self.robot.loop.time, all_variables.ID_OF[name], word)
+        self.robot.write_word(self.robot.names.ids[name], word)
 
     def arm(self, text: str) -> None:
         """Arm a fault that the supervisor's endpoint has admitted. UserError where it cannot act on this robot."""
         if len(self.robot.faults) > MOST_FAULTS:
             raise UserError(f"fault: {MOST_FAULTS + 1} faults of one run are enough")
-        fault = CATALOGUE.typed(text)
+        fault = self.robot.catalogue.typed(text)
         fault.gives_way = True
         self.robot.arm(fault)
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 
 import cython
 
-from ranger_sim.boards.counters import from_dict
 from ranger_sim.firmware_sim.board import EVERY_KIND, Board
+from ranger_sim.firmware_sim.counters import from_dict
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import NEVER, ORDER_PINS, PIN_EDGE, ROW, ROW_KIND, EventQueue
@@ -222,7 +222,7 @@ class RemoteBoard(Board):
         """Ask the board for its counters; `counters` returns them from then on."""
         told = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
         if not self.gone:
-            self.counted = from_dict(json.loads(told))
+            self.counted = from_dict(type(self.uncounted), json.loads(told))
 
     def notes_of(self, command, what) -> bytes:
         """Run one turn with `command`; returns the bytes of the board's notes of the kind `what`."""

@@ -4,7 +4,6 @@ import dataclasses
 import os
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.wiring import ranger as wiring
 
 NEVER, ON_FAILURE = "never", "on-failure"
 SLOWEST, FASTEST = 1e-4, 1000.0  # times real time; chosen by us
@@ -18,7 +17,7 @@ class Settings:
     processor: the one that plant and boards share, None for all. They take turns, so on several they would mostly wait
     for each other too; waking a process there costs ten times as much (a turn in a virtual machine: 3 us on
     one processor, 30 to 140 us between two; benchmarks/2026-11-21-processes.json).
-    boards: those that get a process; the others are outside as real hardware, or absent.
+    boards: those that get a process; the others are outside as real hardware, or absent. Empty: all of the robot.
     """
 
     speed: float | None = 1.0
@@ -26,7 +25,7 @@ class Settings:
     real_time: bool = True
     name: str = "ranger"
     processor: int | None = None
-    boards: tuple[str, ...] = wiring.BOARDS
+    boards: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.speed is not None and not SLOWEST <= self.speed <= FASTEST:

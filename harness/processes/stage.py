@@ -22,7 +22,7 @@ from ranger_sim.harness.processes.places import (
     STAGE_ROWS,
 )
 from ranger_sim.harness.wiring.board_wires import WordWire
-from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.plant.plant import Plant
 
 
 @cython.cclass
@@ -35,7 +35,7 @@ class Stage:
     words: cython.longlong[::1]
     step_times: cython.longlong[::1]
     doubles: cython.double[::1]
-    plant: RangerPlant
+    plant: Plant
     wires: list
     rows: cython.longlong
     shown_end: cython.longlong
@@ -63,7 +63,7 @@ class Stage:
         """Write a row if the plant has moved since the last one."""
         at: cython.longlong
         i: cython.longlong
-        plant: RangerPlant = self.plant
+        plant: Plant = self.plant
         wire: WordWire
         if self.step_times[1] == self.shown_end:
             return

@@ -27,10 +27,8 @@ from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
 from ranger_sim.harness.processes.guard import is_awaited
 from ranger_sim.harness.processes.lateness import figures
-from ranger_sim.harness.processes.requests import Request
 from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
-from ranger_sim.harness.scenario import StopRule
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.harness.stop_rule import StopRule
 
 PLANT = "plant"
 LOOK_S = 0.2  # between two polls of boards and updates of the screen
@@ -88,16 +86,16 @@ class Supervisor:
         self.doors = {door.board.name: door for door in doors}  # of debuggers; each is its board's process's
         self.held: set[str] = set()  # boards that a debugger has, as far as reported
         self.begin = begin
-        self.settings = settings
+        self.settings = settings if settings.boards else dataclasses.replace(settings, boards=tuple(robot.boards))
         self.stop_rule = stop
         self.finish = finish
         self.view = view
-        self.control = ControlServer(settings.name, self.obey)
+        self.control = ControlServer(settings.name, robot.admitted, self.obey)
         self.next_ask_s = self.next_look_s = 0.0
         self.sent_away: dict[str, dict[str, int]] = {}  # clients by endpoint and reason, as far as reported
         self.stage = new_stage()
         self.blocks = {
-            name: Block(name, place, words_shown(robot.boards[name])) for place, name in enumerate(wiring.BOARDS)
+            name: Block(name, place, words_shown(robot.boards[name])) for place, name in enumerate(robot.boards)
         }
         self.children: dict[str, Child] = {}
         self.link, self.plant_link = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -523,7 +521,7 @@ class Supervisor:
             **self.status,
         }
 
-    def obey(self, number: int, request: Request) -> None:
+    def obey(self, number: int, request: Any) -> None:
         """Carry out an admitted request of `ranger-sim ctl`; the reply comes at once, or after the plant's."""
         if request.do == "status":
             self.control.answer(number, self.state())

@@ -86,9 +86,7 @@ def made(order: Order) -> Any:
     machine = order.fresh()
     observed = observe(machine)
     if order.trace:
-        from ranger_sim.harness.timeline import Timeline
-
-        observed.timeline = Timeline(machine, TRACED_S)
+        observed.timeline = machine.timeline(TRACED_S)
     if order.warmed_up:
         try:
             machine.until(order.warmed_up, within=WARM_UP_LIMIT)

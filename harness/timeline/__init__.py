@@ -1,5 +1,5 @@
-"""One timeline of a run: slots, interrupts, frames and their paths, signals, states, faults and the body."""
+"""Timelines of a run: their model, what any machine shows in them, and the formats of their files."""
 
-from ranger_sim.harness.timeline.timeline import Timeline
+from ranger_sim.foundation import moved
 
-__all__ = ["Timeline"]
+__getattr__ = moved.attributes(__name__, "ranger_sim.ranger.timeline", "Timeline")

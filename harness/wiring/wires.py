@@ -1,6 +1,6 @@
 """The wires of a machine, as tables: which sensor is on which pin of which board, which board on which bus.
 
-Read a line from left to right in the direction of the signal. Ranger's tables are harness/wiring/ranger.py.
+Read a line from left to right in the direction of the signal. Ranger's tables are ranger/wiring.py.
 """
 
 import dataclasses

@@ -12,8 +12,8 @@ from ranger_sim.boards.main_brain import controllers, head_walk, programs
 from ranger_sim.boards.main_brain.board import MainBrainBoard
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.firmware_sim.clock import Crystal
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from tests.boards.main_brain_bench import Bench
 
 STANDS, HANGS = 14_000.0, 1_400.0  # a pair's contact sum on the floor and in the air

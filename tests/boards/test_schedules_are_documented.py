@@ -7,7 +7,7 @@ import re
 import pytest
 
 from ranger_sim.firmware_sim.vic import FIQ
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/reference/schedules.md"
 BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")

@@ -17,8 +17,8 @@ from ranger_sim.foundation.events import CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, TX
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.harness.outside.bus_schedule import BusSchedule
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 TABLE = datatable.load()
 BUSES = profile.BUSES

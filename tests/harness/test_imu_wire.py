@@ -5,8 +5,8 @@ import types
 import pytest
 
 from ranger_sim.foundation.events import UART_BYTE
-from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.wiring.imu_wire import ImuWire
+from ranger_sim.ranger.robot import Ranger
 
 
 @pytest.fixture

@@ -12,10 +12,10 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import waiting
 from ranger_sim.harness.names import Names
 from ranger_sim.harness.processes import kernel
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.records.strike_watch import StrikeWatch
 from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.ranger.records.strike_watch import StrikeWatch
+from ranger_sim.ranger.robot import Ranger
 
 MS = 1_000_000
 

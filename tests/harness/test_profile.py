@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ranger_sim import datatable
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import profile
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 from tests.examples import examples
 
 INTERFACES = ("ranger_sim", "slcan", "socketcan", "virtual")

@@ -17,9 +17,10 @@ from ranger_sim.foundation.events import NEVER, PIN_EDGE, UART_BYTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import serial_ports
 from ranger_sim.harness.outside.serial_ports import Dropouts, PtyPort, RealPort, SerialLine
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant.sensors.imu import Imu
+from ranger_sim.ranger import serial_ports as robot_ports
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.examples import examples
 
 BYTE_NS = 10_000
@@ -275,7 +276,7 @@ def test_a_listener_changes_nothing_and_the_run_can_be_repeated():
     for connected in (False, True):
         with contextlib.closing(Ranger(Scenario())) as robot:
             if connected:
-                line = serial_ports.connect_daq(robot, PtyPort())
+                line = robot_ports.connect_daq(robot, PtyPort())
             robot.run_for(1.2)  # the rate controller lets the first points through after a second
             digests.append(robot.trace_digest())
     assert digests[0] == digests[1]
@@ -286,7 +287,7 @@ def test_drop_outs_hold_the_link_of_a_robot_with_bluetooth():
     with contextlib.closing(Ranger(Scenario(), quirks=Quirks(computer_link="bluetooth"))) as robot:
         dropouts = Dropouts(1)
         dropouts.switch_ns = 200 * MS
-        line = serial_ports.connect_daq(robot, PtyPort(), dropouts)
+        line = robot_ports.connect_daq(robot, PtyPort(), dropouts)
         link = robot.board("MB").computer
         link.rate_sum = 40_960
         robot.run_for(0.2)
@@ -300,7 +301,7 @@ def test_drop_outs_hold_the_link_of_a_robot_with_bluetooth():
 
 def test_a_real_inertial_unit_takes_the_place_of_the_plants():
     with contextlib.closing(Ranger(Scenario())) as robot, contextlib.closing(PtyPort()) as unit:
-        line = serial_ports.connect_imu(robot, RealPort(unit.path, serial_ports.IMU_BAUD))
+        line = robot_ports.connect_imu(robot, RealPort(unit.path, serial_ports.IMU_BAUD))
         robot.run_for(0.05)
         assert read_all(unit, 4) == start_command(0xC2)
         body = bytes((0xC2,)) + bytes.fromhex("00000000 00000000 bf800000 3f000000 3e800000 00000000 00000000")
@@ -313,7 +314,7 @@ def test_a_real_inertial_unit_takes_the_place_of_the_plants():
 
 def test_the_plants_inertial_unit_can_be_read_by_a_real_host_beside_its_board():
     with contextlib.closing(Ranger(Scenario())) as robot:
-        offer = serial_ports.offer_imu(robot, PtyPort())
+        offer = robot_ports.offer_imu(robot, PtyPort())
         with serial.Serial(offer.port.path, serial_ports.IMU_BAUD, timeout=10) as host:
             robot.run_for(0.1)
             heard = host.read(offer.counters()["bytes_out"])
@@ -330,7 +331,7 @@ def test_the_plants_inertial_unit_can_be_read_by_a_real_host_beside_its_board():
 
 def test_a_host_may_command_the_plants_inertial_unit():
     with contextlib.closing(Ranger(Scenario())) as robot:
-        offer = serial_ports.offer_imu(robot, PtyPort())
+        offer = robot_ports.offer_imu(robot, PtyPort())
         with serial.Serial(offer.port.path, serial_ports.IMU_BAUD, timeout=10) as host:
             robot.run_for(0.1)
             before = offer.counters()["bytes_out"]
@@ -346,7 +347,7 @@ def test_a_host_may_command_the_plants_inertial_unit():
 
 def test_closing_a_robot_closes_its_ends_once():
     robot = Ranger(Scenario())
-    line = serial_ports.connect_daq(robot, PtyPort())
+    line = robot_ports.connect_daq(robot, PtyPort())
     master = line.port.terminal.master
     os.fstat(master)
     robot.close()

@@ -15,9 +15,9 @@ SERVO = pathlib.Path(__file__).resolve().parents[2] / "examples" / "servo"
 RANGERS = (
     "ranger_sim.boards",
     "ranger_sim.datatable.generated",
-    "ranger_sim.harness.conditions",
-    "ranger_sim.harness.ranger",
-    "ranger_sim.harness.wiring.ranger",
+    "ranger_sim.ranger.conditions",
+    "ranger_sim.ranger.robot",
+    "ranger_sim.ranger.wiring",
     "ranger_sim.plant.mechanics.body",
     "ranger_sim.plant.ranger",
     "ranger_sim.sysid",

@@ -13,8 +13,8 @@ from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, NEVER
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import profile, rest_bus, supervision
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.examples import examples
 
 TABLE = datatable.load()

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.events import FLAG_ERROR
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 MASTER = pathlib.Path(__file__).resolve().parents[2] / "datatable" / "master"
 BUSES = ("can1", "can2", "can3", "can4")

@@ -12,12 +12,12 @@ from ranger_sim import loading
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.harness.outside import profile
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.records.strike_watch import StrikeWatch
-from ranger_sim.harness.records.summary import energy, motor_powers, oddities
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant.mechanics.walk_record import WalkRecord
 from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.ranger.records.strike_watch import StrikeWatch
+from ranger_sim.ranger.records.summary import energy, motor_powers, oddities
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 
 @pytest.fixture

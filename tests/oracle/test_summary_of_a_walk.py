@@ -13,9 +13,9 @@ import tomllib
 
 import pytest
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.records.summary_schema import json_schema
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.records.summary_schema import json_schema
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools.recordings import variables_file
 from ranger_sim.tools.run.walk import write_frames
 from tests.oracle import figures

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.records.summary_schema import FIGURES, json_schema
+from ranger_sim.ranger.records.summary_schema import FIGURES, json_schema
+from ranger_sim.ranger.robot import Ranger
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.run import summary_schema
 

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 

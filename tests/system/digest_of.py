@@ -10,8 +10,8 @@ import sys
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.harness.outside import profile
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 
 @dataclasses.dataclass(frozen=True)

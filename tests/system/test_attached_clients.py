@@ -14,8 +14,8 @@ from ranger_sim.can_bus.edge.messages import frame_of_message
 from ranger_sim.can_bus.edge.taps import OFF
 from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.can_bus.hosting import Program, fresh_name
 
 MS = 1_000_000

@@ -11,6 +11,7 @@ import pytest
 from ranger_sim.harness.branching import branch
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
 from ranger_sim.harness.campaigns.cases import Settings
+from ranger_sim.ranger.walks import REFERENCE
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PUSHES = {
@@ -34,7 +35,7 @@ def test_a_start_and_a_time_whose_sum_rounds_up_do_not_keep_a_golden_run_waiting
     start_ns = next(each for each in starts if each * 1e-9 + 0.1 > (each + 100_000_000) * 1e-9)
 
     def end():
-        golden = group.Golden(Settings(), {f"{start_ns} ns"}, group.Watch(after_s=0.1))
+        golden = group.Golden(Settings(machine=REFERENCE), {f"{start_ns} ns"}, group.Watch(after_s=0.1))
         return {"after_ns": golden.record.end_ns - golden.starts[f"{start_ns} ns"]}
 
     assert branch(end, 60.0, 600.0)["after_ns"] == 100_000_000
@@ -61,7 +62,7 @@ class ShortLivedPool(pools.LocalPool):
 def done(data, folder, pool=None):
     """A campaign, run to its end in `folder`."""
     folder.mkdir(exist_ok=True)
-    campaign = engine.Campaign(plan.of_data(data, "test.toml"), folder)
+    campaign = engine.Campaign(plan.of_data(data, "test.toml", REFERENCE), folder)
     try:
         campaign.run(pool or pools.LocalPool(2), lambda done, what: None)
     finally:
@@ -134,7 +135,7 @@ def test_a_sweeps_slot_margin_falls_by_the_cost_that_was_added(tmp_path):
     }
     sweep = done(data, tmp_path)
     assert len(sweep.cases) == 4
-    scheduler = Settings().robot().boards["MCH"].scheduler
+    scheduler = Settings(machine=REFERENCE).robot().boards["MCH"].scheduler
     added = (many - few) * scheduler.find(task).cost / scheduler.slot_cycles
     margins = {
         (case.settings.body["hip_gear"], case.settings.costs[f"MCH.{task}"]): sweep.result(case)["slots"]["MCH"]
@@ -211,7 +212,7 @@ def test_a_plan_may_name_a_file_with_a_users_own_modes(tmp_path):
 def test_a_result_is_known_by_the_content_of_the_file_with_the_users_modes(tmp_path):
     path = tmp_path / "own.py"
     path.write_text(OWN_MODE)
-    own = dataclasses.replace(plan.of_data(PUSHES, "test.toml"), axes={}, fault_module=str(path))
+    own = dataclasses.replace(plan.of_data(PUSHES, "test.toml", REFERENCE), axes={}, fault_module=str(path))
     before = own.watch_key()
     path.write_text(OWN_MODE.replace("5.0", "4.5"))
     assert own.watch_key() != before != dataclasses.replace(own, fault_module=None).watch_key()

@@ -14,6 +14,7 @@ import pytest
 
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.harness.campaigns import engine, group, plan, pools
+from ranger_sim.ranger.walks import REFERENCE
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLAN = """
@@ -87,7 +88,7 @@ def descendants(process):
 
 
 def test_a_run_branched_off_the_golden_run_is_the_run_from_power_up(few, tmp_path):
-    campaign = engine.Campaign(plan.load(few), tmp_path)
+    campaign = engine.Campaign(plan.load(few, REFERENCE), tmp_path)
     try:
         campaign.run(pools.LocalPool(1), lambda done, what: None)
         for case in campaign.cases[:3]:

@@ -20,8 +20,9 @@ from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.numbers import float_of_word
 from ranger_sim.harness.outside import serial_ports
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger import serial_ports as robot_ports
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools import cli
 from ranger_sim.tools.robodaq import command as daq
 from ranger_sim.tools.robodaq.codec import write_packet
@@ -36,7 +37,7 @@ class Robot:
 
     def __init__(self, monkeypatch, capsys, quirks=None, dropouts=None):
         self.ranger = Ranger(Scenario(), quirks=quirks)
-        self.line = serial_ports.connect_daq(self.ranger, serial_ports.PtyPort(), dropouts)
+        self.line = robot_ports.connect_daq(self.ranger, serial_ports.PtyPort(), dropouts)
         self.board = self.ranger.board("MB")
         self.board.computer.rate_sum = 40_960  # not ten seconds of ramp
         self.capsys = capsys

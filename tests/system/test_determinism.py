@@ -11,8 +11,8 @@ import pytest
 
 from ranger_sim import loading
 from ranger_sim.boards.main_brain import controllers
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.system.digest_of import Case, outcome
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

@@ -6,9 +6,9 @@ import pytest
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import errors as codes
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.timing import robot_figures
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.timing import robot_figures
 
 # EXECUTION_TIME in us (robot.md T1). UI: the logs' main brain sends six lights in every slot, so ours does here.
 LOGS = robot_figures.EXECUTION_TIME_US

@@ -11,7 +11,7 @@ import pytest
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.lpc2194 import image
 from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 from tests.firmware_sim.native.support import COMPILER
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -90,7 +90,7 @@ def test_a_converter_that_never_ends_makes_the_chips_slots_overrun(three, tmp_pa
 
 
 def test_the_hex_file_is_the_same_program_as_the_elf_file(three):
-    from ranger_sim.harness.firmware import native_boards
+    from ranger_sim.ranger.firmware import native_boards
 
     built = native_boards.build_image(three.FOLDER)
     assert image.read(built.hex_path).segments == image.read(built.path).segments
@@ -100,7 +100,7 @@ def test_the_hex_file_is_the_same_program_as_the_elf_file(three):
 
 
 def test_the_robot_walks_with_the_image_as_with_the_emulated_hip_board(three):
-    from ranger_sim.harness.firmware import native_boards
+    from ranger_sim.ranger.firmware import native_boards
 
     built = native_boards.build_image(three.FOLDER)
     with contextlib.closing(Ranger(images={"MCH": built.path})) as robot, contextlib.closing(Ranger()) as other:

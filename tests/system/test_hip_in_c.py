@@ -7,9 +7,9 @@ import shutil
 import pytest
 
 from ranger_sim.boards.quirks import Quirks
-from ranger_sim.harness.firmware import native_boards
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.firmware import native_boards
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.firmware_sim.native.support import COMPILER
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

@@ -18,10 +18,10 @@ from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.lpc2194.image import read
 from ranger_sim.foundation.events import CAN_REQUEST, CAN_RX, CAN_TX_DONE, ORDER_BUS, ORDER_PINS, PIN_EDGE
 from ranger_sim.foundation.numbers import float_of_word, word_of_float
-from ranger_sim.harness.firmware import image_boards
-from ranger_sim.harness.firmware.robot_image_board import RobotImageBoard
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.firmware import image_boards
+from ranger_sim.ranger.firmware.robot_image_board import RobotImageBoard
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from tests.boards.motor_bench import FRAME_NS
 from tests.boards.original_images import CHANNELS, COUNTS, DATA, WHOLE, Sent, frames_of_the_image, stimulus_of
 

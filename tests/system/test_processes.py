@@ -17,7 +17,7 @@ from ranger_sim.foundation.peers import connected
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.timeline import perfetto_reader
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TWO_SECONDS = 2.0  # the promise for naming what died or hangs
@@ -226,8 +226,8 @@ SCRIPT = """
 import argparse, contextlib, sys
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import Supervisor, View
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import StopRule
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--name")

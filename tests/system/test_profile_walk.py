@@ -3,8 +3,8 @@
 import contextlib
 
 from ranger_sim.harness.outside import profile
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 
 def walked(chosen, steps):

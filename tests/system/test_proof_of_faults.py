@@ -5,8 +5,8 @@ import contextlib
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 
 def test_a_gyro_that_lies_is_seen_on_its_bus_first_and_the_main_brain_reacts():

@@ -6,8 +6,8 @@ import pytest
 from ranger_sim import datatable
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.schedule import scheduled_frames_per_s
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 
 BUSES = ("can1", "can2", "can3", "can4")
 # Frames/s: sync and what the boards send, robot.md N1.10.

@@ -6,7 +6,7 @@ import pytest
 
 from ranger_sim.can_bus.edge import benchmark
 from ranger_sim.foundation.events import EventQueue
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools import cli
 from ranger_sim.tools.bench import cases, command, flooders, floods, interfaces, processes, traffic, walks
 from tests.can_bus.hosting import hosted

@@ -13,9 +13,9 @@ import pytest
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files, terms
 from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools import cli
 from ranger_sim.tools.compare_walk import emulate, figure, gait, hip_law, naming, work
 from ranger_sim.tools.compare_walk.candidates import BY_NAME, CANDIDATES

@@ -11,7 +11,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults import text
 from ranger_sim.harness.faults.catalogue import MODES, mode
 from ranger_sim.harness.faults.names import NameParameter
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from ranger_sim.tools import cli, faults
 
 OWN = faults.DOCUMENT.read_text(encoding="utf-8").split("```python\n")[2].partition("```")[0]

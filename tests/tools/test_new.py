@@ -12,7 +12,7 @@ from ranger_sim.datatable.loader import load_table
 from ranger_sim.tools import cli
 from ranger_sim.tools.new import command
 from tests.firmware_sim.native.support import COMPILER
-from tests.harness.testing.project import environment, how_to_find_the_plugin
+from tests.ranger.testing.project import environment, how_to_find_the_plugin
 
 
 def everything(folder):
@@ -74,7 +74,7 @@ def test_its_tests_pass_at_once_and_it_needs_nothing_of_ranger(tmp_path):
     (tmp_path / "wheel" / "test_imports.py").write_text(
         "import sys\n\n\ndef test_nothing_of_ranger_is_needed(machine):\n"
         "    machine.run_for(0.01)\n"
-        "    rangers = ('ranger_sim.boards', 'ranger_sim.datatable.generated', 'ranger_sim.harness.ranger')\n"
+        "    rangers = ('ranger_sim.boards', 'ranger_sim.datatable.generated', 'ranger_sim.ranger.robot')\n"
         "    assert [name for name in sys.modules if name.startswith(rangers)] == []\n"
     )
     done = subprocess.run(

@@ -11,8 +11,8 @@ import pytest
 
 from ranger_sim.can_bus.edge.candump import read_candump
 from ranger_sim.datatable.generate import GENERATED_FOLDER
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools.run import walk
 
 from . import places

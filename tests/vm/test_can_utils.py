@@ -10,8 +10,8 @@ from ranger_sim.can_bus.edge import interfaces
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
 from ranger_sim.datatable.generate import GENERATED_FOLDER
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools.run import walk
 
 

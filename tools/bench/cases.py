@@ -38,8 +38,8 @@ TICK_S = 1e-3  # the shortest time between two ticks of a Linux kernel
 
 def robot(seconds: float, log: str = "none", swap: bool = False) -> dict:
     """The whole robot for `seconds`, without its first second; CPU seconds of the stepping loop only."""
-    from ranger_sim.harness.ranger import Ranger
-    from ranger_sim.harness.scenario import Scenario, StopRule
+    from ranger_sim.ranger.robot import Ranger
+    from ranger_sim.ranger.scenario import Scenario, StopRule
 
     with contextlib.closing(Ranger(Scenario(), log=log)) as walking:
         if swap:

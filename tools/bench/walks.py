@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools.command_line.units import figure
 
 # parameter set, seeds, steps, roughness in m

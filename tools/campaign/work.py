@@ -17,6 +17,7 @@ from ranger_sim import loading
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
+from ranger_sim.ranger.walks import REFERENCE
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
 from ranger_sim.tools.command_line import interrupts, terminal
@@ -34,7 +35,7 @@ EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 def run(options: argparse.Namespace) -> int:
     """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
     console = terminal.console(stderr=True)
-    wanted = plan.load(options.file)
+    wanted = plan.load(options.file, REFERENCE)
     check_scheduler(options)
     folder = writable_folder(options.out or pathlib.Path("runs") / "campaigns" / wanted.name)
     campaign = engine.Campaign(wanted, folder)

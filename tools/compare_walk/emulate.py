@@ -16,9 +16,9 @@ from typing import Any
 
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import body_files, terms
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools.compare_walk import gait
 from ranger_sim.tools.compare_walk.candidates import BY_NAME
 

@@ -22,8 +22,8 @@ from scipy.stats import t as t_distribution
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError, printable
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.sysid import channels, inspection, losses, repairs, sanity
 from ranger_sim.sysid.dataset import Array, Finding
 from ranger_sim.tools.command_line import streams, terminal

@@ -11,9 +11,10 @@ from typing import Any
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import body_files
 from ranger_sim.plant.mechanics.parameters import BodyParameters
+from ranger_sim.ranger.scenario import Scenario, StopRule
+from ranger_sim.ranger.walks import REFERENCE
 from ranger_sim.sysid.figures.question import Candidate, Outcome, Point
 from ranger_sim.tools.command_line.files import replace_file
 from ranger_sim.tools.command_line.workers import workers
@@ -105,7 +106,7 @@ class Setup:
         for key, value in moved.items():
             room, _, name = key.partition(".")
             rooms[room][name] = value
-        return Settings(walk=walk, controller=rooms["controller"], body=rooms["body"])
+        return Settings(walk=walk, controller=rooms["controller"], body=rooms["body"], machine=REFERENCE)
 
 
 class Walks:
@@ -117,7 +118,7 @@ class Walks:
         self.setup = setup
         self.candidates = {each.name: each for each in candidates}
         self.jobs = jobs
-        self.version = version()
+        self.version = version(REFERENCE)
         self.path = folder / STORE if folder is not None else None
         self.known: dict[str, dict[str, Any]] = {}
         if self.path is not None and self.path.exists():

@@ -14,8 +14,8 @@ from rich.table import Table
 
 from ranger_sim import loading
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.campaigns.cases import written
 from ranger_sim.plant import body_files
+from ranger_sim.ranger.walks import written
 from ranger_sim.sysid.figures import file
 from ranger_sim.sysid.figures.diagnose import ROUNDS, Diagnosis, diagnose, values_of
 from ranger_sim.sysid.figures.question import Candidate, Figure, Question

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ranger_sim.firmware_sim.gdb.server import GdbServer
-    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.ranger.robot import Ranger
 
 GDB = Option(
     "--gdb",

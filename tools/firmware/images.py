@@ -6,7 +6,7 @@ import pathlib
 from ranger_sim.firmware_sim.lpc2194 import image
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.firmware import image_boards
+from ranger_sim.ranger.firmware import image_boards
 from ranger_sim.tools.command_line.options import Option
 from ranger_sim.tools.command_line.units import word
 

@@ -14,7 +14,6 @@ from typing import Any
 
 from ranger_sim.boards.main_brain import controllers
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
 from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
 from ranger_sim.plant.ranger import SAMPLES, STEP_NS, RangerPlant
@@ -27,6 +26,7 @@ from ranger_sim.plant.sensors.imu import (
     SILENT,
 )
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, MOTOR_NAMES, WORD_NAMES
+from ranger_sim.ranger.scenario import Scenario
 
 STEP_S = STEP_NS * 1e-9
 # How far a time may lie from the grid: far above the rounding of a day's seconds, far below a step. Chosen by us.

@@ -11,7 +11,7 @@ import zipfile
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools.command_line.files import writable_folder
 from ranger_sim.tools.command_line.options import add_all
 from ranger_sim.tools.fmu.body import ExportedBody, given_of

@@ -15,7 +15,7 @@ from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import normal_errors
 from ranger_sim.harness.outside.serial_ports import DAQ_BAUD, RealPort, reason_of
-from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.ranger.names import RANGER
 from ranger_sim.tools.panel.channels import EMPTY, Times, Trace, Values, between
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, Source, known_pose, known_states, table_channels
 from ranger_sim.tools.robodaq.codec import Point

@@ -16,7 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.records.sampler import PERIOD_NS
-from ranger_sim.harness.records.summary import JOULES_PER_WH
+from ranger_sim.ranger.records.summary import JOULES_PER_WH
 from ranger_sim.tools.panel.channels import Channel, Memory, Times, Trace, Values, between
 from ranger_sim.tools.panel.inside.buses import Bus
 from ranger_sim.tools.panel.inside.errors import ERRORS, ON_NO_BUS, ErrorList, changes

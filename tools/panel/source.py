@@ -9,7 +9,7 @@ from typing import Any
 from ranger_sim import Ranger, datatable
 from ranger_sim.datatable import parameters
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import STATE_VARIABLES, state_names
+from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values
 
 # The pose of the robot's parts as the robot itself knows it: legs as estimated by its program of 2011 or those of 2015
@@ -136,7 +136,7 @@ def group_of(name: str) -> str:
 def fault_rows() -> dict[str, Any]:
     """{places: where a fault can be injected; modes: available modes, by kind of place}."""
     from ranger_sim.harness.faults.catalogue import MODES
-    from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+    from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
     places = [{"name": place.name, "kind": place.kind, "what": place.what} for place in CATALOGUE.places.values()]
     modes: dict[str, list[dict[str, str]]] = {}

@@ -30,7 +30,7 @@ FLUSH_S = 5.0  # of virtual time: so much of a slow variable a killed run may lo
 class VariablesFile:
     """The file, filled block by block as the run's recorder hands them over. OSError when it cannot be written.
 
-    `robot`: a `harness.ranger.Ranger` that has not been closed.
+    `robot`: a `ranger.robot.Ranger` that has not been closed.
     """
 
     def __init__(self, robot: Any, path: pathlib.Path) -> None:
@@ -114,7 +114,7 @@ def groups_of(robot: Any) -> list[MdfGroup]:
 
 
 def write(robot: Any, path: pathlib.Path) -> None:
-    """Write what the robot's log kept. `robot`: a `harness.ranger.Ranger` whose log was not "none"."""
+    """Write what the robot's log kept. `robot`: a `ranger.robot.Ranger` whose log was not "none"."""
     file = VariablesFile(robot, path)
     try:
         for rows in robot.logbook.kept("samples"):

@@ -83,7 +83,7 @@ def over_time(key: str, title: str, quantity: str, unit: str, *lines: tuple, **m
 
 
 def groups(walk: Any) -> list[Group]:
-    """All charts of a walk, a `harness.recorded.Recorded`."""
+    """All charts of a walk, a `ranger.records.recorded.Recorded`."""
     found = [phase_portraits(), joint_angles(), currents_and_power(), steps(walk), bus_load(walk), slot_times(walk)]
     return [*found, *path(walk)]
 

@@ -12,7 +12,7 @@ from plotly.offline import get_plotlyjs
 from ranger_sim import datatable
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.harness import normal_errors
-from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.ranger.names import RANGER
 from ranger_sim.tools.command_line.units import duration_text, figure, length_text
 from ranger_sim.tools.faults import fault_text
 from ranger_sim.tools.report import charts
@@ -39,7 +39,7 @@ ROBOT = {
 
 
 def render(robot: Any, summary: dict) -> str:
-    """The page as text. `robot`: a `harness.ranger.Ranger` that kept a log; `summary`: its summary."""
+    """The page as text. `robot`: a `ranger.robot.Ranger` that kept a log; `summary`: its summary."""
     walk = robot.recorded()
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),

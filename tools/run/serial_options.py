@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import serial_ports
+from ranger_sim.ranger import serial_ports as robot_ports
 from ranger_sim.tools.command_line.options import Option, add_all
 from ranger_sim.tools.command_line.units import word
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.ranger.robot import Ranger
 
 
 PORT = word("a port, or pty")
@@ -88,11 +89,11 @@ def connect(robot: Ranger, given: argparse.Namespace) -> tuple[dict[str, Any], l
         dropouts = None
         if given.daq_dropouts:
             dropouts = serial_ports.Dropouts(robot.scenario.seed, robot.start_ns)
-        ends["daq"] = serial_ports.connect_daq(robot, ports["daq"], dropouts)
+        ends["daq"] = robot_ports.connect_daq(robot, ports["daq"], dropouts)
     if "imu" in ports:
-        ends["imu"] = serial_ports.connect_imu(robot, ports["imu"])
+        ends["imu"] = robot_ports.connect_imu(robot, ports["imu"])
     if "imu-offer" in ports:
-        ends["imu-offer"] = serial_ports.offer_imu(robot, ports["imu-offer"])
+        ends["imu-offer"] = robot_ports.offer_imu(robot, ports["imu-offer"])
     lines = [MEANINGS[name].format(port.path) for name, port in ports.items()]
     if lines and given.json == "-":  # nothing else is printed, and without its name a pseudo-terminal is of no use
         print(*lines, sep="\n", file=sys.stderr, flush=True)

@@ -8,7 +8,7 @@ import json
 import pathlib
 from typing import Any
 
-from ranger_sim.harness.records import summary_schema
+from ranger_sim.ranger.records import summary_schema
 
 DOCUMENT = pathlib.Path(__file__).resolve().parents[2] / "docs" / "summary.md"
 TABLE_BEGIN = "<!-- written by python -m ranger_sim.tools.run.summary_schema: begin -->"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ranger_sim.harness import normal_errors
-from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.ranger.names import RANGER
 
 HEALTHY = (
     "On its feet; no board dead, no frame lost or refused, no slot overrun, every strike noticed; a floor that only "

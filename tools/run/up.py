@@ -17,8 +17,6 @@ from ranger_sim.datatable.addresses import XCP_BUS, XCP_MASTER_ID, XCP_SLAVE_ID
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.feed.server import FeedServer
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.outside.profile import load as load_profile
 from ranger_sim.harness.processes import control, places
@@ -26,11 +24,13 @@ from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.processes.plant_process import sent_away
-from ranger_sim.harness.processes.requests import admitted, can_be_armed
 from ranger_sim.harness.processes.settings import FASTEST, NEVER, ON_FAILURE, SLOWEST, Settings, one_processor
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, Supervisor, View, check_platform
 from ranger_sim.harness.stop_rule import MOST_STEPS, StopRule
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.feed import FeedServer
+from ranger_sim.ranger.requests import admitted, can_be_armed
 from ranger_sim.tools import faults
 from ranger_sim.tools.buses import server_options
 from ranger_sim.tools.command_line import interrupts, terminal
@@ -49,8 +49,8 @@ from ranger_sim.tools.timing import trace
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
     from ranger_sim.harness.processes.plant_process import PlantRun
-    from ranger_sim.harness.ranger import Ranger
-    from ranger_sim.harness.timeline import Timeline
+    from ranger_sim.ranger.robot import Ranger
+    from ranger_sim.ranger.timeline import Timeline
     from ranger_sim.tools.run.logs import RunLogs
 
 PLAIN_S = 2.0  # between two lines without a terminal
@@ -206,7 +206,7 @@ def external_buses(
 
 def run(options: argparse.Namespace) -> int:
     """Start the processes and look after them; exit codes as for `walk`."""
-    from ranger_sim.harness.ranger import Ranger  # the whole robot, and python-can: only when it is to walk
+    from ranger_sim.ranger.robot import Ranger  # the whole robot, and python-can: only when it is to walk
     from ranger_sim.tools.buses import bus
 
     check_platform()
@@ -221,6 +221,7 @@ def run(options: argparse.Namespace) -> int:
         real_time=not options.no_real_time,
         name=options.name,
         processor=processor(options.processor),
+        boards=wiring.BOARDS,
     )
     if options.out:
         writable_folder(options.out)

@@ -17,15 +17,15 @@ from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness import normal_errors
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.firmware import native_boards
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.outside.profile import load as load_profile
-from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.plant import terms
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.firmware import native_boards
+from ranger_sim.ranger.names import RANGER
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools import faults
 from ranger_sim.tools.command_line import interrupts, streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ranger_sim.harness.faults.fault import Fault
-    from ranger_sim.harness.ranger import Ranger
+    from ranger_sim.ranger.robot import Ranger
 
 __all__ = ["walk", "write_frames"]
 
@@ -97,7 +97,7 @@ def profile_of(options: argparse.Namespace, console: Console) -> Profile | None:
 
 def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace, interrupted: list[bool]) -> int:
     """`run` with everything checked; `interrupted` is filled by Ctrl-C."""
-    from ranger_sim.harness.ranger import Ranger  # the whole robot: only when it is to walk
+    from ranger_sim.ranger.robot import Ranger  # the whole robot: only when it is to walk
 
     if options.out:
         writable_folder(options.out)

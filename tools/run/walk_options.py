@@ -4,9 +4,9 @@ import argparse
 import shlex
 from typing import Any
 
-from ranger_sim.harness.scenario import LIMITS, Scenario
 from ranger_sim.harness.stop_rule import MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, StopRule
 from ranger_sim.plant.electrics.electronics import SWITCHES
+from ranger_sim.ranger.scenario import LIMITS, Scenario
 from ranger_sim.tools import faults
 from ranger_sim.tools.command_line.options import Option, add_all
 from ranger_sim.tools.command_line.units import (

@@ -12,11 +12,11 @@ from rich.console import Console
 from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import BOARD_CLASSES, Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
-from ranger_sim.harness.timing import robot_figures, static_check
 from ranger_sim.harness.timing.slots import SlotView, Statistics
-from ranger_sim.harness.timing.static_check import OVERRUNS, BoardBound, FunctionBound
+from ranger_sim.ranger.robot import BOARD_CLASSES, Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
+from ranger_sim.ranger.timing import robot_figures, static_check
+from ranger_sim.ranger.timing.static_check import OVERRUNS, BoardBound, FunctionBound
 from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.units import TIMES, number, quantity, whole_number

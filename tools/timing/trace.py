@@ -19,8 +19,8 @@ from ranger_sim.tools.timing.trace_server import PORT, VIEWER, TraceServer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ranger_sim.harness.ranger import Ranger
-    from ranger_sim.harness.timeline import Timeline
+    from ranger_sim.ranger.robot import Ranger
+    from ranger_sim.ranger.timeline import Timeline
 
 LONGEST_NAP_S = 1.0  # so that Ctrl-C acts soon; chosen by us
 SHOWN_S = 0.02  # around the time: ten slots of the main brain, chosen by us
@@ -73,7 +73,7 @@ def attach(robot: Ranger, given: argparse.Namespace) -> Timeline | None:
     check(given)
     if not given.trace:
         return None
-    from ranger_sim.harness.timeline import Timeline
+    from ranger_sim.ranger.timeline import Timeline
 
     return Timeline(robot, given.trace_last)
 

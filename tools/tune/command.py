@@ -26,7 +26,7 @@ from rich.console import Console
 
 from ranger_sim.boards.main_brain import controllers, programs
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.units import LENGTHS, number, quantity, whole_number
 from ranger_sim.tools.command_line.workers import workers
@@ -272,7 +272,7 @@ class Judge:
 
 def walk(order: tuple[str, int, float, Task]) -> dict:
     """The summary of one walk of the whole robot: (controller file, seed, roughness in m, task)."""
-    from ranger_sim.harness.ranger import Ranger  # the whole robot: only when it is to walk
+    from ranger_sim.ranger.robot import Ranger  # the whole robot: only when it is to walk
 
     controller, seed, roughness_m, task = order
     scenario = Scenario(controller=controller, body=task.body, seed=seed, floor_roughness_m=roughness_m)

@@ -8,7 +8,7 @@ import pytest
 
 from dev.fuzz import Finding
 from dev.fuzz import channel as fuzz_channel
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 
 
 def test_three_hundred_damaged_turns_are_answered():

@@ -3,8 +3,7 @@
 import pytest
 
 from dev.fuzz import Finding, doors
-from ranger_sim.harness.processes import control
-from ranger_sim.harness.processes.requests import Request
+from ranger_sim.ranger.requests import Request
 
 
 @pytest.fixture
@@ -33,7 +32,7 @@ def test_a_door_that_does_too_much_or_holds_too_much_is_found(fuzz):
 
 
 def test_a_request_that_must_not_be_admitted_is_found(fuzz, monkeypatch):
-    monkeypatch.setattr(control, "admitted", lambda line: Request("set", name="P_UI_LCD_TIME", value=5.0))
+    monkeypatch.setattr(fuzz.control, "admitted", lambda line: Request("set", name="P_UI_LCD_TIME", value=5.0))
     with pytest.raises(Finding, match=r"value=5\.0.* was admitted"):
         for _ in range(10):
             fuzz.poll()
@@ -48,7 +47,7 @@ def test_a_well_behaved_program_that_is_not_answered_is_found(fuzz, monkeypatch)
 
 
 def test_an_exception_at_a_door_leaves_with_its_case(monkeypatch):
-    monkeypatch.setattr(control, "admitted", lambda line: 1 // 0)
+    monkeypatch.setattr(doors, "admitted", lambda line: 1 // 0)
     with pytest.raises(ZeroDivisionError) as fault:
         doors.run(100)
     assert "python -m dev.fuzz doors: seed 1, case" in fault.value.__notes__[0]

@@ -5,7 +5,7 @@ import pytest
 from dev.fuzz import Finding, requests
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.fault import Fault
-from ranger_sim.harness.feed.server import FeedServer
+from ranger_sim.ranger.feed import FeedServer
 
 
 def test_hostile_requests_and_viewers_are_stood():

@@ -12,7 +12,7 @@ import pytest
 
 from ranger_sim.firmware_sim.native import sanitizers
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 from tests.firmware_sim.native.support import COMPILER, folder_with
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]

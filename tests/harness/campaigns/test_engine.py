@@ -5,6 +5,7 @@ import json
 import pytest
 
 from ranger_sim.harness.campaigns import engine, plan
+from ranger_sim.ranger.walks import REFERENCE
 
 DATA = {"vary": {"seed": [1, 2, 3]}}
 
@@ -33,7 +34,7 @@ class Answering:
 @pytest.fixture
 def run(tmp_path):
     def run(outcomes=None, **data):
-        campaign = engine.Campaign(plan.of_data({**DATA, **data}, "test.toml"), tmp_path)
+        campaign = engine.Campaign(plan.of_data({**DATA, **data}, "test.toml", REFERENCE), tmp_path)
         pool = Answering(outcomes or {})
         campaign.run(pool, lambda done, what: None)
         campaign.close()

@@ -7,8 +7,8 @@ import pytest
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.harness.campaigns import group, outcomes
 from ranger_sim.harness.campaigns.outcomes import Band, classify
-from ranger_sim.harness.campaigns.walks import WALKS
 from ranger_sim.harness.faults.proof import damage, gait, prove
+from ranger_sim.ranger.walks import WALKS
 from tests.harness.faults.records import COLUMN, MS, STEP_MS, errors, record
 
 BEGAN = 1000 * MS

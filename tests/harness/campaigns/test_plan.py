@@ -8,13 +8,14 @@ from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import plan
 from ranger_sim.harness.campaigns.engine import around, spread
+from ranger_sim.ranger.walks import REFERENCE
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 STUCK = "MCH.absolute_encoder:stuck@{start}"
 
 
 def made(**data):
-    return plan.of_data({"title": "test", **data}, "test.toml")
+    return plan.of_data({"title": "test", **data}, "test.toml", REFERENCE)
 
 
 def test_a_census_is_every_combination():
@@ -198,23 +199,23 @@ def test_what_is_wrong_is_said_in_one_line_with_its_place(data, told):
 
 def test_a_file_that_is_not_there_or_no_toml_is_named(tmp_path):
     with pytest.raises(UserError, match="No such file"):
-        plan.load(tmp_path / "none.toml")
+        plan.load(tmp_path / "none.toml", REFERENCE)
     (tmp_path / "bad.toml").write_text("title = ")
     with pytest.raises(UserError, match=r"bad\.toml:1:9: not valid TOML"):
-        plan.load(tmp_path / "bad.toml")
+        plan.load(tmp_path / "bad.toml", REFERENCE)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "campaigns").glob("*.toml")), ids=lambda path: path.stem)
 def test_the_campaigns_that_come_with_the_project_can_be_read(path):
-    found = plan.load(path)
+    found = plan.load(path, REFERENCE)
     assert found.search or found.cases()
 
 
 def test_the_sensors_campaign_has_every_sensor_and_every_mode_that_it_takes():
-    from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+    from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
     CATALOGUE.load()
-    found = {case.fault.partition("@")[0] for case in plan.load(ROOT / "campaigns" / "sensors.toml").cases()}
+    found = {case.fault.partition("@")[0] for case in plan.load(ROOT / "campaigns" / "sensors.toml", REFERENCE).cases()}
     sensors = ("encoder", "current", "voltage", "foot", "sensor", "imu")
     expected = {
         f"{place.name}:{mode}"

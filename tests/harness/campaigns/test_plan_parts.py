@@ -12,6 +12,8 @@ from ranger_sim.harness.campaigns.group import Watch
 from ranger_sim.harness.campaigns.outcomes import Band
 from ranger_sim.harness.campaigns.plan import Plan, Range, Sample, Search, Tolerance
 from ranger_sim.harness.campaigns.statistics import Stopping
+from ranger_sim.harness.campaigns.subjects import OwnMachine
+from ranger_sim.ranger.walks import REFERENCE, WALK, WALKS
 
 PATH = "here.toml"
 
@@ -58,7 +60,7 @@ def test_a_range_is_told_with_its_step_or_that_it_goes_by_factors():
     ],
 )
 def test_a_range_of_a_file_is_this(values, expected):
-    found = plan.range_of("floor_roughness", values, PATH)
+    found = plan.range_of(WALKS, "floor_roughness", values, PATH)
     assert found == expected and found.log is expected.log
 
 
@@ -79,24 +81,24 @@ def test_a_range_of_a_file_is_this(values, expected):
     ],
 )
 def test_a_range_that_is_none_is_refused(values, told):
-    refused(told, plan.range_of, "force", values, PATH)
+    refused(told, plan.range_of, WALKS, "force", values, PATH)
 
 
 # ---- lists
 
 
 def test_a_single_value_is_a_list_of_one_and_its_kind_is_what_the_axis_takes():
-    assert plan.values_of("seed", 3, PATH) == [3] and plan.values_of("start", "1 s", PATH) == ["1 s"]
-    assert plan.values_of("x", [1, 2.5, "a"], PATH) == [1, 2.5, "a"]
-    assert plan.values_of("cost.MCH.x", [1, 2.5], PATH) == [1, 2.5]
-    assert plan.values_of("fault", "a:b", PATH) == ["a:b"]
-    assert plan.values_of("x", {"low": 1, "high": 2}, PATH) == Range(1.0, 2.0)
+    assert plan.values_of(WALKS, "seed", 3, PATH) == [3] and plan.values_of(WALKS, "start", "1 s", PATH) == ["1 s"]
+    assert plan.values_of(WALKS, "x", [1, 2.5, "a"], PATH) == [1, 2.5, "a"]
+    assert plan.values_of(WALKS, "cost.MCH.x", [1, 2.5], PATH) == [1, 2.5]
+    assert plan.values_of(WALKS, "fault", "a:b", PATH) == ["a:b"]
+    assert plan.values_of(WALKS, "x", {"low": 1, "high": 2}, PATH) == Range(1.0, 2.0)
     for name in ("controller.P", "body.p", "cost.p"):
-        refused("a list of numbers, or { low, high },", plan.values_of, name, ["1"], PATH)
-        assert plan.values_of(name, {"low": 1, "high": 2}, PATH) == Range(1.0, 2.0)
-    refused("a list of texts is expected", plan.values_of, "fault", [1], PATH)
-    refused("a list of values, or { low, high }, is expected", plan.values_of, "x", [True], PATH)
-    refused("a list of values", plan.values_of, "x", [], PATH)
+        refused("a list of numbers, or { low, high },", plan.values_of, WALKS, name, ["1"], PATH)
+        assert plan.values_of(WALKS, name, {"low": 1, "high": 2}, PATH) == Range(1.0, 2.0)
+    refused("a list of texts is expected", plan.values_of, WALKS, "fault", [1], PATH)
+    refused("a list of values, or { low, high }, is expected", plan.values_of, WALKS, "x", [True], PATH)
+    refused("a list of values", plan.values_of, WALKS, "x", [], PATH)
 
 
 def test_tables_in_vary_have_dotted_names_and_ranges_stay_whole():
@@ -106,10 +108,11 @@ def test_tables_in_vary_have_dotted_names_and_ranges_stay_whole():
 
 
 def test_an_axis_is_a_setting_or_a_name_in_a_faults_text():
-    assert all(plan.is_setting(name, "") for name in (*plan.WALK, "controller.X", "body.x", "cost.MCH.x"))
-    assert not any(plan.is_setting(name, "") for name in ("machine.x", "force", "fault"))
-    assert all(plan.is_setting(name, "servo.py:new") for name in ("seed", "machine.x", "cost.A.x"))
-    assert not any(plan.is_setting(name, "servo.py:new") for name in ("slope", "body.x", "force"))
+    assert all(WALKS.is_setting(name) for name in (*WALK, "controller.X", "body.x", "cost.MCH.x"))
+    assert not any(WALKS.is_setting(name) for name in ("machine.x", "force", "fault"))
+    own = OwnMachine.__new__(OwnMachine)
+    assert all(own.is_setting(name) for name in ("seed", "machine.x", "cost.A.x"))
+    assert not any(own.is_setting(name) for name in ("slope", "body.x", "force"))
     assert plan.names_in("a:b,x={x},y={y:g}@{start}..{x}", PATH) == {"x", "y", "start"}
     assert plan.names_in("a:b{{x}}", PATH) == set()
     refused("here.toml: fault 'a}': ", plan.names_in, "a}", PATH)
@@ -141,8 +144,8 @@ def test_a_value_of_a_walk_is_taken_in_its_unit():
         ("seed", 4): 4,
     }
     for (name, value), expected in values.items():
-        assert plan.walk_value(name, value, PATH) == pytest.approx(expected)
-    refused("slope = '3 m': a number with one of the units rad, deg", plan.walk_value, "slope", "3 m", PATH)
+        assert plan.walk_value(WALKS, name, value, PATH) == pytest.approx(expected)
+    refused("slope = '3 m': a number with one of the units rad, deg", plan.walk_value, WALKS, "slope", "3 m", PATH)
 
 
 # ---- faults
@@ -193,18 +196,20 @@ def test_a_table_of_faults_that_comes_to_nothing_is_refused(group, told):
 
 
 def test_how_runs_are_watched_is_taken_whole():
-    assert plan.watch_of({}, PATH) == Watch(7.0, 5.0, 30.0, 300.0, Band(0.15, 0.15, 0.30))
+    assert plan.watch_of({}, PATH, WALKS) == Watch(7.0, 5.0, 30.0, 300.0, Band(0.15, 0.15, 0.30))
     data = {
         "watch": {"after": "2 s", "from": "0 s", "patience": "0 s", "limit": "1 ms"},
         "band": {"step_length": 0.1, "step_time": "20 %", "motor_power": 9.99},
     }
-    assert plan.watch_of(data, PATH) == Watch(2.0, 0.0, 0.0, 0.001, Band(0.1, 0.2, 9.99))
+    assert plan.watch_of(data, PATH, WALKS) == Watch(2.0, 0.0, 0.0, 0.001, Band(0.1, 0.2, 9.99))
     for name in ("after", "limit"):
-        refused(f"[watch] {name} = '0 s': it must be above 0", plan.watch_of, {"watch": {name: "0 s"}}, PATH)
-    refused("unknown key 'until'", plan.watch_of, {"watch": {"until": "1 s"}}, PATH)
-    refused("unknown key 'power'", plan.watch_of, {"band": {"power": 0.1}}, PATH)
+        refused(f"[watch] {name} = '0 s': it must be above 0", plan.watch_of, {"watch": {name: "0 s"}}, PATH, WALKS)
+    refused("unknown key 'until'", plan.watch_of, {"watch": {"until": "1 s"}}, PATH, WALKS)
+    refused("unknown key 'power'", plan.watch_of, {"band": {"power": 0.1}}, PATH, WALKS)
     for wrong in (0.0, 10.0, -0.1, "1 s", True, [0.1]):
-        refused(f"[band] step_time = {wrong!r}: a share such as", plan.watch_of, {"band": {"step_time": wrong}}, PATH)
+        refused(
+            f"[band] step_time = {wrong!r}: a share such as", plan.watch_of, {"band": {"step_time": wrong}}, PATH, WALKS
+        )
 
 
 @pytest.mark.parametrize(
@@ -338,7 +343,7 @@ def test_a_small_file_is_this_plan():
         "faults": [{"places": "world.robot", "modes": "push", "values": {"force": "{force}"}, "period": "1 s"}],
         "tolerance": {"reaction": {"within": "20 ms"}},
     }
-    found = plan.of_data(data, "folder/name.toml")
+    found = plan.of_data(data, "folder/name.toml", REFERENCE)
     assert found == Plan(
         path="folder/name.toml",
         title="T",
@@ -348,6 +353,7 @@ def test_a_small_file_is_this_plan():
         healthy_seeds=(3, 4),
         axes={"force": [1, 2], "seed": [5], "fault": ["world.robot:push,force={force}@1 s"]},
         tolerances=(Tolerance("reaction", 20.0),),
+        machine=REFERENCE,
     )
     assert (found.name, found.design) == ("name", "census")
     assert found.population() == "2 of force; seed 5; fault world.robot:push,force={force}@1 s"
@@ -356,19 +362,23 @@ def test_a_small_file_is_this_plan():
     assert found.watch_key() == key
     first, second = found.cases()
     assert (first.fault, second.fault) == ("world.robot:push,force=1@1 s", "world.robot:push,force=2@1 s")
-    assert first.settings == second.settings == Settings({"slope_rad": 0.01, "seed": 5})
+    assert first.settings == second.settings == Settings({"slope_rad": 0.01, "seed": 5}, machine=REFERENCE)
     assert first.reference is None and first.axes["force"] == 1
-    plain = plan.of_data({}, "folder/name.toml")
+    plain = plan.of_data({}, "folder/name.toml", REFERENCE)
     assert (plain.title, plain.description, plain.healthy_seeds) == ("name", "", (1, 2, 3, 4, 5, 6))
     assert plain.population() == "one walk"
     [case] = plain.cases()
-    assert (case.settings, case.reference, case.fault) == (Settings({"seed": 1}), Settings({"seed": 1}), None)
+    assert (case.settings, case.reference, case.fault) == (
+        Settings({"seed": 1}, machine=REFERENCE),
+        Settings({"seed": 1}, machine=REFERENCE),
+        None,
+    )
 
 
 def test_a_sample_and_a_search_stand_for_their_ranges():
     ranges = {"force": {"low": 1.0, "high": 2.0}, "start": ["1 s"], "fault": ["world.robot:push,force={force}@{start}"]}
-    sample = plan.of_data({"vary": ranges, "sample": {"runs": 3}}, PATH)
-    search = plan.of_data({"vary": ranges, "search": {"least": "force"}}, PATH)
+    sample = plan.of_data({"vary": ranges, "sample": {"runs": 3}}, PATH, REFERENCE)
+    search = plan.of_data({"vary": ranges, "search": {"least": "force"}}, PATH, REFERENCE)
     assert (sample.design, search.design) == ("sample", "search")
     told = "force from 1 to 2; start 1 s; fault world.robot:push,force={force}@{start}"
     assert sample.population() == search.population() == told
@@ -397,4 +407,4 @@ def test_a_sample_and_a_search_stand_for_their_ranges():
     ],
 )
 def test_a_file_that_is_no_plan_is_refused(data, told):
-    refused(told, plan.of_data, data, PATH)
+    refused(told, plan.of_data, data, PATH, REFERENCE)

@@ -6,6 +6,7 @@ import pytest
 
 from ranger_sim.harness.campaigns import engine, plan, summary
 from ranger_sim.harness.campaigns.statistics import clopper_pearson
+from ranger_sim.ranger.walks import REFERENCE
 
 GAIT = {"steps": 9, "step_length_m": 0.4, "step_time_s": 0.6, "motor_power_W": 9.0}
 
@@ -16,7 +17,7 @@ def campaign_of(tmp_path):
     made = []
 
     def campaign(outcomes, activated_s=2.0, detection_ms=None, **data):
-        campaign = engine.Campaign(plan.of_data(data, "test.toml"), tmp_path)
+        campaign = engine.Campaign(plan.of_data(data, "test.toml", REFERENCE), tmp_path)
         made.append(campaign)
         for case, outcome in zip(campaign.plan.cases(), outcomes, strict=False):
             result = {
@@ -84,7 +85,7 @@ def test_a_replay_has_every_digit_of_the_run_and_ends_when_it_did(campaign_of):
     (row,) = summary.of(campaign_of(["fall"], activated_s=0.0, **data))["rows"]
     words = shlex.split(row["replay"])
     options = dict(zip(words[2::2], words[3::2], strict=True))
-    (case,) = plan.of_data(data, "test.toml").cases()
+    (case,) = plan.of_data(data, "test.toml", REFERENCE).cases()
     assert float(options["--slope"]) == case.settings.walk["slope_rad"]
     assert float(options["--floor-roughness"]) == case.settings.walk["floor_roughness_m"]
     assert options["--time"] == "3.000s" and options["--fault"] == "world.robot:push,force=20"

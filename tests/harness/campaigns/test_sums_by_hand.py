@@ -13,13 +13,14 @@ from ranger_sim.harness.campaigns.outcomes import Band
 from ranger_sim.harness.campaigns.plan import Plan, Range, Sample, Search, Tolerance
 from ranger_sim.harness.campaigns.statistics import Share, Stopping, census, clopper_pearson, wilson
 from ranger_sim.harness.faults.proof import Detection, Difference, Gait, Proof
+from ranger_sim.ranger.walks import REFERENCE
 
 STUCK, PUSH = "MCH.motor:stuck@1 s", "world.robot:push@1 s"
 
 
 def plan(**more):
     whole = {"path": "a b.toml", "title": "T", "description": "D", "walk": {}, "watch": Watch(), "healthy_seeds": (1,)}
-    return Plan(**{**whole, "axes": {}, **more})
+    return Plan(**{**whole, "axes": {}, "machine": REFERENCE, **more})
 
 
 def error(board, code, ms):
@@ -235,7 +236,7 @@ def test_a_replay_is_the_walk_itself_or_the_campaigns_where_more_was_set():
     ):
         assert summary.replay(made, run("k", "fall", PUSH, settings=settings)) == again
     assert summary.replay(made, run("k", "fall", None)) == again
-    assert summary.replay(plan(machine="x.py:y"), run("k", "fall", PUSH)) == again
+    assert summary.replay(plan(machine=f"{__file__}:y"), run("k", "fall", PUSH)) == again
 
 
 def test_everything_of_a_small_campaign_adds_up():
@@ -248,7 +249,9 @@ def test_everything_of_a_small_campaign_adds_up():
     made = Made(
         **{name: getattr(made, name) for name in (*made.__dataclass_fields__, "design")},
         population=made.population,
-        subject=Made(criteria={"fall": "", "masked": "", "no effect": "", "invalid": ""}),
+        subject=Made(
+            criteria={"fall": "", "masked": "", "no effect": "", "invalid": ""}, walk_options=lambda settings: None
+        ),
     )
     felt = {"first_firmware": {"name": "V", "where": "can1", "ms": 2.0}, "reaction": None}
     rows = [

@@ -7,11 +7,11 @@ by step with one without.
 import math
 import types
 
-from ranger_sim.harness.conditions import condition
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.plant.ranger import RangerPlant
 from ranger_sim.plant.sensors.imu import HEADER_RATES, SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD
 from ranger_sim.plant.sensors.incremental_encoder import IncrementalEncoder
+from ranger_sim.ranger.conditions import condition
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 
 STEP_NS = 250_000
 

@@ -3,11 +3,11 @@
 import numpy as np
 
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.harness.conditions import STATE_VARIABLES
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.faults.evidence import Record
-from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.plant.ranger import SAMPLES
+from ranger_sim.ranger.conditions import STATE_VARIABLES
+from ranger_sim.ranger.names import RANGER
 
 MS = 1_000_000
 BOARDS = ["MCH", "MCFO", "MB"]

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from ranger_sim.tools.faults import fault_text
 from tests.harness.faults.bench import EdgeBench
 

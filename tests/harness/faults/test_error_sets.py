@@ -4,7 +4,7 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.error_sets import ErrorConfiguration, ErrorPort, ErrorSet
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from tests.harness.faults.bench import PlantBench
 
 

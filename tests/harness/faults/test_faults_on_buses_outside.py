@@ -10,8 +10,8 @@ from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.outside import move_bus
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.robot import Ranger
 
 FREE = 2040  # an identifier that nobody of the robot sends
 BIT = 1 << 22  # in which the duplicate differs, by default

@@ -8,9 +8,9 @@ from ranger_sim.can_bus.node import OPERATING
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.faults.catalogue import CATALOGUE
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 START, END = "60 ms", "70 ms"
 START_NS, END_NS = 60_000_000, 70_000_000

@@ -6,8 +6,9 @@ from types import SimpleNamespace as Made
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.faults import sensor, words, world
+from ranger_sim.harness.faults import sensor, words
 from ranger_sim.harness.faults.fault import Place
+from ranger_sim.ranger.faults import world
 
 MS = 1_000_000
 

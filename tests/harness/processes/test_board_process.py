@@ -14,7 +14,7 @@ from ranger_sim.harness.processes import places
 from ranger_sim.harness.processes.channel import SLOT_WORDS, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, TO_BOARD
 from ranger_sim.harness.processes.lone_board import LoneBoard
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 from tests.examples import examples
 
 STEP_NS = 100_000

@@ -18,8 +18,8 @@ from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
 from ranger_sim.harness.processes.places import SLOTS
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.stage import Stage
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.robot import Ranger
 from tests.examples import examples
 from tests.harness.processes.child import Child
 

@@ -24,8 +24,8 @@ from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import Supervisor
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from tests.firmware_sim.native.support import COMPILER, SCHEDULE, TIMER, folder_with, library_of
 from tests.harness.processes.test_supervisor import Said
 

@@ -10,8 +10,8 @@ import pytest
 from ranger_sim.harness.processes import supervisor
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import Supervisor, View
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import StopRule
 from tests.harness.processes.child import Child, fork
 
 

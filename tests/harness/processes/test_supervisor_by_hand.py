@@ -10,11 +10,11 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import places, supervisor
-from ranger_sim.harness.processes.requests import Request
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import GONE, HANG_S, PLANT, RESTARTING, RUNNING, STOPPED, Child, Supervisor
-from ranger_sim.harness.ranger import Ranger
 from ranger_sim.harness.stop_rule import StopRule
+from ranger_sim.ranger.requests import Request
+from ranger_sim.ranger.robot import Ranger
 
 
 class Said(supervisor.View):

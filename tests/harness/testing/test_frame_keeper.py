@@ -6,8 +6,8 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.names import Names
-from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing import frames
+from ranger_sim.ranger.names import RANGER
 
 
 def test_blocks_of_the_window_are_kept_and_passed_on():

@@ -7,12 +7,12 @@ import pytest
 from ranger_sim.datatable.generated import errors as error_table
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.normal_errors import BURST_S
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.health import Expected, Health, amount
-from ranger_sim.harness.testing.robots import assert_healthy, new_robot
-from ranger_sim.harness.wiring import ranger as wiring
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.names import RANGER
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.testing.robots import assert_healthy, new_robot
 
 NOTHING = lambda: None  # noqa: E731  (a function of a schedule that does nothing)
 

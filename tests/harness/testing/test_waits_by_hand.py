@@ -9,11 +9,11 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import word_of_value
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import ConditionNotMetError
-from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.testing.bench import AHEAD_BITS, BusAlone
 from ranger_sim.harness.testing.frames import frame_type
 from ranger_sim.harness.testing.wire import Intervals, Wire
+from ranger_sim.ranger.conditions import ConditionNotMetError
+from ranger_sim.ranger.names import RANGER
+from ranger_sim.ranger.testing.bench import AHEAD_BITS, BusAlone
 
 US = 1000
 FRAME = frame_type(RANGER)

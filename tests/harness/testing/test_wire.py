@@ -6,12 +6,12 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.row_stream import FrameStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.ranger_names import RANGER
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.testing.figures import Observed
 from ranger_sim.harness.testing.frames import FrameKeeper
 from ranger_sim.harness.testing.wire import Wire
+from ranger_sim.ranger.names import RANGER
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 MS = 1_000_000
 ANGLE, CURRENT, HEEL = (

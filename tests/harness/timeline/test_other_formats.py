@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.timeline import Timeline
 from ranger_sim.harness.timeline import files as formats
 from ranger_sim.harness.timeline.model import Events, Instant, Instants
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.timeline import Timeline
 
 RUN_S = 0.03
 

@@ -8,10 +8,10 @@ import pytest
 
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.conditions import condition
-from ranger_sim.harness.ranger import BOARD_CLASSES, Ranger
-from ranger_sim.harness.timeline import Timeline
 from ranger_sim.harness.timing.machine_slots import Held
+from ranger_sim.ranger.conditions import condition
+from ranger_sim.ranger.robot import BOARD_CLASSES, Ranger
+from ranger_sim.ranger.timeline import Timeline
 
 
 def test_recording_every_board_leaves_the_run_byte_for_byte_as_it_is():

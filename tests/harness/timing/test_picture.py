@@ -4,8 +4,9 @@ from types import SimpleNamespace as Made
 
 import pytest
 
-from ranger_sim.harness.timing import picture, static_check
+from ranger_sim.harness.timing import picture
 from ranger_sim.harness.timing.picture import WIDTH
+from ranger_sim.ranger.timing import static_check
 
 
 def test_a_piece_of_time_fills_the_cells_that_it_covers_and_no_other():

@@ -8,10 +8,10 @@ import pytest
 
 from ranger_sim.harness.processes import activity, places
 from ranger_sim.harness.processes.apart import Undertaker
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.testing.process_robot import ProcessRobot
-from ranger_sim.harness.timeline import Timeline
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.ranger.testing.process_robot import ProcessRobot
+from ranger_sim.ranger.timeline import Timeline
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux (eventfd, pidfd)")
 

@@ -7,7 +7,7 @@ import pytest
 
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import mch
-from ranger_sim.harness.ranger import Ranger
+from ranger_sim.ranger.robot import Ranger
 
 SLOW_CYCLES = 27_000  # with what its slot does beside, more than the 30,000 of 500 us
 

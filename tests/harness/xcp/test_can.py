@@ -23,10 +23,10 @@ from ranger_sim.datatable.generated import errors, routes
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.harness.processes.outside import move_bus
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
-from ranger_sim.harness.wiring import ranger as wiring
 from ranger_sim.harness.xcp.can import XcpCanProbe
+from ranger_sim.ranger import wiring
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 STEP_S = 0.00025  # of the plant: as often the master looks

@@ -12,10 +12,10 @@ import pytest
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import XCP_MASTER_ID, XCP_SLAVE_ID, address_of
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.xcp.can import XcpCanProbe
 from ranger_sim.harness.xcp.udp import XcpUdpServer
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 pytest.importorskip("pyxcp")
 MASTER = pathlib.Path(__file__).with_name("pyxcp_master.py")

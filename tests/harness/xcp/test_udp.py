@@ -11,10 +11,10 @@ from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import address_of
 from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, MALFORMED
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.xcp import udp
 from ranger_sim.harness.xcp.udp import XcpUdpServer
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 
 class Client:

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from ranger_sim.harness.records.summary import oddities
 from ranger_sim.plant.mechanics import walk_record
 from ranger_sim.plant.mechanics.body import DOUBLE, FALLEN, SINGLE, Body
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.plant.ranger import RangerPlant
+from ranger_sim.ranger.records.summary import oddities
 from ranger_sim.tools.report.page import contact
 from tests.plant.walking.small_controllers import STEP_S, PaperGait, Walker, mid_stance_start
 

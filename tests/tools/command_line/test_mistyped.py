@@ -3,9 +3,9 @@
 import pytest
 
 from ranger_sim.foundation.user_error import UserError, did_you_mean
-from ranger_sim.harness.conditions import condition
 from ranger_sim.harness.faults import text
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.conditions import condition
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools.cli import main
 
 

@@ -5,11 +5,11 @@ Read from the plant itself, between its steps; shares nothing with tools/fmu but
 
 import contextlib
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.plant.electrics.drive import PWM_WRITE, ROW
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, MOTOR_NAMES, WORD_NAMES
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 
 class Recorder(StepWatch):

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.scenario import Scenario
 from ranger_sim.plant import body_files
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools.fmu.body import ExportedBody, given_of
 from ranger_sim.tools.fmu.units import exponents
 from tests.tools.fmu.recording import recorded

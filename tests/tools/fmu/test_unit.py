@@ -8,7 +8,7 @@ import zipfile
 import numpy
 import pytest
 
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools import cli
 from tests.tools.fmu.recording import recorded
 

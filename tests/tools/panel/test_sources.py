@@ -14,7 +14,7 @@ from ranger_sim import Ranger, Scenario
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import error_word
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.feed.server import FeedServer
+from ranger_sim.ranger.feed import FeedServer
 from ranger_sim.tools.panel.inside.errors import ErrorList
 from ranger_sim.tools.panel.link import LinkSource
 from ranger_sim.tools.panel.recording import Event, RecordingSource

@@ -1,8 +1,9 @@
 """A robot with its data link in this process, on virtual time: what it sends goes to a session, or is lost."""
 
 from ranger_sim.harness.outside import serial_ports
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario
+from ranger_sim.ranger import serial_ports as robot_ports
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario
 
 LOOK_S = 0.005
 
@@ -36,7 +37,7 @@ class OnALine:
     def __init__(self):
         self.robot = Ranger(Scenario())
         self.port = InMemory()
-        serial_ports.connect_daq(self.robot, self.port)
+        robot_ports.connect_daq(self.robot, self.port)
         self.robot.board("MB").computer.rate_sum = 40_960  # not ten seconds of ramp
 
     def pass_on(self, session, seconds, loses=False):

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools.run import unexpected
 
 MU = 0.9

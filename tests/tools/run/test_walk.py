@@ -11,8 +11,8 @@ from rich.console import Console
 
 from ranger_sim.foundation import random_arrays
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.ranger import Ranger
-from ranger_sim.harness.scenario import Scenario, StopRule
+from ranger_sim.ranger.robot import Ranger
+from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools import cli
 from ranger_sim.tools.command_line import interrupts
 from ranger_sim.tools.command_line.units import duration_text

@@ -6,7 +6,7 @@ import shlex
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ranger_sim.harness.scenario import LIMITS, StopRule
+from ranger_sim.ranger.scenario import LIMITS, StopRule
 from ranger_sim.tools import cli
 from ranger_sim.tools.run import serial_options, walk_options
 from ranger_sim.tools.run.walk_options import WALK

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from ranger_sim.harness.timing import robot_figures
+from ranger_sim.ranger.timing import robot_figures
 from ranger_sim.tools import cli
 from ranger_sim.tools.timing import slots
 

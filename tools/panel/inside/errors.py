@@ -12,7 +12,7 @@ import numpy as np
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import parts_of_error_word
 from ranger_sim.harness import normal_errors
-from ranger_sim.harness.ranger_names import RANGER
+from ranger_sim.ranger.names import RANGER
 from ranger_sim.tools.panel.inside.frames import keys_of
 from ranger_sim.tools.panel.source import error_rows
 
