@@ -211,15 +211,16 @@ class MotorUnit:
         half: cython.double = 0.5 * self.gear * rate_rad_s * seconds
         middle: cython.double = self.gear * angle_rad + half
         factor: cython.double = 1.0
-        part: cython.double
-        x: cython.double
+        amplitude: cython.double
+        half_phase: cython.double
         i: cython.Py_ssize_t
         for i in range(0, len(self.ripples), 3):
-            part = self.ripples[i]
-            x = self.ripples[i + 1] * half
-            if x > 1e-4 or x < -1e-4:  # below, the mean of a sine about its middle is the middle, to 1e-9
-                part *= sin(x) / x
-            factor += part * sin(self.ripples[i + 1] * middle + self.ripples[i + 2])
+            amplitude = self.ripples[i]
+            half_phase = self.ripples[i + 1] * half
+            # below, the mean of a sine about its middle is the middle, to 1e-9
+            if half_phase > 1e-4 or half_phase < -1e-4:
+                amplitude *= sin(half_phase) / half_phase
+            factor += amplitude * sin(self.ripples[i + 1] * middle + self.ripples[i + 2])
         self.angle_factor = factor
 
     @cython.ccall
@@ -263,19 +264,26 @@ class MotorUnit:
         GK: cython.double = self.mounting * self.gear * self.K * self.angle_factor
         contact_V: cython.double = self.contact_drop_V
         back_emf_V: cython.double = GK * rate_rad_s
-        amps: cython.double = self.bridge_current_A
-        d: cython.double = drive.duty
-        x: cython.double
-        drop: cython.double
+        bridge_A: cython.double = self.bridge_current_A
+        duty: cython.double = drive.duty
+        driving_V: cython.double
+        drop_V: cython.double
         sign: cython.double
-        final: cython.double
-        above: cython.double
-        part: cython.double = -1.0
+        final_A: cython.double
+        above_A: cython.double
+        end_A: cython.double = -1.0  # size of the current at the end of the step; below 0: it crosses zero before
+        steady_As: cython.double
+        decaying_As: cython.double
+        size_As: cython.double
         total_As: cython.double
+        ripple_As: cython.double
+        gate_As: cython.double
         from_battery_As: cython.double = 0.0
-        if amps == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
-            x = d * battery_V - back_emf_V
-            if -contact_V <= x <= contact_V:
+        from_battery_J: cython.double
+        mean_Nm: cython.double
+        if bridge_A == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
+            driving_V = duty * battery_V - back_emf_V
+            if -contact_V <= driving_V <= contact_V:
                 # nothing drives a current through the contacts and no lead switches: only time passes
                 if self.current_A != 0.0 or self.battery_current_A != 0.0 or self.drive_Nm != 0.0:
                     self.current_A = 0.0
@@ -289,63 +297,63 @@ class MotorUnit:
             self._know_step(h, R)
         if drive.next_change_ns > t1:
             if drive.is_open:
-                x = -back_emf_V
-                drop = contact_V + battery_V + 2.0 * self.diode_drop_V
+                driving_V = -back_emf_V
+                drop_V = contact_V + battery_V + 2.0 * self.diode_drop_V
             else:
-                x = d * battery_V - back_emf_V
-                drop = contact_V + self.dead_time_fraction * battery_V
-            # `sign`: side of zero the current is on or goes to; `final` and `above` are measured on that side
-            if amps > 0.0 or amps == 0.0 and x > drop:
+                driving_V = duty * battery_V - back_emf_V
+                drop_V = contact_V + self.dead_time_fraction * battery_V
+            # `sign`: side of zero the current is on or goes to; `final_A` and `above_A` are measured on that side
+            if bridge_A > 0.0 or bridge_A == 0.0 and driving_V > drop_V:
                 sign = 1.0
-            elif amps < 0.0 or x < -drop:
+            elif bridge_A < 0.0 or driving_V < -drop_V:
                 sign = -1.0
             else:
                 sign = 0.0
             if sign != 0.0:
-                final = (sign * x - drop) * self.per_ohm
-                above = sign * amps - final
-                part = final + above * self.decay
-        if part >= 0.0:
-            amps = sign * part
-            part = h * final
-            x = above * self.decay_s
-            self.square_A2s += final * (part + 2.0 * x) + above * above * self.decay_squared_s
-            part += x
-            self.size_As += part
-            total_As = sign * part
+                final_A = (sign * driving_V - drop_V) * self.per_ohm
+                above_A = sign * bridge_A - final_A
+                end_A = final_A + above_A * self.decay
+        if end_A >= 0.0:
+            bridge_A = sign * end_A
+            steady_As = h * final_A
+            decaying_As = above_A * self.decay_s
+            size_As = steady_As + decaying_As
+            total_As = sign * size_As
+            self.square_A2s += final_A * (steady_As + 2.0 * decaying_As) + above_A * above_A * self.decay_squared_s
+            self.size_As += size_As
             if drive.is_open:
-                from_battery_As -= part
-                self.diode_J += 2.0 * self.diode_drop_V * part
+                from_battery_As -= size_As
+                self.diode_J += 2.0 * self.diode_drop_V * size_As
             else:
                 # the dead time's drop is the battery's own voltage, switched against the current: it goes back
-                from_battery_As += d * total_As - self.dead_time_fraction * part
+                from_battery_As += duty * total_As - self.dead_time_fraction * size_As
                 if drive.switching_leads > 0:
-                    part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * h
-                    x = drive.switching_leads * self.gate_W_per_V * h
-                    self.ripple_J += part * battery_V
-                    self.gate_J += x * battery_V
-                    from_battery_As += part + x
+                    ripple_As = battery_V * R * self.ripple_per_ohm2 * drive.ripple * h
+                    gate_As = drive.switching_leads * self.gate_W_per_V * h
+                    self.ripple_J += ripple_As * battery_V
+                    self.gate_J += gate_As * battery_V
+                    from_battery_As += ripple_As + gate_As
         else:
             self._step_in_pieces(t0, t1, back_emf_V, battery_V)
-            amps = self.bridge_current_A
+            bridge_A = self.bridge_current_A
             total_As = self.total_As
             from_battery_As = self.from_battery_As
-        self.bridge_current_A = amps
-        self.current_A = self.mounting * amps
+        self.bridge_current_A = bridge_A
+        self.current_A = self.mounting * bridge_A
         self.battery_current_A = from_battery_As * self.per_s
         self.mechanical_J += back_emf_V * total_As
-        x = from_battery_As * battery_V
-        if x >= 0.0:
-            self.drawn_J += x
+        from_battery_J = from_battery_As * battery_V
+        if from_battery_J >= 0.0:
+            self.drawn_J += from_battery_J
         else:
-            self.returned_J -= x
+            self.returned_J -= from_battery_J
         self.heat_s += h
         if self.heat_s >= 0.008:
             self._heat()
         # the torque numbers for the body: `load` of the mean current
-        x = GK * total_As * self.per_s
-        self.drive_Nm = x
-        self.coulomb_Nm = self.mu * (x if x > 0.0 else -x) + self.C0
+        mean_Nm = GK * total_As * self.per_s
+        self.drive_Nm = mean_Nm
+        self.coulomb_Nm = self.mu * (mean_Nm if mean_Nm > 0.0 else -mean_Nm) + self.C0
 
     @cython.cfunc
     def _step_in_pieces(
@@ -368,21 +376,26 @@ class MotorUnit:
         R: cython.double = self.known_ohm
         tau: cython.double = self.tau_s
         contact_V: cython.double = self.contact_drop_V
-        amps: cython.double = self.bridge_current_A
-        seconds: cython.double
-        left: cython.double
-        x: cython.double
-        drop: cython.double
-        d: cython.double
+        bridge_A: cython.double = self.bridge_current_A
+        between_changes_s: cython.double
+        left_s: cython.double
+        piece_s: cython.double
+        driving_V: cython.double
+        drop_V: cython.double
+        duty: cython.double
         sign: cython.double
-        final: cython.double
-        above: cython.double
-        e: cython.double
-        e_s: cython.double
-        ee_s: cython.double
-        part: cython.double
-        charge: cython.double
-        absolute: cython.double
+        final_A: cython.double
+        above_A: cython.double
+        end_A: cython.double
+        decay: cython.double
+        decay_s: cython.double
+        decay_squared_s: cython.double
+        steady_As: cython.double
+        piece_As: cython.double
+        signed_As: cython.double
+        unsigned_As: cython.double
+        ripple_As: cython.double
+        gate_As: cython.double
         from_battery_As: cython.double = 0.0
         total_As: cython.double = 0.0
         size_As: cython.double = 0.0
@@ -391,77 +404,77 @@ class MotorUnit:
             following = drive.next_change_ns
             if following > t1:
                 following = t1
-            seconds = (following - now) * 1e-9
-            d = drive.duty
+            between_changes_s = (following - now) * 1e-9
+            duty = drive.duty
             if drive.is_open:
-                x = -back_emf_V
-                drop = contact_V + battery_V + 2.0 * self.diode_drop_V
+                driving_V = -back_emf_V
+                drop_V = contact_V + battery_V + 2.0 * self.diode_drop_V
             else:
-                x = d * battery_V - back_emf_V
-                drop = contact_V + self.dead_time_fraction * battery_V
-            charge = 0.0
-            absolute = 0.0
-            left = seconds
-            while left > 0.0:
-                # `sign`: side of zero the current is on or goes to; `final` and `above` are measured on that side
-                if amps > 0.0:
+                driving_V = duty * battery_V - back_emf_V
+                drop_V = contact_V + self.dead_time_fraction * battery_V
+            signed_As = 0.0
+            unsigned_As = 0.0
+            left_s = between_changes_s
+            while left_s > 0.0:
+                # `sign`: side of zero the current is on or goes to; `final_A` and `above_A` are measured on that side
+                if bridge_A > 0.0:
                     sign = 1.0
-                elif amps < 0.0:
+                elif bridge_A < 0.0:
                     sign = -1.0
-                elif x > drop:
+                elif driving_V > drop_V:
                     sign = 1.0
-                elif x < -drop:
+                elif driving_V < -drop_V:
                     sign = -1.0
                 else:
                     break  # the contact drop holds the current at zero
-                final = (sign * x - drop) * self.per_ohm
-                above = sign * amps - final
-                if left == h:
-                    e = self.decay
-                    e_s = self.decay_s
-                    ee_s = self.decay_squared_s
+                final_A = (sign * driving_V - drop_V) * self.per_ohm
+                above_A = sign * bridge_A - final_A
+                if left_s == h:
+                    decay = self.decay
+                    decay_s = self.decay_s
+                    decay_squared_s = self.decay_squared_s
                 else:
-                    e = exp(-left / tau)
-                    e_s = tau * (1.0 - e)
-                    ee_s = 0.5 * tau * (1.0 - e * e)
-                part = final + above * e
-                if part >= 0.0:
-                    amps = sign * part
-                    part = left
-                    left = 0.0
+                    decay = exp(-left_s / tau)
+                    decay_s = tau * (1.0 - decay)
+                    decay_squared_s = 0.5 * tau * (1.0 - decay * decay)
+                end_A = final_A + above_A * decay
+                if end_A >= 0.0:
+                    bridge_A = sign * end_A
+                    piece_s = left_s
+                    left_s = 0.0
                 else:
-                    # the current reaches zero inside: there e = -final / above
-                    e = -final / above
-                    e_s = tau * (1.0 - e)
-                    ee_s = 0.5 * tau * (1.0 - e * e)
-                    part = tau * log(above / -final)
-                    if part > left:
-                        part = left
-                    left -= part
-                    amps = 0.0
-                part *= final
-                square_A2s += final * (part + 2.0 * above * e_s) + above * above * ee_s
-                part += above * e_s
-                charge += sign * part
-                absolute += part
-            total_As += charge
-            size_As += absolute
+                    # the current reaches zero inside: there the decay is -final / above
+                    decay = -final_A / above_A
+                    decay_s = tau * (1.0 - decay)
+                    decay_squared_s = 0.5 * tau * (1.0 - decay * decay)
+                    piece_s = tau * log(above_A / -final_A)
+                    if piece_s > left_s:
+                        piece_s = left_s
+                    left_s -= piece_s
+                    bridge_A = 0.0
+                steady_As = final_A * piece_s
+                square_A2s += final_A * (steady_As + 2.0 * above_A * decay_s) + above_A * above_A * decay_squared_s
+                piece_As = steady_As + above_A * decay_s
+                signed_As += sign * piece_As
+                unsigned_As += piece_As
+            total_As += signed_As
+            size_As += unsigned_As
             if drive.is_open:
-                from_battery_As -= absolute
-                self.diode_J += 2.0 * self.diode_drop_V * absolute
+                from_battery_As -= unsigned_As
+                self.diode_J += 2.0 * self.diode_drop_V * unsigned_As
             else:
                 # the dead time's drop is the battery's own voltage, switched against the current: it goes back
-                from_battery_As += d * charge - self.dead_time_fraction * absolute
+                from_battery_As += duty * signed_As - self.dead_time_fraction * unsigned_As
                 if drive.switching_leads > 0:
-                    part = battery_V * R * self.ripple_per_ohm2 * drive.ripple * seconds
-                    x = drive.switching_leads * self.gate_W_per_V * seconds
-                    self.ripple_J += part * battery_V
-                    self.gate_J += x * battery_V
-                    from_battery_As += part + x
+                    ripple_As = battery_V * R * self.ripple_per_ohm2 * drive.ripple * between_changes_s
+                    gate_As = drive.switching_leads * self.gate_W_per_V * between_changes_s
+                    self.ripple_J += ripple_As * battery_V
+                    self.gate_J += gate_As * battery_V
+                    from_battery_As += ripple_As + gate_As
             now = following
             if now == drive.next_change_ns:
                 drive.apply(now)
-        self.bridge_current_A = amps
+        self.bridge_current_A = bridge_A
         self.total_As = total_As
         self.from_battery_As = from_battery_As
         self.size_As += size_As

@@ -10,7 +10,9 @@ robot, along the (sloped) floor and normal to it.
 
 The body's fields and geometry are defined here. Its motion and events, in the order in which one file imports the next:
 
-    stance, air          one step of the equations of motion: on one or two feet; in flight or in the operator's hands
+    leg_motion           a leg during a step: chain, torques, stages
+    stance_equations     the equations of motion on one or two feet
+    stance, air          one step: on one or two feet; in flight or in the operator's hands
     sliding              one step while a foot slides
     walking/impact       a foot meets the floor
     walking/lift_off     a foot leaves it
@@ -29,9 +31,11 @@ from cython.cimports.libc.math import cos, sin
 from ranger_sim.plant.mechanics.contact_equations import ContactEquations
 from ranger_sim.plant.mechanics.floor import Floor
 from ranger_sim.plant.mechanics.leg import INNER, LEG_NAMES, OUTER, Leg
+from ranger_sim.plant.mechanics.leg_motion import LegMotion
 from ranger_sim.plant.mechanics.observed import Observed
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.plant.mechanics.parts import Ankle, HipJoint, Sole
+from ranger_sim.plant.mechanics.stance_equations import StanceEquations
 from ranger_sim.plant.mechanics.walk_record import WalkRecord
 
 if TYPE_CHECKING:
@@ -60,6 +64,9 @@ class Body:
     inner: Leg
     stance: Leg
     swing: Leg
+    outer_motion: LegMotion
+    inner_motion: LegMotion
+    stance_equations: StanceEquations
     mode: cython.longlong
     step_start_ns: cython.longlong
     changes: cython.longlong
@@ -86,6 +93,8 @@ class Body:
     # the rest serves double stance, the sole, events and additional terms
     closing_rate: cython.double
     hip_ay: cython.double
+    hip_ddx: cython.double[4]
+    hip_ddy: cython.double[4]
     sole: Sole
     event: cython.longlong
     event_leg: Leg
@@ -124,6 +133,8 @@ class Body:
         self.hip_vx = 0.0
         self.hip_vy = 0.0
         self.hip_ay = 0.0  # at the start of the last step, in the air only
+        self.hip_ddx = [0.0] * 4  # accelerations at the stages of a step in the air
+        self.hip_ddy = [0.0] * 4
         self.saved = [0.0] * 4
 
         # contact
@@ -159,7 +170,13 @@ class Body:
         self.event_leg = self.outer
         self.changes = 0  # touches, lift-offs and falls so far
         self.cause = ""  # of a fall
-        self.equations = ContactEquations()  # kept to be filled anew
+        # filled anew in every step
+        self.equations = ContactEquations()
+        self.outer_motion = LegMotion(self.outer)
+        self.inner_motion = LegMotion(self.inner)
+        self.stance_equations = StanceEquations(
+            self.hip, self.ankle, self.sole, self.M, self.inverse_smoothing, self.closing_rate
+        )
         # in the operator's hands, upright, the inner legs ahead
         self.inner.angle = -0.3
         self.inner.foot_angle = -0.3

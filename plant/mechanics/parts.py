@@ -5,6 +5,8 @@
 import cython
 from cython.cimports.libc.math import cos, sin, sqrt
 
+from ranger_sim.plant.mechanics.friction import smoothed_sign
+
 
 @cython.final
 @cython.cclass
@@ -46,6 +48,22 @@ class HipJoint:
             return self.k * angle
         length = sqrt(self.aabb - 2.0 * self.ab * cos(angle))
         return 2.0 * self.exact_k * self.ab * (1.0 - self.l0 / length) * sin(angle)
+
+    @cython.ccall
+    @cython.exceptval(check=False)
+    def torque(
+        self, sign: cython.double, angle: cython.double, rate: cython.double, per_rad_s: cython.double
+    ) -> cython.double:
+        """Torque of motor and spring on a leg against the other one, N m (EQUATIONS 2.1, 2.4).
+
+        sign: the leg's `hip_sign`; angle, rate: of that leg less the other one (rad, rad/s); per_rad_s: 1 / epsilon.
+        """
+        return (
+            sign * self.drive
+            - self.coulomb * smoothed_sign(rate * per_rad_s)
+            - self.viscous * rate
+            - self.spring_torque(angle)
+        )
 
     @cython.ccall
     @cython.exceptval(check=False)

@@ -126,8 +126,7 @@ def write_forces(body: "Body") -> cython.void:
     x.right[COLUMN_VX] = body.M * body.gx
     x.right[COLUMN_VY] = body.M * body.gy
     # EQUATIONS 2.1, 2.4: the hip's motor and spring
-    hip = joint.drive - joint.coulomb * smoothed_sign(rate * body.inverse_smoothing) - joint.viscous * rate
-    hip -= joint.spring_torque(o.angle - i.angle)
+    hip = joint.torque(1.0, o.angle - i.angle, rate, body.inverse_smoothing)
     if terms is not None:
         hip += terms.torque_on_hip(o.angle - i.angle, rate)
     write_leg(body, o)

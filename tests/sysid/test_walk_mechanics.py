@@ -1,7 +1,7 @@
 """The walk's balances on motions of the plant's body: what they leave over is what moves it, and else nothing.
 
-The body's accelerations come from Lagrange's equations in closed form (plant/mechanics/stance.py), which other tests
-hold against two further derivations; the balances here are sums of moments.
+The body's accelerations come from Lagrange's equations in closed form (plant/mechanics/stance_equations.py), which
+other tests compare with two further derivations; the balances here are sums of moments.
 """
 
 import dataclasses

@@ -1,7 +1,7 @@
 """The appendix's own formulation, corrected: angles q1 ... q4 that swap names at heel-strike, massless feet.
 
 It is the second derivation of the body (angular momentum balances about P1, A1, H and A2, where
-`plant/mechanics/stance.py` uses Lagrange's equations in fixed legs) and the model of the benchmarks of the
+`plant/mechanics/stance_equations.py` uses Lagrange's equations in fixed legs) and the model of the benchmarks of the
 appendix's section 6. Numbers in parentheses are the appendix's equations; the corrections are the errata listed in
 plant/EQUATIONS.md, section 13.
 
