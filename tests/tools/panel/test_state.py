@@ -22,8 +22,9 @@ def page(tmp_path_factory):
     log = folder / "log.csv"
     log.write_text("time_s,hip_rad\n" + "".join(f"{k / 100},{k % 7}\n" for k in range(30)), encoding="utf-8")
     with served(str(log)) as (address, _), page_of(address, folder) as page:
-        page.value("void Promise.all([import('/state.js'), import('/store.js')]).then((both) => { window.both = both; })")
-        page.until("window.both !== undefined")
+        page.value("void import('/state.js').then((state) => { window.state = state; })")
+        page.value("void import('/store.js').then((store) => { window.store = store; })")
+        page.until("window.state !== undefined && window.store !== undefined")
         yield page
 
 
@@ -31,7 +32,7 @@ def result(page, script, address="plots=channel_0,channel_1;channel_2&span=10", 
     """What a script returns that has `state()`, `update`, `subscribe`, the modules and a connected store."""
     return page.value(
         f"""(() => {{
-            const [at, {{ makeStore }}] = window.both;
+            const at = window.state, {{ makeStore }} = window.store;
             const store = makeStore(at.initial, at.updates), {{ state, update, subscribe }} = store;
             update.connected({json.dumps(hello)}, {json.dumps(address)});
             {script}
@@ -47,7 +48,8 @@ def test_the_address_that_a_state_writes_recalls_the_same_state(page):
         const address = at.addressOf(state());
         const other = makeStore(at.initial, at.updates);
         other.update.connected(state().hello, address);
-        return [address, at.addressOf(other.state()), other.state().plots.map((plot) => plot.channels), other.state().notes];
+        const { plots, notes } = other.state();
+        return [address, at.addressOf(other.state()), plots.map((plot) => plot.channels), notes];
     """
     address, again, plots, notes = result(page, script)
     assert address == again
