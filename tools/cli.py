@@ -62,7 +62,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.new import command as new
     from ranger_sim.tools.panel import command as panel
     from ranger_sim.tools.robodaq import command as daq
-    from ranger_sim.tools.run import summary_schema, up, walk
+    from ranger_sim.tools.run import ctl, summary_schema, up, walk
     from ranger_sim.tools.timing import slots, trace
     from ranger_sim.tools.tune import command as tune
     from ranger_sim.tools.vm import command as vm
@@ -81,6 +81,7 @@ def parser() -> argparse.ArgumentParser:
     trace.register(commands)
     tune.register(commands)
     up.register(commands)
+    ctl.register(commands)
     body.register(commands)
     bus.register(commands)
     can_bounds.register(commands)

@@ -41,6 +41,7 @@ class PlantRun:
         self.stage_words = words
         self.paused = False
         self.stopping = False
+        self.lost = ""  # the board whose stopped process ended the run
         self.mourned: set[str] = set()
         self.deaths: list[dict] = []
         self.gave_way: dict[int, str] = {}  # by the fault's number
@@ -153,7 +154,7 @@ class PlantRun:
                 if self.orders > ORDERS_LIMIT:
                     raise UserError(f"{what}: {ORDERS_LIMIT} requests wait for the robot's time to pass")
             if what == "stop":
-                self.stopping = True
+                self.stopping, self.lost = True, self.lost or order.get("lost", "")
             elif what == "pause":
                 self.paused = True
             elif what == "resume":
@@ -330,7 +331,7 @@ def serve(
     started = wallclock.monotonic_s()
     run.run(stop)
     run.wall_s = wallclock.monotonic_s() - started
-    interrupted = run.stopping
+    interrupted = run.stopping and not run.lost
     run.tell(collecting=True)
     run.collect()
     kernel.be_ordinary()

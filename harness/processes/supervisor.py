@@ -25,7 +25,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
-from ranger_sim.harness.processes.guard import is_awaited
+from ranger_sim.harness.processes.guard import DEADLINE_S, is_awaited
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
 from ranger_sim.harness.stop_rule import StopRule
@@ -33,6 +33,7 @@ from ranger_sim.harness.stop_rule import StopRule
 PLANT = "plant"
 LOOK_S = 0.2  # between two polls of boards and updates of the screen
 ASK_S = 0.005  # between two polls of requests, however many there are: it limits a client that never stops
+MOST_LOOK_S = 5 * LOOK_S  # how much of a process's stop one poll counts: a suspended machine or terminal counts once
 HANG_S = 1.0  # a board that keeps its turn this long is checked, and named well within 2 s
 RESTART_LIMIT = 5  # per board with --restart on-failure, so that a broken board does not keep us busy
 
@@ -54,7 +55,10 @@ class View:
 
 @dataclasses.dataclass
 class Child:
-    """A process of the robot. `turn`: the turn it had at the last poll, since `turn_since_s`."""
+    """A process of the robot. `turn`: the turn it had at the last poll, since `turn_since_s`.
+
+    stopped_s: for how long it has been stopped while a reply was awaited from it.
+    """
 
     name: str
     process: int
@@ -62,6 +66,7 @@ class Child:
     turn: int = -1
     turn_since_s: float = 0.0
     turn_cpu_s: float = 0.0
+    stopped_s: float = 0.0
     was_asked: bool = False  # for its position while it keeps its turn: a program in C reports it when it ends
 
 
@@ -92,6 +97,7 @@ class Supervisor:
         self.view = view
         self.control = ControlServer(settings.name, robot.admitted, self.obey)
         self.next_ask_s = self.next_look_s = 0.0
+        self.looked_s = 0.0
         self.sent_away: dict[str, dict[str, int]] = {}  # clients by endpoint and reason, as far as reported
         self.stage = new_stage()
         self.blocks = {
@@ -103,6 +109,7 @@ class Supervisor:
         self.signals: list[int] = []
         self.interrupts = 0
         self.ending = False  # the plant's process has reported the end
+        self.has_given_up = False  # a stopped process has ended the run
         self.status: dict = {}
         self.restarts: dict[str, int] = {}
         self.exit_code: int | None = None
@@ -391,7 +398,7 @@ class Supervisor:
             self.view.say(f"{child.name} (process {child.process}) {how}{': ' + why if why else ''}")
         words[places.FATE] = 1
         os.eventfd_write(self.blocks[child.name].answer_descriptor, 1)
-        if self.ending or self.interrupts:
+        if self.ending or self.interrupts or self.has_given_up:
             return
         if before == RESTARTING:
             self.make_room(child)
@@ -426,8 +433,11 @@ class Supervisor:
         self.exit_code = 1
 
     def look(self) -> None:
-        """Find boards that keep their turn too long, and show the state."""
+        """Find processes that keep their turn, or are stopped, too long, and show the state."""
         now = wallclock.monotonic_s()
+        passed_s, self.looked_s = min(now - self.looked_s, MOST_LOOK_S), now
+        for child in self.children.values():
+            self.look_at_stopped(child, passed_s)
         for name, block in self.blocks.items():
             child = self.children.get(name)
             if child is None or child.state != RUNNING:
@@ -462,6 +472,29 @@ class Supervisor:
         self.say_who_was_sent_away()
         if not self.ending:
             self.view.show(self.state())
+
+    def look_at_stopped(self, child: Child, passed_s: float) -> None:
+        """End the run when a process that is stopped has owed a reply for the deadline.
+
+        The body's process finishes the files; when it is itself the stopped one, none are finished.
+        """
+        block = self.blocks.get(child.name)
+        if child.state != STOPPED or (block is not None and not is_awaited(block)):
+            child.stopped_s = 0.0
+            return
+        child.stopped_s += passed_s
+        if child.stopped_s < DEADLINE_S:
+            return
+        child.stopped_s = 0.0
+        self.has_given_up = True
+        self.view.say(
+            f"{child.name} (process {child.process}) is stopped and has not replied for {DEADLINE_S:g} s: "
+            "it is killed, and the run ends"
+        )
+        if block is not None:
+            block.leave_fault(f"its process was stopped (SIGSTOP) for {DEADLINE_S:g} s")
+            self.order({"do": "stop", "lost": child.name})
+        os.kill(child.process, signal.SIGKILL)
 
     def is_held(self, name: str, words: Any) -> bool:
         """Whether a debugger has the board, or is awaited; reported when that begins."""

@@ -222,6 +222,25 @@ def test_a_stopped_board_is_named(up):
     assert robot.interrupt() == 130  # it is let go on, so that the files can be finished
 
 
+def test_a_board_that_stays_stopped_ends_the_run_with_its_cause_and_finished_files(up, tmp_path):
+    robot = up("--out", str(tmp_path / "run"), "--restart", "on-failure", speed="max")
+    os.kill(robot.processes()["CSR"], signal.SIGSTOP)
+    robot.wait_for(r"CSR \(process \d+\) is stopped and has not replied for 10 s: it is killed, and the run ends")
+    assert robot.end() == 1
+    assert "CSR was lost at" in robot.text and "its process was stopped (SIGSTOP) for 10 s" in robot.text
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert "CSR" in summary["failed_boards"] and not summary["interrupted"]
+    assert [death["board"] for death in summary["processes"]["deaths"]] == ["CSR"]
+
+
+def test_a_body_that_stays_stopped_ends_the_run(up):
+    robot = up(speed="max")
+    os.kill(robot.processes()["plant"], signal.SIGSTOP)
+    robot.wait_for(r"plant \(process \d+\) is stopped and has not replied for 10 s")
+    assert robot.end() == 1
+    assert "the run is lost, no files are finished" in robot.text
+
+
 SCRIPT = """
 import argparse, contextlib, sys
 from ranger_sim.harness.processes.settings import Settings
@@ -377,7 +396,7 @@ def test_boards_that_a_profile_has_elsewhere_get_no_process(up, tmp_path):
 @pytest.mark.parametrize(
     ("places", "complaint"),
     [
-        (["can9=virtual:a"], "there is no bus or board can9; there are can1, can2, can3, can4, MCH"),
+        (["can9=virtual:a"], "unknown bus or board 'can9' (available: can1, can2, can3, can4, MCH"),
         (["can1=virtual:a", "can1=virtual:b"], "can1 is given twice"),
         (["MCH=virtual:a"], "its bus can1 is not outside"),
         (["can1=socketcan:no-such-interface"], "bus can1 on socketcan:no-such-interface: "),

@@ -10,7 +10,7 @@ import pytest
 from ranger_sim.tools import cli
 from ranger_sim.tools.new import from_dbc
 from tests.firmware_sim.native.support import COMPILER
-from tests.harness.testing.project import environment, how_to_find_the_plugin
+from tests.ranger.testing.project import environment, how_to_find_the_plugin
 
 TWO_NODES = """VERSION ""
 NS_ :

@@ -20,12 +20,17 @@ IMAGE = Option(
 OPTIONS = (IMAGE,)
 
 
-def images_of(options: argparse.Namespace) -> dict[str, Image]:
-    """Read the requested images, by board."""
+def files_of(options: argparse.Namespace) -> dict[str, str]:
+    """The files of --image, by board. UserError for a board that is unknown or has two."""
     wanted: dict[str, str] = {}
     for text in options.image:
         board, path = image_boards.placed(text)
         if board in wanted:
             raise UserError(f"--image {text}: {board} has {wanted[board]} already")
         wanted[board] = path
-    return {board: image.read(pathlib.Path(path)) for board, path in wanted.items()}
+    return wanted
+
+
+def images_of(options: argparse.Namespace) -> dict[str, Image]:
+    """Read the requested images, by board."""
+    return {board: image.read(pathlib.Path(path)) for board, path in files_of(options).items()}

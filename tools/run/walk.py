@@ -158,14 +158,20 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     return 1 if summary["fell"] or summary["failed_boards"] else 0
 
 
-def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firmware]:
-    """The requested firmware in C, by board, compiled."""
+def firmware_folders(options: argparse.Namespace) -> dict[str, str]:
+    """The folders of --firmware, by board. UserError for a board that is unknown or has two."""
     wanted: dict[str, str] = {}
     for text in options.firmware:
         board, folder = native_boards.placed(text)
         if board in wanted:
             raise UserError(f"--firmware {text}: {board} has {wanted[board]} already")
         wanted[board] = folder
+    return wanted
+
+
+def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firmware]:
+    """The requested firmware in C, by board, compiled."""
+    wanted = firmware_folders(options)
     if options.coverage and not wanted:
         raise UserError("--coverage: there is no firmware in C in this run; --firmware BOARD=DIR gives a board one")
     if options.coverage:

@@ -101,6 +101,71 @@ def test_a_board_that_keeps_its_turn_too_long_is_killed_and_told(alone):
     assert alone.children["MCH"].was_asked
 
 
+def stopped(alone, name="MCH", process=41):
+    """A child that is stopped while its reply is awaited."""
+    child = alone.children[name] = Child(name, process, state=STOPPED)
+    if name != PLANT:
+        words = alone.blocks[name].words
+        words[places.ASKED], words[places.ANSWERED] = 7, 6
+    return child
+
+
+def pass_time(alone, seconds):
+    """Let time pass, with a poll every fifth of a second; the first one has nothing to count."""
+    alone.look()
+    for _ in range(round(seconds / 0.2)):
+        alone.clock.now += 0.2
+        alone.look()
+
+
+def test_a_board_that_stays_stopped_ends_the_run_after_ten_seconds(alone):
+    alone.look()
+    stopped(alone)
+    pass_time(alone, 9.8)
+    assert alone.killed == [] and plants(alone) == []
+    pass_time(alone, 0.4)
+    assert alone.killed == [(41, signal.SIGKILL)]
+    assert plants(alone) == [{"do": "stop", "lost": "MCH"}]
+    assert alone.view.heard() == [
+        "MCH (process 41) is stopped and has not replied for 10 s: it is killed, and the run ends"
+    ]
+    assert alone.blocks["MCH"].fault() == "its process was stopped (SIGSTOP) for 10 s"
+    alone.settings = Settings(None, restart="on-failure")
+    alone.ended(alone.children["MCH"], -9)
+    assert plants(alone) == []  # it is not restarted: the run ends
+
+
+def test_the_body_that_stays_stopped_ends_the_run_as_well(alone):
+    alone.look()
+    stopped(alone, PLANT, 42)
+    pass_time(alone, 10.2)
+    assert alone.killed == [(42, signal.SIGKILL)]
+    alone.ended(alone.children[PLANT], -9)
+    assert alone.exit_code == 1
+
+
+def test_a_suspended_machine_counts_as_one_second_of_a_stop(alone):
+    alone.look()
+    stopped(alone)
+    alone.clock.now += 3600.0
+    alone.look()
+    pass_time(alone, 8.8)
+    assert alone.killed == []
+
+
+def test_a_stopped_board_that_owes_no_reply_or_goes_on_does_not_end_the_run(alone):
+    alone.look()
+    child = stopped(alone)
+    pass_time(alone, 9.0)
+    child.state = RUNNING
+    alone.look()
+    child.state = STOPPED
+    pass_time(alone, 9.0)
+    alone.blocks["MCH"].words[places.ANSWERED] = 7  # the robot is paused
+    pass_time(alone, 60.0)
+    assert alone.killed == []
+
+
 @pytest.mark.parametrize(
     ("change", "killed"),
     [

@@ -41,13 +41,13 @@ def plots(page):
     return page.value(f"window.rangerPanel.plots.all().map((p) => {names})")
 
 
-def test_the_help_tells_of_every_key_that_does_something(tmp_path, recording):
+def test_the_help_lists_every_key_that_does_something(tmp_path, recording):
     with served(str(recording)) as (address, _), page_of(address, tmp_path) as page:
         page.value("window.rangerPanel.plots.setMark(1)")
         Hand(page).give("#note", "a step")
         Hand(page).click("#note-form button", "Keep")
         for place, keys in page.value("window.rangerPanel.keys()").items():
-            assert keys["told"] == keys["bound"], place
+            assert keys["listed"] == keys["bound"], place
         Hand(page).view("help")
         shown = page.value("[...document.querySelectorAll('#keys dt')].map((e) => e.textContent.trim())")
         assert {"h", "/", "← →", "+ -", "m", "n", "1 … 9", "Space", "Esc", "Alt+0 … Alt+5", "Del Backspace"} <= {*shown}

@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from ranger_sim.tools.run.up import LiveView, PlainView
+from ranger_sim.tools.run.up_view import LiveView, PlainView
 
 LATENESS = {"slots": 10, "p50_us": 20, "p99_us": 300, "p999_us": 4000, "max_us": 5000.4}
 STATE = {

@@ -1,14 +1,13 @@
 // The list of channels: searched by words, walked through by the arrow keys (one of its buttons is reached by Tab).
 import { bind } from "./keys.js";
+import { drawn } from "./state.js";
 
-// chosen: what a click does with a channel
-export function makeChannelList(box, search, chosen) {
-  let channels = [], listed = [], here = 0;   // listed: numbers of channels, group by group
-  let anywhere = new Set(), there = new Set();   // drawn in some plot, and in the chosen one
+export function makeChannelList({ state, update, subscribe }, box, search) {
+  let channels = [], listed = [], here = 0;   // listed: numbers of channels, group by group; here: the button that Tab reaches
   const words = (channel) => `${channel.name} ${channel.unit} ${channel.description} ${channel.group}`.toLowerCase();
   const buttons = () => [...box.querySelectorAll("button")];
 
-  function know(found) {
+  function order(found) {
     channels = found;
     const groups = [...new Set(channels.map((channel) => channel.group))];
     listed = [...channels.keys()].sort((a, b) => groups.indexOf(channels[a].group) - groups.indexOf(channels[b].group) || a - b);
@@ -28,8 +27,8 @@ export function makeChannelList(box, search, chosen) {
     if (!rows.length) rows.push(Object.assign(document.createElement("li"), { className: "note", textContent: "no channel has these words" }));
     box.replaceChildren(...rows);
     box.scrollTop = here = 0;
-    stand(0);
-    mark();
+    reachBy(0);
+    mark(state());
   }
 
   function line(channel, k) {
@@ -37,13 +36,13 @@ export function makeChannelList(box, search, chosen) {
     button.dataset.channel = k;
     button.append(channel.name, Object.assign(document.createElement("small"), { textContent: channel.unit ? ` ${channel.unit}` : "" }));
     button.ondragstart = (event) => event.dataTransfer.setData("text/plain", String(k));
-    button.onclick = () => { stand(buttons().indexOf(button)); chosen(k); };
+    button.onclick = () => { reachBy(buttons().indexOf(button)); update.toggleChannel(k); };
     item.append(button);
     return item;
   }
 
   // Tab leads to this one of the buttons.
-  function stand(place) {
+  function reachBy(place) {
     const all = buttons();
     if (all[here]) all[here].tabIndex = -1;
     here = Math.max(0, Math.min(all.length - 1, place));
@@ -51,18 +50,21 @@ export function makeChannelList(box, search, chosen) {
     return all[here];
   }
 
-  const go = (place) => { if (place < 0) search.focus(); else stand(place)?.focus(); };
+  const go = (place) => { if (place < 0) search.focus(); else reachBy(place)?.focus(); };
   bind("channels", box, { ArrowDown: () => go(here + 1), ArrowUp: () => go(here - 1), Home: () => go(0), End: () => go(Infinity) });
   bind("search", search, { ArrowDown: () => go(here) });
   search.oninput = list;
 
-  function mark() {
+  // Which channels are drawn in some plot, and which in the chosen one.
+  function mark(now) {
+    const anywhere = new Set(drawn(now)), there = now.plots.find((plot) => plot.id === now.chosen)?.channels ?? [];
     for (const button of buttons()) {
       const k = +button.dataset.channel;
       button.classList.toggle("on", anywhere.has(k));
-      button.setAttribute("aria-pressed", String(there.has(k)));
+      button.setAttribute("aria-pressed", String(there.includes(k)));
     }
   }
 
-  return { know, drawn: (in_any, in_chosen) => { anywhere = new Set(in_any); there = new Set(in_chosen); mark(); } };
+  subscribe(["hello"], ({ hello }) => order(hello.channels));
+  subscribe(["plots", "chosen"], mark);
 }

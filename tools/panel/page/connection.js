@@ -1,12 +1,13 @@
 // The one WebSocket: JSON out, binary messages in (messages.py has their form). Comes back by itself when it is lost.
-// A frame of the screen paints one picture, when it is due: painted as it comes, one picture would cost two frames.
+// A frame of the screen paints one picture, when it is due: painted on arrival, one picture would cost two frames.
 const VERSION = 3, TEXT = 1, TRACES = 2, POSE = 3, PICTURE = 4, ENVELOPE = 1, FOLLOWS = 1, ANEW = 2;
 const AGAIN_MS = [300, 1000, 3000];
 
-export function connect(heard) {
+// on: {hello, picture, traces, pose, values, state, closed}, called with what was received
+export function connect(on) {
   let socket = null, tries = 0, number = 0, refused = false;
-  let pictures = [];   // that came and are not painted
-  let heard_ms = performance.now();   // when the last message came
+  let pictures = [];   // received and not painted
+  let received_ms = performance.now();   // when the last message was received
   const waiting = new Map();
 
   function open() {
@@ -15,19 +16,19 @@ export function connect(heard) {
     socket.binaryType = "arraybuffer";
     pictures = [];
     socket.onopen = () => { tries = 0; };
-    socket.onmessage = (event) => { heard_ms = performance.now(); take(event.data); };
+    socket.onmessage = (event) => { received_ms = performance.now(); take(event.data); };
     socket.onclose = (event) => {
       for (const { fail } of waiting.values()) fail("the connection was lost");
       waiting.clear();
       refused = event.code === 1008;
-      heard.closed(event.reason || (tries ? "no answer" : "the connection was lost"), refused);
+      on.closed(event.reason || (tries ? "no answer" : "the connection was lost"), refused);
       if (!refused) setTimeout(open, AGAIN_MS[Math.min(tries++, AGAIN_MS.length - 1)]);
     };
   }
 
   function take(buffer) {
     const head = new DataView(buffer);
-    if (head.getUint8(0) !== VERSION) heard.closed("the server speaks another version: load the page again", true);
+    if (head.getUint8(0) !== VERSION) on.closed("the server has another version: load the page again", true);
     else if (head.getUint8(1) !== PICTURE) part(buffer, 0, buffer.byteLength);
     else if (pictures.push(buffer) === 1) requestAnimationFrame(paint);
   }
@@ -48,15 +49,15 @@ export function connect(heard) {
   function part(buffer, at, length) {
     const view = new DataView(buffer, at, length), kind = view.getUint8(1);
     if (kind === TEXT) takeText(JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, at + 16, length - 16))));
-    else if (kind === TRACES) heard.traces(plot(buffer, at, view));
-    else if (kind === POSE) heard.pose(view.getFloat64(16, true), new Float32Array(buffer, at + 24, view.getUint32(8, true)));
+    else if (kind === TRACES) on.traces(plot(buffer, at, view));
+    else if (kind === POSE) on.pose(view.getFloat64(16, true), new Float32Array(buffer, at + 24, view.getUint32(8, true)));
   }
 
   function takeText(content) {
-    if ("hello" in content) heard.hello(content.hello);
-    else if ("values" in content && "at" in content) heard.values(content.values, content.at);
-    else if ("state" in content) heard.state(content.state);
-    else if ("picture" in content) heard.picture(content.picture, content.lost);
+    if ("hello" in content) on.hello(content.hello);
+    else if ("values" in content && "at" in content) on.values(content.values, content.at);
+    else if ("state" in content) on.state(content.state);
+    else if ("picture" in content) on.picture(content.picture, content.lost);
     else if ("answer" in content) {
       const asked = waiting.get(content.answer);
       waiting.delete(content.answer);
@@ -86,12 +87,12 @@ export function connect(heard) {
     return found;
   }
 
-  const send = (wish) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(wish)); };
-  const ask = (wish) => new Promise((done, fail) => {
-    if (!socket || socket.readyState !== 1) { fail("there is no connection"); return; }
+  const send = (request) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(request)); };
+  const ask = (request) => new Promise((done, fail) => {
+    if (!socket || socket.readyState !== 1) { fail("not connected"); return; }
     waiting.set(++number, { done, fail });
-    send({ ...wish, number });
+    send({ ...request, number });
   });
   open();
-  return { send, ask, silent_ms: () => performance.now() - heard_ms };
+  return { send, ask, silent_ms: () => performance.now() - received_ms };
 }

@@ -26,7 +26,7 @@ function colourWords(rgb) {
   return most ? `${COLOURS[rgb.reduce((sum, each, k) => sum + (2 * each >= most) * (1 << k), 0)]} (red ${rgb[0]}, green ${rgb[1]}, blue ${rgb[2]})` : "off";
 }
 
-export function makeFace(box, press, steer) {
+export function makeFace({ subscribe }, { order }, box) {
   box.innerHTML = '<p class="note" id="unseen" role="status"></p><div class="top"><div class="lcd" role="img" aria-label="display"></div><div><label><input type="checkbox" id="hear"> hear the buzzer</label><p class="note" id="tone"></p></div></div>' +
     '<div class="lights"></div><div class="lights leds"></div><div class="keys"></div>' +
     '<label class="stick">radio <input type="range" min="-1" max="1" step="0.05" value="0" aria-label="radio stick, left to right"> <output>0</output></label>';
@@ -34,15 +34,15 @@ export function makeFace(box, press, steer) {
   for (let k = 0; k < 6; k++) lights.append(lamp(`light ${k + 1}`, k + 1));
   lights.append(lamp("sync light", "sync"));
   const leds = box.querySelector(".leds");
-  for (const name of Object.keys(LED_COLOURS)) leds.append(lamp(`${name} light beside the processor`, name));
+  for (const name of Object.keys(LED_COLOURS)) leds.append(lamp(`${name} light next to the processor`, name));
   KEYS.forEach((name, k) => {
     const button = Object.assign(document.createElement("button"), { type: "button", innerHTML: `key ${k}<small></small>` });
     button.querySelector("small").textContent = name;
-    button.onclick = () => press(k);
+    button.onclick = () => order({ do: "key", key: k }, `key ${k} pressed`);
     keys.append(button);
   });
   stick.oninput = () => { box.querySelector("output").textContent = stick.value; };
-  stick.onchange = () => steer(Number(stick.value));
+  stick.onchange = () => order({ do: "radio", stick: Number(stick.value) }, `radio stick at ${Number(stick.value)}`);
   let audio = null, tone = null, gain = null;
   box.querySelector("#hear").onchange = (event) => {
     if (!event.target.checked) { gain && (gain.gain.value = 0); return; }
@@ -86,5 +86,6 @@ export function makeFace(box, press, steer) {
       gain.gain.value = words[TONE] && box.querySelector("#hear").checked ? 0.05 : 0;
     }
   }
-  return { show };
+  subscribe(["hello"], ({ can }) => { box.hidden = !can.has("panel"); });
+  subscribe(["hello", "robot"], ({ can, robot }) => { if (can.has("panel")) show(robot.panel, robot.panel_unseen); });
 }

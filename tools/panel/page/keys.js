@@ -42,11 +42,11 @@ const PLACES = {
 };
 const SHOWN = { ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Escape: "Esc", Delete: "Del" };
 const SIGNS = new Set(PLACES.page[1].flatMap(({ keys }) => keys).filter((key) => key.length === 1));   // keys of one sign
-const TYPING = "input:not([type=checkbox]), select, textarea", SPACE_IS_ITS = "button, summary, [type=checkbox]";
+const TYPING = "input:not([type=checkbox]), select, textarea", USES_SPACE = "button, summary, [type=checkbox]";
 
 const bound = new Map();   // place: keys that something is bound to
 const STORED = "ranger-sim signs";
-let signs = true;          // keys of one sign act; who speaks to the computer may not want them
+let signs = true;          // keys of one sign act; users of speech input may not want them
 try { signs = localStorage.getItem(STORED) !== "off"; } catch { /* nothing is stored here: they act */ }
 
 // A key's name, also with Alt on keyboards where that gives other signs.
@@ -56,30 +56,30 @@ function named(event) {
   return event.shiftKey && key.length > 1 ? `Shift+${key}` : key;
 }
 
-// Does the key belong to what has the focus, so that it does nothing for the page?
-function taken(key, target) {
+// True if the key belongs to what has the focus, so that it does nothing for the page.
+function isTaken(key, target) {
   if (SIGNS.has(key) && !signs) return true;
-  if (key === "Space" && target.matches(SPACE_IS_ITS)) return true;
+  if (key === "Space" && target.matches(USES_SPACE)) return true;
   return !key.startsWith("Alt+") && target.matches(TYPING);
 }
 
-// actions: {key: what it does}; one that answers false has done nothing.
+// actions: {key: what it does}; one that returns false has done nothing.
 export function bind(place, element, actions) {
-  const told = new Set(PLACES[place][1].flatMap((each) => each.native ? [] : each.keys));
-  for (const key of Object.keys(actions)) if (!told.has(key)) throw new Error(`the help does not tell of ${key} in ${place}`);
+  const listed = new Set(PLACES[place][1].flatMap((each) => each.native ? [] : each.keys));
+  for (const key of Object.keys(actions)) if (!listed.has(key)) throw new Error(`the help does not list ${key} in ${place}`);
   bound.set(place, new Set([...bound.get(place) ?? [], ...Object.keys(actions)]));
   element.addEventListener("keydown", (event) => {
     const key = named(event);
-    if (event.ctrlKey || event.metaKey || !Object.hasOwn(actions, key) || (place === "page" && taken(key, event.target))) return;
+    if (event.ctrlKey || event.metaKey || !Object.hasOwn(actions, key) || (place === "page" && isTaken(key, event.target))) return;
     if (actions[key](event) === false) return;
     event.preventDefault();
     event.stopPropagation();
   });
 }
 
-// {place: {told, bound}}, keys in the order of the alphabet.
+// {place: {listed, bound}}, keys in the order of the alphabet.
 export const bindings = () => Object.fromEntries(Object.entries(PLACES).map(([place, [, rows]]) =>
-  [place, { told: rows.flatMap((each) => each.native ? [] : each.keys).sort(), bound: [...bound.get(place) ?? []].sort() }]));
+  [place, { listed: rows.flatMap((each) => each.native ? [] : each.keys).sort(), bound: [...bound.get(place) ?? []].sort() }]));
 
 function shown(keys) {
   const key = (name) => (name.length > 1 ? name.split("+") : [name]).flatMap((each, k) =>
@@ -87,7 +87,7 @@ function shown(keys) {
   return keys.length > 3 ? [...key(keys[0]), " … ", ...key(keys.at(-1))] : keys.flatMap((each) => [...key(each), " "]);
 }
 
-export function help(box, sayOf) {
+export function help(box, checkbox) {
   for (const [title, rows] of Object.values(PLACES)) {
     const list = document.createElement("dl");
     for (const each of rows) {
@@ -97,9 +97,9 @@ export function help(box, sayOf) {
     }
     box.append(Object.assign(document.createElement("h3"), { textContent: title }), list);
   }
-  sayOf.checked = signs;
-  sayOf.onchange = () => {
-    signs = sayOf.checked;
+  checkbox.checked = signs;
+  checkbox.onchange = () => {
+    signs = checkbox.checked;
     try { localStorage.setItem(STORED, signs ? "on" : "off"); } catch { /* it holds until the page is left */ }
   };
 }

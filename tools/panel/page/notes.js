@@ -1,36 +1,32 @@
-// Notes: marks that are kept with a word, in the address and on the plots; a click goes there.
+// The notes at times, a click goes there; and the field for a note at the mark, which gets the focus when the last note is gone.
 import { bind } from "./keys.js";
+import { by } from "./renew.js";
 
-// on: {changed(notes), go(time)}; beside: what gets the focus when the last note is gone
-export function makeNotes(box, beside, on) {
-  const notes = [];   // {time, text}
-
-  function list() {
+export function makeNotes({ state, update, subscribe }, box, field) {
+  subscribe(["notes"], ({ notes }) => {
     box.replaceChildren(...notes.map((each, k) => {
       const part = Object.assign(document.createElement("span"), { className: "kept" });
-      const going = Object.assign(document.createElement("button"), { type: "button", className: "chip", title: "go there", textContent: `${each.time.toFixed(3)} s: ${each.text}` });
+      const there = Object.assign(document.createElement("button"), { type: "button", className: "chip", title: "go there", textContent: `${each.time.toFixed(3)} s: ${each.text}` });
       const closer = Object.assign(document.createElement("button"), { type: "button", className: "close", textContent: "×" });
       closer.setAttribute("aria-label", `take away the note at ${each.time.toFixed(3)} s`);
-      going.onclick = () => on.go(each.time);
+      there.onclick = () => update.goToMark(each.time);
       closer.onclick = () => take(k);
-      bind("note", going, { Delete: () => take(k), Backspace: () => take(k) });
-      part.append(going, closer);
+      bind("note", there, { Delete: () => take(k), Backspace: () => take(k) });
+      part.append(there, closer);
       return part;
     }));
-    on.changed(notes);
-  }
+  });
 
   function take(k) {
-    notes.splice(k, 1);
-    list();
-    (box.children[Math.min(k, notes.length - 1)]?.firstChild ?? beside).focus();
+    update.removeNote(k);
+    (box.children[Math.min(k, state().notes.length - 1)]?.firstChild ?? field).focus();
   }
 
-  function add(time, text) {
-    notes.push({ time, text });
-    notes.sort((one, other) => one.time - other.time);
-    list();
-  }
-
-  return { add, all: () => notes };
+  by("note-form").onsubmit = (event) => {
+    event.preventDefault();
+    const text = field.value.trim(), { mark_s } = state();
+    if (!text || mark_s === null) { update.say(mark_s === null ? "click a plot first: the note stands at the mark" : "a note has a word or more"); return; }
+    update.addNote(text);
+    field.value = "";
+  };
 }

@@ -1,12 +1,20 @@
-// Parameters in groups: value now, limits, default, what was changed here; undo; sets as files; two sets compared.
+// The view of parameters in groups: value now, limits, default, what was changed here; undo; sets as files; two sets compared.
+import { download } from "./download.js";
 import { bind } from "./keys.js";
+import { by } from "./renew.js";
 import { figure } from "./words.js";
 
-export function makeParameters(box, tools, ask) {
+const VALUES_MS = 500;   // between two requests for the values, while the view is shown
+
+export function makeParameters({ state, subscribe }, { ask }, box) {
+  const tools = {
+    search: by("parameter-search"), changed: by("changed-only"), undo: by("undo"), save: by("save-set"), load: by("load-set"), compare: by("compare-set"),
+    note: (text, is_bad) => { by("parameter-note").textContent = text; by("parameter-note").classList.toggle("bad", !!is_bad); },
+  };
   let rows = [], current = {}, first = null, compared = null;
   const undone = [], inputs = new Map();
 
-  function know(found) {
+  function list(found) {
     rows = found;
     inputs.clear();
     const groups = new Map();
@@ -98,7 +106,7 @@ export function makeParameters(box, tools, ask) {
     const content = JSON.parse(await file.text());
     const found = content.parameters ?? content;
     const unknown = Object.keys(found).filter((name) => !inputs.has(name));
-    if (unknown.length) throw `${file.name}: ${unknown[0]} is no parameter`;
+    if (unknown.length) throw `${file.name}: unknown parameter ${unknown[0]}`;
     return found;
   }
 
@@ -136,13 +144,14 @@ export function makeParameters(box, tools, ask) {
   tools.save.onclick = save;
   tools.load.onchange = () => { if (tools.load.files[0]) load(tools.load.files[0]); tools.load.value = ""; };
   tools.compare.onchange = () => { if (tools.compare.files[0]) compare(tools.compare.files[0]); tools.compare.value = ""; };
-  return { know, show };
-}
-
-export function download(name, content) {
-  const link = document.createElement("a");
-  link.href = content instanceof Blob ? URL.createObjectURL(content) : URL.createObjectURL(new Blob([content]));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  subscribe(["hello"], ({ hello }) => list(hello.parameters));
+  setInterval(async () => {
+    const { hello, view, numbers } = state();
+    if (!hello || view !== "parameters") return;
+    const names = rows.map((row) => row.name).filter((name) => numbers.has(name));
+    try {
+      const { values } = await ask({ do: "values", channels: names.map((name) => numbers.get(name)), at: null });
+      show(Object.fromEntries(names.map((name, k) => [name, values[k]])));
+    } catch { /* the light shows it */ }
+  }, VALUES_MS);
 }

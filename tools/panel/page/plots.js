@@ -2,27 +2,62 @@
 // has its axes and cursor, and strip.js its lines.
 import { bind } from "./keys.js";
 import { colourOf, dashOf, inkOf, swatch } from "./pens.js";
-import { put as say } from "./renew.js";
+import { put } from "./renew.js";
+import { drawn } from "./state.js";
 import { makeStrip } from "./strip.js";
+import { colour, onOtherColours } from "./theme.js";
 import { extremes, plotWords, title, valueWords } from "./words.js";
 
 const HEIGHT = 230, MOST_AXES = 4, AXIS_PX = 62, MOST_POINTS = 4000;
 const TIGHTER = 0.5;    // an axis stays as it is until what is seen leaves it, or needs less than this share of it
-const READABLE_MS = 150;   // between two figures at one place
-const TOLD_MS = 1000;      // between two of a plot's descriptions in words
-const MOST_CHANNELS = 48;  // of all plots (server.py)
+const READABLE_MS = 150;    // between two figures at one place
+const DESCRIBED_MS = 1000;  // between two of a plot's descriptions in words
 
-export function makePlots(box, on, colour) {
-  let plots = [], channels = [], chosen = null;   // chosen: where channels go
-  let mark = null, at = null, dragged = null;   // dragged: the plot that a channel is drawn out of
-  let exact = { at: null, values: {} }, marked = {}, notes = [], told_ms = 0, described_ms = 0;   // what the server says stands at the cursor, and at the mark
+export function makePlots({ state, update, subscribe }, box) {
+  // Of each plot of the state, in its order: its id, its channels (numbers), and what draws it.
+  let plots = [];
+  let dragged = null;    // the plot that a channel is dragged out of
+  let pointed;           // where uPlot itself has placed the cursors, by the mouse; undefined: it has not
+  let figures_ms = 0, described_ms = 0;   // when the figures, and the descriptions, were last written
 
-  function add(numbers = []) {
+  const channels = () => state().hello.channels;
+
+  subscribe(["plots", "chosen"], (now, before) => {
+    if (now.plots !== before.plots) arrange(now.plots);
+    for (const { id, element } of plots) {
+      element.classList.toggle("chosen", id === now.chosen);
+      element.querySelector(".which").setAttribute("aria-pressed", String(id === now.chosen));
+    }
+  });
+  subscribe(["view"], ({ view }) => { if (view === "plots") resize(); });
+  subscribe(["cursor_s"], ({ cursor_s }) => {
+    if (cursor_s === pointed) return;
+    pointed = undefined;
+    for (const { chart } of plots) if (chart) placeCursor(chart);
+  });
+  subscribe(["mark_s", "notes"], redraw);
+  subscribe(["plots", "cursor_s", "mark_s", "at_cursor", "at_mark"], () => values());
+  subscribe(["pictures"], () => values(performance.now()));
+  onOtherColours(restyle);
+
+  // A plot for each of the state. What is above a plot is only replaced when its channels or its place changed: a click on it may be under way.
+  function arrange(wanted) {
+    const before = plots;
+    for (const plot of before) if (!wanted.some(({ id }) => id === plot.id)) remove(plot);
+    plots = wanted.map(({ id, channels: numbers }) => before.find((plot) => plot.id === id) ?? made(id, numbers));
+    plots.forEach((plot, place) => {
+      const is_same = plot === before[place] && plot.numbers === wanted[place].channels;
+      plot.numbers = wanted[place].channels;
+      if (!is_same) head(plot);
+    });
+  }
+
+  function made(id, numbers) {
     const element = document.createElement("div");
     element.className = "plot";
     element.setAttribute("role", "group");
     element.innerHTML = '<div class="head"></div><div class="chart" role="img"></div>';
-    const plot = { element, numbers: [...numbers], pens: new Map(), chart: null, signature: "", found: null, strip: null, ranges: {}, drawn: 0 };
+    const plot = { id, element, numbers, pens: new Map(), chart: null, signature: "", found: null, strip: null, ranges: {}, drawn: 0 };
     element.addEventListener("dragover", (event) => { event.preventDefault(); element.classList.add("over"); });
     element.addEventListener("dragleave", () => element.classList.remove("over"));
     element.addEventListener("drop", (event) => {
@@ -30,64 +65,28 @@ export function makePlots(box, on, colour) {
       element.classList.remove("over");
       const number = parseInt(event.dataTransfer.getData("text/plain"), 10), from = dragged;
       dragged = null;
-      if (from) move(from, number, plot);
-      else if (Number.isInteger(number)) put(plot, number);
+      if (from) update.moveChannel(number, from.id, id);
+      else if (Number.isInteger(number)) update.putChannel(id, number);
     });
-    element.addEventListener("pointerdown", () => choose(plot));
+    element.addEventListener("pointerdown", () => update.choosePlot(id));
     bindHead(plot);
     box.append(element);
-    plots.push(plot);
-    head(plot);
-    choose(plot);
     sizes.observe(element);
     return plot;
   }
 
-  function put(plot, number) {
-    if (!channels[number] || plot.numbers.includes(number)) return;
-    if (wanted().reduce((sum, each) => sum + each.numbers.length, 0) >= MOST_CHANNELS) { on.full(MOST_CHANNELS); return; }
-    plot.numbers.push(number);
-    head(plot);
-    on.changed();
-  }
-
-  function take(plot, number) {
-    plot.numbers = plot.numbers.filter((each) => each !== number);
-    head(plot);
-    on.changed();
-  }
-
-  function move(plot, number, to) {
-    if (to === plot || to.numbers.includes(number)) return;
-    plot.numbers = plot.numbers.filter((each) => each !== number);
-    to.numbers.push(number);
-    head(plot);
-    head(to);
-    on.changed();
-  }
-
-  function close(plot) {
-    const place = plots.indexOf(plot);
+  function remove(plot) {
     sizes.unobserve(plot.element);
     plot.chart?.destroy();
     plot.element.remove();
-    plots.splice(place, 1);
-    if (!plots.length) add();
-    plots.forEach(head);
-    choose(chosen === plot ? plots[Math.min(place, plots.length - 1)] : chosen);
-    chosen.element.querySelector(".which").focus();
-    on.changed();
   }
 
-  // Channels go into this plot from now on. What stands above is not made anew: a click on it is under way.
-  function choose(plot) {
-    chosen = plot;
-    for (const each of plots) {
-      each.element.classList.toggle("chosen", each === chosen);
-      each.element.querySelector(".which").setAttribute("aria-pressed", String(each === chosen));
-    }
-    on.chosen();
+  function close(plot) {
+    update.closePlot(plot.id);
+    chosen().element.querySelector(".which").focus();
   }
+
+  const chosen = () => plots.find((plot) => plot.id === state().chosen);
 
   // Up and down lead a channel from plot to plot.
   function bindHead(plot) {
@@ -96,12 +95,10 @@ export function makePlots(box, on, colour) {
     const shift = (by) => onChip((number) => {
       const place = plots.indexOf(plot) + by;
       if (place < 0) return;
-      const to = plots[place] ?? add();
-      move(plot, number, to);
-      choose(to);
-      to.element.querySelector(`[data-channel="${number}"]`)?.focus();
+      update.moveChannel(number, plot.id, plots[place]?.id ?? null, true);
+      chosen().element.querySelector(`[data-channel="${number}"]`)?.focus();
     });
-    const out = onChip((number) => take(plot, number));
+    const out = onChip((number) => update.takeChannel(plot.id, number));
     bind("chip", row, { ArrowUp: shift(-1), ArrowDown: shift(1), Delete: out, Backspace: out });
   }
 
@@ -121,15 +118,15 @@ export function makePlots(box, on, colour) {
 
   const shade = (plot, number) => colour(colourOf(pen(plot, number)));
 
-  // What stands above a plot. The focus stays at its place in the row.
+  // What is above a plot. The focus stays at its place in the row.
   function head(plot) {
     const row = plot.element.querySelector(".head"), name = nameOf(plot);
     const focus = row.contains(document.activeElement) ? [...row.children].indexOf(document.activeElement) : -1;
     plot.element.setAttribute("aria-label", name);
-    const which = button("which", String(plots.indexOf(plot) + 1), () => choose(plot));
+    const which = button("which", String(plots.indexOf(plot) + 1), () => update.choosePlot(plot.id));
     which.title = "channels go into this plot";
     which.setAttribute("aria-label", `${name}: channels go here`);
-    which.setAttribute("aria-pressed", String(plot === chosen));
+    which.setAttribute("aria-pressed", String(plot.id === state().chosen));
     row.replaceChildren(which, ...plot.numbers.map((number) => chipOf(plot, number, name)));
     if (!plot.numbers.length) row.append(Object.assign(document.createElement("span"), { className: "note", textContent: "click a channel, or drag it here" }));
     const closer = button("close", "×", () => close(plot));
@@ -138,7 +135,6 @@ export function makePlots(box, on, colour) {
     if (focus >= 0) row.querySelectorAll("button")[Math.min(focus, plot.numbers.length)].focus();
     if (!plot.numbers.length && plot.chart) { plot.chart.destroy(); plot.chart = null; plot.signature = ""; }
     if (plot.numbers.length) chartOf(plot);
-    values();
   }
 
   function button(kind, text, act) {
@@ -148,7 +144,7 @@ export function makePlots(box, on, colour) {
   }
 
   function chipOf(plot, number, name) {
-    const chip = button("chip", "", () => take(plot, number)), channel = channels[number];
+    const chip = button("chip", "", () => update.takeChannel(plot.id, number)), channel = channels()[number];
     chip.style.setProperty("--swatch", swatch(pen(plot, number)));
     chip.title = `${channel.description}; click to take it out`;
     chip.setAttribute("aria-label", `${title(channel)}: take it out of ${name}`);
@@ -200,7 +196,7 @@ export function makePlots(box, on, colour) {
   // So many axes that half of the width is left for the lines.
   const axesOf = (plot) => Math.max(1, Math.min(MOST_AXES, units(plot).length, Math.floor(width(plot) / 2 / AXIS_PX)));
 
-  const unitOf = (number) => channels[number].unit || "1";
+  const unitOf = (number) => channels()[number].unit || "1";
 
   function build(plot) {
     plot.chart?.destroy();
@@ -213,20 +209,20 @@ export function makePlots(box, on, colour) {
         grid: { show: k === 0, stroke: line, width: 1 }, ticks: { stroke: line } });
     });
     const series = [{}, ...plot.numbers.map((number) => ({
-      label: channels[number].name, scale: unitOf(number), stroke: (chart) => striped(plot, number, chart), width: 1, points: { show: false }, spanGaps: false }))];
+      label: channels()[number].name, scale: unitOf(number), stroke: (chart) => striped(plot, number, chart), width: 1, points: { show: false }, spanGaps: false }))];
     const dot = (_, k) => shade(plot, plot.numbers[k - 1]);
     plot.chart = new uPlot({
       width: width(plot), height: HEIGHT, scales, axes, series, legend: { show: false },
       cursor: { drag: { x: true, y: false, setScale: false }, sync: { key: "time" }, y: false, points: { size: 6, stroke: dot, fill: dot } },
       hooks: {
         setCursor: [(chart) => {
-          if (chart.cursor.event && chart.cursor.left >= 0) { at = chart.posToVal(chart.cursor.left, "x"); on.cursor(at); values(); }
+          if (chart.cursor.event && chart.cursor.left >= 0) point(chart.posToVal(chart.cursor.left, "x"));
         }],
         setSelect: [(chart) => {
           if (chart.select.width > 3) {
             const begin = chart.posToVal(chart.select.left, "x"), end = chart.posToVal(chart.select.left + chart.select.width, "x");
             chart.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-            on.zoom(begin, end);
+            update.zoomTo(begin, end);
           }
         }],
         drawAxes: [(chart) => { if (plot.strip) lines(plot, chart); }],
@@ -234,9 +230,14 @@ export function makePlots(box, on, colour) {
       },
     }, nothing(plot), plot.element.querySelector(".chart"));
     plot.chart.batch(() => {});   // at once, so that its size is known
-    plot.chart.over.addEventListener("dblclick", () => on.widen());
-    plot.chart.over.addEventListener("click", (event) => { if (event.detail === 1 && at !== null) { mark = at; on.marked(mark); redraw(); } });
-    plot.chart.over.addEventListener("mouseleave", () => { at = null; on.cursor(null); values(); });
+    plot.chart.over.addEventListener("dblclick", () => update.widen());
+    plot.chart.over.addEventListener("click", (event) => { if (event.detail === 1 && state().cursor_s !== null) update.setMark(state().cursor_s); });
+    plot.chart.over.addEventListener("mouseleave", () => point(null));
+  }
+
+  function point(time) {
+    pointed = time;
+    update.point(time);
   }
 
   // Of a held window, with its dashes where they are while it goes on.
@@ -246,7 +247,8 @@ export function makePlots(box, on, colour) {
   }
 
   function marks(chart) {
-    if (mark !== null) upright(chart, mark, "bad", [6, 4], "");
+    const { mark_s, notes } = state();
+    if (mark_s !== null) upright(chart, mark_s, "bad", [6, 4], "");
     for (const { time, text } of notes) upright(chart, time, "warn", [2, 3], text);
   }
 
@@ -282,7 +284,7 @@ export function makePlots(box, on, colour) {
         chart.setData(joined(found.map(drawable)), true);
         chart.setScale("x", { min: end - span, max: end });
       });
-      stand(chart);
+      placeCursor(chart);
     } else {
       if (anew) {
         if (!plot.strip) chart.setData(nothing(plot), false);
@@ -296,9 +298,9 @@ export function makePlots(box, on, colour) {
     plot.drawn++;
   }
 
-  // The chart's cursor where `at` is in its window.
-  function stand(chart) {
-    const left = at === null ? -10 : chart.valToPos(at, "x");
+  // The chart's cursor, where it is in its window.
+  function placeCursor(chart) {
+    const { cursor_s } = state(), left = cursor_s === null ? -10 : chart.valToPos(cursor_s, "x");
     chart.setCursor(left >= 0 ? { left, top: 10 } : { left: -10, top: -10 }, false);
   }
 
@@ -348,41 +350,46 @@ export function makePlots(box, on, colour) {
   // Of a channel of a plot: the value at the cursor as the server has it, without a cursor the newest that is drawn;
   // undefined: it is on its way.
   function valueOf(plot, number) {
-    if (at !== null) return exact.at === at ? exact.values[number] ?? null : undefined;
+    const { cursor_s, at_cursor } = state();
+    if (cursor_s !== null) return at_cursor.time === cursor_s ? at_cursor.values[number] ?? null : undefined;
     const trace = plot.found?.find((each) => each.channel === number);
     return trace && trace.low.length ? trace.low[trace.low.length - 1] : null;
   }
 
-  const inWords = (number, value) => valueWords(channels[number], value, at !== null && mark !== null ? marked[number] ?? null : null);
+  function inWords(number, value) {
+    const { cursor_s, mark_s, at_mark } = state();
+    return valueWords(channels()[number], value, cursor_s !== null && mark_s !== null ? at_mark[number] ?? null : null);
+  }
 
+  // now: the page's clock, where figures change too quickly to be read; 0: at once
   function values(now = 0) {
-    if (now && now - told_ms < READABLE_MS) return;
-    told_ms = now;
+    if (now && now - figures_ms < READABLE_MS) return;
+    figures_ms = now;
     for (const plot of plots) {
       for (const chip of plot.element.querySelectorAll(".chip")) {
         const value = valueOf(plot, +chip.dataset.channel);
-        if (value !== undefined) say(chip.children[2], inWords(+chip.dataset.channel, value));
+        if (value !== undefined) put(chip.children[2], inWords(+chip.dataset.channel, value));
       }
     }
-    if (!now || now - described_ms >= TOLD_MS) { described_ms = now; plots.forEach(describe); }
+    if (!now || now - described_ms >= DESCRIBED_MS) { described_ms = now; plots.forEach(describe); }
   }
 
-  // The picture for who does not see it.
+  // The picture in words, for readers who do not see it.
   function describe(plot) {
     const { min, max } = plot.chart?.scales.x ?? {};
     const lines = plot.numbers.map((number, k) => {
       const trace = plot.found?.find((each) => each.channel === number);
       const [least, most] = plot.strip ? plot.strip.extremes(k) : trace ? extremes(trace) : [Infinity, -Infinity];
-      return { channel: channels[number], text: inWords(number, valueOf(plot, number)), least, most };
+      return { channel: channels()[number], text: inWords(number, valueOf(plot, number)), least, most };
     });
-    plot.element.querySelector(".chart").setAttribute("aria-label", plotWords(nameOf(plot), [min, max], at, lines));
+    plot.element.querySelector(".chart").setAttribute("aria-label", plotWords(nameOf(plot), [min, max], state().cursor_s, lines));
   }
 
-  // What stands at the cursor; nothing while it is on its way.
+  // The values at the cursor in words; nothing while they are on their way.
   function atCursor() {
-    if (at === null || exact.at !== at) return "";
-    const numbers = [...new Set(plots.flatMap((plot) => plot.numbers))];
-    return `${at.toFixed(3)} s. ${numbers.map((number) => `${title(channels[number])}: ${inWords(number, exact.values[number]) || "no value"}`).join("; ")}`;
+    const now = state(), { cursor_s, at_cursor } = now;
+    if (cursor_s === null || at_cursor.time !== cursor_s) return "";
+    return `${cursor_s.toFixed(3)} s. ${drawn(now).map((number) => `${title(channels()[number])}: ${inWords(number, at_cursor.values[number]) || "no value"}`).join("; ")}`;
   }
 
   function redraw() { for (const plot of plots) plot.chart?.redraw(false); }
@@ -394,10 +401,10 @@ export function makePlots(box, on, colour) {
     return others.length > 0;
   }
 
-  const sizes = new ResizeObserver(() => { if (resize()) on.resized(); });
+  const sizes = new ResizeObserver(() => { if (resize()) update.plotsResized(); });
   const wanted = () => plots.filter((plot) => plot.numbers.length);
 
-  // Other colours: all is drawn anew as it stands.
+  // Other colours: all is drawn anew as it is.
   function restyle() {
     for (const plot of wanted()) {
       const { strip, chart } = plot, [x, ...data] = chart.data, { min, max } = chart.scales.x;
@@ -413,17 +420,5 @@ export function makePlots(box, on, colour) {
     return Math.max(10, Math.min(MOST_POINTS, Math.floor(pixels)));
   }
 
-  return {
-    add, put, take, close, choose, show, values, redraw, resize, restyle, wanted, points, atCursor,
-    know: (found) => { channels = found; },
-    all: () => plots,
-    chosen: () => chosen,
-    cursor: () => at,
-    setCursor: (time) => { at = time; values(); for (const plot of plots) if (plot.chart) stand(plot.chart); },
-    mark: () => mark,
-    setMark: (time) => { mark = time; redraw(); values(); },
-    stands: (values_there, time) => { exact = { at: time, values: values_there }; values(); },
-    setNotes: (found) => { notes = found; redraw(); },
-    stoodAtMark: (values_there) => { marked = values_there; values(); },
-  };
+  return { all: () => plots, wanted, show, points, atCursor };
 }

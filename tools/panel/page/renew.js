@@ -1,5 +1,7 @@
-// Brings what is shown up to date without putting something new in its place: the focus, a selection and the place of
-// somebody who has it read aloud stay where they are, and nothing is said again that is the same.
+// Elements of the page, and bringing them up to date without replacing them: the focus, a selection and the place of a
+// screen reader stay where they are, and nothing is announced again that is the same.
+
+export const by = (id) => document.getElementById(id);
 
 export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
