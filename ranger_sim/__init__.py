@@ -13,6 +13,8 @@ The public names:
     StopRule    when a walk is done: steps, time or distance
     Quirks      where the firmware follows the one of 2016 instead of the appendix
     Profile     which boards and buses are real, bit rates and schedules of the buses; `load_profile` reads one
+    diagnose    the errors of a simulation by measured data: a `DiagnosisResult`
+    identify    parameters from the recording of a bench: an `IdentificationResult`
     UserError   a mistake of the user, reported in one line
 
 Everything else is internal and changes without notice; CAN programs find the interface `ranger_sim` by python-can.
@@ -34,17 +36,35 @@ if TYPE_CHECKING:
     from ranger_sim.harness.outside.profile import load as load_profile
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.scenario import Scenario, StopRule
+    from ranger_sim.sysid.api import diagnose, identify
+    from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
 
-__all__ = ["Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "load_profile"]
+__all__ = [
+    "DiagnosisResult",
+    "IdentificationResult",
+    "Profile",
+    "Quirks",
+    "Ranger",
+    "Scenario",
+    "StopRule",
+    "UserError",
+    "diagnose",
+    "identify",
+    "load_profile",
+]
 __version__ = "0.1.0"
 
 _PLACES = {
+    "DiagnosisResult": ("sysid.results", "DiagnosisResult"),
+    "IdentificationResult": ("sysid.results", "IdentificationResult"),
     "Profile": ("harness.outside.profile", "Profile"),
     "Quirks": ("boards.quirks", "Quirks"),
     "Ranger": ("harness.ranger", "Ranger"),
     "Scenario": ("harness.scenario", "Scenario"),
     "StopRule": ("harness.scenario", "StopRule"),
     "UserError": ("foundation.user_error", "UserError"),
+    "diagnose": ("sysid.api", "diagnose"),
+    "identify": ("sysid.api", "identify"),
     "load_profile": ("harness.outside.profile", "load"),
 }
 

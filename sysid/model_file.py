@@ -12,6 +12,7 @@ A file by hand may have terms only.
 import dataclasses
 import json
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
@@ -19,6 +20,7 @@ from ranger_sim.plant import terms
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.model_terms import NoFormError, effects_of, parameter_terms, term_of
+from ranger_sim.sysid.results import DiagnosisEvidence, KnownCause
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,17 +44,12 @@ class ModelFile:
     model: terms.Model
 
 
-def effects_found(found: Diagnosis) -> list[FoundEffect]:
-    """What the model had and what was named, each with its term."""
+def effects_found(found: Diagnosis, had: Sequence[KnownCause]) -> list[FoundEffect]:
+    """What the model had, by these data, and what was named, each with its term."""
     values = {name: value for name, value in found.extended.values.items() if "@" not in name}
     known = [
-        KnownEffect(
-            each["name"],
-            each["at"],
-            {name: value["value"] for name, value in each["parameters"].items()},
-            each["shape"],
-        )
-        for each in found.answer["evidence"]["known"]
+        KnownEffect(each.name, each.at, {name: value.value for name, value in each.parameters.items()}, each.shape)
+        for each in had
     ]
     for each in found.named:
         numbers = zip(each.effect.coefficients, each.coefficients, strict=True)
@@ -69,15 +66,14 @@ def effects_found(found: Diagnosis) -> list[FoundEffect]:
     return made
 
 
-def model_text(found: Diagnosis) -> str:
+def model_text(found: Diagnosis, evidence: DiagnosisEvidence) -> str:
     """The file's text."""
-    evidence = found.answer["evidence"]
-    values = {name: each["value"] for name, each in evidence["parameters"].items()}
-    intervals = {name: tuple(each["ci95"]) for name, each in evidence["parameters"].items()}
-    effects = effects_found(found)
+    values = {name: each.value for name, each in evidence.parameters.items()}
+    intervals = {name: each.ci95 for name, each in evidence.parameters.items()}
+    effects = effects_found(found, evidence.known)
     names = [recording.table.name for recording in found.recordings]
     tables = [each.term for each in effects if each.term is not None]
-    if evidence["parameters_are_physical"]:
+    if evidence.parameters_are_physical:
         tables += parameter_terms(found.machine, values, intervals)
     lines = [f"title = {_quoted('found in ' + ', '.join(names))}"]
     for table in tables:

@@ -11,8 +11,8 @@ from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches import leg, motor, pulley
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.fit import Parameter
-from ranger_sim.sysid.identify import coverage, legs, registry
-from ranger_sim.sysid.identify import motor as identify_motor
+from ranger_sim.sysid.identification import coverage, legs, registry
+from ranger_sim.sysid.identification import motor as identify_motor
 
 
 def altered(data, name, value):

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from ranger_sim.sysid.identify import motor, registry
-from ranger_sim.sysid.identify.registry import OF_TABLES
+from ranger_sim.sysid.identification import motor, registry
+from ranger_sim.sysid.identification.registry import OF_TABLES
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.identify import command
 

@@ -7,12 +7,12 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.benches import ankle_sine, leg, motor, pulley, springs
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify import ankle as fit_ankle
-from ranger_sim.sysid.identify import legs as fit_legs
-from ranger_sim.sysid.identify import motor as fit_motor
-from ranger_sim.sysid.identify import springs as fit_springs
-from ranger_sim.sysid.identify.blocks import Block, solve
-from ranger_sim.sysid.identify.coverage import Machine
+from ranger_sim.sysid.identification import ankle as fit_ankle
+from ranger_sim.sysid.identification import legs as fit_legs
+from ranger_sim.sysid.identification import motor as fit_motor
+from ranger_sim.sysid.identification import springs as fit_springs
+from ranger_sim.sysid.identification.blocks import Block, solve
+from ranger_sim.sysid.identification.coverage import Machine
 
 
 @dataclasses.dataclass(frozen=True)
