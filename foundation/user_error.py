@@ -1,4 +1,4 @@
-"""The only exception for mistakes of a user."""
+"""The exceptions for mistakes of a user: `UserError`, and a class of it for each kind of thing that is wrong."""
 
 import difflib
 from collections.abc import Iterable
@@ -28,6 +28,46 @@ class UserError(Exception):
 
     def __str__(self) -> str:
         return "\n".join(self.args)
+
+
+class TableError(UserError):
+    """The data table: its files, variables, errors, boards, or what is generated from it."""
+
+
+class ProfileError(UserError):
+    """A profile: boards, buses and their interfaces."""
+
+
+class ScenarioError(UserError):
+    """A scenario: its numbers, controller, parameters, quirks or conditions."""
+
+
+class ModelError(UserError):
+    """What is simulated: a body, a motor, a sensor, a floor, a model file, or a machine that is diagnosed."""
+
+
+class DataError(UserError):
+    """Measured data: a recording that cannot be read, or from which nothing can be concluded."""
+
+
+class FaultError(UserError):
+    """A fault that is injected: its place, mode, size or time."""
+
+
+class CampaignError(UserError):
+    """A campaign: its plan, runs or results."""
+
+
+class BusError(UserError):
+    """A CAN bus: its bits, frames and databases, interfaces and connections."""
+
+
+class FirmwareError(UserError):
+    """Firmware: its schedule, its chip, its source in C or its image."""
+
+
+class RequestError(UserError):
+    """A request to a running robot."""
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

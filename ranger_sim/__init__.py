@@ -15,7 +15,8 @@ The public names:
     Profile     which boards and buses are real, bit rates and schedules of the buses; `load_profile` reads one
     diagnose    the errors of a simulation by measured data: a `DiagnosisResult`
     identify    parameters from the recording of a bench: an `IdentificationResult`
-    UserError   a mistake of the user, reported in one line
+    UserError   a mistake of the user, reported in one line; by what is wrong a TableError, ProfileError, ScenarioError,
+                ModelError, DataError, FaultError, CampaignError, BusError, FirmwareError or RequestError
 
 Everything else is internal and changes without notice; CAN programs find the interface `ranger_sim` by python-can.
 
@@ -31,7 +32,19 @@ from ranger_sim import loading  # noqa: F401  (first: it finds the packages)
 
 if TYPE_CHECKING:
     from ranger_sim.boards.quirks import Quirks
-    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.foundation.user_error import (
+        BusError,
+        CampaignError,
+        DataError,
+        FaultError,
+        FirmwareError,
+        ModelError,
+        ProfileError,
+        RequestError,
+        ScenarioError,
+        TableError,
+        UserError,
+    )
     from ranger_sim.harness.outside.profile import Profile
     from ranger_sim.harness.outside.profile import load as load_profile
     from ranger_sim.harness.ranger import Ranger
@@ -40,13 +53,23 @@ if TYPE_CHECKING:
     from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
 
 __all__ = [
+    "BusError",
+    "CampaignError",
+    "DataError",
     "DiagnosisResult",
+    "FaultError",
+    "FirmwareError",
     "IdentificationResult",
+    "ModelError",
     "Profile",
+    "ProfileError",
     "Quirks",
     "Ranger",
+    "RequestError",
     "Scenario",
+    "ScenarioError",
     "StopRule",
+    "TableError",
     "UserError",
     "diagnose",
     "identify",
@@ -62,7 +85,7 @@ _PLACES = {
     "Ranger": ("harness.ranger", "Ranger"),
     "Scenario": ("harness.scenario", "Scenario"),
     "StopRule": ("harness.scenario", "StopRule"),
-    "UserError": ("foundation.user_error", "UserError"),
+    **{name: ("foundation.user_error", name) for name in __all__ if name.endswith("Error")},
     "diagnose": ("sysid.api", "diagnose"),
     "identify": ("sysid.api", "identify"),
     "load_profile": ("harness.outside.profile", "load"),

@@ -15,7 +15,7 @@ import pathlib
 from collections.abc import Sequence
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import terms
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
@@ -114,7 +114,7 @@ def read(path: str | pathlib.Path, machine: Machine) -> ModelFile:
         gear = told.get("gear")
         own = getattr(machine, "gear", None)
         if gear is not None and own is not None and abs(gear / own - 1.0) > 1e-9:
-            raise UserError(f"{path}: it was found at a gear of {gear:g}, not {own:g} (--gear)")
+            raise ModelError(f"{path}: it was found at a gear of {gear:g}, not {own:g} (--gear)")
         effects = [_effect(str(path), number, each) for number, each in enumerate(told.get("effect", []), 1)]
         parameters = {name: float(value) for name, value in told.get("parameters", {}).items()}
         return ModelFile(str(path), machine.name, gear, effects, parameters, model)
@@ -123,7 +123,7 @@ def read(path: str | pathlib.Path, machine: Machine) -> ModelFile:
         try:
             effects += [KnownEffect(*each) for each in effects_of(machine, term)]
         except NoFormError as reason:
-            raise UserError(f"{path}: {term.form.name} at {term.at}: {reason}") from None
+            raise ModelError(f"{path}: {term.form.name} at {term.at}: {reason}") from None
     return ModelFile(str(path), str(told.get("experiment", "")), None, effects, {}, model)
 
 
@@ -131,13 +131,13 @@ def _effect(path: str, number: int, table: Any) -> KnownEffect:
     """One [[diagnosis.effect]]."""
     place = f"{path}: diagnosis.effect {number}"
     if not isinstance(table, dict):
-        raise UserError(f"{place}: an effect is a table, not {table!r}")
+        raise ModelError(f"{place}: an effect is a table, not {table!r}")
     texts = [table.get(name) for name in ("cause", "at")]
     numbers = [table.get(name, {}) for name in ("coefficients", "shape")]
     if not all(isinstance(text, str) for text in texts):
-        raise UserError(f"{place}: cause and at are texts")
+        raise ModelError(f"{place}: cause and at are texts")
     for each in numbers:
         if not isinstance(each, dict) or not all(map(terms.is_number, each.values())):
-            raise UserError(f"{place}: coefficients and shape are tables of numbers")
+            raise ModelError(f"{place}: coefficients and shape are tables of numbers")
     made = [{name: float(value) for name, value in each.items()} for each in numbers]
     return KnownEffect(str(texts[0]), str(texts[1]), made[0], made[1])

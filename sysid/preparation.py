@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import losses, repairs, sanity
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Repair, Table
@@ -58,12 +58,12 @@ def prepared(
     if missing or not names:
         wanted = ", ".join(missing) or "one of its channels"
         there = ", ".join(dataset.channels) or "none"
-        raise UserError(
+        raise DataError(
             f"{dataset.name}: {machine.name} needs {wanted}; there are {there} (--map NAME=CHANNEL names it)"
         )
     for name in asked:
         if name not in names:
-            raise UserError(f"--repair {name}: unknown channel of {dataset.name} (available: {', '.join(names)})")
+            raise DataError(f"--repair {name}: unknown channel of {dataset.name} (available: {', '.join(names)})")
     dataset.channels = {name: dataset.channels[name] for name in names}
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
     dataset.repairs = [each for each in dataset.repairs if each.channel in ("", *names)]
@@ -79,13 +79,13 @@ def prepared(
         if doubt.kind == "slow_samples" and not ours:
             continue  # a user's own machine may be a tank
         place = f"{doubt.channel}: " if doubt.channel else ""
-        raise UserError(f"{dataset.name}: {place}{doubt.text}; nothing is concluded from such data")
+        raise DataError(f"{dataset.name}: {place}{doubt.text}; nothing is concluded from such data")
     if ours:  # a user's own machine may have a setting for a channel
         for each in machine.quantities:
             if each.needed and np.ptp(mended[each.name].value) == 0.0:
-                raise UserError(f"{dataset.name}: {each.name}: one value all the time; nothing is concluded from that")
+                raise DataError(f"{dataset.name}: {each.name}: one value all the time; nothing is concluded from that")
     own = getattr(machine, "table", None)  # of a machine whose channels come at rates of their own
     table = own(mended, names) if own is not None else mended.table(names)
     if len(table) < LEAST_ROWS:
-        raise UserError(f"{dataset.name}: {len(table)} rows with all channels, at least {LEAST_ROWS} are needed")
+        raise DataError(f"{dataset.name}: {len(table)} rows with all channels, at least {LEAST_ROWS} are needed")
     return Prepared(table, mended.findings, mended.repairs, mended.ledger())

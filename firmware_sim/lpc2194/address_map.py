@@ -11,7 +11,7 @@ import cython
 
 from ranger_sim.firmware_sim.arm7.core import Device
 from ranger_sim.firmware_sim.lpc2194.block import Block, NotModelledError
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
@@ -22,7 +22,7 @@ BLOCKS: Final = 128
 NAME_OF_ACCESS = {1: "byte", 2: "half-word", 4: "word"}
 
 
-class NotModelledAccess(UserError):  # noqa: N818  (it is what the program did)
+class NotModelledAccess(FirmwareError):  # noqa: N818  (it is what the program did)
     """The program accessed something that is not modelled; `address` and `pc` give the place, as numbers."""
 
     def __init__(self, text, address, pc) -> None:

@@ -4,7 +4,7 @@ import dataclasses
 import difflib
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.fault import Parameter
 
 ANY = "any"
@@ -19,7 +19,7 @@ class NameParameter(Parameter):
         """`value` as text, or a UserError naming `where`."""
         text = str(value).strip()
         if not text:
-            raise UserError(f"{where}: {self.name} is empty, it is {self.meaning}")
+            raise FaultError(f"{where}: {self.name} is empty, it is {self.meaning}")
         return text
 
 
@@ -40,9 +40,9 @@ def identifier_of(robot: Any, text: str, where: str) -> int:
     except ValueError:
         near = difflib.get_close_matches(text, known, 3)
         hint = f", meant was perhaps {' or '.join(near)}" if near else ""
-        raise UserError(f"{where}: frame {text!r} is neither a variable nor an identifier{hint}") from None
+        raise FaultError(f"{where}: frame {text!r} is neither a variable nor an identifier{hint}") from None
     if not 0 <= number <= HIGHEST_IDENTIFIER:
-        raise UserError(f"{where}: frame {text!r} is outside 0 ... {HIGHEST_IDENTIFIER:#x}")
+        raise FaultError(f"{where}: frame {text!r} is outside 0 ... {HIGHEST_IDENTIFIER:#x}")
     return number
 
 
@@ -52,5 +52,5 @@ def chosen(name: str, there: Any, what: str) -> str:
     if name not in names:
         near = difflib.get_close_matches(name, names, 3)
         hint = f"meant was perhaps {' or '.join(near)}" if near else f"there are {', '.join(names)}"
-        raise UserError(f"{what} {name!r}: {hint}")
+        raise FaultError(f"{what} {name!r}: {hint}")
     return name

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from ranger_sim.boards.firmware_board import SatelliteBoard
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import NORMAL_TASK
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import chosen, name_parameter
@@ -173,7 +173,7 @@ class FullRing(Hold):
     def connect(self) -> None:
         ProcessorFault.connect(self)
         if not isinstance(self.board, SatelliteBoard):
-            raise UserError(
+            raise FaultError(
                 f"fault {self.text()}: {self.name} has no ring of a satellite; the router's rings only lose frames, the"
                 " main brain has no CAN, and a program in C keeps its ring to itself"
             )

@@ -3,7 +3,7 @@
 import importlib
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid.machine import Machine
 
 MACHINES = {
@@ -41,16 +41,18 @@ def machine_of(machine: str | Machine, gear: float | None = None) -> Machine:
     is. UserError for an unknown experiment, a gear that it does not have, and an object that is not a machine."""
     if not isinstance(machine, str):
         if missing := missing_members(machine):
-            raise UserError(f"the machine {machine!r} has no {', '.join(missing)} (sysid/machine.py has its members)")
+            raise ModelError(f"the machine {machine!r} has no {', '.join(missing)} (sysid/machine.py has its members)")
         if gear is not None:
-            raise UserError(f"--gear {gear:g}: only the motor bench has a gearbox, not {machine.name}")
+            raise ModelError(f"--gear {gear:g}: only the motor bench has a gearbox, not {machine.name}")
         return machine
     if machine not in MACHINES:
-        raise UserError(f"--experiment {machine}: there are {', '.join(MACHINES)}; a machine of yours is module:object")
+        raise ModelError(
+            f"--experiment {machine}: there are {', '.join(MACHINES)}; a machine of yours is module:object"
+        )
     if gear is None:
         return made(machine)()
     if machine != "motor-bench":
-        raise UserError(f"--gear {gear:g}: only the motor bench has a gearbox, not {machine}")
+        raise ModelError(f"--gear {gear:g}: only the motor bench has a gearbox, not {machine}")
     if not 0.01 <= gear <= 1e4:
-        raise UserError(f"--gear {gear:g}: allowed are 0.01 to 10000")
+        raise ModelError(f"--gear {gear:g}: allowed are 0.01 to 10000")
     return made(machine)(gear)

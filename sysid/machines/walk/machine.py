@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy import ndimage
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import body_files
 from ranger_sim.sysid import channels, signals
 from ranger_sim.sysid.dataset import Array, Dataset, Table
@@ -173,7 +173,7 @@ class Walk:
         rows += _encoder_rows(table, single, recording)
         recording.rows = [each for each in rows if len(each.where) >= each.fewest]
         if not recording.rows:
-            raise UserError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
+            raise ModelError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
         for each in recording.rows:
             recording.equations[each.name] = _equation(recording, each, self.numbers)
             if recording.places is not None and each.repeats:
