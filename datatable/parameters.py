@@ -6,7 +6,6 @@ same limits to data from its serial link (`all_variables.WRITABLE`, generated fr
 
 from __future__ import annotations
 
-import difflib
 import functools
 import math
 import numbers
@@ -15,7 +14,7 @@ from typing import Any
 from ranger_sim import datatable
 from ranger_sim.datatable.model import COMPUTER, LIMITS, Variable
 from ranger_sim.datatable.packing import word_of_value
-from ranger_sim.foundation.user_error import TableError
+from ranger_sim.foundation.user_error import TableError, unknown
 
 CHANNEL_PREFIX = "LV_"  # the serial link's own variables: channels are chosen, not written
 LONGEST_SHOWN = 60  # characters of a value in a message
@@ -31,8 +30,7 @@ def find(name: str) -> Variable:
     """The variable of this name; UserError with the nearest names for an unknown name."""
     row = rows().get(name)
     if row is None:
-        near = difflib.get_close_matches(name[:LONGEST_SHOWN], rows(), 3)
-        raise TableError(f"{shown(name)}: no such variable" + (f"; did you mean {', '.join(near)}?" if near else ""))
+        raise TableError(unknown("variable", name[:LONGEST_SHOWN], rows()))
     return row
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 LONGEST_NAME = 100  # letters of a name that is compared with others
 LEAST_ALIKE = 0.7  # of 1, as difflib measures it: two letters swapped in a word of four are 0.75
 MOST_NAMED = 2
+FEW, MOST_LISTED = 12, 100  # names that are always listed; that are listed where none is close
 
 
 def printable(text: str) -> str:
@@ -77,3 +78,16 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     begun = [each for each in names if name and each.startswith(name)][:MOST_NAMED]
     near = begun or difflib.get_close_matches(name[:LONGEST_NAME], names, MOST_NAMED, LEAST_ALIKE)
     return f"did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> str:
+    """`unknown board 'MHC' (available: MCH, MB)`; of more than FEW names `unknown frame 'MCH_ANGEL'; did you mean ...?`.
+
+    Without any of them where nothing is close and there are more than MOST_LISTED.
+    """
+    names = list(known)
+    near = did_you_mean(name, names) if len(names) > FEW else ""
+    if near:
+        return f"unknown {what} {name!r}; {near}"
+    listed = f" (available: {', '.join(names) or 'none'})" if len(names) <= MOST_LISTED else ""
+    return f"unknown {what} {name!r}{listed}"

@@ -17,8 +17,7 @@ from typing import Any
 
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
-from ranger_sim.foundation.user_error import ScenarioError
-from ranger_sim.harness.names import meant
+from ranger_sim.foundation.user_error import ScenarioError, unknown
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.waiting import (
     COMPARED,
@@ -116,10 +115,8 @@ class Quantity(Comparison):
         Comparison.__init__(self, text, name, sign, value, SAMPLES)
         self.variable = all_variables.ID_OF.get(name)
         if self.variable is None and self.column < 0:
-            raise ScenarioError(
-                f"condition {text!r}: {name!r} is neither a variable of the table nor a quantity of the body"
-                + meant(name, [*all_variables.ID_OF, *SAMPLES])
-            )
+            known = [*all_variables.ID_OF, *SAMPLES]
+            raise ScenarioError(f"condition {text!r}: {unknown('variable or quantity of the body', name, known)}")
 
     def now(self) -> float:
         if self.variable is None:

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import ModelError, UserError
+from ranger_sim.foundation.user_error import ModelError, UserError, unknown
 from ranger_sim.plant.electrics.electrics import ElectricsParameters
 from ranger_sim.plant.electrics.motor_parameters import MotorParameters
 from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
@@ -126,7 +126,7 @@ def load(name: str | pathlib.Path) -> BodyFile:
 def _load(name: str, users: tuple[str, ...]) -> BodyFile:
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not name.endswith(".toml") and name not in available():
-        raise ModelError(f"body {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+        raise ModelError(f"{unknown('body', str(name), available())}, or give a .toml file")
     data = toml_file.load(path, "body file")
     base_name = data.get("base")
     if isinstance(base_name, str) and (base_name in users or base_name == path.stem):

@@ -22,7 +22,7 @@ from typing import Any
 
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.numbers import reals
-from ranger_sim.foundation.user_error import ModelError
+from ranger_sim.foundation.user_error import ModelError, unknown
 from ranger_sim.plant.mechanics import term_torques as torques
 from ranger_sim.plant.mechanics.leg import INNER, OUTER
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
@@ -313,7 +313,7 @@ def _check(place: str, table: object) -> Term:
         raise ModelError(f"{place}: a term is a table, not {table!r}")
     name = table.get("form")
     if not isinstance(name, str) or name not in FORMS:
-        raise ModelError(f"{place}: form is {name!r}; there are: {', '.join(FORMS)}")
+        raise ModelError(f"{place}: {unknown('form', str(name), FORMS)}")
     form = FORMS[name]
     at = table.get("at")
     place = f"{place} ({name})"

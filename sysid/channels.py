@@ -6,7 +6,7 @@ by hand otherwise (`--map old=new`).
 
 import dataclasses
 
-from ranger_sim.foundation.user_error import DataError
+from ranger_sim.foundation.user_error import DataError, unknown
 from ranger_sim.sysid.dataset import Dataset, Repair
 
 WRITTEN_SAMPLES = 3  # the robot's log has a first and a last sample of what no board ever wrote
@@ -38,8 +38,7 @@ class Experiment:
         for channel in self.channels:
             if channel.name == name:
                 return channel
-        there = ", ".join(channel.name for channel in self.channels)
-        raise DataError(f"{name}: no channel of the experiment {self.name}; it has {there}")
+        raise DataError(f"{self.name}: {unknown('channel', name, (channel.name for channel in self.channels))}")
 
 
 def _leg_names() -> tuple[Name, ...]:
@@ -137,7 +136,7 @@ EXPERIMENTS = {experiment.name: experiment for experiment in _ALL}
 def experiment(name: str) -> Experiment:
     """The experiment of this name; UserError with all names when there is none."""
     if name not in EXPERIMENTS:
-        raise DataError(f"{name!r}: no such experiment; there are {', '.join(EXPERIMENTS)}")
+        raise DataError(unknown("experiment", name, EXPERIMENTS))
     return EXPERIMENTS[name]
 
 

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import DataError, printable
+from ranger_sim.foundation.user_error import DataError, printable, unknown
 
 Array = NDArray[np.float64]
 # Why samples are left out. Of the second kind nothing is lost: the same was there already, never was, or is not wanted.
@@ -182,8 +182,7 @@ class Dataset:
         try:
             return self.channels[name]
         except KeyError:
-            there = ", ".join(self.channels) or "none"
-            raise DataError(f"{self.name}: there is no channel {name}; there are {there}") from None
+            raise DataError(f"{self.name}: {unknown('channel', name, self.channels)}") from None
 
     def __contains__(self, name: str) -> bool:
         return name in self.channels

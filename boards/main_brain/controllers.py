@@ -17,7 +17,7 @@ from ranger_sim.boards.main_brain.programs import parameter_rows
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import mb as table_ids
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import ScenarioError
+from ranger_sim.foundation.user_error import ScenarioError, unknown
 
 FOLDER = pathlib.Path(__file__).parent / "parameters"
 DEFAULT_PROGRAM = "record"
@@ -101,11 +101,12 @@ def load(name: str | pathlib.Path) -> Controller:
 def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
     """The set `name`; `users`: the files whose base it is, the nearest one last."""
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
-    asked = f"{users[-1]}: base {name!r}" if users else f"controller {name!r}"
+    place = f"{users[-1]}: " if users else ""
     if not name.endswith(".toml") and name not in available():
-        raise ScenarioError(f"{asked}: unknown; there are {', '.join(available())}, or give a .toml file")
+        what = unknown("base" if users else "controller", name, available())
+        raise ScenarioError(f"{place}{what}, or give a .toml file")
     if path.resolve() in [each.resolve() for each in users]:
-        raise ScenarioError(f"{asked} leads back to this set")
+        raise ScenarioError(f"{place}base {name!r} leads back to this set")
     data = toml_file.load(path, "controller file")
     place = str(path)
     _only(data, ("title", "description", "program", "base", "parameters", "reasons", "operator"), place)
@@ -117,7 +118,7 @@ def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
         base = _load(base_name, (*users, path))
     program = _text(data, "program", place, base.program if base is not None else DEFAULT_PROGRAM)
     if program not in programs.PROGRAMS:
-        raise ScenarioError(f"{place}: program = {program!r}: unknown; there are {', '.join(programs.PROGRAMS)}")
+        raise ScenarioError(f"{place}: {unknown('program', program, programs.PROGRAMS)}")
     needed = programs.program(program).parameters()
     changes = _parameters(_table(data, "parameters", place), place)
     for each in changes:

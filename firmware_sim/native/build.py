@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 
+from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.firmware_sim.native.manifest import Manifest
 from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.user_error import FirmwareError
@@ -18,7 +19,6 @@ from ranger_sim.foundation.user_error import FirmwareError
 HERE = pathlib.Path(__file__).resolve().parent
 INCLUDE = HERE / "include"
 RUNTIME = HERE / "runtime" / "runtime.c"
-COMPILERS = ("cc", "gcc", "clang")
 LONGEST_S = 600.0  # a compiler that takes longer than this hangs
 WORD_BITS = sys.maxsize.bit_length() + 1  # of pointers, and of long in the data models of Unix
 
@@ -65,17 +65,6 @@ class Addition:
 
     include: tuple[pathlib.Path, ...] = ()
     sources: tuple[pathlib.Path, ...] = ()
-
-
-def compiler() -> str:
-    """The C compiler: $CC, or the first of the usual ones; UserError when none is found."""
-    asked = os.environ.get("CC")
-    for name in (asked.split()[-1],) if asked and asked.split() else COMPILERS:
-        found = shutil.which(name)
-        if found:
-            return found
-    looked = f"CC={asked}" if asked else ", ".join(COMPILERS)
-    raise FirmwareError(f"no C compiler is installed here (looked for {looked}); firmware in C needs one")
 
 
 def build(

@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Iterable
 from typing import Any
 
-from ranger_sim.firmware_sim.native.build import compiler
+from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.foundation.user_error import FirmwareError
 
 PREFIX = "GCOV_PREFIX"  # where libgcov writes to

@@ -16,7 +16,7 @@ import shutil
 import subprocess
 from collections.abc import Collection, Iterable
 
-from ranger_sim.firmware_sim.native.build import compiler
+from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.firmware_sim.native.crash import lines_of
 from ranger_sim.foundation.user_error import FirmwareError
 

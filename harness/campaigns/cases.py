@@ -9,7 +9,7 @@ import tempfile
 from typing import Any
 
 from ranger_sim import __version__, datatable, loading
-from ranger_sim.foundation.user_error import CampaignError, UserError
+from ranger_sim.foundation.user_error import CampaignError, UserError, unknown
 from ranger_sim.harness.campaigns.subjects import own_machine
 from ranger_sim.harness.campaigns.walks import WALKS
 from ranger_sim.harness.ranger import Ranger
@@ -71,9 +71,7 @@ class Settings:
         for task, factor in self.costs.items():
             board, _, entry = task.partition(".")
             if board not in robot.boards:
-                raise CampaignError(
-                    f"campaign: cost.{task}: there is no board {board!r}, but {', '.join(robot.boards)}"
-                )
+                raise CampaignError(f"campaign: cost.{task}: {unknown('board', board, robot.boards)}")
             try:
                 found = robot.boards[board].scheduler.find(entry)
             except UserError as error:

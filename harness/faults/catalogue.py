@@ -4,14 +4,13 @@ A mode belongs to kinds of places, not to a machine: a fault of an encoder's edg
 Ranger's places, and the modes that only it has, are in ranger_catalogue.py.
 """
 
-import difflib
 import importlib
 import importlib.util
 import pathlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from ranger_sim.foundation.user_error import FaultError, UserError
+from ranger_sim.foundation.user_error import FaultError, UserError, unknown
 from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.fault import Fault, Place
 from ranger_sim.harness.waiting import Condition, Wanted
@@ -92,13 +91,11 @@ class Catalogue:
             return ""
         return f"it needs {needs or 'a place that is a ' + ' or a '.join(sorted(others))}"
 
-    def named(self, name: str, there: Iterable[str], what: str) -> str:
+    def named(self, name: str, there: Iterable[str], what: str, where: str = "") -> str:
         """Return `name`, which must be in `there`; otherwise a UserError with the nearest ones."""
         names = list(there)
         if name not in names:
-            near = difflib.get_close_matches(name, names, 3)
-            hint = f"meant was perhaps {' or '.join(near)}" if near else f"there are {', '.join(names) or 'none'}"
-            raise FaultError(f"{what} {name!r}: {hint}{self.hint}")
+            raise FaultError(f"{where}{unknown(what, name, names)}{self.hint}")
         return name
 
     def find(self, name: str) -> Place:
@@ -113,10 +110,10 @@ class Catalogue:
         if reason := self.refusal(where, mode):
             raise FaultError(f"fault {where.name}:{mode}: it cannot act there; {reason}, this is {where.what}")
         modes = self.modes_of(where)
-        kind = modes[self.named(mode, modes, f"fault mode at {where.name},")]
+        kind = modes[self.named(mode, modes, "mode", f"fault {where.name}: ")]
         known = [parameter.name for parameter in kind.parameters]
         for name in parameters:
-            self.named(name, known, f"fault {where.name}:{mode}, parameter")
+            self.named(name, known, "parameter", f"fault {where.name}:{mode}: ")
         if self.condition is None:
             raise FaultError(f"fault {where.name}:{mode}: this catalogue belongs to no machine")
         return kind.asked(where, start, end, parameters, self.condition)

@@ -66,7 +66,7 @@ class TaskFault(ProcessorFault):
     def found(self, name: str) -> Any:
         """The task of this name. UserError for a missing one, or one that calls others."""
         tasks = [task for task in self.board.scheduler.schedule.all_tasks() if task.kind == NORMAL_TASK]
-        chosen(name, [task.name for task in tasks], f"fault {self.place.name}:{self.mode}, task")
+        chosen(name, [task.name for task in tasks], "task", f"fault {self.place.name}:{self.mode}")
         return next(task for task in tasks if task.name == name)
 
 
@@ -280,7 +280,7 @@ class StuckInterrupt(ProcessorFault):
     def connect(self) -> None:
         ProcessorFault.connect(self)
         there = {source.name: source for source in self.board.vic.sources.values() if source.attached}
-        name = chosen(self.values["interrupt"], there, f"fault {self.place.name}:{self.mode}, interrupt")
+        name = chosen(self.values["interrupt"], there, "interrupt", f"fault {self.place.name}:{self.mode}")
         self.source = there[name]
         if name == "can_receive" and self.robot.quirks.full_receive_ring_kills:
             self.permanent = POWER_CYCLE  # its handler fills the ring with copies of the last frame

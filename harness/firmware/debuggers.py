@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from ranger_sim.firmware_sim.gdb.server import GdbServer, never
-from ranger_sim.foundation.user_error import FirmwareError
+from ranger_sim.foundation.user_error import FirmwareError, unknown
 
 
 class Place(NamedTuple):
@@ -36,7 +36,7 @@ def open_doors(
         for text in wanted:
             place = placed(text)
             if place.board not in boards:
-                raise FirmwareError(f"gdb {text}: there is no board {place.board}; there are {', '.join(boards)}")
+                raise FirmwareError(f"gdb {text}: {unknown('board', place.board, boards)}")
             board = boards[place.board]
             if getattr(board, "core", None) is None:
                 raise FirmwareError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")

@@ -23,7 +23,7 @@ from typing import Any
 
 from ranger_sim.datatable.model import ROUTER, Table
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import ProfileError
+from ranger_sim.foundation.user_error import ProfileError, unknown
 from ranger_sim.harness.outside.bus_schedule import (
     MOST_ROWS,
     MOST_TURNS,
@@ -291,7 +291,7 @@ def load(
     """
     text = str(name)
     if not text.endswith(".toml") and text not in available():
-        raise ProfileError(f"profile {text!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+        raise ProfileError(f"{unknown('profile', text, available())}, or give a .toml file")
     path = pathlib.Path(text) if text.endswith(".toml") else FOLDER / f"{text}.toml"
     faults: list[ProfileFault] = []
     reader = _Reader(str(path), faults)

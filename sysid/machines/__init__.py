@@ -3,7 +3,7 @@
 import importlib
 from typing import Any
 
-from ranger_sim.foundation.user_error import ModelError
+from ranger_sim.foundation.user_error import ModelError, unknown
 from ranger_sim.sysid.machine import Machine
 
 MACHINES = {
@@ -47,7 +47,7 @@ def machine_of(machine: str | Machine, gear: float | None = None) -> Machine:
         return machine
     if machine not in MACHINES:
         raise ModelError(
-            f"--experiment {machine}: there are {', '.join(MACHINES)}; a machine of yours is module:object"
+            f"--experiment {machine}: {unknown('experiment', machine, MACHINES)}; a machine of yours is module:object"
         )
     if gear is None:
         return made(machine)()

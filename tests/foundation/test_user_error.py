@@ -11,7 +11,7 @@ from ranger_sim import datatable
 from ranger_sim.can_bus.edge.external_bus import place_of
 from ranger_sim.firmware_sim.lpc2194 import image
 from ranger_sim.foundation import user_error
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.campaigns import plan
 from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.processes.control import ask
@@ -80,3 +80,12 @@ def test_a_package_with_a_kind_of_its_own_raises_no_bare_user_error(package):
 
 def test_a_message_is_printable_whatever_it_quotes():
     assert str(UserError("a\x1b[31m", "b\u202e")) == "a\\x1b[31m\nb\\u202e"
+
+
+def test_an_unknown_name_is_reported_with_all_of_a_few_names_or_the_near_ones_of_many():
+    assert unknown("board", "MHC", ["MCH", "MB"]) == "unknown board 'MHC' (available: MCH, MB)"
+    assert unknown("pin", "a", []) == "unknown pin 'a' (available: none)"
+    many = [f"name_{number}" for number in range(13)]
+    assert unknown("name", "nmae_12", many) == "unknown name 'nmae_12'; did you mean 'name_12' or 'name_2'?"
+    assert unknown("name", "x", many) == f"unknown name 'x' (available: {', '.join(many)})"
+    assert unknown("name", "x", [f"name_{number}" for number in range(101)]) == "unknown name 'x'"

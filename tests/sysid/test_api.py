@@ -96,7 +96,10 @@ def test_a_sound_motor_bench_of_another_simulation_raises_no_alarm():
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ({"files": "none.csv", "machine": "mars"}, "--experiment mars: there are motor-bench"),
+        (
+            {"files": "none.csv", "machine": "mars"},
+            "unknown experiment 'mars' .available: motor-bench",
+        ),
         ({"files": "none.csv", "machine": "walk", "gear": 3.0}, "--gear 3: only the motor bench has a gearbox"),
         ({"files": "none.csv", "machine": Cart(), "gear": 3.0}, "--gear 3: only the motor bench has a gearbox"),
         ({"files": "none.csv", "machine": object()}, "has no name, quantities, parameters, prepare, effects, generic"),

@@ -203,7 +203,7 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
         (["none.csv", "--experiment", "motor-bench"], "none.csv: there is no such file"),
         (
             ["data.csv", "--experiment", "moon"],
-            f"--experiment moon: there are {', '.join(MACHINES)}; a machine of yours",
+            f"--experiment moon: unknown experiment 'moon' (available: {', '.join(MACHINES)}); a machine of yours",
         ),
         (["data.csv", "--experiment", "nowhere:Cart"], "--experiment nowhere:Cart: No module named 'nowhere'"),
         (["data.csv", "--experiment", "json:dumps"], "--experiment json:dumps: it has no name, quantities"),
@@ -300,5 +300,5 @@ def test_the_positioning_machine_is_wrong_where_its_literature_says():
 
 
 def test_an_unknown_machine_is_refused():
-    with pytest.raises(UserError, match="there are motor-bench, leg-swing, positioning, ankle, walk"):
+    with pytest.raises(UserError, match="available: motor-bench, leg-swing, positioning, ankle, walk"):
         ranger_sim.diagnose("none.csv", "mars")
