@@ -1,4 +1,4 @@
-"""The result of a diagnosis, before it is printed (`answer.py`) or drawn."""
+"""The workings of a diagnosis: regressions and named effects, from which `answer.py` makes its result."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -8,6 +8,7 @@ from ranger_sim.sysid import intervals, misfit, plausibility
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.results import DiagnosisResult
 
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
@@ -27,7 +28,7 @@ class KnownEffect:
 
 @dataclasses.dataclass
 class Diagnosis:
-    """All results, for the report; `answer` is the printed part."""
+    """What a diagnosis works with, for the report; `result` is what it returns."""
 
     machine: Machine
     recordings: list[Recording]
@@ -41,7 +42,12 @@ class Diagnosis:
     before: misfit.Misfit
     after: misfit.Misfit
     doubts: plausibility.Doubts
-    answer: dict[str, Any] = dataclasses.field(default_factory=dict)
+    result: DiagnosisResult = dataclasses.field(init=False)  # made last, by answer.py alone
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """The result as plain data."""
+        return self.result.to_dict()
 
     @property
     def detected(self) -> bool:

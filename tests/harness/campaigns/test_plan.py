@@ -125,7 +125,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
 @pytest.mark.parametrize(
     ("data", "told"),
     [
-        ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "meant was perhaps stuck"),
+        ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "unknown mode 'stuk'"),
         ({"vary": {"fault": ["MCH.encoder:stuck"]}}, "fault place 'MCH.encoder'"),
         ({"vary": {"fault": [STUCK]}}, "'start' is no name of [vary]"),
         ({"vary": {"fault": ["MCH.joint_encoder:stuck@{"]}}, "Single '{'"),
@@ -136,7 +136,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
             "rate is '9', allowed are -5.2 to 5.2",
         ),
         ({"walk": {"seed": 1.5}}, "[walk]: scenario: seed is 1.5, a whole number"),
-        ({"walk": {"controller": "nobody"}}, "[walk]: controller 'nobody': unknown"),
+        ({"walk": {"controller": "nobody"}}, "[walk]: unknown controller 'nobody'"),
         ({"vary": {"seed": ["one"]}}, "[vary] seed = one: scenario: seed is 'one', a whole number"),
         ({"vary": {"body.gear_of_the_hip": [60]}}, "[vary] body.gear_of_the_hip = 60: "),
         ({"vary": {"controller.P_X": ["fast"]}}, "[vary] controller.P_X = ['fast']: a list of numbers"),
@@ -161,7 +161,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
             "looks = 2.5: a whole number from 1 to 50",
         ),
         ({"watch": {"after": "0 s"}}, "[watch] after = '0 s': it must be above 0"),
-        ({"vary": {"sed": [1]}}, "[vary] sed: it is no setting of a walk"),
+        ({"vary": {"sed": [1]}}, "[vary] sed: not a setting of a walk"),
         ({"vary": {"seed": []}}, "a list of values"),
         ({"vary": {"seed": {"low": 1, "high": 3}}}, "a range needs [sample] or [search]"),
         ({"vary": {"slope": {"low": 0.1, "high": 0.0}}, "sample": {"runs": 3}}, "low below high"),
