@@ -35,7 +35,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     show.set_defaults(run=run_show)
 
     listing = actions.add_parser("list", help="variables, all or of one board")
-    listing.add_argument("--board", metavar="BOARD", help="only what this board publishes or hears")
+    listing.add_argument("--board", metavar="BOARD", help="only what this board publishes or receives")
     listing.set_defaults(run=run_list)
 
     for action in (generate, show, listing):
@@ -84,7 +84,7 @@ def run_copy(arguments: argparse.Namespace) -> int:
             if path.suffix in (".csv", ".toml"):
                 shutil.copyfile(path, folder / path.name)
     except OSError as error:
-        raise UserError(f"{error.filename or folder}: {error.strerror}: the copy needs a folder of its own") from error
+        raise UserError(f"{error.filename or folder}: {error.strerror}: the copy needs a new folder") from error
     print(f"{folder}: change variables.csv, then ranger-sim table generate --master {folder}")
     print(f"then it is the table of whatever runs with RANGER_SIM_TABLE={folder}")
     return EXIT_DONE
@@ -161,5 +161,5 @@ def run_list(arguments: argparse.Namespace) -> int:
         )
     console.print(grid)
     if not described:
-        print("no room for descriptions: a wider window, --json or `table show NAME` has them")
+        print("descriptions do not fit: widen the window, or use --json or `table show NAME`")
     return EXIT_DONE

@@ -46,7 +46,7 @@ def walk_table(first: dict, rest: dict) -> str:
         ("the same per kilometre", f"{493 / robot_km:.2f} Wh", f"{drawn_Wh / km:.2f} Wh", ""),
         ("mean power out of them", f"{robot_W:.1f} W", f"{drawn_W:.1f} W", ""),
         ("cost of transport of that", "0.28", f"{first['tcot'] * drawn_W / first['total_power_W']:.2f}", ""),
-        ("heel strike told late by", "14 ± 3 ms", f"{late['mean']:.1f} ± {late['std']:.1f} ms", ""),
+        ("heel strike reported late by", "14 ± 3 ms", f"{late['mean']:.1f} ± {late['std']:.1f} ms", ""),
     ]
     return table(rows)
 

@@ -152,7 +152,7 @@ def record() -> dict:
         if stations and abs(stations["value down"]) > LEAST_CURRENT_A:
             break
     else:
-        raise SystemExit("no command came of a hip angle in the same slot of the main brain")
+        raise SystemExit("no hip angle led to a command in the same slot of the main brain")
     begin = stations["ae_update"][0]
     end = stations["control"][1]
     lanes = {

@@ -295,7 +295,7 @@ class Schedule:
             for name in speakers:
                 if name not in names:
                     there = ", ".join(names)
-                    raise UserError(f"schedule: speaker {name!r} is no task of every slot; there are {there}")
+                    raise UserError(f"schedule: speaker {name!r} is not a task of every slot (available: {there})")
             for task in self.every + self.last:
                 task.speaks = task.name in speakers
 

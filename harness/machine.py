@@ -134,7 +134,7 @@ class Machine:
     def _wired(self, name: str) -> Any:
         """A board that the wiring names."""
         if name not in self.boards:
-            raise UserError(f"wiring: there is no board {name!r}, but {', '.join(self.boards)}")
+            raise UserError(f"wiring: unknown board {name!r} (available: {', '.join(self.boards)})")
         return self.boards[name]
 
     def _part(self, kind: str, number: int) -> Any:
@@ -252,7 +252,7 @@ class Machine:
     def board(self, name: str) -> Any:
         """The board of this name. UserError for any other."""
         if name not in self.boards:
-            raise UserError(f"board {name!r}: there is none of this name, but {', '.join(self.boards)}")
+            raise UserError(f"unknown board {name!r} (available: {', '.join(self.boards)})")
         return self.boards[name]
 
     def quantities(self) -> dict[str, float]:

@@ -190,7 +190,7 @@ def condition(
         if name not in quantities:
             told = ", ".join(quantities) or "none"
             raise UserError(
-                f"condition {text!r}: {name!r} is no quantity of the body, but {told}{meant(name, quantities)}"
+                f"condition {text!r}: {name!r} is not a quantity (available: {told}){meant(name, quantities)}"
             )
         return Comparison(text, name, sign, float(value), quantities)
     if match := re.fullmatch(NOTED, text):

@@ -34,7 +34,7 @@ LOSSES = {
     "bit_flip": "single values with a wrong bit",
 }
 NOTHING_LOST = {
-    "repeated": "samples that came again, stamp and value",
+    "repeated": "repeated samples, stamp and value",
     "never_written": "samples of a variable before it was written",
     "cut": "a time that is not wanted",
 }
@@ -183,7 +183,7 @@ class Dataset:
             return self.channels[name]
         except KeyError:
             there = ", ".join(self.channels) or "none"
-            raise UserError(f"{self.name}: there is no channel {name}; there are {there}") from None
+            raise UserError(f"{self.name}: unknown channel {name} (available: {there})") from None
 
     def __contains__(self, name: str) -> bool:
         return name in self.channels

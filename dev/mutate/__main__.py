@@ -66,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     )
     command.add_argument("room", nargs="+", choices=packages(), metavar="ROOM", help=", ".join(packages()))
     command.add_argument(
-        "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each room (default {COUNT})"
+        "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each package (default {COUNT})"
     )
     command.add_argument("--seed", type=int, default=1, metavar="S", help="draws them (default 1)")
     command.add_argument(
@@ -74,20 +74,20 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="PATH",
-        help="tests to run (default: tests/ROOM and what the suite has for the room elsewhere)",
+        help="tests to run (default: tests/PACKAGE and the package's tests elsewhere)",
     )
     command.add_argument(
         "--limit",
         type=whole_number(1),
         default=int(LIMIT_S),
         metavar="S",
-        help=f"of the tests that reach a mutant, run the cheapest of so many seconds together (default {LIMIT_S:g})",
+        help=f"of the tests that reach a mutant, run the cheapest, this many seconds in total (default {LIMIT_S:g})",
     )
     command.add_argument(
         "--build",
         type=whole_number(1),
         metavar="S",
-        help="what is not noticed in a compiled module: build it, and run so many seconds of compiled tests",
+        help="unnoticed mutants of a compiled module: build each, and run this many seconds of compiled tests",
     )
     command.add_argument(
         "--map-limit",

@@ -132,7 +132,7 @@ class Calls:
         self.chip.spend(cycles)
 
     def idle(self) -> None:
-        raise UserError("only a main loop of its own can sleep, not a task or a handler")
+        raise UserError("only a board's own main loop can sleep, not a task or a handler")
 
     def slot_cycles(self) -> int:
         return self.chip.cycles_since_tick()

@@ -71,7 +71,8 @@ class Settings:
         for task, factor in self.costs.items():
             board, _, entry = task.partition(".")
             if board not in robot.boards:
-                raise UserError(f"campaign: cost.{task}: there is no board {board!r}, but {', '.join(robot.boards)}")
+                available = ", ".join(robot.boards)
+                raise UserError(f"campaign: cost.{task}: unknown board {board!r} (available: {available})")
             try:
                 found = robot.boards[board].scheduler.find(entry)
             except UserError as error:

@@ -302,7 +302,7 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
     tolerances = tuple(tolerances_of(data, path))
     if search and tolerances:
         raise UserError(
-            f"{path}: [tolerance] {tolerances[0].what}: the runs of a [search] are chosen and stand for no population"
+            f"{path}: [tolerance] {tolerances[0].what}: runs of a [search] are chosen, do not represent a population"
         )
     plan = Plan(
         path=path,
@@ -395,7 +395,7 @@ def check_faults(plan: Plan) -> None:
             try:
                 text = str(plan.case({**first, **point, "fault": fault}).fault)
             except KeyError as error:
-                raise UserError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
+                raise UserError(f"{plan.path}: fault {fault!r}: {error} is not a name of [vary]") from None
             except (ValueError, IndexError, AttributeError) as error:
                 raise UserError(f"{plan.path}: fault {fault!r}: {error}") from None
             try:
@@ -441,11 +441,11 @@ def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, lis
             continue
         if machine:
             raise UserError(
-                f"{path}: [vary] {name}: it is no setting (seed, machine.KEYWORD, cost.BOARD.TASK) and no fault's text "
+                f"{path}: [vary] {name}: not a setting (seed, machine.KEYWORD, cost.BOARD.TASK) and no fault's text "
                 f"has {{{name}}}"
             )
         raise UserError(
-            f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
+            f"{path}: [vary] {name}: not a setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
             f"body.PARAMETER, cost.BOARD.TASK) and no fault's text has {{{name}}}"
         )
     return axes

@@ -140,7 +140,7 @@ class Catalogue:
             return
         spec = importlib.util.spec_from_file_location(f"ranger_sim_fault_module_{path.stem}", path)
         if spec is None or spec.loader is None:
-            raise UserError(f"fault module {path}: it is no Python file (.py)")
+            raise UserError(f"fault module {path}: it is not a Python file (.py)")
         module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)

@@ -104,7 +104,7 @@ class PackLost(BatteryFault):
 
     mode = "pack_lost"
     meaning = "loses packs: the others carry the current"
-    parameters = (WholeNumber("packs", "1", 1, 1, 100, "so many of them", "chosen by us: a plug; the robot has seven"),)
+    parameters = (WholeNumber("packs", "1", 1, 1, 100, "number of packs", "chosen by us: a plug; the robot has seven"),)
 
     def connect(self) -> None:
         BatteryFault.connect(self)
@@ -195,7 +195,7 @@ class Restart(Fault):
         self.where = f"fault {self.text()}"
         emulated(self.robot, self.name, self.where)
         if self.robot.polled:
-            raise UserError(f"{self.where}: ends outside hold on to this board; start them with processes of their own")
+            raise UserError(f"{self.where}: external ends hold on to this board; start them as separate processes")
         self.back_ns = NEVER
         self.slots_before = 0
 

@@ -197,7 +197,7 @@ def why_unseen(robot: Any) -> str:
     if profile is not None and "UI" in profile.external():
         return "The user interface board is outside: its own display, lights and buzzer show what it drives."
     if profile is not None and "UI" in profile.absent():
-        return "There is no user interface board in this run."
+        return "This run does not have a user interface board."
     if isinstance(board, PowerlessBoard):
         return "The user interface board is without power or held in reset."
     if getattr(board, "gone", False):

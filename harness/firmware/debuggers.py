@@ -36,12 +36,12 @@ def open_doors(
         for text in wanted:
             place = placed(text)
             if place.board not in boards:
-                raise UserError(f"gdb {text}: there is no board {place.board}; there are {', '.join(boards)}")
+                raise UserError(f"gdb {text}: unknown board {place.board} (available: {', '.join(boards)})")
             board = boards[place.board]
             if getattr(board, "core", None) is None:
                 raise UserError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")
             if any(door.board is board for door in doors):
-                raise UserError(f"gdb {text}: {place.board} has a door already")
+                raise UserError(f"gdb {text}: {place.board} has a port already")
             doors.append(GdbServer(board, place.port, place.host, allow_network, ends))
     except BaseException:
         close_doors(doors)

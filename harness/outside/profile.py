@@ -221,7 +221,7 @@ def _schedule(name: str, folder: pathlib.Path, table: Table, faults: list[Profil
                 value,
                 f"is in the occasional list of {listed[0]}: give [occasional] {listed[0]}"
                 if listed
-                else "no row of a board's schedule sends it and it is no command of the main brain",
+                else "no row of a board's schedule sends it and it is not a command of the main brain",
             )
         else:
             every[key] = reader.whole(value, f"every.{key}", 1, MOST_TURNS, 1)
@@ -229,7 +229,7 @@ def _schedule(name: str, folder: pathlib.Path, table: Table, faults: list[Profil
     for key, value in reader.table(content, "occasional").items():
         if key not in {board.name for board in table.with_role("satellite") if board.occasional}:
             reader.fault(
-                f"occasional.{key}", value, "no board of that name has an occasional list and a CAN bus of its own"
+                f"occasional.{key}", value, "no board of that name has both an occasional list and a CAN bus"
             )
         else:
             occasional[key] = reader.whole(value, f"occasional.{key}", 1, MOST_TURNS, 1)
@@ -268,7 +268,7 @@ def default() -> Profile:
     schedule = full_schedule()
     buses = {name: BusProfile(name, None, None, table.bit_rates[name.upper()], FULL, schedule, {}) for name in BUSES}
     boards = dict.fromkeys(wiring.BOARDS, EMULATED)
-    return Profile("default", "", "the robot as it is", "", boards, buses)
+    return Profile("default", "", "the robot unchanged", "", boards, buses)
 
 
 @functools.cache
@@ -429,5 +429,5 @@ def _with_router(reader: _Reader, boards: Mapping[str, str], table: Table) -> No
         reader.fault(f"boards.{external}", EXTERNAL, WITHOUT_CAN)
     elif boards[router] == ABSENT and boards[brain] == EMULATED:
         reader.fault(
-            f"boards.{router}", ABSENT, f"without the router {brain} reaches nobody: make {brain} absent as well"
+            f"boards.{router}", ABSENT, f"without the router {brain} reaches no board: make {brain} absent as well"
         )

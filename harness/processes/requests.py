@@ -56,13 +56,13 @@ def _board(value: Any) -> str:
 
 def _parameter(value: Any) -> str:
     if not isinstance(value, str):
-        raise UserError(f"set: {shown(value)} is no name of a parameter")
+        raise UserError(f"set: {shown(value)} is not the name of a parameter")
     return parameters.parameter(value).name
 
 
 def _fault(value: Any) -> str:
     if not isinstance(value, str):
-        raise UserError(f"fault: {shown(value)} is no fault, as PLACE:MODE")
+        raise UserError(f"fault: {shown(value)} is not a fault in the form PLACE:MODE")
     return can_be_armed(CATALOGUE.typed(value)).text()
 
 
@@ -79,7 +79,7 @@ def can_be_armed(fault: Fault) -> Fault:
 
 def _which(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_FAULTS:
-        raise UserError(f"clear: {shown(value)} is no number of a fault, 0 to {MOST_FAULTS}")
+        raise UserError(f"clear: {shown(value)} is not the number of a fault, 0 to {MOST_FAULTS}")
     return value
 
 
@@ -115,10 +115,10 @@ def admitted(line: bytes) -> Request:
     what = content.pop("do", None)
     fields = REQUESTS.get(what) if isinstance(what, str) else None
     if fields is None:
-        raise UserError(f"{shown(what)} is no request; there are {', '.join(REQUESTS)}")
+        raise UserError(f"{shown(what)} is not a request (available: {', '.join(REQUESTS)})")
     for name in content:
         if name not in fields:
-            raise UserError(f"{what}: {shown(name)} is no field of it; it has {', '.join(fields) or 'none'}")
+            raise UserError(f"{what}: unknown field {shown(name)} (available: {', '.join(fields) or 'none'})")
     found: dict[str, Any] = {}
     for name, check in fields.items():
         if name not in content:

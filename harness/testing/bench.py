@@ -356,7 +356,7 @@ class BoardAlone(Bench):
         firmware: Any = None,
     ) -> None:
         if name not in BOARD_CLASSES:
-            raise UserError(f"board {name!r}: there is none of this name, but {', '.join(BOARD_CLASSES)}")
+            raise UserError(f"unknown board {name!r} (available: {', '.join(BOARD_CLASSES)})")
         wires = [wire for wire in wiring.CAN if wire.board == name]
         Bench.__init__(self, {f"can{wire.bus}": bit_rate for wire in wires})
         self.name = name

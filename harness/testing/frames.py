@@ -121,7 +121,7 @@ class FrameKeeper:
     def frames(self, bus: str, identifiers: set[int] | None = None, since_ns: int = 0) -> list[Frame]:
         """Frames of a bus in their order; only those identifiers (None: all), from `since_ns` on."""
         if bus not in self.streams:
-            raise UserError(f"bus {bus!r}: there is none of this name, but {', '.join(self.streams)}")
+            raise UserError(f"unknown bus {bus!r} (available: {', '.join(self.streams)})")
         self.streams[bus].flush()
         found: list[Frame] = []
         for last_ns, block in self.blocks[bus]:

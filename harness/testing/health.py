@@ -49,7 +49,7 @@ class Expected:
         for text in self.errors:
             board, _, name = text.rpartition(":")
             if name not in names.codes:
-                raise UserError(f"expected error {text!r}: the table has none of this name{meant(name, names.codes)}")
+                raise UserError(f"expected error {text!r}: the table does not have it{meant(name, names.codes)}")
             if board and board not in boards:
                 raise UserError(f"expected error {text!r}: board {board!r} is none of {', '.join(boards)}")
 
@@ -113,7 +113,7 @@ class Health:
             *amount("lost frames", wanted.lost_frames, lost, off),
             *amount("error frames", wanted.bus_errors, broken, off),
             *amount("bus-off", wanted.bus_off, self._bus_off(now, before)),
-            *amount("boards that stand still", wanted.dead, self._dead(now)),
+            *amount("boards that do not run", wanted.dead, self._dead(now)),
             *self._fall(wanted),
             *amount("injected faults that did not act", wanted.idle_faults, self._idle()),
         ]

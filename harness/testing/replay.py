@@ -60,7 +60,7 @@ def into_board(board: BoardAlone, frames: Iterable[Frame]) -> int:
             if frame.bus in ("can1", "can2", "can3", "can4"):
                 continue  # of a walk's folder, but not of this board
             raise UserError(
-                f"replay: channel {frame.bus!r} is no bus of {board.name}: "
+                f"replay: channel {frame.bus!r} is not a bus of {board.name}: "
                 f"read_log(path, bus={next(iter(board.buses), 'can1')!r}) says which it is"
             )
         if frame.identifier in own:

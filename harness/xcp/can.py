@@ -131,7 +131,7 @@ class XcpCanProbe(StepWatch):
         StepWatch.__init__(self)
         names = [each.name for each in robot.buses]
         if bus not in names:
-            raise UserError(f"XCP on {bus}: there is no such bus, but {', '.join(names)}")
+            raise UserError(f"XCP on {bus}: unknown bus (available: {', '.join(names)})")
         self.robot, self.bus = robot, bus
         emulated = robot.buses[names.index(bus)]
         bit_rate = emulated.bitrate if outside is None else outside.bit_rate

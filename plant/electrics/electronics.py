@@ -50,7 +50,7 @@ def itemised_W(off: tuple[str, ...] = ()) -> dict[str, float]:
     for name in off:
         for item in SWITCHES.get(name, (name,)):
             if item not in items:
-                raise UserError(f"electronics: there is no item {item!r} to switch off; there are: {', '.join(items)}")
+                raise UserError(f"electronics: unknown item {item!r} to switch off (available: {', '.join(items)})")
             del items[item]
     items["converter loss"] = sum(items.values()) * (1.0 / EFFICIENCY - 1.0)
     return items

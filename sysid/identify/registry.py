@@ -134,7 +134,7 @@ def bench_of(name: str) -> Bench:
     try:
         return BENCHES[name]
     except KeyError:
-        raise UserError(f"bench {name!r}: there is none; there are {', '.join(BENCHES)}") from None
+        raise UserError(f"unknown bench {name!r} (available: {', '.join(BENCHES)})") from None
 
 
 def alone(

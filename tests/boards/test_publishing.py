@@ -105,10 +105,10 @@ def test_an_error_goes_out_only_while_one_waits_with_the_stamp_of_its_first_time
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (lines()[:1] + lines()[2:], "LEG: line 2 of what is sent is ERROR_LEG in the board's room; .* it is KEYS"),
-        (lines()[:3], r"line 4 of what is sent is no more in the board's room; .* it is \(sweep\)"),
-        ([*lines(), Send("SPEED", 1.0, 1, 2)], "line 5 of what is sent is SPEED in the board's room; .* it is no more"),
-        ([lines()[1], lines()[0], *lines()[2:]], "line 1 of what is sent is KEYS in the board's room; .* it is ANGLE"),
+        (lines()[:1] + lines()[2:], "LEG: line 2 of what is sent is ERROR_LEG in the board's package; .* has KEYS"),
+        (lines()[:3], r"line 4 of what is sent is no more in the board's package; .* has \(sweep\)"),
+        ([*lines(), Send("SPEED", 1.0, 1, 2)], "line 5 of what is sent is SPEED in the board's .* has no more"),
+        ([lines()[1], lines()[0], *lines()[2:]], "line 1 of what is sent is KEYS in the board's package; .* has ANGLE"),
     ],
     ids=["missing", "missing at the end", "too many", "another order"],
 )
@@ -167,7 +167,7 @@ def test_adding_a_variable_takes_a_line_a_name_in_a_row_and_a_send_and_nothing_e
     done = run(house, *generate)
     assert done.returncode == 0, done.stderr
     forgotten = run(house, "-c", HEAR_A_NEW_VARIABLE)
-    assert "line 2 of what is sent is MCH_ANG_RATE in the board's room" in forgotten.stderr
+    assert "line 2 of what is sent is MCH_ANG_RATE in the board's package" in forgotten.stderr
     hip = house / "boards/hip.py"
     line = re.search(r'^ *Send\("MCH_ANGLE".*\n', hip.read_text(encoding="utf-8"), re.MULTILINE).group(0)
     edit(hip, line, line + " " * 16 + 'Send("MCH_SPIKES", lambda: board.encoder.value, 260, 400),\n')

@@ -72,4 +72,4 @@ def test_a_folder_without_generated_code_is_named(tmp_path, monkeypatch):
 
 def test_a_copy_never_goes_over_a_folder_that_is_there(tmp_path, capsys):
     assert cli.main(["table", "copy", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"ranger-sim: {tmp_path}: File exists: the copy needs a folder of its own\n"
+    assert capsys.readouterr().err == f"ranger-sim: {tmp_path}: File exists: the copy needs a new folder\n"

@@ -161,7 +161,7 @@ def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):
     with pytest.raises(UserError, match="an entry has key and reason"):
         work.known(listed)
     listed.write_text('[[mutant]]\nkey = "a"\nreason = "b"\n' * 2, encoding="utf-8")
-    with pytest.raises(UserError, match="stands there twice"):
+    with pytest.raises(UserError, match="is listed twice"):
         work.known(listed)
 
 

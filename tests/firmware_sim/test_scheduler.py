@@ -433,7 +433,7 @@ def test_a_replaced_function_may_speak_whatever_the_schedule_said():
 
 def test_a_speaker_that_is_no_task_of_every_slot_is_refused():
     log = Log()
-    with pytest.raises(UserError, match="speaker 'x' is no task of every slot; there are a, b"):
+    with pytest.raises(UserError, match=r"speaker 'x' is not a task of every slot \(available: a, b\)"):
         Schedule(every=(log.task("a", 1),), last=(log.task("b", 1),), speakers=("x",))
 
 

@@ -156,7 +156,7 @@ def test_a_controller_moves_from_one_bus_to_another_and_off_it(wires):
     wires.push(1_000_001, 0, events.CAN_REQUEST, 1, 1, 0x100, 8, 0, 0)
     second.advance(2_000_000)
     assert second.counters.frames == 1
-    with pytest.raises(UserError, match="MCH: 'can1' is no Bus"):
+    with pytest.raises(UserError, match="MCH: 'can1' is not a Bus"):
         wires.connect_bus(1, "can1", 0)
 
 

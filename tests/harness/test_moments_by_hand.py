@@ -105,7 +105,7 @@ def test_the_nearest_value_that_a_quantity_had_is_told_with_its_unit():
     machine.rate = 1.0
     other.met()
     assert other.nearest() == "the nearest value of rate was 1"
-    with pytest.raises(UserError, match="'angel_rad' is no quantity of the body, but angle_rad, rate"):
+    with pytest.raises(UserError, match=r"'angel_rad' is not a quantity \(available: angle_rad, rate"):
         condition("angel_rad > 1")
 
 

@@ -117,7 +117,7 @@ def test_an_external_router_with_the_main_brain_is_allowed_and_alone_is_not(tmp_
     [
         ('[boards]\nMCH = "real"\n', "boards.MCH", "'real'", "emulated, external, absent"),
         ('[boards]\nMCX = "absent"\n', "boards.MCX", "'absent'", "the boards are MCH"),
-        ('[boards]\nCSR = "absent"\n', "boards.CSR", "'absent'", "reaches nobody"),
+        ('[boards]\nCSR = "absent"\n', "boards.CSR", "'absent'", "reaches no board"),
         ('[boards]\nMCH = "external"\n', "boards.MCH", "'external'", "can1, which is emulated"),
         ("[boards]\nMCH = 3\n", "boards.MCH", "3", "expected"),
         ('boards = "all"\n', "boards", "'all'", "table"),

@@ -71,7 +71,7 @@ def none(p, u, a):
 
 
 CASES = {
-    "as it stands": ({}, 0.0),
+    "unchanged": ({}, 0.0),
     "behind a filter": ({}, 0.02),
     "behind the board's filter": ({}, ankle_motion.RATE_FILTER_S),
     "no load friction": ({"load_friction": 0.0}, 0.0),

@@ -198,7 +198,7 @@ def test_judgements_are_asked_for_by_name_and_undo_what_they_name():
     part = repairs.cut(data, 2.0, 100.0)
     assert part["current_A"].time_s[-1] < 2.0 <= part["current_A"].time_s[-1] + 0.0041
     assert [each.kind for each in part.repairs] == ["converted", "cut"]
-    with pytest.raises(UserError, match="'furlong' is no unit"):
+    with pytest.raises(UserError, match="unknown unit 'furlong'"):
         repairs.converted(data, "joint_angle_rad", "furlong")
     with pytest.raises(UserError, match="samples outside"):
         repairs.cut(data, 0.0, 100.0)

@@ -377,7 +377,7 @@ def test_boards_that_a_profile_has_elsewhere_get_no_process(up, tmp_path):
 @pytest.mark.parametrize(
     ("places", "complaint"),
     [
-        (["can9=virtual:a"], "there is no bus or board can9; there are can1, can2, can3, can4, MCH"),
+        (["can9=virtual:a"], "unknown bus or board can9 (available: can1, can2, can3, can4, MCH"),
         (["can1=virtual:a", "can1=virtual:b"], "can1 is given twice"),
         (["MCH=virtual:a"], "its bus can1 is not outside"),
         (["can1=socketcan:no-such-interface"], "bus can1 on socketcan:no-such-interface: "),
@@ -454,7 +454,7 @@ def test_the_timeline_of_a_run_has_the_slots_of_every_board_in_its_process(comma
 
 def test_a_timeline_that_cannot_be_is_refused_before_any_process_begins(command, tmp_path):
     done = command("up", "--time", "0.1s", "--trace", str(tmp_path / "run.txt"))
-    assert done.returncode == 2 and "is no format" in done.stderr and done.stderr.count("\n") == 1
+    assert done.returncode == 2 and "is not a format" in done.stderr and done.stderr.count("\n") == 1
 
 
 def test_a_fault_whose_place_is_taken_when_it_is_to_begin_is_told_by_status_and_by_the_robot(up):

@@ -231,7 +231,7 @@ TOLD = {
     [
         (
             {},
-            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), told by MCFI_ANKL_LO from MCFI "
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), reported by MCFI_ANKL_LO from MCFI "
             "after 738.5 ms, inner_foot in afterpush instead of prepush after 19 ms, fell after 1275 ms",
         ),
         (
@@ -240,12 +240,12 @@ TOLD = {
         ),
         (
             {"detected": None, "reaction": None, "fall_ms": None},
-            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), no error tells of it",
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), no error reports it",
         ),
         (
             {"detected": {**TOLD["detected"], "rate": True}, "reaction": None, "fall_ms": None},
-            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), told by MCFI_ANKL_LO from MCFI, "
-            "more often than without after 738.5 ms",
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), reported by MCFI_ANKL_LO from "
+            "MCFI, more often than without after 738.5 ms",
         ),
     ],
 )
@@ -272,7 +272,7 @@ def test_a_walk_with_proof_says_when_who_told_and_changes_nothing(capsys, tmp_pa
     # the board reads the word in its next slot, within 0.5 ms; errors are looked at every 0.25 ms
     assert 0.0 < found["detection_ms"] <= 0.75
     assert found["fall_ms"] is None
-    assert "told by AE_SPIKE from MCH" in capsys.readouterr().err
+    assert "reported by AE_SPIKE from MCH" in capsys.readouterr().err
 
 
 def test_several_faults_are_held_against_one_golden_run_together_from_the_first_one_on(capsys, tmp_path):

@@ -207,7 +207,7 @@ def test_without_qemu_the_user_is_told_what_to_run(capfd, monkeypatch):
 
 def test_options_that_cannot_be_are_refused(capfd, tmp_path):
     assert cli.main(["vm", "--shared", str(tmp_path / "none"), "--", "true"]) == 2
-    assert "this is no folder" in capfd.readouterr().err
+    assert "not a folder" in capfd.readouterr().err
     with pytest.raises(SystemExit):
         cli.main(["vm"])
     assert "COMMAND" in capfd.readouterr().err

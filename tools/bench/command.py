@@ -153,7 +153,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the named measurements; 0 done, 1 when a response on the bus came later than its bound."""
     for name in options.part:
         if name not in PARTS:
-            options.refuse(f"{name!r} is no part; there are {', '.join(PARTS)}")
+            options.refuse(f"{name!r} is not a part (available: {', '.join(PARTS)})")
     json_file = json_target(options.json)
     chosen = [name for name in PARTS if name in (options.part or TOGETHER)]
     result: dict = {"date": wallclock.today_iso(), "machine": machine()}
@@ -216,7 +216,7 @@ def timed_together(cases: list[str], runs: int, seconds: float) -> dict:
 def lines_of(figures: dict, runs: int) -> list[str]:
     """The figures as lines of a table. Simulated seconds are compared by their cost in frames of the yardstick."""
     lines = [
-        f"timed together, {runs} runs of each in turn, each in a process of its own:",
+        f"timed together, {runs} runs of each in turn, each in a separate process:",
         f"  {'per second of processor time':38} {'median':>9} {'least':>9} {'most':>9}  {'':11}  python-can's virtual",
     ]
     for name, figure in figures.items():

@@ -34,7 +34,7 @@ def register(commands: Any) -> None:
         type=quantity(TIMES, "s", 0.0),
         default=1.0,
         metavar="1s",
-        help="listen for so long (default 1 s)",
+        help="time to listen (default 1 s)",
     )
     command.add_argument("--json", metavar="FILE|-", help="the findings as JSON; - prints them and nothing else")
     command.set_defaults(run=run)

@@ -23,7 +23,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--pool",
         choices=("local", "dask"),
-        help="plain processes of this machine (the default), or a Dask cluster of its own, encrypted",
+        help="plain processes of this machine (the default), or a new Dask cluster, encrypted",
     )
     command.add_argument("--scheduler", metavar="ADDRESS", help="a Dask cluster that runs already, as tls://host:8786")
     for option, what in (
@@ -36,7 +36,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--document", metavar="FILE.md", help="also put the tables into this document, between its two marks"
     )
-    command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and tell what happened")
+    command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and print what happened")
     command.set_defaults(run=run)
 
 

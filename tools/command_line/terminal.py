@@ -45,7 +45,7 @@ def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:
         table.columns = kept
     console.print(table)
     if gone:
-        console.print(f"no room for {', '.join(map(one_line, gone))}: a wider window or --json has it", soft_wrap=True)
+        console.print(f"{', '.join(map(one_line, gone))}: do not fit; widen the window or use --json", soft_wrap=True)
 
 
 def one_line(heading: str) -> str:

@@ -145,7 +145,7 @@ def machine_of(experiment: str, gear: float | None = None) -> Machine:
     if experiment in MACHINES:
         if gear is not None:
             if experiment != "motor-bench":
-                raise UserError(f"--gear {gear:g}: only the motor bench has a gearbox to be told, not {experiment}")
+                raise UserError(f"--gear {gear:g}: only the motor bench has a gearbox to be given, not {experiment}")
             if not 0.01 <= gear <= 1e4:
                 raise UserError(f"--gear {gear:g}: allowed are 0.01 to 10000")
             return made(experiment)(gear)
@@ -169,7 +169,7 @@ def machine_of(experiment: str, gear: float | None = None) -> Machine:
     ]
     if missing:
         raise UserError(
-            f"--experiment {experiment}: it has no {', '.join(missing)} (sysid/machine.py tells what a machine has)"
+            f"--experiment {experiment}: it has no {', '.join(missing)} (sysid/machine.py describes what a machine has)"
         )
     return machine
 

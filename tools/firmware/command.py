@@ -30,13 +30,13 @@ FIRMWARE = Option(
 )
 SANITIZE = Option(
     "--sanitize",
-    "compile the firmware with the address and undefined-behaviour sanitizers; what they find is told at the end, with "
-    "file and line, and makes exit code 1",
+    "compile the firmware with the address and undefined-behaviour sanitizers; findings are printed at the end, with "
+    "file and line, and make exit code 1",
     of_run=False,
 )
 IN_PROCESS = Option(
     "--in-process",
-    "run the firmware in the walk's own process instead of one of its own: faster, but a crash ends the walk",
+    "run the firmware in the walk's own process instead of a separate one: faster, but a crash ends the walk",
     of_run=False,
 )
 BOARD_DEADLINE = Option(

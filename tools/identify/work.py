@@ -36,7 +36,7 @@ EXIT_DONE, EXIT_REFUSED = 0, 1
 UNEXPLAINED = 2.0
 UNEXPLAINED_TEXT = (
     "the residual is {:.0f} times the instruments' noise: something that is not in the model moves it, "
-    "and these values may stand in for it (not physical)"
+    "and these values may compensate for it (not physical)"
 )
 
 

@@ -107,7 +107,7 @@ def register(commands: Any) -> None:
         help="wait so long for an answer (default 10s)",
     )
     command.add_argument(
-        "--json", metavar="FILE|-", help="what came and was read as JSON; - prints it and nothing else"
+        "--json", metavar="FILE|-", help="file for the received values as JSON; - prints them and nothing else"
     )
     command.set_defaults(run=run)
 

@@ -92,7 +92,7 @@ def register(commands: Any) -> None:
     """Add both subcommands to the command line."""
     up = commands.add_parser(
         "up",
-        help="let Ranger walk in real time, each board a process of its own",
+        help="let Ranger walk in real time, each board in a separate process",
         description="One process for each board and one for the body. Without an end it walks until Ctrl-C.",
     )
     walk_options.add_run_options(up)
@@ -149,7 +149,7 @@ def register(commands: Any) -> None:
         metavar="BUS=INTERFACE:CHANNEL",
         help="put a bus on a python-can interface, e.g. can1=socketcan:vcan0, with python-can's options behind it if "
         "needed ('can1=slcan:/dev/ttyACM0 --bitrate 1000000'); can1= asks python-can's configuration, section can1; "
-        "MCH=... gives one board of such a bus a place of its own (repeatable). The run is then asynchronous",
+        "MCH=... gives one board of such a bus a separate place (repeatable). The run is then asynchronous",
     )
     add_all(up, (faults.FAULT, faults.MODULE, *FIRMWARE, *IMAGES, gdb_options.GDB))
     trace.add_options(up)
@@ -157,7 +157,7 @@ def register(commands: Any) -> None:
 
     ctl = commands.add_parser(
         "ctl",
-        help="look at, pause, resume or change a robot that `up` runs",
+        help="show, pause, resume or change a robot that `up` runs",
         description="status, pause, resume; restart BOARD; key N: press a key for 0.2 s (1: walk; 2: stop, and a "
         "walking robot falls); set NAME VALUE: write a parameter, within its limits (ranger-sim table show NAME); "
         "fault PLACE:MODE: arm a fault, as --fault of `up` has it; clear N: end the fault that was armed as number N, "
@@ -192,7 +192,7 @@ def external_buses(
             found[name] = ExternalBus(name, int(keywords.get("bitrate", bit_rates[name])), opener(name, keywords))
         else:
             known = ", ".join([*bit_rates, *(each for each in wiring.BOARDS if each in single)])
-            raise UserError(f"--bus {text}: there is no bus or board {name}; there are {known}")
+            raise UserError(f"--bus {text}: unknown bus or board {name} (available: {known})")
     for name, bus_profile in profile.buses.items() if profile is not None else ():
         keywords_of_profile = bus_profile.python_can()
         if keywords_of_profile is not None and name not in found:
@@ -369,7 +369,7 @@ def print_processes(found: dict, console: Console) -> None:
     console.print(
         f"{found['paced_factor'] or 0.0:.2f} x real time by the wall clock, "
         f"{sum(each['turns_per_s'] for each in found['boards'].values()):.0f} turns per second of the robot's time"
-        + ("; frames or bytes came from outside: this run cannot be repeated" if found["asynchronous"] else ""),
+        + ("; frames or bytes arrived from outside: this run cannot be repeated" if found["asynchronous"] else ""),
         highlight=False,
     )
     for name, counts in found["outside"].items():

@@ -22,7 +22,7 @@ def register(commands: Any) -> None:
         usage="ranger-sim vm [options] -- COMMAND [ARGUMENT ...]",
         description="Boots Debian's kernel under software emulation and runs COMMAND in it, in this folder and among "
         "the files of this machine, with vcan0 ... vcan3 up and two Kvaser adapters on one bus as can0 and can1. "
-        "What COMMAND writes into files is gone afterwards, except below --shared.",
+        "Files that COMMAND writes are gone afterwards, except below --shared.",
     )
     command.add_argument(
         "--time-limit",
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns its exit code."""
     for name in options.shared:
         if not pathlib.Path(name).is_dir():
-            raise UserError(f"--shared {name!r}: this is no folder")
+            raise UserError(f"--shared {name!r}: not a folder")
     if options.kvm and not os.access("/dev/kvm", os.R_OK | os.W_OK):
         raise UserError("--kvm: /dev/kvm is not there or may not be used; leave --kvm out for software emulation")
     guest = machine.Guest(

@@ -23,7 +23,7 @@ def test_a_slave_that_writes_what_is_no_parameter_is_found(monkeypatch):
             self.robot.board("MB").memory[(address - 0x10000) // 4] = 1 + int.from_bytes(data[:3], "little")
 
     monkeypatch.setattr(TableMemory, "write", written)
-    with pytest.raises(Finding, match="a variable that is no parameter was written"):
+    with pytest.raises(Finding, match="a variable that is not a parameter was written"):
         xcp.run(3000, seed=4)
 
 

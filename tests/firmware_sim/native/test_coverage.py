@@ -140,5 +140,5 @@ def test_a_compiler_without_gcov_is_told(tmp_path, monkeypatch):
     alone.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("CC", "gcc")
-    with pytest.raises(UserError, match=r"gcc has no gcov beside it: --coverage needs gcc with its gcov"):
+    with pytest.raises(UserError, match=r"gcc has no gcov in its folder: --coverage needs gcc with its gcov"):
         coverage.gcov()

@@ -44,7 +44,7 @@ def test_settings_are_the_keywords_of_what_makes_it():
         ({"machine": {"make": str(SERVO / "servo.py:old")}}, "no function or class 'old'"),
         ({"machine": {"make": MAKE, "mass": 3}}, "unexpected keyword argument 'mass'"),
         ({"walk": {"seed": 3}}, r"\[walk\] and \[machine\]: one of them"),
-        ({"band": {"angel_rad": 0.1}}, r"\[band\] angel_rad: it is no quantity of the body, but angle_rad"),
+        ({"band": {"angel_rad": 0.1}}, r"\[band\] angel_rad: it is not a quantity of the body \(available: angle_rad"),
         ({"band": {"angle_rad": -1.0}}, "a number above 0 is expected"),
         ({"vary": {"controller.P": [1.0]}}, r"no setting \(seed, machine.KEYWORD, cost.BOARD.TASK\)"),
         ({"vary": {"fault": ["DRIVE.encodr:stuck"]}}, "meant was perhaps DRIVE.encoder"),

@@ -126,7 +126,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
     [
         ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "meant was perhaps stuck"),
         ({"vary": {"fault": ["MCH.encoder:stuck"]}}, "fault place 'MCH.encoder'"),
-        ({"vary": {"fault": [STUCK]}}, "'start' is no name of [vary]"),
+        ({"vary": {"fault": [STUCK]}}, "'start' is not a name of [vary]"),
         ({"vary": {"fault": ["MCH.joint_encoder:stuck@{"]}}, "Single '{'"),
         ({"vary": {"fault": {"low": 1, "high": 2}}}, "[vary] fault = {'low': 1, 'high': 2}: a list of texts"),
         ({"vary": {"fault": ["MCH.joint_encoder:stuck@{at}"], "at": ["step 3", "soon"]}}, "condition 'soon'"),
@@ -160,7 +160,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
             "looks = 2.5: a whole number from 1 to 50",
         ),
         ({"watch": {"after": "0 s"}}, "[watch] after = '0 s': it must be above 0"),
-        ({"vary": {"sed": [1]}}, "[vary] sed: it is no setting of a walk"),
+        ({"vary": {"sed": [1]}}, "[vary] sed: not a setting of a walk"),
         ({"vary": {"seed": []}}, "a list of values"),
         ({"vary": {"seed": {"low": 1, "high": 3}}}, "a range needs [sample] or [search]"),
         ({"vary": {"slope": {"low": 0.1, "high": 0.0}}, "sample": {"runs": 3}}, "low below high"),

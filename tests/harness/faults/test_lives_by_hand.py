@@ -275,7 +275,7 @@ def test_a_whole_number_is_one(number):
             Wrong.parameters[1].checked(wrong, "here")
     with pytest.raises(UserError, match=r"allowed are -1 to 5 V$"):
         Wrong.parameters[0].checked(5.1, "here")
-    with pytest.raises(UserError, match=r"fault A.x:wrong: there is no parameter 'y', but size, times, level"):
+    with pytest.raises(UserError, match=r"fault A.x:wrong: unknown parameter 'y' \(available: size, times, level"):
         Robot().inject(y=1)
 
 

@@ -263,7 +263,7 @@ def test_what_is_in_the_process_of_a_program_in_c_is_out_of_reach_and_said_so(tm
         with pytest.raises(UserError, match=r"MCH is not emulated in this process.*Ranger\(in_process=True\)"):
             robot.inject("MCH.processor", "extra_cycles", task="control")
         robot.run_for(0.001)
-        with pytest.raises(UserError, match=r"MCH runs in a process of its own.*Ranger\(in_process=True\)"):
+        with pytest.raises(UserError, match=r"MCH runs in a separate process.*Ranger\(in_process=True\)"):
             robot.board("MCH")
         with pytest.raises(UserError, match="its process runs already; replace before time passes"):
             robot.replace("MCH", "control", lambda: None, cost=1)

@@ -58,7 +58,7 @@ def test_what_is_in_another_process_is_out_of_reach_and_said_so():
 
 def test_a_fault_inside_a_board_is_refused_and_one_at_its_sensor_acts():
     with contextlib.closing(new_robot(seed=3, backend="processes")) as robot:
-        with pytest.raises(UserError, match="MCH runs in a process of its own; its converter is there"):
+        with pytest.raises(UserError, match="MCH runs in a separate process; its converter is there"):
             robot.inject("MCH.adc_external", "gain", factor=1.1)
         fault = robot.inject("MCH.absolute_encoder", "offset", at="0.02 s")
         robot.run_for(0.06)
@@ -157,4 +157,4 @@ def test_of_the_moon(ranger):
     done = pytest_in(tmp_path, RANGER_SIM_BACKEND="processes")
     assert [done.outcome(f"test_{name}") for name in names] == ["skipped", "skipped", "skipped", "error"]
     assert "backend processes has no board memory" in done.reason("test_looks_inside")
-    assert "MCH runs in a process of its own" in done.reason("test_looks_inside_without_saying_so")
+    assert "MCH runs in a separate process" in done.reason("test_looks_inside_without_saying_so")

@@ -26,7 +26,7 @@ def test_a_keeper_needs_no_other_listener_and_knows_its_buses():
     keeper = frames.FrameKeeper({"can0": stream}, Names())
     stream.sink(5, b"")
     assert len(keeper.blocks["can0"]) == 1
-    with pytest.raises(UserError, match="^bus 'can9': there is none of this name, but can0$"):
+    with pytest.raises(UserError, match=r"^unknown bus 'can9' \(available: can0\)$"):
         keeper.frames("can9")
 
 

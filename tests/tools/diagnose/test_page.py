@@ -104,7 +104,7 @@ def test_an_unknown_fault_is_drawn_where_the_general_tests_see_it_and_its_parame
 def test_a_tie_names_both_and_tells_where_to_look_for_each():
     found = diagnose(Cart(), [cart_run(1, slope=0.02)])
     said = text_of(page.render(found))
-    assert "these data cannot tell" in said
+    assert "these data cannot decide" in said
     assert "A spirit level along the path" in said and "power-up" in said
     assert "a tie" in said
 
