@@ -1,4 +1,4 @@
-"""`python -m dev.mutate ROOM ...`: what share of small faults in a room its tests notice.
+"""`python -m dev.mutate PACKAGE ...`: the share of small faults in a package that its tests notice.
 
 Of all faults that `mutants.py` knows to put into the room's files, so many are drawn with a seed, put one at a time
 into a copy of the repository, and the tests of the room that reach the place are run there, interpreted and cheapest
@@ -64,7 +64,7 @@ def parser() -> argparse.ArgumentParser:
     command = argparse.ArgumentParser(
         prog=COMMAND, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    command.add_argument("room", nargs="+", choices=packages(), metavar="ROOM", help=", ".join(packages()))
+    command.add_argument("room", nargs="+", choices=packages(), metavar="PACKAGE", help=", ".join(packages()))
     command.add_argument(
         "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each package (default {COUNT})"
     )
