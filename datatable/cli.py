@@ -161,5 +161,5 @@ def run_list(arguments: argparse.Namespace) -> int:
         )
     console.print(grid)
     if not described:
-        print("descriptions do not fit: widen the window, or use --json or `table show NAME`")
+        print("too narrow for descriptions: widen the window, or use --json or `table show NAME`")
     return EXIT_DONE

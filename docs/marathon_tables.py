@@ -52,7 +52,7 @@ def walk_table(first: dict, rest: dict) -> str:
 
 
 def energy_table(walk: dict) -> str:
-    """What each consumer took; what the motors gave back is a line of its own."""
+    """What each consumer took; what the motors gave back is its own line."""
     taken = {name: value for name, value in walk["energy_Wh"].items() if name != "total" and value > 0.0}
     total = walk["energy_Wh"]["total"]
     back = total - walk["battery"]["delivered_Wh"]

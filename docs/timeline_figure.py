@@ -195,7 +195,7 @@ def whole(way: Way, begin: int, end: int, path: tuple, inside: bool) -> list:
 
 
 class Figure:
-    """The parts of the picture, and where instants and lanes lie in it."""
+    """The parts of the picture, and where times and lanes lie in it."""
 
     def __init__(self, kept: dict) -> None:
         self.kept = kept
@@ -206,7 +206,7 @@ class Figure:
         self.parts: list[str] = []
 
     def x(self, time_ns: float) -> float:
-        """Pixels from the left of an instant in ns."""
+        """Pixels from the left ofa time in ns."""
         share = (time_ns - self.zero - self.from_ns) / (self.to_ns - self.from_ns)
         return round(LEFT + share * (RIGHT - LEFT), 1)
 

@@ -138,7 +138,7 @@ COMPILED = SOURCES.compiled_modules()
 
 
 class Names(dict):
-    """A namespace in which a name without a known value stands for itself."""
+    """A namespace in which a name without a known value represents itself."""
 
     def __missing__(self, name):
         return name

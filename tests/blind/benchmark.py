@@ -6,7 +6,7 @@
     DIR/table.txt, table.md   figures, methods side by side, and which causes are missed or misnamed
     DIR/score.json            the figures by method, for a program
 
-The generator and each diagnosis run in processes of their own. Measured data lie in a folder of their own elsewhere and
+The generator and each diagnosis run in separate processes. Measured data lie in their own folder elsewhere and
 are gone when they are answered; `tests.blind.generate` with the same seed and --count makes them again.
 
 Fixed, as a benchmark of system identification fixes it: a.csv of a case is the training run, b.csv the test run, with
@@ -98,7 +98,7 @@ class Benchmark:
         return (folder / f"{key}.json").exists() or (folder / f"{key}.txt").exists()
 
     def generation(self, part, folder):
-        """The command that makes a part's data; the truth goes where no diagnosis is told of."""
+        """The command that makes a part's data; the truth goes to a folder that no diagnosis knows."""
         command = [sys.executable, "-m", "tests.blind.generate", "--experiment", self.experiment]
         command += ["--count", str(self.cases), "--seed", str(self.seed), "--slice", f"{part[0]}:{part[1]}"]
         command += ["--seconds", str(self.seconds)] if self.seconds else []

@@ -7,7 +7,7 @@ Every figure comes with how many cases it rests on and its 95 % interval (Cloppe
 statistics for a median and a percentile) beside its target.
 
 What counts as named: the causes of an answer that does not abstain. A set: the causes with all that they are tied with.
-What theory cannot tell apart is not asked for: a cause with a twin in the truth (`ties`, cosine above 0.95) is outside
+What theory cannot distinguish is not asked for: a cause with a twin in the truth (`ties`, cosine above 0.95) is outside
 the first cause's figures and inside those of ties; an effect outside the catalogue that looks like a cause is left out.
 Parameters: the first one of a cause, which is its size. The gain is the answer's own word; beside it stands what the
 truth says of it, for effects that grow with their size: an effect of size s, modelled with s', leaves (1 - s'/s)^2 of
@@ -234,7 +234,7 @@ def relative_error(cause, name, value):
 
 
 def matched(groups, wanted):
-    """(how many of the wanted names are met each by a group of its own, groups that meet none).
+    """(how many of the wanted names are met each by its own group, groups that meet none).
 
     Two effects, so trying every order is cheap.
     """

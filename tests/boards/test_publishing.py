@@ -156,7 +156,7 @@ while board.outbox.take():
 
 
 def test_adding_a_variable_takes_a_line_a_name_in_a_row_and_a_send_and_nothing_else(tmp_path):
-    """The three steps of "How to add a variable", on a copy; what is forgotten is told at once."""
+    """The three steps of "How to add a variable", on a copy; what is forgotten is reported at once."""
     house = copy_of_the_house(tmp_path)
     generate = ("-m", "ranger_sim", "table", "generate")
     with open(house / "datatable/master/variables.csv", "a", encoding="utf-8") as variables:

@@ -483,7 +483,7 @@ def arbitration_key(frame):
 
 
 class Bus:
-    """Nodes on a wire. `inverted`: numbers of the bits that everybody samples inverted."""
+    """Nodes on a wire. `inverted`: numbers of the bits that every node samples inverted."""
 
     def __init__(self, nodes):
         self.nodes = nodes

@@ -57,7 +57,7 @@ def hosted(*channels, name=None, speed=1.0, servers=(), **options):
 
 
 class Program:
-    """A program in a process of its own, on pipes or (terminal=True) on a pseudo-terminal of 120 x 40.
+    """A program in a separate process, on pipes or (terminal=True) on a pseudo-terminal of 120 x 40.
 
     together: standard error comes with the output.
     """

@@ -98,7 +98,7 @@ def test_a_dominant_bit_in_a_delimiter_is_an_error_of_form_in_it():
 
 @pytest.mark.parametrize("first", [1, 2])
 def test_an_overload_flag_that_does_not_show_is_an_error_in_it(first):
-    """A dominant bit in one of the first two of the intermission calls for an overload frame of everybody."""
+    """A dominant bit in one of the first two of the intermission calls for an overload frame of every node."""
     behind = START + len(fields_of(STANDARD)) - 1 + first
     for n in range(1, 7):
         found = met(STANDARD, behind, behind + n)

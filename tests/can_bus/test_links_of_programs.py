@@ -850,7 +850,7 @@ def test_interfaces_are_opened_as_the_table_says(monkeypatch):
 
 
 class Air:
-    """An interface of the test: every other bus hears each message but for each `lose`-th, and every `swap`-th late."""
+    """An interface of the test: every other bus receives each message but each `lose`-th, and every `swap`-th late."""
 
     def __init__(self, lose=0):
         self.buses, self.lose, self.count, self.sent = [], lose, 0, []

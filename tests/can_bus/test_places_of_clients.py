@@ -1,4 +1,4 @@
-"""Clients of a bus, event by event: how frames are laid into three buffers, what is told, who is seen off."""
+"""Clients of a bus, event by event: how frames are laid into three buffers, what is reported, who is seen off."""
 
 import struct
 

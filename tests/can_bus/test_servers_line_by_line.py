@@ -396,7 +396,7 @@ def test_socketcand_messages_may_come_in_pieces_with_space_around_them(daemon):
 
 def test_socketcand_a_bus_that_is_not_there_ends_the_connection(daemon):
     client = daemon.client()
-    assert daemon.say(client, "< open can7 >") == "< error could not open bus, there are can1 >"
+    assert daemon.say(client, "< open can7 >") == "< error could not open bus (available: can1) >"
     assert client.ending
     counted(daemon.server, refused=1, sent_away_malformed=1)
 

@@ -1,4 +1,4 @@
-"""pya2l reads a description in a process of its own, because its parser leaves descriptors open; prints JSON.
+"""pya2l reads a description in a separate process, because its parser leaves descriptors open; prints JSON.
 
 Argument: the file. It is also told whether a grammar that is cut off is refused.
 """

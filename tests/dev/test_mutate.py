@@ -262,7 +262,7 @@ def test_mutants_are_noticed_or_survive_in_a_copy_and_verdicts_are_kept(tried):
 
 
 def test_a_mutant_is_noticed_as_well_by_a_second_server_that_has_a_map_already(house, tried, monkeypatch):
-    """It must have imported everything when the first mutant is put into a file; folders may be told from here."""
+    """It must have imported everything when the first mutant is put into a file; folders may be given from here."""
     monkeypatch.chdir(house.parent)
     copy = work.Copy(pathlib.Path("work/copy"), house)
     (copy.folder / "seen").unlink()

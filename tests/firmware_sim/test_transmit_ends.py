@@ -27,7 +27,7 @@ TRANSMIT_INTERRUPTS = (0, ICR_TI1, ICR_TI2, ICR_TI3, ICR_TI1 | ICR_TI2 | ICR_TI3
 class Sender:
     """A board whose slots do anything to its controller at random, on a bus with errors and a rival.
 
-    `seen`: what it read, each with the instant.
+    `seen`: what it read, each with the time.
     """
 
     def __init__(self, seed, beforehand):

@@ -42,7 +42,7 @@ class Ends(Board):
 
 
 class Line:
-    """Something outside that hears a board."""
+    """Something outside that receives a board."""
 
     def __init__(self):
         self.heard = []
@@ -61,7 +61,7 @@ def wires():
 
 
 def on_a_bus(wires, controller=1):
-    """The bus at a controller of the board, with another node that hears; that one's inbox."""
+    """The bus at a controller of the board, with another node that receives; that one's inbox."""
     bus = Bus("can1", MBIT)
     inboxes = [EventQueue(), EventQueue()]
     nodes = [bus.add_node(name, inbox, 1, 500 + n) for n, (name, inbox) in enumerate(zip("ab", inboxes, strict=True))]

@@ -1,4 +1,4 @@
-"""Frames of absent boards, counted and timed from the master table and the bus schedule by a reader of its own."""
+"""Frames of absent boards, counted and timed from the master table and the bus schedule by its own reader."""
 
 import collections
 import dataclasses

@@ -48,7 +48,7 @@ class Run:
             self.frames = robot.logbook.frames()
 
     def count(self, bus, since_s=0.0, by=None, error=False):
-        """Frames, or error frames, on a bus since an instant; `by`: what its publisher must fulfil."""
+        """Frames, or error frames, on a bus sincea time; `by`: what its publisher must fulfil."""
         kept = self.frames
         at = (kept["bus"] == BUSES.index(bus)) & (kept["time_ns"] >= since_s * 1e9)
         at &= ((kept["flags"] & FLAG_ERROR) != 0) == error

@@ -100,7 +100,7 @@ OTHER_ORACLES = (
 
 
 def leaves(value, path=""):
-    """(dotted path, value) of everything in a summary that is no dictionary; empty dictionaries have none."""
+    """(dotted path, value) of everything in a summary that is not a dictionary; empty dictionaries have none."""
     if isinstance(value, dict):
         for name, inner in value.items():
             yield from leaves(inner, f"{path}.{name}" if path else name)

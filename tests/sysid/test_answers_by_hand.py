@@ -1,4 +1,4 @@
-"""What is told of a diagnosis, learned tables, signatures, terms of a model and time bases, worked out by hand."""
+"""What is reported of a diagnosis, learned tables, signatures, terms of a model and time bases, worked out by hand."""
 
 import dataclasses
 import math

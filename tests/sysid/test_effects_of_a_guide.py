@@ -1,4 +1,4 @@
-"""What a mass on a guide can have, beside a second book; its signals, its equation and the rows that count."""
+"""What a mass on a guide can have, compared with a second book; its signals, its equation and the rows that count."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What a swinging leg can have, beside a second book; its signals, inputs, steps and rows that count."""
+"""What a swinging leg can have, compared with a second book; its signals, inputs, steps and rows that count."""
 
 import math
 from types import SimpleNamespace
@@ -253,7 +253,7 @@ def test_a_step_is_the_midpoint_rule_in_parts_of_2_ms_at_most():
 
 
 def acceleration(leg, q, w, u, p):
-    """The balance is held by a test of its own; here friction's sign and the inertia."""
+    """The balance is held by its own test; here friction's sign and the inertia."""
     torque, friction = leg._torques(np.array([q]), np.array([w]), u, p)
     return float(((torque - friction * math.tanh(w / 0.01)) / p["inertia_kg_m2"])[0])
 

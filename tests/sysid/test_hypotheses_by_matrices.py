@@ -84,7 +84,7 @@ def test_a_figure_that_does_not_change_is_a_flat_surface():
 
 
 class Flat:
-    """A simulated figure that is linear in the candidates, with a variance of its own."""
+    """A simulated figure that is linear in the candidates, with its own variance."""
 
     def __init__(self, start, slopes, variance):
         self.start, self.each, self.variance = start, np.array(slopes), variance

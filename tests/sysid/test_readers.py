@@ -1,4 +1,4 @@
-"""Files of every format as datasets: known values, units turned into SI, and mistakes told in a line."""
+"""Files of every format as datasets: known values, units turned into SI, and mistakes reported in a line."""
 
 import math
 import os
@@ -332,7 +332,7 @@ def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
         ("t_s,a_V\n0,x\n1,y\n", "no channel except"),
         (b"t_s,a_V\n0,\x00\n", "bytes of value 0"),
         (b"\x89PNG\r\n\x1a\n\xff\xfe\x9c", "no row below|no time column|empty"),
-        (b"\xff\xfe\x00", "no text table|no row|no time column|empty"),
+        (b"\xff\xfe\x00", "not a text table|no row|no time column|empty"),
     ],
 )
 def test_what_is_no_table_is_told_in_a_line(table, text, line):

@@ -268,7 +268,7 @@ def test_an_angle_at_rest_is_not_stuck_because_a_temperature_moves():
 
 
 def bench_at_first_at_rest(**changes):
-    """A motor that stands for half a second of five and then turns to and fro; torque by a noisy load cell."""
+    """A motor that rests for half a second of five and then turns to and fro; torque by a noisy load cell."""
     time_s = np.arange(2500) * 0.002
     noise = generator(5, "a load cell").normal(size=(3, len(time_s)))
     turning = np.where(time_s < 0.508, 0.0, np.sin(3.0 * (time_s - 0.508)))

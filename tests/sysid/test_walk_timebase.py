@@ -1,4 +1,4 @@
-"""Channels at rates of their own on one even time base, and strikes, on records small enough to be worked by hand."""
+"""Channels at their own rates on one even time base, and strikes, on records small enough to be worked by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Campaigns of the whole robot: a branch is the run, and whoever is killed, the results are the same."""
+"""Campaigns of the whole robot: a branch is the run, and whichever process is killed, the results are the same."""
 
 import contextlib
 import importlib.util

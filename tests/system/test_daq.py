@@ -1,6 +1,6 @@
 """`ranger-sim daq` and a whole robot, over a pseudo-terminal, on virtual time that the test drives.
 
-The command looks at its port; each look lets the robot pass some milliseconds first, and the robot's time is the
+The command looks at its port; each poll lets the robot pass some milliseconds first, and the robot's time is the
 clock. So nothing sleeps and nothing depends on how fast the machine is.
 """
 
@@ -44,7 +44,7 @@ class Robot:
         robot = self
 
         class Port(daq.RealPort):
-            """Lets the robot pass some time before each look, and waits for what the kernel carries meanwhile."""
+            """Lets the robot pass some time before each poll, and waits for what the kernel carries meanwhile."""
 
             def __init__(self, *options):
                 super().__init__(*options)

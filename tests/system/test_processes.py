@@ -26,7 +26,7 @@ FACTORS = {"realtime_factor", "cpu_factor"}  # how fast the machine was
 
 
 class Up:
-    """A running `ranger-sim up` (or a script that does the same) with a name of its own."""
+    """A running `ranger-sim up` (or a script that does the same) with its own name."""
 
     def __init__(self, *arguments, script=None, speed="0.05"):
         self.name = f"test-{uuid.uuid4().hex[:12]}"
@@ -286,7 +286,7 @@ sys.exit(main(["up", *sys.argv[1:]]))
 
 
 def test_a_run_started_with_all_signals_blocked_ends_and_can_be_interrupted(up):
-    """Blocked signals are inherited from whoever starts it; the end of a process is one."""
+    """Blocked signals are inherited from whichever process starts it; the end of a process is one."""
     assert up("--time", "0.02s", script=BLOCKED, speed="max").end() == 0
     robot = up(script=BLOCKED)
     robot.processes()

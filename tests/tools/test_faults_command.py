@@ -1,4 +1,4 @@
-"""`ranger-sim faults` and `walk --fault` as people type them, modes of their own, and the tables of docs/faults.md."""
+"""`ranger-sim faults` and `walk --fault` as people type them, their own modes, and the tables of docs/faults.md."""
 
 import json
 import re
@@ -151,7 +151,7 @@ def command(*arguments):
 
 
 def test_a_mode_of_a_users_own_is_listed_and_acts(tmp_path):
-    """The example of docs/faults.md, in a process of its own: the catalogue of this one stays as it is."""
+    """The example of docs/faults.md, in a separate process: the catalogue of this one stays as it is."""
     module = tmp_path / "burnt.py"
     module.write_text(OWN, encoding="utf-8")
     done = command("faults", "MCH.battery_voltage", "--fault-module", module)

@@ -1,4 +1,4 @@
-"""The whole robot on vcan0 ... vcan3: its boards hear each other through the kernel, and can-utils listen."""
+"""The whole robot on vcan0 ... vcan3: its boards receive each other through the kernel, and can-utils listen."""
 
 import collections
 import dataclasses

@@ -1,7 +1,7 @@
 """Whole walks of the emulated robot, as its own main brain logged them, with something wrong in the body or a sensor.
 
 The robot is the emulator itself, run as a user runs it: `ranger-sim walk` with a body file, a model file, a seed and a
-battery, in a process of its own. From its record only what the main brain knew is taken (never the plant's own values):
+battery, in a separate process. From its record only what the main brain knew is taken (never the plant's own values):
 filtered and rounded by the boards, delayed by the buses. That is logged as RoboDAQ does, every 6 ms the latest value of
 each variable, with single rows and silences of 50 to 180 ms missing.
 

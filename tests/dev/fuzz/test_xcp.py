@@ -37,5 +37,5 @@ def test_a_door_that_takes_too_many_commands_in_a_look_is_found(monkeypatch):
     import dataclasses
 
     monkeypatch.setattr(udp, "RULE", dataclasses.replace(udp.RULE, burst=100_000))
-    with pytest.raises(Finding, match="more commands in a look"):
+    with pytest.raises(Finding, match="more commands in a poll"):
         xcp.run(3000, seed=4)

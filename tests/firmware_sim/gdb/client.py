@@ -72,7 +72,7 @@ def session(machine, until, talk, clients=1, beside=(), run=None, **options):
     """What `talk(client, ...)` returns, with so many clients connected, and the door.
 
     The machine has run to `until` (None: for as long as the talk takes); `beside`: doors of the same process. `run`
-    is how it passes time to an instant, in units of `until`.
+    is how it passes time toa time, in units of `until`.
     """
     run = run or machine.run
     with contextlib.ExitStack() as stack:

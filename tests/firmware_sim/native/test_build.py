@@ -1,4 +1,4 @@
-"""Building firmware: what is wrong with a folder, its sources or a library is told in plain lines."""
+"""Building firmware: what is wrong with a folder, its sources or a library is reported in plain lines."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Which lines and branches of a program in C ran is told as it was: counts known by hand, in every kind of process."""
+"""Executed lines and branches of a program in C are reported: counts known by hand, in every kind of process."""
 
 import json
 import pathlib

@@ -1,4 +1,4 @@
-"""Firmware in C on the emulated chip: the same as the same program in Python, stamp for stamp; faults told plainly."""
+"""Firmware in C on the emulated chip: equal to the same program in Python, stamp for stamp; faults reported plainly."""
 
 import contextlib
 import io

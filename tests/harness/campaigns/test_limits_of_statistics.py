@@ -70,7 +70,7 @@ def test_a_rule_has_one_to_fifty_looks_and_an_error_below_a_half(make):
     assert len(make(50)) == 50 and len(make(1, 0.49)) == 1
     assert make(1, 0.1)[0] == pytest.approx(stats.norm.ppf(0.95), abs=1e-4)
     for looks in (0, 51):
-        with pytest.raises(UserError, match=f"stopping rule: {looks} looks, allowed are 1 to 50"):
+        with pytest.raises(UserError, match=f"stopping rule: {looks} analyses, allowed are 1 to 50"):
             make(looks)
     for error in (0.0, 0.5, -0.1):
         with pytest.raises(UserError, match="stopping rule: an error of "):

@@ -46,7 +46,7 @@ def test_settings_are_the_keywords_of_what_makes_it():
         ({"walk": {"seed": 3}}, r"\[walk\] and \[machine\]: one of them"),
         ({"band": {"angel_rad": 0.1}}, r"\[band\] angel_rad: it is not a quantity of the body \(available: angle_rad"),
         ({"band": {"angle_rad": -1.0}}, "a number above 0 is expected"),
-        ({"vary": {"controller.P": [1.0]}}, r"no setting \(seed, machine.KEYWORD, cost.BOARD.TASK\)"),
+        ({"vary": {"controller.P": [1.0]}}, r"not a setting \(seed, machine.KEYWORD, cost.BOARD.TASK\)"),
         ({"vary": {"fault": ["DRIVE.encodr:stuck"]}}, "meant was perhaps DRIVE.encoder"),
         ({"vary": {"fault": ["DRIVE.encoder:stuck@step 3"]}}, "it reads like 12.3 s, angle_rad > 0.3"),
     ],

@@ -148,7 +148,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
                 "search": {},
                 "tolerance": {"detection": {"within": "1 s"}},
             },
-            "the runs of a [search] are chosen",
+            "runs of a [search] are chosen",
         ),
         ({"vary": {"seed": [1]}, "sample": {"runs": 5, "interval": ["wilson"]}}, "allowed are clopper-pearson, wilson"),
         (

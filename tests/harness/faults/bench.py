@@ -43,7 +43,7 @@ class Bench:
         self.boards = {}
 
     def inject(self, place, mode, at=None, until=None, **parameters):
-        """As Ranger.inject; conditions are instants."""
+        """As Ranger.inject; conditions are times."""
         fault = CATALOGUE.fault(place, mode, at, until, parameters)
         fault.arm(self)
         self.faults.append(fault)

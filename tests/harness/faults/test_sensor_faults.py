@@ -1,7 +1,7 @@
 """Every mode at every kind of sensor, on the plant alone: it differs at its place and nowhere else, and ends.
 
 The plant moves on its own here, whatever its sensors show. So a run with a fault can be held against one without, byte
-for byte: before, beside the fault's place, and after its end.
+for byte: before, at other places than the fault's, and after its end.
 """
 
 import functools

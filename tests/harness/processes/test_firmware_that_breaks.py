@@ -1,4 +1,4 @@
-"""Firmware in C that crashes, hangs or uses up its stack ends its own process only, and it is told where it was."""
+"""Firmware in C that crashes, hangs or uses up its stack ends its own process only, and it is reported where it was."""
 
 import contextlib
 import dataclasses
@@ -110,7 +110,7 @@ def program(function, slots=3):
 
 
 def broken(folder, function):
-    """What is told of the program after it ended its process, and the lines of its remarks."""
+    """What is reported of the program after it ended its process, and the lines of its remarks."""
     source, remarks = program(function)
     folder = folder_with(folder, source, MANIFEST)
     with (

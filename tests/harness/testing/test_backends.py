@@ -1,4 +1,4 @@
-"""The backends: the same robot by the same methods, and what one has not is told by name."""
+"""The backends: the same robot by the same methods, and what one has not is reported by name."""
 
 import contextlib
 import os
@@ -50,7 +50,7 @@ def test_what_is_in_another_process_is_out_of_reach_and_said_so():
     with contextlib.closing(new_robot(backend="processes")) as robot:
         assert robot.board("MCH").name == "MCH"  # before time passes it is here
         robot.run_for(0.001)
-        with pytest.raises(MissingError, match="backend processes has no board memory: MCH runs in a process"):
+        with pytest.raises(MissingError, match="backend processes has no board memory: MCH runs in a separate process"):
             robot.board("MCH")
         with pytest.raises(UserError, match="its process runs already; replace before time passes"):
             robot.replace("MCH", "mc_compliant_control", lambda: None, cost=1)

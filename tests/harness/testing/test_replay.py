@@ -1,4 +1,4 @@
-"""A recording into one board: the same frames at the same instants, whatever the format."""
+"""A recording into one board: the same frames at the same times, whatever the format."""
 
 import pathlib
 

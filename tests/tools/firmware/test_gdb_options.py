@@ -37,7 +37,7 @@ def image(tmp_path_factory):
 
 
 def started(command, *words):
-    """The command line in a process of its own; a robot of processes under a name of its own."""
+    """The command line in a separate process; a robot of processes under its own name."""
     words = (*words, "--name", f"gdb-{os.getpid()}") if command == "up" else words
     return subprocess.Popen(
         [sys.executable, "-m", "ranger_sim", command, *words],

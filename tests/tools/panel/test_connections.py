@@ -47,7 +47,7 @@ class Panel(Fuzz):
 
 
 def on_a_panel(test):
-    """Run `test(panel)` beside a server; what it met is no exception."""
+    """Run `test(panel)` with a server, which must meet no exception."""
 
     async def run():
         panel = Panel()

@@ -335,7 +335,7 @@ def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
     source.close()
 
 
-@pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "no folder of a walk")])
+@pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "not a folder of a walk")])
 def test_what_is_no_recording_is_told(tmp_path, monkeypatch, path, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=words):

@@ -1,4 +1,4 @@
-"""What a healthy walk has not is told, each thing in a line; a healthy one has no line."""
+"""What a healthy walk has not is reported, each thing in a line; a healthy one has no line."""
 
 import copy
 import math

@@ -61,7 +61,7 @@ def test_only_the_last_part_is_written_where_that_is_asked_for(tmp_path, capsys)
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["--trace", "run.txt"], "suffix '.txt' is not a format; there are .pftrace"),
+        (["--trace", "run.txt"], "suffix '.txt' is not a format (available: .pftrace"),
         (["--trace", "nowhere/run.pftrace"], "cannot be written"),
         (["--trace", "."], "is not a format"),
         (["--trace-last", "10s"], "--trace-last needs --trace"),
