@@ -22,7 +22,7 @@ def clock(seconds: float) -> str:
 
 
 def walk_table(first: dict, rest: dict) -> str:
-    """The walk beside the robot's."""
+    """The walk compared with the robot's."""
     km, hours = first["distance_m"] / 1000.0, first["walked_h"]
     drawn_Wh, late = first["battery"]["delivered_Wh"], first["heel_strike_delay_ms"]
     drawn_W, whole_km = drawn_Wh / hours, (first["distance_m"] + rest["distance_m"]) / 1000.0

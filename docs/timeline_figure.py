@@ -206,7 +206,7 @@ class Figure:
         self.parts: list[str] = []
 
     def x(self, time_ns: float) -> float:
-        """Pixels from the left ofa time in ns."""
+        """Pixels from the left of a time in ns."""
         share = (time_ns - self.zero - self.from_ns) / (self.to_ns - self.from_ns)
         return round(LEFT + share * (RIGHT - LEFT), 1)
 

@@ -227,7 +227,7 @@ def test_constants_are_the_same_numbers_interpreted_and_compiled():
 
 
 def test_what_is_long_or_wide_says_why():
-    """A function above 150 lines, a class above 40 fields: its docstring tells why it is better so."""
+    """A function above 150 lines, a class above 40 fields: its docstring has the reason."""
     silent = []
     for path in sources():
         if "generated" in path.parts:

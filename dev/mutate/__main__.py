@@ -1,7 +1,7 @@
 """`python -m dev.mutate PACKAGE ...`: the share of small faults in a package that its tests notice.
 
-Of all faults that `mutants.py` knows to put into the room's files, so many are drawn with a seed, put one at a time
-into a copy of the repository, and the tests of the room that reach the place are run there, interpreted and cheapest
+Of all faults that `mutants.py` can put into the package's files, COUNT are drawn with a seed, put one at a time
+into a copy of the repository, and the tests of the package that reach the place are run there, interpreted and cheapest
 first. Where the robot is built, a mutant in a plain Python module is tried with all else compiled; with --build, one
 in a compiled module that the interpreted tests let pass is built and given to the compiled ones. Verdicts are kept in
 the work folder: a run that was broken off goes on where it was, and a larger count goes on from a smaller one.

@@ -228,9 +228,7 @@ def _schedule(name: str, folder: pathlib.Path, table: Table, faults: list[Profil
     occasional: dict[str, int] = {}
     for key, value in reader.table(content, "occasional").items():
         if key not in {board.name for board in table.with_role("satellite") if board.occasional}:
-            reader.fault(
-                f"occasional.{key}", value, "no board of that name has both an occasional list and a CAN bus"
-            )
+            reader.fault(f"occasional.{key}", value, "no board of that name has both an occasional list and a CAN bus")
         else:
             occasional[key] = reader.whole(value, f"occasional.{key}", 1, MOST_TURNS, 1)
     in_turn = reader.whole(content.get("commands_in_turn", 0), "commands_in_turn", 0, MOST_TURNS, 0)

@@ -156,9 +156,7 @@ FIGURES = (
     ),
     # the run
     Figure("realtime_factor", REAL, "1", "virtual time over wall-clock time of the stepping loop"),
-    Figure(
-        "cpu_factor", REAL, "1", "virtual time over the processor's time for it", "it took no measurable time"
-    ),
+    Figure("cpu_factor", REAL, "1", "virtual time over the processor's time for it", "it took no measurable time"),
     Figure("compiled", FLAG, "", "compiled modules ran, not the plain sources"),
     Figure("controller", TEXT, "", "parameter set, as asked for"),
     Figure("body", TEXT, "", "body that walked, as asked for"),

@@ -2,7 +2,7 @@
 
 Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
 diagnosis itself is held to these bounds on fresh cases in every run; RANGER_SIM_BLIND (a seed, or "fresh") has the
-comparators beside it, on the cases of that seed.
+comparators as well, on the cases of that seed.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""What boards publish: lines of a room's table, laid out as the master table says; and how a variable is added."""
+"""What boards publish: lines of a package's table, laid out as the master table says; and how a variable is added."""
 
 import os
 import pathlib
@@ -121,7 +121,7 @@ def test_a_line_that_is_not_the_tables_is_refused_by_its_place_and_name(given, m
 
 
 def copy_of_the_house(folder):
-    """The package and its rooms, without what was built."""
+    """The packages without what was built."""
     unwanted = shutil.ignore_patterns("__pycache__", "*.so", "build_record.json", "*.c")
     for name in ("ranger_sim", *packages(), "profiles"):
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=unwanted)
@@ -135,7 +135,7 @@ def edit(path, before, after):
 
 
 def run(folder, *arguments):
-    """Python in the copy, which knows nothing of the house that it was copied from."""
+    """Python in the copy, which knows nothing of the repository that it was copied from."""
     environment = os.environ | {"RANGER_SIM_INTERPRETED": "1", "PYTHONPATH": str(folder)}
     return subprocess.run(
         [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False

@@ -111,7 +111,7 @@ class Program:
             self.text += data.decode("utf-8", "replace")
 
     def errors(self):
-        """What the program has said on standard error; it must be about to end."""
+        """What the program has written to standard error; it must be about to end."""
         if self.process.poll() is None:
             self.process.kill()
         return self._said()

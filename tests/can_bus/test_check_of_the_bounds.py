@@ -1,4 +1,4 @@
-"""The check of the bounds checked: sets, releases, what is played and what is counted, beside hand-made answers."""
+"""The check of the bounds checked: sets, releases, what is played and what is counted, by hand-made answers."""
 
 import dataclasses
 import itertools

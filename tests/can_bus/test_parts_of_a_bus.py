@@ -1,4 +1,4 @@
-"""The parts of a bus beside plain second derivations: load by listing bits, lists of what waits, states by field."""
+"""The parts of a bus against plain second derivations: load by listing bits, lists of what waits, states by field."""
 
 import array
 import dataclasses

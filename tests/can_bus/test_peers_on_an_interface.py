@@ -1,4 +1,4 @@
-"""An external bus in figures: every frame in and out, and every count, beside what its bits and its limits give."""
+"""An external bus in figures: every frame in and out, and every count, compared with its bits and its limits."""
 
 import errno
 import os

@@ -98,7 +98,7 @@ def test_slcan_commands_have_the_answers_of_the_protocol(line):
     ("length", "answer"), [(31, "Z\r"), (32, "Z\r"), (33, "\a"), (64, "\a"), (65, "\a"), (200, "\a")]
 )
 def test_slcan_a_command_has_32_bytes_at_most_and_the_next_one_is_heard(line, length, answer):
-    """An extended frame has 26 and may carry a stamp behind it; what is longer is no command, however much comes."""
+    """An extended frame has 26 and may carry a stamp behind it; a longer line is not a command, at any length."""
     _, say = line
     say("O\r")
     frame = "T0000012380102030405060708"

@@ -1,4 +1,4 @@
-"""The mutation tool: which faults it makes, how it draws them, and that it tells noticed ones from survivors."""
+"""The mutation tool: which faults it makes, how it draws them, and that it separates noticed ones from survivors."""
 
 import dataclasses
 import pathlib

@@ -390,7 +390,7 @@ def test_a_schedule_that_names_no_speakers_promises_silence_only_until_the_next_
 
 
 def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_them():
-    """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 has none of its own."""
+    """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 is empty."""
     chip = speaking(speakers=("b",)).chip
     assert chip.speaks_from() == 10_000  # a before the first b of the slot that begins at 0
     chip.advance(TICK_NS + 5_000)

@@ -1,4 +1,4 @@
-"""The ends of transmissions, written by the bus beforehand or sent as messages: a program cannot tell which."""
+"""The ends of transmissions, written by the bus beforehand or sent as messages: a program sees no difference."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A branch that dies, raises or hangs is a result, and harms nobody."""
+"""A branch that dies, raises or hangs is a result, and harms no other."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""The supervisor's door: what is admitted, what is answered with its fault, and how much a client may ask."""
+"""The supervisor's endpoint: what is admitted, what is answered with its fault, and how much a client may ask."""
 
 import contextlib
 import itertools
@@ -107,7 +107,7 @@ def test_python_writes_a_parameter_by_the_same_check(kind):
 
 
 class Robot:
-    """A door and what passed it; answers each request at once, unless `silent`."""
+    """An endpoint and what passed it; answers each request at once, unless `silent`."""
 
     def __init__(self, name):
         self.requests = []

@@ -23,7 +23,7 @@ def absent(*names):
 
 
 def sent(rest, until_ns, step_ns=MS):
-    """Every frame until then, taken in steps."""
+    """Every frame before that time, taken in steps."""
     found = []
     now = START
     while now < until_ns:

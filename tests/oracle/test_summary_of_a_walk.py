@@ -1,7 +1,7 @@
 """summary.json against figures found a second time: from the run's own files, or with a known answer.
 
-Each figure is in one of two lists. `figures.py` recomputes what the files tell; `OTHER_ORACLES` names, for each
-of the others, why the files cannot tell it, and the test that holds it to something else.
+Each figure is in one of two lists. `figures.py` recomputes what the files have; `OTHER_ORACLES` names, for each
+of the others, why the files do not have it, and the test that holds it to something else.
 """
 
 import contextlib

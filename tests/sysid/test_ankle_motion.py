@@ -1,4 +1,4 @@
-"""The ankle's free simulation beside another integrator, on the equations of its module's text written once more.
+"""The ankle's free simulation against another integrator, on the equations of its module's text written once more.
 
 Every term is large here, so that none hides behind another; steps of 0.2 ms, for the current is one of first order.
 """

@@ -153,7 +153,7 @@ def test_signals_of_the_leg_are_what_their_names_say():
 
 
 def test_a_gaussian_of_3_ms_rounds_what_a_sensor_s_lag_is_multiplied_with():
-    """Of a jump at steps of 1 ms the slope is the Gaussian itself: its height tells its width."""
+    """Of a jump at steps of 1 ms the slope is the Gaussian itself: its height gives its width."""
     fine = table()
     fine = type(fine)(0.001 * np.arange(COUNT), {}, (slice(0, COUNT),))
     jump = (np.arange(COUNT) >= 150).astype(float)

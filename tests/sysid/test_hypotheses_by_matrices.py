@@ -1,4 +1,4 @@
-"""Surfaces, hypotheses and pieces of the fit beside matrices that are written out whole."""
+"""Surfaces, hypotheses and pieces of the fit against matrices that are written out whole."""
 
 import itertools
 import math

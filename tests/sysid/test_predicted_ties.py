@@ -1,4 +1,4 @@
-"""Ties predicted by structure, confirmed or broken by data; and those that nobody predicted."""
+"""Ties predicted by structure, confirmed or broken by data; and those that were not predicted."""
 
 import pytest
 

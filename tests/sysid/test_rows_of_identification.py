@@ -1,4 +1,4 @@
-"""Rows of every block of the identification, worked out once more; simulations in them beside another integrator."""
+"""Rows of every block of the identification, worked out once more; simulations in them against another integrator."""
 
 import math
 

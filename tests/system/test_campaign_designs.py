@@ -41,7 +41,7 @@ def test_a_start_and_a_time_whose_sum_rounds_up_do_not_keep_a_golden_run_waiting
 
 
 class LeftError(Exception):
-    """As if somebody had killed the campaign."""
+    """As if the campaign had been killed."""
 
 
 class ShortLivedPool(pools.LocalPool):
@@ -194,7 +194,7 @@ def command(path, folder):
 
 
 def test_a_plan_may_name_a_file_with_a_users_own_modes(tmp_path):
-    """In processes of its own: the catalogue of this one stays as it is."""
+    """In separate processes: the catalogue of this one stays as it is."""
     path, folder = tmp_path / "own.toml", tmp_path / "out"
     path.write_text(OWN_PLAN)
     missing = command(path, folder)

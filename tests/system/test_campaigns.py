@@ -45,7 +45,7 @@ def few(tmp_path):
 
 
 def results_in(folder):
-    """{key: result} of a campaign's file, without what the run cost; every key stands there once."""
+    """{key: result} of a campaign's file, without what the run cost; every key is there once."""
     lines = [json.loads(line) for line in (folder / "results.jsonl").read_bytes().splitlines()]
     assert len({line["key"] for line in lines}) == len(lines)
     return {line["key"]: {name: value for name, value in line.items() if name != "spent"} for line in lines}

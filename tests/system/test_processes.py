@@ -80,7 +80,7 @@ class Up:
         return status
 
     def processes(self):
-        """Process ids by name, as the robot tells them, once it runs."""
+        """Process ids by name, as the robot reports them, once it runs."""
         status = self.running()
         found = {name: each["process"] for name, each in status["boards"].items()}
         return {**found, "plant": status["plant"], "supervisor": self.started.pid}

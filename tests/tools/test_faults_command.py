@@ -104,7 +104,7 @@ def test_a_fault_gives_every_digit_of_its_parameters():
 
 
 def walk(capsys, *arguments):
-    """(exit code, summary, what was said) of a walk."""
+    """(exit code, summary, standard error) of a walk."""
     code = cli.main(["walk", "--json", "-", *arguments])
     printed = capsys.readouterr()
     return code, json.loads(printed.out), printed.err

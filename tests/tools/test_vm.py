@@ -147,7 +147,7 @@ def test_the_command_keeps_its_words_folder_and_environment(tmp_path):
 
 @pytest.fixture
 def attendant(monkeypatch):
-    """attendant(write, guest) -> an Attendant and the other ends of its sockets by name; the clock stands at 1 s."""
+    """attendant(write, guest) -> an Attendant and the other ends of its sockets by name; the clock is at 1 s."""
     monkeypatch.setattr(machine.wallclock, "monotonic_s", lambda: 1.0)
     with contextlib.ExitStack() as stack:
 

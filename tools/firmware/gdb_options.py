@@ -43,9 +43,7 @@ def never() -> bool:
 def line(door: GdbServer) -> str:
     """The line that tells the user how to connect gdb to a port."""
     host = "" if door.host == "127.0.0.1" else door.host
-    open_to_all = (
-        "" if loopback(door.host) else ", open to the network: any client there may do anything to the board"
-    )
+    open_to_all = "" if loopback(door.host) else ", open to the network: any client there may do anything to the board"
     return f"gdb for {door.board.name}: target remote {host}:{door.port}; the run waits for it{open_to_all}"
 
 

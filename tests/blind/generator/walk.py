@@ -70,7 +70,7 @@ FOOT_M, MASS_KG_M, LEG_KG, SPRING, LEG_INERTIA = 0.146, 0.04, 4.955, 7.6, 0.55  
 
 @dataclasses.dataclass
 class Asked:
-    """One walk: body parameters beside `ranger`'s, terms of a model file, options of the command."""
+    """One walk: body parameters other than `ranger`'s, terms of a model file, options of the command."""
 
     seed: int
     battery: float
@@ -96,7 +96,7 @@ class Ruler:
 class Effect:
     """name: the catalogue's identifier. smallest, largest: size at the ends of the ladder; places: where it may sit.
 
-    put(asked, size, place) lets it act; tell: what it is called and how large it is.
+    put(asked, size, place) lets it act; `tell`: what it is called and how large it is.
     """
 
     name: str

@@ -25,7 +25,7 @@ class Loop:
 
 
 class Bench:
-    """Stands for a robot: `inject` and `step`. `seed`: of the faults' randomness."""
+    """Takes the place of a robot: `inject` and `step`. `seed`: of the faults' randomness."""
 
     catalogue = CATALOGUE
 
@@ -125,7 +125,7 @@ class PlantBench(Bench):
 
 
 class EdgeBench(Bench):
-    """One joint encoder whose joint stands at `angle(seconds)` rad; `board` decodes as the firmware does."""
+    """One joint encoder whose joint is at `angle(seconds)` rad; `board` decodes as the firmware does."""
 
     PLACES = ("MCH.joint_encoder", "MCFO.joint_encoder")
 

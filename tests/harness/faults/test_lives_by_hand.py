@@ -1,4 +1,4 @@
-"""A fault from being armed until its place is clear, step by step, and what two faults may do beside each other."""
+"""A fault from being armed until its place is clear, step by step, and what two faults may do at the same time."""
 
 import math
 from types import SimpleNamespace as Made

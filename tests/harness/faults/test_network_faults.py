@@ -1,4 +1,4 @@
-"""Faults at buses, controllers and serial lines of the whole robot: what the firmware tells of them, and their end."""
+"""Faults at buses, controllers and serial lines of the whole robot: the firmware's reports of them, and their end."""
 
 from contextlib import closing
 

@@ -1,4 +1,4 @@
-"""The feed: who looks sees what the log would keep, changes nothing, and waits for nobody."""
+"""The feed: a reader gets what the log would keep, changes nothing, and the robot waits for no reader."""
 
 import contextlib
 import json

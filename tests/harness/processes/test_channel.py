@@ -27,7 +27,7 @@ NEAR = 1_000_000  # ns; stamps of the tests
 
 
 class Pair:
-    """Both ends of one mailbox of a board's block. Nobody rings here: the bells are closed at once."""
+    """Both ends of one mailbox of a board's block. They do not ring: the bells are closed at once."""
 
     def __init__(self, direction):
         self.block = Block("MCH", 0, 0)

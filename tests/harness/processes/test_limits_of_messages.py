@@ -36,7 +36,7 @@ class Line:
         block[self.pair.used_word] = self.slots
 
     def read(self):
-        """(how many messages arrived, what was said of it)."""
+        """(how many messages arrived, what was reported of it)."""
         arrived = self.pair.read()
         reader = self.pair.reader
         assert reader.damaged == (0 if arrived or reader.notes else 1)

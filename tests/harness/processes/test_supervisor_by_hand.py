@@ -18,7 +18,7 @@ from ranger_sim.harness.stop_rule import StopRule
 
 
 class Said(supervisor.View):
-    """Everything that was said and shown."""
+    """Everything that was reported and shown."""
 
     def __init__(self):
         self.lines, self.shown = [], []
@@ -30,7 +30,7 @@ class Said(supervisor.View):
         self.shown.append(state)
 
     def heard(self):
-        """What was said since the last call."""
+        """What was reported since the last call."""
         lines, self.lines = self.lines, []
         return lines
 

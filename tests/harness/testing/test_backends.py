@@ -26,7 +26,7 @@ schedule = "1mbit"
 
 
 def without_sent(counters):
-    """A controller learns of the end of a transmission when somebody asks it: inside later than in a process."""
+    """A controller learns of the end of a transmission when it is asked: inside later than in a process."""
     return {name: replace(board, can=[replace(end, sent=0) for end in board.can]) for name, board in counters.items()}
 
 

@@ -13,7 +13,7 @@ from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
 
 
 def recorded(until_ns=2_000_000, phase_ns=0, interrupt_at=None, most_rows=1 << 20, origin_ns=0, **table):
-    """The view of a chip that ran this table, recorded from the start; one interrupt of 600 cycles ata time."""
+    """The view of a chip that ran this table, recorded from the start; one interrupt of 600 cycles at a time."""
     log = Log()
     log.start(phase_ns=phase_ns, **{name: task(log) if callable(task) else task for name, task in table.items()})
     if interrupt_at is not None:

@@ -1,4 +1,4 @@
-"""A step of the body beside steps of its own accelerations, and terms of a model file beside drives that do the same.
+"""A step of the body against steps of its own accelerations, and terms of a model file against drives that do the same.
 
 `test_body_equations.py` holds the accelerations at one time against two other derivations. Here they are
 asked for at times only, and Nystrom's method of EQUATIONS 15 is written down again around them, with steps so short

@@ -1,4 +1,4 @@
-"""The page of a diagnosis: it says what the answer says, draws where the cause shows, and needs nothing beside it."""
+"""The page of a diagnosis: it says what the answer says, draws where the cause shows, and needs no other file."""
 
 import re
 
@@ -52,7 +52,7 @@ def test_the_page_is_one_file_and_the_same_each_time(found, drawn):
 
 
 def test_a_cause_is_drawn_where_it_shows_and_the_model_with_it_leaves_nothing_there(found):
-    """F = 0.02 v |v|: over the speed its part beside the base is largest at the ends; with it the means are noise."""
+    """F = 0.02 v |v|: over the speed its part outside the base is largest at the ends; with it the means are noise."""
     made = figures.sides(found)
     (each,) = found.named
     side = made["force"]

@@ -56,7 +56,7 @@ def ended(run):
 
 
 def port_of(run):
-    """The port that a line of it tells."""
+    """The port that a line of it names."""
     for line in run.stdout:
         if found := re.search(r"target remote :(\d+)", line):
             return int(found[1])

@@ -1,4 +1,4 @@
-"""Connections to the panel: who keeps one, who makes room, what becomes of who takes nothing; on a clock of ours."""
+"""Connections to the panel: which are kept, which are dropped, and what happens to those that read nothing."""
 
 import asyncio
 import socket

@@ -38,7 +38,7 @@ def traces(page, place):
 
 
 def steps_shown(page, since_s):
-    """Durations of the steps that the first plot shows, once it shows WINDOW_S froma time on."""
+    """Durations of the steps that the first plot shows, once it shows WINDOW_S from a time on."""
     page.until(f"window.rangerPanel.span()[1] > {since_s + WINDOW_S}")
     Hand(page).click("#freeze", "Hold")
     assert page.value("document.querySelector('.chip span').textContent") == "hip_rad, rad"

@@ -1,4 +1,4 @@
-"""The panel's door: who is served, what a page may say, and that nothing it does stops the others."""
+"""The panel's server: which clients are served, what a page may send, and that no page stops the others."""
 
 import asyncio
 import contextlib
@@ -69,7 +69,7 @@ class Ramp(Source):
 
 @pytest.fixture
 def panel():
-    """(server, its address, what it told)."""
+    """(server, its address, what it printed)."""
     told = []
     with listening("127.0.0.1", 0) as listener:
         port = listener.getsockname()[1]
@@ -120,7 +120,7 @@ def heard(socket, wanted):
 
 
 def answer(socket, **wish):
-    """What the server answers to a wish."""
+    """What the server answers to a request."""
     socket.send(json.dumps({**wish, "number": 7}))
     return heard(socket, lambda kind, body: kind == messages.TEXT and body.get("answer") == 7)
 
@@ -324,7 +324,7 @@ def test_when_all_places_are_taken_one_more_is_told_and_pages_that_never_read_ke
 
 
 def test_a_page_gets_two_pictures_ahead_of_what_it_has_shown_and_no_third(panel):
-    """The bound of what a dead page costs: two pictures. A page beside it shows how many there are meanwhile."""
+    """The bound of what a dead page costs: two pictures. Another page shows how many there are meanwhile."""
     _, address, _ = panel
 
     def seen_beside():

@@ -213,7 +213,7 @@ def test_only_the_viewers_page_gets_the_trace(file, method, headers, status):
 
 
 def visit(server, said=b""):
-    """A connection that has said this, taken in."""
+    """A connection that has sent this, taken in."""
     client = socket.create_connection(("127.0.0.1", server.port))
     client.setblocking(False)
     client.send(said)
@@ -222,7 +222,7 @@ def visit(server, said=b""):
 
 
 def test_connections_that_say_nothing_keep_nobody_waiting_and_floods_are_bounded(tmp_path):
-    """A browser opens some in advance; one that said nothing once kept all others waiting for ever."""
+    """A browser opens some in advance; one that sent nothing once kept all others waiting for ever."""
     file = tmp_path / "a.pftrace"
     file.write_bytes(bytes(5_000_000))
     limits = LIMITS["trace"]
