@@ -145,7 +145,7 @@ class Lockstep:
         for place, board in enumerate(self.boards):
             if board.name == name:
                 return place
-        raise UserError(f"lockstep: no board is called {name}")
+        raise UserError(f"lockstep: no board is named {name}")
 
     def board(self, name) -> Board:
         """Return the board of this name."""

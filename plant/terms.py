@@ -391,7 +391,7 @@ class Model:
             if total >= 1.0:
                 raise UserError(
                     f"{self.source}: the commutation ripples at {at} together are {total:g} of its torque constant; "
-                    "allowed is what lies below 1"
+                    "they must be below 1"
                 )
 
 

@@ -26,7 +26,7 @@ TABLES_END = "<!-- end -->\n"
 
 FAULT = Option(
     "--fault",
-    'lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 when one '
+    'inject a fault: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 when one '
     "did not act; ranger-sim faults lists places and modes",
     word("PLACE:MODE"),
     "TEXT",
@@ -46,7 +46,7 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "faults",
         help="list what can be made to fail, where, with which parameters",
-        description="Without PLACE all places and the modes of each; with PLACE what they do, parameter by parameter.",
+        description="Without PLACE, all places and the modes of each; with PLACE, its modes and their parameters.",
         epilog='ranger-sim walk --fault "MCH.joint_encoder:stuck@step 12..step 14" lets one act.',
     )
     command.add_argument("place", nargs="?", metavar="PLACE", help="a place, as MCH.joint_encoder")

@@ -34,7 +34,7 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
         raise UserError(f"{path}: holds no CAN messages")
     rate = bit_rate if bit_rate is not None else _baudrate(database)
     if rate is None:
-        raise UserError(f"{path}: says nothing of the bit rate (attribute Baudrate); give --bit-rate")
+        raise UserError(f"{path}: has no bit rate (attribute Baudrate); give --bit-rate")
     messages = []
     silent = []
     for one in database.messages:

@@ -258,7 +258,7 @@ class Calls:
         self.new(self.adcxs, 0)
         it = self.hardware.external
         if it is None:
-            raise UserError("no external converter hangs on this board")
+            raise UserError("this board has no external converter")
         if 0 in self.masters:
             raise UserError("the SSP is a master of words already, so the external converter cannot have it")
         adc = Ads7871(self.chip, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)

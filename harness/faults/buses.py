@@ -138,7 +138,7 @@ class DuplicateIdentifier(IntruderFault):
     def connect(self) -> None:
         IntruderFault.connect(self)
         if not self.values["frame"] or self.values["frame"] == ANY:
-            raise UserError(f"fault {self.text()}: say by frame= which identifier is there twice")
+            raise UserError(f"fault {self.text()}: give the duplicate identifier by frame=")
         self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
 
     def made_outside(self) -> OutsideIntruder:

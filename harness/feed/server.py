@@ -34,7 +34,7 @@ class FeedServer(Door[Peer]):
             listener.bind(records.address(name))
         except OSError:
             listener.close()
-            raise UserError(f"a robot named {name} shows itself already: give this one another --name") from None
+            raise UserError(f"a robot named {name} is already running: choose another --name") from None
         listener.listen(LIMITS["feed"].peers)
         listener.setblocking(False)
         super().__init__("feed", listener)

@@ -361,9 +361,7 @@ def _buses(
         if interface is None:
             for key in ("channel", "options"):
                 if entry.get(key):
-                    reader.fault(
-                        f"{place}.{key}", entry[key], "means nothing without interface: the bus is emulated inside"
-                    )
+                    reader.fault(f"{place}.{key}", entry[key], "needs `interface`: without one the bus is emulated")
         for key in options:
             if key in ("interface", "channel", "bitrate", "fd"):
                 reader.fault(
@@ -377,7 +375,7 @@ def _buses(
             reader.fault(
                 f"{place}.bit_rate",
                 rate if "bit_rate" in entry else None,
-                f"{'' if 'bit_rate' in entry else f'is missing, so {rate}: '}adapters for classic CAN end at "
+                f"{'' if 'bit_rate' in entry else f'is missing, so {rate}: '}adapters for classic CAN reach at most "
                 f"{ADAPTER_BIT_RATE} bit/s",
             )
         wanted = reader.text(entry, "schedule", place, FULL) or FULL

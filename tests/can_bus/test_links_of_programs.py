@@ -154,7 +154,7 @@ def test_a_welcome_may_come_in_pieces_with_more_behind_it(monkeypatch, cut):
 @pytest.mark.parametrize(
     ("pieces", "words"),
     [
-        ([], "'name' ended the connection without a word"),
+        ([], "'name' ended the connection without a message"),
         ([struct.pack("<IB", 4, 3) + b"why"], "why"),
         ([struct.pack("<IB", 1, 5)], "'name' does not speak the attach protocol"),
         ([struct.pack("<IBHHI", 9, 2, 1, 64, 5)], "'name' does not speak the attach protocol"),

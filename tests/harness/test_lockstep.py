@@ -156,5 +156,5 @@ def test_a_board_with_another_inbox_or_of_another_name_takes_no_place():
     robot = Ranger(Scenario())
     with pytest.raises(UserError, match="the inbox of the new MCH is not that of the one whose place it takes"):
         robot.loop.replace(IdleBoard("MCH"))
-    with pytest.raises(UserError, match="no board is called NOPE"):
+    with pytest.raises(UserError, match="no board is named NOPE"):
         robot.loop.replace(IdleBoard("NOPE"))

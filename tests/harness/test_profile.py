@@ -128,7 +128,7 @@ def test_an_external_router_with_the_main_brain_is_allowed_and_alone_is_not(tmp_
         ("[buses.can1]\nbit_rate = true\n", "buses.can1.bit_rate", "True", "whole number"),
         ('[buses.can1]\nschedule = "slow"\n', "buses.can1.schedule", "'slow'", "1mbit, full"),
         ('[buses.can1]\nschedule = "../../x"\n', "buses.can1.schedule", "'../../x'", "no such schedule"),
-        ('[buses.can1]\nchannel = "can0"\n', "buses.can1.channel", "'can0'", "without interface"),
+        ('[buses.can1]\nchannel = "can0"\n', "buses.can1.channel", "'can0'", "needs `interface`"),
         ('[buses.can1]\ninterface = "socketcan"\nbit_rate = 500000\n', "buses.can1.channel", "None", "missing"),
         (
             ON_CAN0.replace("socketcan", "sockets"),

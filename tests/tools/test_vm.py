@@ -182,7 +182,7 @@ def test_a_machine_that_stops_by_itself_leaves_its_last_words(attendant):
     guest["console"].send(b"\x1b[2Jbooting\r\nKernel panic - not syncing\r\n")
     for each in guest.values():
         each.close()
-    with pytest.raises(UserError, match="its last words:\nbooting\nKernel panic - not syncing$"):
+    with pytest.raises(UserError, match="its last output:\nbooting\nKernel panic - not syncing$"):
         watcher.attend()
 
 

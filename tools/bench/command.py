@@ -107,9 +107,9 @@ def register(commands: Any) -> None:
         epilog="parts:\n" + named_lines({name: part.line for name, part in PARTS.items()}, 15),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    command.add_argument("part", nargs="*", metavar="PART", help="what is measured; see below")
+    command.add_argument("part", nargs="*", metavar="PART", help="parts to measure; see below")
     command.add_argument(
-        "--runs", type=whole_number(1), default=3, metavar="N", help="turns of what is timed together (default 3)"
+        "--runs", type=whole_number(1), default=3, metavar="N", help="repetitions of timed parts (default 3)"
     )
     command.add_argument(
         "--seconds", type=whole_number(1), default=20, metavar="S", help="virtual seconds per run (default 20)"
@@ -124,7 +124,7 @@ def register(commands: Any) -> None:
         help="times real time of the robot under floods (default: 0.25 to 1 by the number of processors)",
     )
     command.add_argument(
-        "--keep", metavar="FILE", help="of floods: rows that FILE has are not measured again, new ones are added"
+        "--keep", metavar="FILE", help="of floods: rows in FILE are kept, only missing ones are measured"
     )
     command.add_argument("--sets", type=whole_number(1), default=10_000, metavar="N", help="of bounds (default 10000)")
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")

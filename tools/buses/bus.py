@@ -50,7 +50,7 @@ def register(commands: Any) -> None:
         "--seconds",
         type=quantity(TIMES, "s", above=0.0, most=MOST_TIME_S),
         default=math.inf,
-        help="end after so long (default: with Ctrl-C)",
+        help="end after this time (default: with Ctrl-C)",
     )
     command.set_defaults(run=run)
 

@@ -25,8 +25,8 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "check-bus",
         help="whether the CAN interfaces of a profile are ready",
-        description="Interfaces there, up, bit rate as in the profile, state and error counters, traffic. Each failure "
-        "comes with the command that mends it. Exit code 1 when there is one.",
+        description="Checks each interface: present, up, bit rate of the profile, state and error counters, traffic. "
+        "Prints a command that mends each failure. Exit code 1 when there is one.",
     )
     command.add_argument("profile", metavar="PROFILE", help="name of a profile or a .toml file")
     command.add_argument(

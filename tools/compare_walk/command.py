@@ -24,7 +24,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--controller", default="head-2015", metavar="NAME", help="parameter set for the program head-2015 (head-2015)"
     )
-    command.add_argument("--body", default="ranger", metavar="NAME", help="what walks, by name or .toml file (ranger)")
+    command.add_argument("--body", default="ranger", metavar="NAME", help="body, by name or as a .toml file (ranger)")
     command.add_argument("--model", metavar="FILE", help="model file (.toml) with additional terms")
     command.add_argument(
         "--slope",

@@ -41,7 +41,7 @@ IN_PROCESS = Option(
 )
 BOARD_DEADLINE = Option(
     "--board-deadline",
-    f"end the process of a firmware that gives no answer for so long (default {DEADLINE_S:g}s); 0s: never, to debug it",
+    f"end a firmware's process that does not answer for this time (default {DEADLINE_S:g}s); 0s: never, to debug it",
     quantity(TIMES, "s", least=0.0, most=LONGEST_DEADLINE_S),
     f"{DEADLINE_S:g}s",
     DEADLINE_S,

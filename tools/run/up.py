@@ -117,7 +117,7 @@ def register(commands: Any) -> None:
         help="name under which other programs find this robot (default ranger)",
     )
     group.add_argument(
-        "--no-real-time", action="store_true", help="do not ask for SCHED_FIFO and locked memory, even if permitted"
+        "--no-real-time", action="store_true", help="do not request SCHED_FIFO and locked memory, even if permitted"
     )
     group.add_argument(
         "--processor",
@@ -163,7 +163,7 @@ def register(commands: Any) -> None:
         "fault PLACE:MODE: arm a fault, as --fault of `up` has it; clear N: end the fault that was armed as number N, "
         "from 0; radio STICK: steer, -1 (left) to 1 (right).",
     )
-    ctl.add_argument("request", choices=("status", "pause", "resume", *FIELDS), help="what is asked for")
+    ctl.add_argument("request", choices=("status", "pause", "resume", *FIELDS), help="the request")
     ctl.add_argument("values", nargs="*", metavar="VALUE", help="its board, key, or name and value")
     ctl.add_argument("--name", default="ranger", help="name of the robot (default ranger)")
     ctl.set_defaults(run=run_ctl)

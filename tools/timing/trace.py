@@ -112,7 +112,7 @@ def register(commands: Any) -> None:
         type=quantity(TIMES, "s", 0.0),
         default=SHOWN_S,
         metavar="20ms",
-        help="how much around it is shown at first (default 20 ms)",
+        help="length that is shown at first (default 20 ms)",
     )
     opening.add_argument("--offline", action="store_true", help="write a page next to FILE and open that")
     opening.add_argument("--out", type=pathlib.Path, metavar="PAGE.html", help="where the page is written")

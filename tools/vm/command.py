@@ -29,7 +29,7 @@ def register(commands: Any) -> None:
         type=quantity(TIMES, "s", 0.0),
         default=default.time_limit_s,
         metavar="10min",
-        help="the machine is switched off after so long, with exit code 124 (default 10min)",
+        help="the machine is switched off after this time, with exit code 124 (default 10min)",
     )
     command.add_argument(
         "--memory",
@@ -56,7 +56,7 @@ def register(commands: Any) -> None:
         "--kvm", action="store_true", help="use /dev/kvm instead of emulation: far faster where it works"
     )
     command.add_argument("--console", action="store_true", help="show the machine's console on standard error")
-    command.add_argument("command_line", nargs="+", metavar="COMMAND", help="what to run, after --")
+    command.add_argument("command_line", nargs="+", metavar="COMMAND", help="the command to run, after --")
     command.set_defaults(run=run)
 
 

@@ -312,7 +312,7 @@ def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tm
     source = program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start").replace("stdlib", "unistd")
     done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
     assert (done.returncode, found) == (2, None)
-    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program does not get through its start: {told}\n", done.stderr)
+    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program fails in its start: {told}\n", done.stderr)
 
 
 EXITS = ("exit(0);", "_exit(0);", "_Exit(0);", "quick_exit(0);")
@@ -341,7 +341,7 @@ def test_a_library_that_ends_the_process_that_loads_it_is_refused_and_never_a_su
     """Whatever code it ends with: the trial says how far it came over a pipe."""
     source = program(leaving(WELL + "\n" + CONSTRUCTOR % end))[0]
     line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
-    assert "its program does not get through its loading (what runs in it before firmware_start" in line
+    assert "its program fails in its loading (what runs in it before firmware_start" in line
     assert line.endswith("): it ended its process with code 0")
 
 
@@ -352,7 +352,7 @@ def test_a_library_that_is_up_to_date_is_tried_before_a_walk_loads_it(tmp_path):
     folder = folder_with(tmp_path / "fw", program(leaving(WELL + "\n" + CONSTRUCTOR % end))[0], MANIFEST)
     assert walked(folder)[1]["failed_boards"] == []
     (tmp_path / "now").touch()
-    assert "fw: MCH: its program does not get through its loading" in refused(folder)
+    assert "fw: MCH: its program fails in its loading" in refused(folder)
 
 
 @needs_compiler
@@ -361,7 +361,7 @@ def test_a_start_that_calls_exit_is_refused_with_its_place(tmp_path):
     source = program(WELL)[0].replace("{ fw_can_start", "{ exit(0); fw_can_start")
     line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
     assert re.search(
-        r"does not get through its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line
+        r"fails in its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line
     )
 
 
@@ -458,7 +458,7 @@ def test_a_start_without_a_sign_of_life_is_refused(tmp_path, monkeypatch, start,
     head = "#define _POSIX_C_SOURCE 200809L\n#include <signal.h>\n#include <unistd.h>\n"
     source = head + program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start")
     folder = folder_with(tmp_path / "fw", source, MANIFEST)
-    with pytest.raises(UserError, match=re.escape(f"MCH: its program does not get through its start: {told}")):
+    with pytest.raises(UserError, match=re.escape(f"MCH: its program fails in its start: {told}")):
         Ranger(firmware={"MCH": folder})
 
 

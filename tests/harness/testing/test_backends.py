@@ -110,7 +110,7 @@ def test_a_machine_without_vcan_is_told_what_it_lacks(monkeypatch):
 def test_hardware_needs_a_profile_with_a_bus_outside(tmp_path):
     inside = tmp_path / "inside.toml"
     inside.write_text('title = "nothing outside"\n[buses.can1]\nbit_rate = 1_000_000\n', encoding="utf-8")
-    with pytest.raises(UserError, match="backend hardware: a profile says what is real: --ranger-profile my.toml"):
+    with pytest.raises(UserError, match="backend hardware: it needs a profile: --ranger-profile my.toml"):
         new_robot(backend="hardware")
     with pytest.raises(UserError, match="backend hardware: the profile .* puts no bus on an interface"):
         new_robot(backend="hardware", profile=str(inside))
