@@ -56,7 +56,7 @@ class WordWire:
 class SspWire:
     """The serial link between two boards; an exchange that the master starts takes `exchange_ns`.
 
-    `tampering`: a fault that changes what arrives, or None (`harness/faults/link.py`).
+    `tampering`: a fault that changes what arrives, or None (`harness/faults/links.py`).
     """
 
     master: "EventQueue"

@@ -360,9 +360,7 @@ def test_a_library_that_is_up_to_date_is_tried_before_a_walk_loads_it(tmp_path):
 def test_a_start_that_calls_exit_is_refused_with_its_place(tmp_path):
     source = program(WELL)[0].replace("{ fw_can_start", "{ exit(0); fw_can_start")
     line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
-    assert re.search(
-        r"fails in its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line
-    )
+    assert re.search(r"fails in its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line)
 
 
 @needs_compiler
