@@ -1,5 +1,5 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
-# make test-interpreted: the rooms' own tests on the plain sources, where compiled modules run in `make test`; and nine
+# make test-interpreted: the packages' own tests on the plain sources, where compiled modules run in `make test`; and nine
 #   scenarios compiled and interpreted, to the byte.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
@@ -30,7 +30,7 @@ test: $(VENV)/.all
 	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways" $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
-# The rooms' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
+# The packages' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
 # minutes so, programs that keep a pace, and what compares both modes already.
 PLAIN = $(addprefix tests/,foundation datatable can_bus firmware_sim boards plant ranger/test_counters.py \
 	harness/test_imu_wire.py harness/test_profile.py ranger/test_requests.py harness/test_supervision.py)

@@ -232,7 +232,7 @@ def main():
     try:
         set_up(chosen.what, chosen.venv.absolute())
     except SetUpError as error:
-        print(f"ranger-sim could not be set up: {error}\nEverything that was said is in {LOG}", file=sys.stderr)
+        print(f"ranger-sim could not be set up: {error}\nThe whole output is in {LOG}", file=sys.stderr)
         return 1
     return 0
 

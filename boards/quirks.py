@@ -38,7 +38,7 @@ class Quirks:
     """Appendix 4.7: PI with the emphasis on the integral. Firmware: Kp = 0, integral only."""
 
     speed_limiter: bool = switch(True, False, YES_OR_NO)
-    """Appendix 4.7: a speed limiter beside the current limiter. Firmware: none, only the duty ceiling."""
+    """Appendix 4.7: a speed limiter in addition to the current limiter. Firmware: none, only the duty ceiling."""
 
     thermal_derating: bool = switch(True, False, YES_OR_NO)
     """Appendix 4.7: thermal average brings the current down near its limit. Firmware: slope of wrong sign."""
@@ -129,10 +129,10 @@ class Quirks:
     """Appendix 4.10, 4.11: wired or Bluetooth. Firmware: chosen when it is built, the last one wired."""
 
     parameter_writes_checked: bool = switch(True, False, YES_OR_NO)
-    """A packet that writes what is no parameter raises an error. Firmware: any variable is overwritten."""
+    """A packet that writes a variable other than a parameter raises an error. Firmware: any variable is overwritten."""
 
     serial_dma_off_at_start: bool = switch(False, True, YES_OR_NO)
-    """Firmware: the first look at the serial line finds its receive transfer off and reports an error."""
+    """Firmware: the first poll of the serial line finds its receive transfer off and reports an error."""
 
     heel_strike: str = switch("baseline", "filtered_sum", ("baseline", "filtered_sum"))
     """Appendix 4.3: voltage above its swing baseline for 2 ms. Firmware: two filtered sensors above 850

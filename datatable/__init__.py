@@ -57,9 +57,7 @@ def check_own_table() -> None:
     from ranger_sim.datatable.generated import all_variables
 
     if all_variables.TABLE_HASH != table_hash(str(OWN_TABLE)):
-        raise TableError(
-            f"{OWN_TABLE}: changed since its code was made: ranger-sim table generate --master {OWN_TABLE}"
-        )
+        raise TableError(f"{OWN_TABLE}: changed after code generation: ranger-sim table generate --master {OWN_TABLE}")
 
 
 def published_schedule(board: str) -> "PublishedSchedule":

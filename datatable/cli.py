@@ -21,12 +21,12 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     parser = subparsers.add_parser("table", help="the master table of variables: generate code, look things up")
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
 
-    generate = actions.add_parser("generate", help="write everything that is made from the master table")
+    generate = actions.add_parser("generate", help="write everything that is generated from the master table")
     generate.add_argument("--check", action="store_true", help="write nothing; exit code 1 when files are stale")
     generate.add_argument("--out", metavar="DIR", help="write to this folder (default: generated, in the master's)")
     generate.set_defaults(run=run_generate)
 
-    copying = actions.add_parser("copy", help="begin a table of your own: our master files in a folder of yours")
+    copying = actions.add_parser("copy", help="copy the master files into a new folder, for your own table")
     copying.add_argument("folder", metavar="DIR", help="a folder that does not exist yet")
     copying.set_defaults(run=run_copy)
 
@@ -35,7 +35,7 @@ def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     show.set_defaults(run=run_show)
 
     listing = actions.add_parser("list", help="variables, all or of one board")
-    listing.add_argument("--board", metavar="BOARD", help="only what this board publishes or hears")
+    listing.add_argument("--board", metavar="BOARD", help="only what this board publishes or receives")
     listing.set_defaults(run=run_list)
 
     for action in (generate, show, listing):
@@ -84,9 +84,9 @@ def run_copy(arguments: argparse.Namespace) -> int:
             if path.suffix in (".csv", ".toml"):
                 shutil.copyfile(path, folder / path.name)
     except OSError as error:
-        raise TableError(f"{error.filename or folder}: {error.strerror}: the copy needs a folder of its own") from error
+        raise TableError(f"{error.filename or folder}: {error.strerror}: the copy needs a new folder") from error
     print(f"{folder}: change variables.csv, then ranger-sim table generate --master {folder}")
-    print(f"then it is the table of whatever runs with RANGER_SIM_TABLE={folder}")
+    print(f"every program with this variable uses it: RANGER_SIM_TABLE={folder}")
     return EXIT_DONE
 
 
@@ -161,5 +161,5 @@ def run_list(arguments: argparse.Namespace) -> int:
         )
     console.print(grid)
     if not described:
-        print("no room for descriptions: a wider window, --json or `table show NAME` has them")
+        print("too narrow for descriptions: use a wider window, --json or `table show NAME`")
     return EXIT_DONE

@@ -120,7 +120,7 @@ def board_module(table: Table, board: Board) -> str:
         "# ids by name",
         *id_lines(known),
         "",
-        "# what the board sends and hears, by id",
+        "# what the board sends and receives, by id",
         *tuple_lines("SEND", "tuple[int, ...]", (str(variable.id) for variable in send)),
         *tuple_lines("SEND_TYPES", "tuple[str, ...]", (quoted(variable.type) for variable in send)),
         *tuple_lines("RECEIVE", "tuple[int, ...]", (str(variable.id) for variable in receive)),

@@ -140,7 +140,7 @@ def main():
     runs = [recording(f"foot_inertia_{number}") for number in range(1, 6)]
     between(runs[0])
     for of_program in (False, True):
-        print("law of the robot's program:" if of_program else "law as told, K (target - p) + D (target' - p'):")
+        print("law of the robot's program:" if of_program else "law as given, K (target - p) + D (target' - p'):")
         for number, run in enumerate(runs[:3], 1):
             values, parts = predicted(run, run, None, of_program)
             said = ", ".join(f"{key} {value:.4g}" for key, value in values.items())

@@ -18,7 +18,7 @@ PAGE = pathlib.Path(__file__).parent / "reference/causes.md"
 HEAD = """# Causes and unknowns
 
 What `ranger-sim diagnose` can name, what its machines know beforehand, what `ranger-sim identify` finds, and what a
-model file can add. `ranger-sim causes CAUSE` tells more of one; [diagnose](../diagnose.md) says how a cause is found,
+model file can add. `ranger-sim causes CAUSE` describes one; [diagnose](../diagnose.md) says how a cause is found,
 [identify](../identify.md) how a number is, and [model terms](../how-to/model-term.md) how a form is put into a walk.
 
 `python docs/causes_table.py` writes this page, and a test holds it: no number of these tables changes unseen.

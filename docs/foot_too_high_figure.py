@@ -31,7 +31,7 @@ def line(x1: float, y1: float, x2: float, y2: float, colour: str = GREY, width: 
 
 
 def place(value: float, limits: tuple, ends: tuple) -> float:
-    """Where a value lies between two ends, in pixels; what is beyond stands at the end."""
+    """Where a value lies between two ends, in pixels; values beyond are drawn at the end."""
     share = (min(max(value, limits[0]), limits[1]) - limits[0]) / (limits[1] - limits[0])
     return round(ends[0] + share * (ends[1] - ends[0]), 1)
 

@@ -22,7 +22,7 @@ def clock(seconds: float) -> str:
 
 
 def walk_table(first: dict, rest: dict) -> str:
-    """The walk beside the robot's."""
+    """The walk compared with the robot's."""
     km, hours = first["distance_m"] / 1000.0, first["walked_h"]
     drawn_Wh, late = first["battery"]["delivered_Wh"], first["heel_strike_delay_ms"]
     drawn_W, whole_km = drawn_Wh / hours, (first["distance_m"] + rest["distance_m"]) / 1000.0
@@ -46,13 +46,13 @@ def walk_table(first: dict, rest: dict) -> str:
         ("the same per kilometre", f"{493 / robot_km:.2f} Wh", f"{drawn_Wh / km:.2f} Wh", ""),
         ("mean power out of them", f"{robot_W:.1f} W", f"{drawn_W:.1f} W", ""),
         ("cost of transport of that", "0.28", f"{first['tcot'] * drawn_W / first['total_power_W']:.2f}", ""),
-        ("heel strike told late by", "14 ± 3 ms", f"{late['mean']:.1f} ± {late['std']:.1f} ms", ""),
+        ("heel strike reported late by", "14 ± 3 ms", f"{late['mean']:.1f} ± {late['std']:.1f} ms", ""),
     ]
     return table(rows)
 
 
 def energy_table(walk: dict) -> str:
-    """What each consumer took; what the motors gave back is a line of its own."""
+    """What each consumer took; what the motors gave back is its own line."""
     taken = {name: value for name, value in walk["energy_Wh"].items() if name != "total" and value > 0.0}
     total = walk["energy_Wh"]["total"]
     back = total - walk["battery"]["delivered_Wh"]

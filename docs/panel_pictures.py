@@ -1,6 +1,6 @@
 """The pictures of the panel's page, one of each view: python docs/panel_pictures.py (needs Chromium; a minute).
 
-A robot walks in real time beside it, so two runs of this give two pictures of the same. The view Link is of its data
+A robot walks in real time meanwhile, so two runs of this give two pictures of the same. The view Link is of its data
 link, with drop-outs.
 """
 

@@ -2,8 +2,8 @@
 
     python docs/record_walk_figure.py
 
-Left: how far each of the seeds walked on the level. Right: step length over step time of each walk that came to its
-end, beside the robot's (robot.md P6). The same files give the same bytes.
+Left: how far each of the seeds walked on the level. Right: step length over step time of each walk that reached its
+end, compared with the robot's (robot.md P6). The same files give the same bytes.
 """
 
 import json
@@ -64,7 +64,7 @@ def distances(before: list[dict], now: list[dict]) -> list[str]:
 
 
 def gait(level: list[dict], rough: list[dict]) -> list[str]:
-    """A dot for each walk that came to its end."""
+    """A dot for each walk that reached its end."""
     parts = [text(RIGHT_PLOT[0], 30, "Step length over step time", size=15)]
     for hundredths in range(round(100 * TIMES[0]), round(100 * TIMES[1]) + 1, 2):
         x = place(hundredths / 100, TIMES, RIGHT_PLOT)

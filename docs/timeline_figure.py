@@ -101,9 +101,9 @@ def way_from(way: Way, frame: int) -> dict | None:
     stations["frame up"] = times((can1, frame))
     here = (can1, frame)
     for key, track, name in (
-        ("CSR heard", "CSR interrupts", "can1 receive"),
+        ("CSR received", "CSR interrupts", "can1 receive"),
         ("link up", "Link to the main brain", ""),
-        ("MB heard", "MB interrupts", "ssp"),
+        ("MB received", "MB interrupts", "ssp"),
         ("parse_ssp", "MB slots", "parse_ssp"),
     ):
         found = way.following(*here, track, name)
@@ -125,7 +125,7 @@ def way_from(way: Way, frame: int) -> dict | None:
                 if task:
                     stations["link down"], stations["CSR got"] = times(exchange), times(heard)
                     stations["turn"], stations["frame down"] = times(turn), times(sent)
-                    stations["MCH heard"], stations["dispatch"] = times(board), times(task)
+                    stations["MCH received"], stations["dispatch"] = times(board), times(task)
                     control = first_after(mch_tasks, "mc_compliant_control", stations["dispatch"][0])
                     stations["control"] = times(control)
                     stations["value up"] = float(can1.notes["value"][frame])
@@ -152,7 +152,7 @@ def record() -> dict:
         if stations and abs(stations["value down"]) > LEAST_CURRENT_A:
             break
     else:
-        raise SystemExit("no command came of a hip angle in the same slot of the main brain")
+        raise SystemExit("no hip angle led to a command in the same slot of the main brain")
     begin = stations["ae_update"][0]
     end = stations["control"][1]
     lanes = {
@@ -195,7 +195,7 @@ def whole(way: Way, begin: int, end: int, path: tuple, inside: bool) -> list:
 
 
 class Figure:
-    """The parts of the picture, and where instants and lanes lie in it."""
+    """The parts of the picture, and where times and lanes lie in it."""
 
     def __init__(self, kept: dict) -> None:
         self.kept = kept
@@ -206,7 +206,7 @@ class Figure:
         self.parts: list[str] = []
 
     def x(self, time_ns: float) -> float:
-        """Pixels from the left of an instant in ns."""
+        """Pixels from the left of a time in ns."""
         share = (time_ns - self.zero - self.from_ns) / (self.to_ns - self.from_ns)
         return round(LEFT + share * (RIGHT - LEFT), 1)
 
@@ -249,16 +249,16 @@ WAY = (
     ("MCH_ANGLE", "MCH", "the row's line makes a frame of the angle"),
     ("can_transmit", "MCH", "can_transmit asks the controller to send it"),
     ("frame up", "can1", "frame MCH_ANGLE on CAN1"),
-    ("CSR heard", "CSR", "the router's receive interrupt"),
+    ("CSR received", "CSR", "the router's receive interrupt"),
     ("link up", "link", "the next exchange over the serial link takes it along"),
-    ("MB heard", "MB", "the main brain's interrupt at its end"),
+    ("MB received", "MB", "the main brain's interrupt at its end"),
     ("parse_ssp", "MB", "parse_ssp puts it into the data table, as soon as a slot begins"),
     ("estimator", "MB", "estimator and controller work with it"),
     ("send_ssp", "MB", "send_ssp sends the current that the hip shall have"),
     ("link down", "link", "back over the serial link"),
     ("CSR got", "CSR", "the router has it, its main loop routes it"),
     ("frame down", "can1", "frame MCH_COMMAND_CURRENT on CAN1"),
-    ("MCH heard", "MCH interrupts", "the hip board's receive interrupt"),
+    ("MCH received", "MCH interrupts", "the hip board's receive interrupt"),
     ("dispatch", "MCH", "can_rx_dispatch_all hands it over, in the next slot"),
     ("control", "MCH", "mc_compliant_control sets the PWM: the motor feels it"),
 )

@@ -1,6 +1,6 @@
 """Another simulator drives the body: `ranger-sim fmu body.fmu`, then this. Needs FMPy (pip install fmpy).
 
-The robot is let go and nobody steps: when does it fall? Printed for three duties of the outer ankles' motor and two
+It prints when a robot that is let go without a controller falls, for three duties of the outer ankles' motor and two
 masses.
 """
 

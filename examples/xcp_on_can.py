@@ -14,7 +14,7 @@ TICK_S = 10e-6  # of the stamps on CAN
 
 
 def say(bus: can.BusABC, command: str) -> bytes:
-    """The answer to a command; SystemExit when it is refused or nobody answers."""
+    """The answer to a command; SystemExit when it is refused or not answered."""
     bus.send(can.Message(arbitration_id=MASTER, is_extended_id=False, data=bytes.fromhex(command)))
     while True:
         message = bus.recv(2.0)

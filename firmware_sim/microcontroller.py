@@ -119,7 +119,7 @@ class Microcontroller(Chip):
     def _check_peripheral(self, peripheral) -> None:
         """The compiled loop assumes that what is claimed is a Peripheral and does not check again."""
         if not isinstance(peripheral, Peripheral):
-            raise FirmwareError(f"{self.name}: {peripheral!r} is no Peripheral, so nothing can be delivered to it")
+            raise FirmwareError(f"{self.name}: {peripheral!r} is not a Peripheral, so nothing can be delivered to it")
 
     def claim(self, kind, index, peripheral) -> None:
         """Route messages of `kind` whose field a is `index` (0 ... 15) to `peripheral.on_message`."""

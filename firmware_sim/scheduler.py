@@ -297,7 +297,7 @@ class Schedule:
             for name in speakers:
                 if name not in names:
                     there = ", ".join(names)
-                    raise FirmwareError(f"schedule: speaker {name!r} is no task of every slot; there are {there}")
+                    raise FirmwareError(f"schedule: speaker {name!r} is not a task of every slot (available: {there})")
             for task in self.every + self.last:
                 task.speaks = task.name in speakers
 

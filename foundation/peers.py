@@ -88,11 +88,11 @@ TOO_LONG, STALLED, IDLE = "too_long", "stalled", "idle"
 REASONS = {
     FULL: "found no place free",
     FOREIGN: "belonged to another user",
-    UNKNOWN: "had gone before it could be told whose it was",
+    UNKNOWN: "had gone before its owner could be identified",
     MALFORMED: "did not speak the protocol",
     TOO_LONG: "sent a request above the limit",
     STALLED: "went on without taking its answers",
-    IDLE: "had left or not begun to take part, and made room",
+    IDLE: "had left or not begun to take part, and was dropped for a new one",
 }
 
 
@@ -152,7 +152,7 @@ class Terminal:
 
             self.master, self.slave = os.openpty()
         except ImportError:
-            raise UserError(f"pseudo-terminal: there are none on {sys.platform}") from None
+            raise UserError(f"pseudo-terminal: {sys.platform} does not have them") from None
         except OSError as error:
             raise UserError(f"pseudo-terminal: {error.strerror}") from None
         tty.setraw(self.slave)

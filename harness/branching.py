@@ -75,7 +75,7 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     try:
         told: dict[str, Any] = json.loads(answer)
     except ValueError:
-        raise BranchError("crashed", f"its process ended with {code} while it told its result") from None
+        raise BranchError("crashed", f"its process ended with {code} while it sent its result") from None
     if "raised" in told:
         raise BranchError("crashed", told["raised"])
     return told

@@ -88,7 +88,7 @@ class Lockstep:
         # the compiled loop uses these without checking their types again
         for thing, kind in ((plant, Plant), *((b, Board) for b in boards), *((b, Bus) for b in buses)):
             if not isinstance(thing, kind):
-                raise UserError(f"lockstep: {thing!r} is no {kind.__name__}")
+                raise UserError(f"lockstep: {thing!r} is not a {kind.__name__}")
         self.plant = plant
         self.boards = list(boards)
         self.buses = buses
@@ -145,7 +145,7 @@ class Lockstep:
         for place, board in enumerate(self.boards):
             if board.name == name:
                 return place
-        raise UserError(f"lockstep: no board is called {name}")
+        raise UserError(f"lockstep: no board is named {name}")
 
     def board(self, name) -> Board:
         """Return the board of this name."""
@@ -154,7 +154,7 @@ class Lockstep:
     def add(self, board) -> BoardWires:
         """Add a board after the existing ones, between two runs. Returns its wires, not yet connected."""
         if not isinstance(board, Board) or board.name in [each.name for each in self.boards]:
-            raise UserError(f"lockstep: {board!r} is no Board, or there is one of its name")
+            raise UserError(f"lockstep: {board!r} is not a Board, or its name is taken")
         wires = BoardWires(board, WINDOW_NS)
         self.boards.append(board)
         self.wires.append(wires)
@@ -170,7 +170,7 @@ class Lockstep:
         place = self.place(board.name)
         before = self.boards[place]
         if not isinstance(board, Board):
-            raise UserError(f"lockstep: {board!r} is no Board")
+            raise UserError(f"lockstep: {board!r} is not a Board")
         if board.inbox is not before.inbox:
             raise UserError(f"lockstep: the inbox of the new {board.name} is not that of the one whose place it takes")
         self._put(place, board)

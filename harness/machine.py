@@ -72,7 +72,7 @@ class Machine:
                 raise UserError(f"machine: bus {number} is called {name!r}, expected is can{number}")
         for name, board in self.boards.items():
             if board.name != name:
-                raise UserError(f"machine: board {name!r} calls itself {board.name!r}")
+                raise UserError(f"machine: board {name!r} is named {board.name!r}")
         self.recorder = Recorder(len(buses), len(plant.sample_names), words[0])
         self.buses: list[Any] = [Bus(name, rate, seed, log_capacity=0) for name, rate in buses.items()]
         for bus, stream in zip(self.buses, self.recorder.frames, strict=True):

@@ -318,11 +318,11 @@ def _check(place: str, table: object) -> Term:
     at = table.get("at")
     place = f"{place} ({name})"
     if at not in form.places:
-        raise ModelError(f"{place}: at is {at!r}; this form can stand at: {', '.join(form.places)}")
+        raise ModelError(f"{place}: at is {at!r}; this form can act at: {', '.join(form.places)}")
     known = {p.name for p in form.parameters}
     for key in table:
         if key not in known and key not in ("form", "at"):
-            raise ModelError(f"{place}: {key} is no parameter of this form; it has: {', '.join(sorted(known))}")
+            raise ModelError(f"{place}: {key} is not a parameter of this form (available: {', '.join(sorted(known))})")
     values = {}
     for p in form.parameters:
         value = table.get(p.name, p.default)
@@ -391,7 +391,7 @@ class Model:
             if total >= 1.0:
                 raise ModelError(
                     f"{self.source}: the commutation ripples at {at} together are {total:g} of its torque constant; "
-                    "allowed is what lies below 1"
+                    "they must be below 1"
                 )
 
 

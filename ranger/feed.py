@@ -34,7 +34,7 @@ class FeedServer(Door[Peer]):
             listener.bind(records.address(name))
         except OSError:
             listener.close()
-            raise UserError(f"a robot named {name} shows itself already: give this one another --name") from None
+            raise UserError(f"a robot named {name} is already running: choose another --name") from None
         listener.listen(LIMITS["feed"].peers)
         listener.setblocking(False)
         super().__init__("feed", listener)
@@ -197,7 +197,7 @@ def why_unseen(robot: Any) -> str:
     if profile is not None and "UI" in profile.external():
         return "The user interface board is outside: its own display, lights and buzzer show what it drives."
     if profile is not None and "UI" in profile.absent():
-        return "There is no user interface board in this run."
+        return "This run does not have a user interface board."
     if isinstance(board, PowerlessBoard):
         return "The user interface board is without power or held in reset."
     if getattr(board, "gone", False):

@@ -359,7 +359,7 @@ class Ranger(Machine):
         board = Machine.board(self, name)
         if self.processes is not None and name in self.processes.names:
             raise UserError(
-                f"{name} runs in a process of its own, its memory is out of reach: variable(), counters(), wire() and "
+                f"{name} runs in a separate process, its memory is out of reach: variable(), counters(), wire() and "
                 "until() see it; or Ranger(in_process=True)"
             )
         return board

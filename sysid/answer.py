@@ -36,7 +36,7 @@ NEXT = {
     ): "a recording at standstill, which shows an offset without friction",
     frozenset({"sensor_scale", "load_friction"}): "a load cell's calibration, or stalls at several currents",
     frozenset({"stribeck", "presliding"}): "slow reversals, far below the speed at which friction has settled",
-    frozenset({"resistance_temperature", "contact_drop_change"}): "the winding's temperature beside the current",
+    frozenset({"resistance_temperature", "contact_drop_change"}): "the temperature of the winding, and the current",
 }
 
 

@@ -117,7 +117,7 @@ _ALL = (
           "in proportion to the rate", (), "gyro", "sensor_scale"),
     Cause(33, "sensor_offset", "the gyro shows a rate at rest", S,
           "a constant rate, a ramp of the angle", (), "gyro", "sensor_offset"),
-    Cause(34, "leg_asymmetry", "the legs differ, or a centre of mass lies beside its leg", M,
+    Cause(34, "leg_asymmetry", "the legs differ, or a centre of mass is off its leg's axis", M,
           "alternates from step to step", (39, 41)),
     Cause(35, "floor", "the floor slopes or is rough", M + S,
           "gravity along the floor; heights at strikes", (41,)),

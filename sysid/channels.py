@@ -126,7 +126,7 @@ _ALL = (
             Name("voltage_V", "V", "command to the drive, in proportion to its force", True,
                  ("motor_voltage_command_V",)),
             Name("reference_m", "m", "position asked for", False, ("position_reference_m",)),
-            Name("pulse_N", "N", "known force besides the motor's", False, ("injected_force_pulse_N",)),
+            Name("pulse_N", "N", "known force in addition to the motor's", False, ("injected_force_pulse_N",)),
         ),
     ),
 )  # fmt: skip

@@ -34,7 +34,7 @@ LOSSES = {
     "bit_flip": "single values with a wrong bit",
 }
 NOTHING_LOST = {
-    "repeated": "samples that came again, stamp and value",
+    "repeated": "repeated samples, stamp and value",
     "never_written": "samples of a variable before it was written",
     "cut": "a time that is not wanted",
 }

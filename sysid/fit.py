@@ -513,7 +513,7 @@ def _limits_met(parameters: Sequence[Parameter], values: Array, errors: Array) -
         near = max(ON_A_LIMIT * error, 1e-6 * parameter.step)
         for side, limit in (("lower", parameter.low), ("upper", parameter.high)):
             if abs(value - limit) <= near:
-                met.append(f"{parameter.name} stands on its {side} limit {limit:g} {parameter.unit}")
+                met.append(f"{parameter.name} is at its {side} limit {limit:g} {parameter.unit}")
     return "; ".join(met)
 
 

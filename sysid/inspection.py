@@ -53,7 +53,7 @@ LOOK_AT = {
         "overload, and whether the firmware zeroes it at power-up."
     ),
     "voltage_clip": (
-        "The duty beside the battery's voltage in the log: supply too low for the speed, a duty or current limit in "
+        "The duty next to the battery's voltage in the log: supply too low for the speed, a duty or current limit in "
         "the firmware, or an integrator that has run to its stop."
     ),
     "cogging": (
@@ -130,7 +130,7 @@ LOOK_AT = {
         "the slot that samples it, the frame that carries it; step the quantity and scope raw against logged."
     ),
     "bit_flip": (
-        "The encoder's serial line: clock rate for its length, termination, shield and ground beside the motor leads; "
+        "The encoder's serial line: clock rate for its length, termination, shield and ground near the motor leads; "
         "use parity or CRC, or read twice and count the differences."
     ),
     "clock_drift": (
@@ -155,7 +155,7 @@ LOOK_AT = {
     ),
     "floor": (
         "A spirit level along the path (1 mrad is 1 mm in a metre), seams and carpet; the same path walked the other "
-        "way tells floor from robot."
+        "way separates floor from robot."
     ),
     "contact_loss": "The soles: wear, soft rubber, dust, a loose foot; film one strike from the side.",
     "drag": (

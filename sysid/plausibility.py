@@ -83,7 +83,7 @@ def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) 
     for name in regression.equations:
         counted, rows = int(np.count_nonzero(regression.good[name])), len(regression.parts[name].valid)
         if counted < FEW * rows and counted < few[name]:
-            text = f"{counted} of {rows} rows of this equation count: next to nothing is said of it"
+            text = f"{counted} of {rows} rows of this equation count: its residual shows next to nothing"
             findings.append(_finding(name, "few_rows", counted, "rows", text))
         share = explained(regression, name)
         if share is not None and (share < EXPLAINED or (share < COHERENT and _memory(_left(regression, name)) > SLOW)):

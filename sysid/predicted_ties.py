@@ -91,11 +91,11 @@ def told(predicted: Mapping[str, Any] | None) -> list[str]:
     lines = []
     for each in (predicted or {}).get("ties", ()):
         if each["data"] == NOT_PREDICTED:
-            lines.append(f"a tie with {each['with']} was not predicted, and these data cannot tell: another motion may")
+            lines.append(f"a tie with {each['with']} was not predicted, these data cannot decide: another motion may")
             continue
         text = f"predicted tie with {each['with']} (cosine {each['cosine']:.2f} on the reference motion): "
         if each["data"] == CONFIRMED:
-            text += "confirmed, these data cannot tell either"
+            text += "confirmed, these data cannot decide either"
         elif each["data"] == NOT_TRIED:
             text += "not tried, these equations have no such effect"
         elif each["data"] == IMPOSSIBLE:

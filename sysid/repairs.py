@@ -20,17 +20,17 @@ from ranger_sim.sysid.dataset import LOSSES, NOTHING_LOST, Channel, Dataset, Fin
 FEWEST = 2  # samples that a channel must keep
 KINDS = {
     "stamp_wrap": "an overrun counter of the clock counts on",
-    "not_finite": "values and stamps that are no numbers are left out",
-    "sorted": "samples that came out of order are sorted by their stamps",
+    "not_finite": "values and stamps that are not numbers are left out",
+    "sorted": "samples out of order are sorted by their stamps",
     "reversed_stamps": "samples whose stamps go back and do not fit elsewhere are left out",
     "restarted_stamps": "of recordings that lie over each other one is kept",
     "duplicate_stamps": "of samples with one stamp the first is kept",
-    "repeated": "a sample that came again is kept once",
+    "repeated": "a repeated sample is kept once",
     "wrap": "an overrun integer counts on",
     "bit_flip": "single wrong values are left out",
     "dropped": "a channel with nothing in it is left out",
     # requested by name
-    "converted": "another unit than was told",
+    "converted": "another unit than was given",
     "shifted": "a channel's stamps moved",
     "offset": "a constant added",
     "cut": "a time left out",
@@ -91,7 +91,7 @@ def _in_order(channel: Channel, repairs: list[Repair]) -> Channel:
         repairs.append(Repair(channel.name, reason, len(places), text))
     if found.moved:
         text = (
-            f"{found.moved} samples came out of order and are sorted by their stamps: {found.even:.2%} of the steps "
+            f"{found.moved} samples were out of order and are sorted by their stamps: {found.even:.2%} of the steps "
             f"are then {found.step_s:.4g} s"
         )
         repairs.append(Repair(channel.name, "sorted", found.moved, text))
@@ -137,7 +137,7 @@ def converted(dataset: Dataset, name: str, unit: str) -> Dataset:
     channel = dataset[name]
     true = units.unit_of(unit)
     if true is None or not unit.strip():
-        raise DataError(f"{dataset.name}: {unit!r} is no unit that is known here")
+        raise DataError(f"{dataset.name}: unknown unit {unit!r}")
     value = channel.value * true.factor + true.offset
     text = f"the values are in {unit}: times {true.factor:.10g}, now in {true.text}"
     return _with(dataset, dataclasses.replace(channel, value=value, unit=true.text), "converted", len(value), text)

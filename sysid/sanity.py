@@ -24,12 +24,12 @@ KINDS = {
     "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
     "no_stamp": "rows without a stamp",
     "ragged": "rows with too many or too few cells",
-    "unreadable": "cells that are no numbers",
+    "unreadable": "cells that are not numbers",
     "text": "values of a measurement file that have a text instead of a number",
     "no_numbers": "channels of a measurement file that hold no plain numbers",
     "unknown_frames": "frames that the DBC file does not know",
     "lost_frames": "frames that the file has, or should have, and that did not come out",
-    "several_buses": "messages that came on several buses",
+    "several_buses": "messages from several buses",
     "broken_frames": "frames that do not fit their message",
     "no_summary": "a walk's folder without its summary",
     "fell": "the robot fell in this walk",
@@ -44,16 +44,16 @@ KINDS = {
     "slow_samples": "samples so far apart that the stamps may be in another unit",
     "clock_drift": "two clocks do not run alike",
     # of the values
-    "not_finite": "values that are no numbers",
+    "not_finite": "values that are not numbers",
     "wrap": "an integer ran over",
-    "not_repaired": "what drives the machine looks wrong and stays as it is",
+    "not_repaired": "a driving channel looks wrong and stays unchanged",
     "bit_flip": "single values that are wrong by a power of two of the finest step",
     "spike": "single values far from both neighbours",
-    "stuck": "a value stands still while other channels move",
+    "stuck": "a value stays constant while other channels move",
     "constant": "one value all the time",
     "saturation": "values cut off at a limit",
     "lag": "a channel comes later than a redundant one",
-    "wrong_unit": "values as of another unit than is told",
+    "wrong_unit": "values as of another unit than the given one",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
 DOUBTED = ("unknown_unit", "slow_samples", "wrong_unit", "stuck", "noise")
@@ -186,7 +186,7 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
     if len(finite) < count:
         missing = count - len(finite)
         first = float(finite[0]) if len(finite) else 0.0
-        yield Finding(name, "no_stamp", first, first, missing, "samples", f"{missing} stamps are no numbers")
+        yield Finding(name, "no_stamp", first, first, missing, "samples", f"{missing} stamps are not numbers")
     if len(finite) < 2:
         place = float(finite[0]) if len(finite) else 0.0
         yield Finding(name, "single_sample", place, place, 1.0, "samples", "there is one sample only", FATAL)
@@ -247,7 +247,7 @@ def _not_finite(channel: Channel) -> Iterator[Finding]:
     wrong = np.flatnonzero(~np.isfinite(channel.value))
     if len(wrong):
         ends = [float(t) if math.isfinite(t) else 0.0 for t in channel.time_s[wrong[[0, -1]]]]
-        text = f"{len(wrong)} of {len(channel.value)} values are no numbers"
+        text = f"{len(wrong)} of {len(channel.value)} values are not numbers"
         worst = FATAL if len(channel.value) - len(wrong) < 2 else WARNING
         yield Finding(channel.name, "not_finite", ends[0], ends[1], float(len(wrong)), "samples", text, worst)
 
@@ -362,7 +362,7 @@ def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Findi
             moving.append(other.name)
     if moving:
         text = (
-            f"it stands at {channel.value[starts[longest]]:.6g} {channel.unit} for {end - begin:.4g} s "
+            f"it stays at {channel.value[starts[longest]]:.6g} {channel.unit} for {end - begin:.4g} s "
             f"while {', '.join(moving[:3])} move"
         )
         yield Finding(channel.name, "stuck", float(begin), float(end), float(end - begin), "s", text)

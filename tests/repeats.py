@@ -1,4 +1,4 @@
-"""python -m tests.repeats --times 20: the system tests again and again, beside busy processes, with random hash seeds.
+"""python -m tests.repeats --times 20: the system tests again and again, next to busy processes, with random hash seeds.
 
 What a run computes must not depend on who else works on the machine, nor on the order in which a set is walked
 through. Each time a fixed scenario is run, whose digest must be the same every time, and the system tests that wait for

@@ -1,4 +1,4 @@
-"""A command on a terminal of its own: what it prints there, keys, a window that closes."""
+"""A command on a separate terminal: what it prints there, keys, a window that closes."""
 
 import contextlib
 import fcntl

@@ -185,7 +185,7 @@ COMPILED = SOURCES.compiled_modules()
 
 
 class Names(dict):
-    """A namespace in which a name without a known value stands for itself."""
+    """A namespace in which a name without a known value represents itself."""
 
     def __missing__(self, name):
         return name
@@ -274,7 +274,7 @@ def test_constants_are_the_same_numbers_interpreted_and_compiled():
 
 
 def test_what_is_long_or_wide_says_why():
-    """A function above 150 lines, a class above 40 fields: its docstring tells why it is better so."""
+    """A function above 150 lines, a class above 40 fields: its docstring has the reason."""
     silent = []
     for path in sources():
         if "generated" in path.parts:

@@ -143,7 +143,7 @@ def test_relative_links_lead_to_files_and_headings(document):
     "document", [path for path in documents() if path != ROBOT and path.name != "CHANGELOG.md"], ids=name_of
 )
 def test_files_that_a_document_names_exist(document):
-    """A path from the repository's root or from the document's folder; a module's bare name somewhere in the house."""
+    """A path from the repository's root or from the document's folder; a module's bare name anywhere."""
     modules = {path.name for path, _ in texts() if path.suffix in {".py", ".pxd"}}
     lost = []
     for code in re.findall(r"`([^`\n]+)`", document.read_text(encoding="utf-8")):

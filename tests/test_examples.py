@@ -1,4 +1,4 @@
-"""Every Python example of the documents is run as it stands there."""
+"""Every Python example of the documents is run as written there."""
 
 import importlib
 import pathlib
@@ -41,7 +41,7 @@ IN_A_PROJECT = "docs/testing.md"
 
 
 def examples(name):
-    """The Python blocks of a document, in order; without tests, which are run in a project of their own as well."""
+    """The Python blocks of a document, in order; without tests, which are run in their own project as well."""
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / name).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     return [block for block in blocks if "def test_" not in block]
 

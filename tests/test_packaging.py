@@ -48,7 +48,7 @@ def run(arguments, cwd, **environment):
 
 
 def files_of(names, folder, **environment):
-    """{module: file it was loaded from}, imported in a process that stands in `folder`."""
+    """{module: file it was loaded from}, imported in a process that runs in `folder`."""
     done = run(["-c", WHERE_FROM, *names], folder, **environment)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

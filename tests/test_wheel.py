@@ -1,4 +1,4 @@
-"""The wheel, really built, installed into an empty environment, used beside anyone's code."""
+"""The wheel, really built, installed into an empty environment, used with a user's code."""
 
 import json
 import os
@@ -109,7 +109,7 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
-    """(Python with the wheel, folder of a project that has folders of our rooms' names)."""
+    """(Python with the wheel, folder of a project that has folders of our packages' names)."""
     folder = tmp_path_factory.mktemp("installed")
     project = folder / "project"
     for name in OWN_FOLDERS:

@@ -1,10 +1,10 @@
-"""python -m tests.watched --time 3600s --keep FILE: the panel's page in a browser, beside a robot in real time.
+"""python -m tests.watched --time 3600s --keep FILE: the panel's page in a browser, with a robot in real time.
 
 48 channels in four plots, as RoboDAQ had. Every `--every` seconds a row is written of what has been since the row
 before: pictures a second, how late the robot is, processor time of the robot, the panel and the browser; and what is
 held at that moment: the page's JavaScript heap after a collection, the memory of browser and panel. At the end the
 robot's digest is compared with the one of a walk without clock and page. Ends with 1 when the digest is another, the
-page told an error, or one of BOUNDS does not hold.
+page reported an error, or one of BOUNDS does not hold.
 """
 
 import argparse
@@ -87,7 +87,7 @@ def memory_MB(root: int) -> float:
 
 
 def walked_alone(seconds: float, seed: int) -> str:
-    """The digest of a walk that nobody sees."""
+    """The digest of a walk without a viewer."""
     words = ["walk", "--time", f"{seconds}s", "--seed", str(seed), "--log", "none", "--json", "-"]
     done = subprocess.run([sys.executable, "-m", "ranger_sim", *words], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)["trace_digest"]

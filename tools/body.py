@@ -21,7 +21,7 @@ def register(commands: Any) -> None:
     parts.add_parser("list", help="names and titles").set_defaults(run=run_list)
     show = parts.add_parser("show", help="values, units, limits and sources of a body")
     show.add_argument("name", metavar="NAME", help="body, by name or as a .toml file")
-    show.add_argument("--changes", action="store_true", help="only what differs from its base")
+    show.add_argument("--changes", action="store_true", help="only the differences from its base")
     show.add_argument("--json", action="store_true", help="print JSON instead of a table")
     show.set_defaults(run=run_show)
 

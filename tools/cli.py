@@ -73,7 +73,7 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"ranger-sim {__version__}")
     commands: Any = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    commands.add_parser("help", help="what a command does and takes: ranger-sim help COMMAND")
+    commands.add_parser("help", help="options of a command: ranger-sim help COMMAND")
     walk.register(commands)
     info.register(commands)
     table_command.register(commands)

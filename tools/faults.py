@@ -26,7 +26,7 @@ TABLES_END = "<!-- end -->\n"
 
 FAULT = Option(
     "--fault",
-    'lets something fail: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 when one '
+    'inject a fault: "MCH.joint_encoder:stuck@step 12..step 14"; may be given several times; exit code 3 when one '
     "did not act; ranger-sim faults lists places and modes",
     word("PLACE:MODE"),
     "TEXT",
@@ -46,7 +46,7 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "faults",
         help="list what can be made to fail, where, with which parameters",
-        description="Without PLACE all places and the modes of each; with PLACE what they do, parameter by parameter.",
+        description="Without PLACE, all places and the modes of each; with PLACE, its modes and their parameters.",
         epilog='ranger-sim walk --fault "MCH.joint_encoder:stuck@step 12..step 14" lets one act.',
     )
     command.add_argument("place", nargs="?", metavar="PLACE", help="a place, as MCH.joint_encoder")
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         for place in places:
             table.add_row(place.name, f"{place.what}\n{', '.join(CATALOGUE.modes_of(place))}")
         console.print(table)
-        console.print("\nranger-sim faults PLACE tells what they do, and their parameters", soft_wrap=True)
+        console.print("\nranger-sim faults PLACE prints what they do, and their parameters", soft_wrap=True)
         return 0
     print_place(places[0], console)
     return 0
@@ -102,7 +102,7 @@ def print_place(place: Place, console: Console) -> None:
             tell(f"    {p.name:16}{default_text(p)}{unit} ({limits_text(p)}): {p.meaning}")
             sources.setdefault(p.source, []).append(f"{name} {p.name}")
     units = sorted({kind.unit for kind in CATALOGUE.modes_of(place).values() if kind.unit})
-    tell(f"\nThe difference at the place is told in {' or '.join(units)}. Where the numbers come from:")
+    tell(f"\nThe difference at the place is given in {' or '.join(units)}. Where the numbers come from:")
     for source, parameters in sources.items():
         tell(f"    {', '.join(parameters)}: {source}")
     if reasons := refused(place):
@@ -173,7 +173,7 @@ def fault_text(fault: dict) -> str:
             f"{name}: INVALID, it gave way at {fault['gave_way_s']:.6g} s: {fault['gave_way_to']}; one fault at a time"
         )
     if fault["activated_s"] is None:
-        return f"{name}: INVALID, it did not begin: its start condition never came true"
+        return f"{name}: INVALID, it did not begin: its start condition never became true"
     begun = f"{name}: began at {fault['activated_s']:.6g} s"
     ended = "" if fault["ended_s"] is None else f", ended at {fault['ended_s']:.6g} s"
     if not fault["acted"]:
@@ -200,10 +200,10 @@ def proof_text(proof: dict | None) -> str:
         return f"; against the run without {without}: NO EFFECT, nothing that the firmware sends differs"
     parts = [f"{first['name']} differs after {first['after_ms']:.4g} ms ({first['where']})"]
     if told is None:
-        parts.append("no error tells of it")
+        parts.append("no error reports it")
     else:
         more = ", more often than without" if told["rate"] else ""
-        parts.append(f"told by {told['code']} from {told['board']}{more} after {proof['detection_ms']:.4g} ms")
+        parts.append(f"reported by {told['code']} from {told['board']}{more} after {proof['detection_ms']:.4g} ms")
     if reacted is not None:
         instead = f"{reacted['machine']} in {reacted['state']} instead of {reacted['instead_of']}"
         parts.append(f"{instead} after {proof['reaction_ms']:.4g} ms")

@@ -109,8 +109,8 @@ def laid_out(table, sender: Sender, lines) -> dict:
         wanted, found = ([*names, "no more"][min(place, len(names))] for names in (named, given))
         if wanted != found:
             raise FirmwareError(
-                f"{table.BOARD}: line {place + 1} of what is sent is {found} in the board's room; in the master table "
-                f"(datatable/master/boards.toml, then `ranger-sim table generate`) it is {wanted}"
+                f"{table.BOARD}: line {place + 1} of what is sent is {found} in the board's package; the master table "
+                f"(datatable/master/boards.toml, then `ranger-sim table generate`) has {wanted}"
             )
     tasks = {
         name: line.task(table, sender) if isinstance(line, Send) else line

@@ -248,7 +248,7 @@ def greeted(
         while True:
             data = connection.recv(4096)
             if not data:
-                raise BusError(f"{name!r} ended the connection without a word")
+                raise BusError(f"{name!r} ended the connection without a message")
             incoming += data
             for kind, body in wire.records_of(incoming):
                 if kind == wire.REFUSED:

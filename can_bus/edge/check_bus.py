@@ -140,7 +140,7 @@ def check_link(device: str, bit_rate: int, read: Callable[[str], dict[str, Any]]
     kind = link.get("link_type", "")
     if kind != "can":
         return [
-            Finding("there", False, f"{device} is no CAN interface, its link type is {kind!r}", "ip link show type can")
+            Finding("there", False, f"{device} not a CAN interface, its link type is {kind!r}", "ip link show type can")
         ]
     info = link.get("linkinfo") or {}
     virtual = info.get("info_kind", "vcan" if virtual else "can") in ("vcan", "vxcan")
@@ -191,7 +191,7 @@ def _controller(
     elif state == "ERROR-ACTIVE":
         found.append(Finding("state", True, state))
     elif state == "BUS-OFF":
-        text = f"{state}: nobody acknowledges, or everybody runs at another bit rate; check wires and termination first"
+        text = f"{state}: no node acknowledges, or all run at another bit rate; check wires and termination first"
         found.append(Finding("state", False, text, f"ip link set {device} type can restart"))
     elif state in ("ERROR-WARNING", "ERROR-PASSIVE"):
         text = f"{state}: check wires, 120 ohm at both ends, and that all run at one bit rate"

@@ -40,7 +40,7 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     database = load(path)
     rate = bit_rate if bit_rate is not None else bit_rate_of(database)
     if rate is None:
-        raise BusError(f"{path}: says nothing of the bit rate (attribute Baudrate); give --bit-rate")
+        raise BusError(f"{path}: has no bit rate (attribute Baudrate); give --bit-rate")
     messages = []
     silent = []
     for one in database.messages:

@@ -172,8 +172,8 @@ class RangerSimBus(can.BusABC):
             ):
                 if want is not None and want != have:
                     raise BusError(
-                        f"ranger_sim: the private bus {channel} is open with {what} {have:.12g}, not {want:.12g}: who "
-                        "opens it first sets it"
+                        f"ranger_sim: the private bus {channel} is open with {what} {have:.12g}, not {want:.12g}: the "
+                        "first to open it sets it"
                     )
             if wanted["acknowledge"]:
                 with bus.lock:

@@ -110,7 +110,7 @@ class SocketcandServer(StreamServer[_Client]):
             client.taps = self.channels.get(words[1])
             if client.taps is None:
                 self.totals["refused"] += 1
-                words_told = f"< error could not open bus, there are {' '.join(self.channels)} >"
+                words_told = f"< error could not open bus (available: {' '.join(self.channels)}) >"
                 self.send_away(client, MALFORMED, words_told.encode())
                 return
             client.answer(b"< ok >")

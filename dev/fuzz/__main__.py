@@ -19,13 +19,13 @@ CASES = 10_000
 TARGETS = {
     "can": "frames of every kind, and bytes that are none, from outside onto the buses of a walking robot",
     "channel": "damaged messages in the channel between a board's process and the body's",
-    "doors": "hostile programs at every door: requests, connections, floods, answers never read; no robot behind",
-    "gdb": "hostile debuggers at the door of a board that runs machine code",
+    "doors": "hostile programs at every endpoint: requests, connections, floods, unread answers; without a robot",
+    "gdb": "hostile debuggers at the gdb port of a board that runs machine code",
     "panel": "hostile programs at the panel's HTTP and WebSocket",
     "profiles": "profiles and bus schedules with pieces cut out, doubled and replaced",
     "requests": "requests of `ctl` that reach a walking robot, faults of every kind among them; viewers of the feed",
     "serial": "wrong bytes on the line between main brain and computer, both ways",
-    "xcp": "hostile masters at the XCP slave's door on UDP, a robot behind",
+    "xcp": "hostile masters at the XCP slave's UDP port, with a robot",
 }
 
 
@@ -34,7 +34,7 @@ def parser() -> argparse.ArgumentParser:
     command = argparse.ArgumentParser(
         prog=COMMAND,
         description="Hostile input by the thousand. After every case everything is checked.\n"
-        "The first case that the program does not stand is named with its seed;\nthe exit code is then 1.",
+        "The first case that the program fails is named with its seed;\nthe exit code is then 1.",
         epilog="targets:\n" + named_lines(TARGETS, 10),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

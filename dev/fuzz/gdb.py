@@ -185,13 +185,13 @@ class Fuzz:
                 self.look()
             if not is_right(self.last):
                 raise Finding(
-                    f"a well-behaved debugger asked {request!r}, heard {self.last[:40]!r} (case {self.cases})"
+                    f"a well-behaved debugger asked {request!r}, received {self.last[:40]!r} (case {self.cases})"
                 )
         self.checked += 1
         before = self.board.core.instructions
         self.board.core.run(self.board.core.cycles + CYCLES)
         if self.board.core.instructions == before:
-            raise Finding(f"the processor stands after the debugger left (case {self.cases})")
+            raise Finding(f"the processor is halted after the debugger left (case {self.cases})")
 
     def counted(self) -> dict[str, int]:
         """Counts by name."""

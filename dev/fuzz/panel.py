@@ -420,7 +420,7 @@ class Fuzz:
             frames = list(frames_of(program.heard))
             found = [understood(*each) for each in frames]
         except (ValueError, struct.error) as trouble:
-            raise self.fault(f"a page is told what it does not understand: {trouble}") from trouble
+            raise self.fault(f"a page is sent what it does not understand: {trouble}") from trouble
         for code, content in frames:
             if code == PING:
                 program.say(frame(content, PONG))
@@ -458,7 +458,7 @@ class Fuzz:
             visitor.say(f"GET /?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\n\r\n".encode())
             await self.until(visitor, b"</html>")
             if not visitor.heard.startswith(b"HTTP/1.1 200 "):
-                raise self.fault(f"who loads the page is told {bytes(visitor.heard[:60])!r}")
+                raise self.fault(f"a client that loads the page receives {bytes(visitor.heard[:60])!r}")
         self.visits += 1
 
     async def until(self, program: Program, end: bytes) -> None:
@@ -470,7 +470,7 @@ class Fuzz:
                 return
             if turn > TURNS:
                 wallclock.sleep_s(THREADS_S)
-        raise self.fault(f"a well-behaved program waits for {end!r}, and heard {bytes(program.heard[:60])!r}")
+        raise self.fault(f"a well-behaved program waits for {end!r}, and received {bytes(program.heard[:60])!r}")
 
     def counted(self) -> dict[str, int]:
         """Counts by name."""

@@ -173,7 +173,7 @@ class Fuzz:
         """Count it; it must be a printable line."""
         self.refused += 1
         if not text or "\n" in text or len(text) > LIMITS["control"].longest:
-            raise Finding(f"a refusal is no line: {text[:100]!r} (case {self.cases})")
+            raise Finding(f"a refusal is not a line: {text[:100]!r} (case {self.cases})")
 
     def look(self) -> None:
         """A viewer connects, leaves, stops reading, or sends something."""
@@ -223,7 +223,7 @@ class Fuzz:
         """Count, and release everything."""
         self.acted += sum(fault.acted for fault in self.robot.faults)
         if self.robot.time_s > 2 * POLLS_TO_SHOW * SLICE_S and not self.shown:
-            raise Finding(f"nobody was shown anything (case {self.cases})")
+            raise Finding(f"no client was shown anything (case {self.cases})")
         json.dumps(self.robot.summary(), allow_nan=False)
         for viewer in (*self.viewers, self.good):
             viewer.socket.close()

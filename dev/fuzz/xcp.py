@@ -122,7 +122,7 @@ class Fuzz:
         self.server.sample(self.now_ns)
         self.server.poll(self.now_ns)
         if self.server.totals["commands"] - before > LIMITS["xcp-udp"].burst:
-            raise Finding(f"more commands in a look than the table says (case {self.cases})")
+            raise Finding(f"more commands in a poll than the table allows (case {self.cases})")
         if len(self.server.waiting) > WAITING:
             raise Finding(f"measurements pile up (case {self.cases})")
         found = []
@@ -147,7 +147,7 @@ class Fuzz:
     def written(self) -> None:
         """Check that only parameters have changed, each within its limits."""
         if any(self.table[number] != word for number, word in zip(self.others, self.before, strict=True)):
-            raise Finding(f"a variable that is no parameter was written (case {self.cases})")
+            raise Finding(f"a variable that is not a parameter was written (case {self.cases})")
         if self.cases % CASES_TO_CHECK:
             return
         for row in parameters.parameters():

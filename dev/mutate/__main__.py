@@ -1,7 +1,7 @@
-"""`python -m dev.mutate ROOM ...`: what share of small faults in a room its tests notice.
+"""`python -m dev.mutate PACKAGE ...`: the share of small faults in a package that its tests notice.
 
-Of all faults that `mutants.py` knows to put into the room's files, so many are drawn with a seed, put one at a time
-into a copy of the repository, and the tests of the room that reach the place are run there, interpreted and cheapest
+Of all faults that `mutants.py` can put into the package's files, COUNT are drawn with a seed, put one at a time
+into a copy of the repository, and the tests of the package that reach the place are run there, interpreted and cheapest
 first. Where the robot is built, a mutant in a plain Python module is tried with all else compiled; with --build, one
 in a compiled module that the interpreted tests let pass is built and given to the compiled ones. Verdicts are kept in
 the work folder: a run that was broken off goes on where it was, and a larger count goes on from a smaller one.
@@ -64,9 +64,9 @@ def parser() -> argparse.ArgumentParser:
     command = argparse.ArgumentParser(
         prog=COMMAND, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    command.add_argument("room", nargs="+", choices=packages(), metavar="ROOM", help=", ".join(packages()))
+    command.add_argument("room", nargs="+", choices=packages(), metavar="PACKAGE", help=", ".join(packages()))
     command.add_argument(
-        "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each room (default {COUNT})"
+        "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each package (default {COUNT})"
     )
     command.add_argument("--seed", type=int, default=1, metavar="S", help="draws them (default 1)")
     command.add_argument(
@@ -74,20 +74,20 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="PATH",
-        help="tests to run (default: tests/ROOM and what the suite has for the room elsewhere)",
+        help="tests to run (default: tests/PACKAGE and the package's tests elsewhere)",
     )
     command.add_argument(
         "--limit",
         type=whole_number(1),
         default=int(LIMIT_S),
         metavar="S",
-        help=f"of the tests that reach a mutant, run the cheapest of so many seconds together (default {LIMIT_S:g})",
+        help=f"of the tests that reach a mutant, run the cheapest, this many seconds in total (default {LIMIT_S:g})",
     )
     command.add_argument(
         "--build",
         type=whole_number(1),
         metavar="S",
-        help="what is not noticed in a compiled module: build it, and run so many seconds of compiled tests",
+        help="unnoticed mutants of a compiled module: build each, and run this many seconds of compiled tests",
     )
     command.add_argument(
         "--map-limit",

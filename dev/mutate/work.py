@@ -77,7 +77,7 @@ def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
         if set(row) != {"key", "reason"} or not row["reason"].strip():
             raise UserError(f"{path.name}: an entry has key and reason, this one is {row}")
         if any(each.key == row["key"] for each in found):
-            raise UserError(f"{path.name}: {row['key']} stands there twice")
+            raise UserError(f"{path.name}: {row['key']} is listed twice")
         found.append(Known(row["key"], row["reason"]))
     return found
 

@@ -1,4 +1,4 @@
-"""Tells the pytest plugin of ranger-sim which machine the fixture `machine` is."""
+"""Sets the machine of the pytest plugin's fixture `machine`."""
 
 from servo import new
 

@@ -1,4 +1,4 @@
-"""What can fail on the servo beside its controllers and its bus, which follow from the wiring: two places, a mode each.
+"""Faults of the servo, in addition to those of controllers and bus, which follow from the wiring: two places.
 
 The encoder's modes are those of any incremental encoder (`ranger-sim`'s harness/faults/edges.py).
 """

@@ -58,7 +58,7 @@ class Servo(Machine):
 
     @staticmethod
     def new_board(name: str, folder: pathlib.Path, seed: int) -> TableBoard:
-        """A board on a crystal of its own, powered up in a moment of its own."""
+        """A board on its own crystal, powered up in its own moment."""
         stream = RandomStream(seed, f"board {name}")
         crystal = seeded_crystal(stream)
         return TableBoard(name, build(folder), 1, crystal, stream.integer(POWER_UP_SPREAD_NS))

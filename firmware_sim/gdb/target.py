@@ -181,7 +181,7 @@ class Target:
         device = self.core.device
         peek = getattr(device, "peek", None)
         if device is None or peek is None:
-            raise TargetError(f"nothing at {address:#010x} can be looked at without doing something there")
+            raise TargetError(f"nothing at {address:#010x} can be read without a side effect")
         out = bytearray()
         try:
             for place in range(address & -4, address + length, 4):

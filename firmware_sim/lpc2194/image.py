@@ -85,7 +85,7 @@ def read(path: str | os.PathLike) -> Image:
     else:
         raise FirmwareError(f"{path}: {_other_kind(path, content)}")
     if not image.segments:
-        raise FirmwareError(f"{path}: there is nothing in it for flash or RAM")
+        raise FirmwareError(f"{path}: it has no data for flash or RAM")
     first = image.segments[0][0]
     if first >= RAM[0]:
         raise FirmwareError(
@@ -117,7 +117,7 @@ def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple
                 f"({FLASH[0]:#010x}, {FLASH[1]} bytes) and RAM ({RAM[0]:#010x}, {RAM[1]} bytes)"
             )
         if joined and address < joined[-1][0] + len(joined[-1][1]):
-            raise FirmwareError(f"{path}: two pieces of it are at {address:#010x}")
+            raise FirmwareError(f"{path}: two segments overlap at {address:#010x}")
         if joined and address == joined[-1][0] + len(joined[-1][1]):
             joined[-1] = (joined[-1][0], joined[-1][1] + content)
         else:
@@ -158,7 +158,7 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
                 pieces.append((segment["p_paddr"], content[start : start + size]))
         if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
             raise FirmwareError(
-                f"{path}: truncated: the file has {len(content)} bytes, its section table ends behind them"
+                f"{path}: truncated: the file has {len(content)} bytes, its section table ends beyond them"
             )
         symbols = _symbols(elf)
     except (ELFError, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
@@ -217,13 +217,13 @@ def _from_hex(path: pathlib.Path, content: bytes) -> Image:
             continue
         where = f"{path}:{number}"
         if ended:
-            raise FirmwareError(f"{where}: more lines behind the end record")
+            raise FirmwareError(f"{where}: more lines after the end record")
         try:
             record = bytes.fromhex(line[1:].decode("ascii")) if line.startswith(b":") else b""
         except (ValueError, UnicodeDecodeError):
             record = b""
         if len(record) < 5 or len(record) != record[0] + 5:
-            raise FirmwareError(f"{where}: no whole record of Intel HEX")
+            raise FirmwareError(f"{where}: not a complete record of Intel HEX")
         if sum(record) & 0xFF:
             right = -sum(record[:-1]) & 0xFF
             raise FirmwareError(

@@ -325,7 +325,7 @@ class SspBlock(Block):
                     self._start(self.chip.now)
         elif offset == 0x00:
             if value >> 4 & 3:
-                self.not_modelled("a frame format of the SSP beside SPI (SSPCR0 FRF)")
+                self.not_modelled("a frame format of the SSP other than SPI (SSPCR0 FRF)")
             self.CR0 = value & 0xFFFF
             self._set_rate()
         elif offset == 0x04:

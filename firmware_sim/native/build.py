@@ -175,7 +175,7 @@ def errors_in(manifest: Manifest, said: list[str]) -> list[str]:
         found = UNDEFINED.search(line)
         if found:
             errors.append(f"{found['place']}: error: {found['name']} is used, but no source defines it")
-    errors = list(dict.fromkeys(errors)) or said[:20] or ["the compiler failed and said nothing"]
+    errors = list(dict.fromkeys(errors)) or said[:20] or ["the compiler failed without a message"]
     return [f"{manifest.folder}: {manifest.name} does not compile:", *errors]
 
 

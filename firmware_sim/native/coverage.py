@@ -63,7 +63,7 @@ def gcov() -> str:
     name = path.name.replace("gcc", "gcov") if "gcc" in path.name else "gcov"
     found = shutil.which(str(path.with_name(name))) or shutil.which("gcov")
     if found is None:
-        raise FirmwareError(f"{path} has no gcov beside it: --coverage needs gcc with its gcov")
+        raise FirmwareError(f"{path} has no gcov in its folder: --coverage needs gcc with its gcov")
     return found
 
 

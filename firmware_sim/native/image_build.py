@@ -156,5 +156,5 @@ def _sizes(size: str, path: pathlib.Path) -> tuple[int, int]:
     code, text = run_compiler([size, str(path)])
     found = SIZES.search("\n".join(text))
     if code or found is None:
-        raise FirmwareError(f"{path}: {size} does not tell its size")
+        raise FirmwareError(f"{path}: {size} does not report its size")
     return int(found["text"]) + int(found["data"]), int(found["data"]) + int(found["bss"])

@@ -102,9 +102,7 @@ class Library:
         if missing:
             raise FirmwareError(f"{path}: no {' and no '.join(missing)} in it; a program has {ENTRY_POINTS}")
         if len(kinds) == 2:
-            raise FirmwareError(
-                f"{path}: firmware_schedule() and firmware_main() are both there: one of them is too many"
-            )
+            raise FirmwareError(f"{path}: both firmware_schedule() and firmware_main() are defined; one is allowed")
         self.schedule = kinds == ["firmware_schedule"]
         self.turns = ffi.addressof(self.code, "fw_turns")
         if self.code.fw_counts_lines:

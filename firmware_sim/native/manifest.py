@@ -99,7 +99,9 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str], give
         try:
             matching = sorted(folder.glob(pattern))
         except (ValueError, NotImplementedError):
-            raise FirmwareError(f"{path}: firmware.sources: {pattern!r} is no pattern relative to its folder") from None
+            raise FirmwareError(
+                f"{path}: firmware.sources: {pattern!r} is not a pattern relative to its folder"
+            ) from None
         if not matching:
             raise FirmwareError(f"{path}: firmware.sources: {pattern!r} matches no file in {folder}")
         sources += [each for each in matching if each not in sources]
@@ -113,7 +115,7 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str], give
 
 def _folder(path: pathlib.Path, folder: pathlib.Path, name: str) -> pathlib.Path:
     if not (folder / name).is_dir():
-        raise FirmwareError(f"{path}: firmware.include: {name!r} is no folder in {folder}")
+        raise FirmwareError(f"{path}: firmware.include: {name!r} is not a folder in {folder}")
     return folder / name
 
 
@@ -122,14 +124,14 @@ def _master(path: pathlib.Path, folder: pathlib.Path, firmware: dict) -> pathlib
     if name is None:
         return None
     if not isinstance(name, str) or not (folder / name).is_dir():
-        raise FirmwareError(f"{path}: firmware.master: {name!r} is no folder in {folder}")
+        raise FirmwareError(f"{path}: firmware.master: {name!r} is not a folder in {folder}")
     return folder / name
 
 
 def _defines(path: pathlib.Path, found: dict) -> tuple[tuple[str, str], ...]:
     for name, value in found.items():
         if not NAME.fullmatch(name):
-            raise FirmwareError(f"{path}: defines: {name!r} is no name in C")
+            raise FirmwareError(f"{path}: defines: {name!r} is not a name in C")
         if not isinstance(value, int | float | str):
             raise FirmwareError(f"{path}: defines.{name} is {value!r}, a number, text or truth value is expected")
     return tuple((name, str(int(v) if isinstance(v, bool) else v)) for name, v in found.items())

@@ -132,7 +132,7 @@ class Calls:
         self.chip.spend(cycles)
 
     def idle(self) -> None:
-        raise FirmwareError("only a main loop of its own can sleep, not a task or a handler")
+        raise FirmwareError("only a board's own main loop can sleep, not a task or a handler")
 
     def slot_cycles(self) -> int:
         return self.chip.cycles_since_tick()
@@ -258,7 +258,7 @@ class Calls:
         self.new(self.adcxs, 0)
         it = self.hardware.external
         if it is None:
-            raise FirmwareError("no external converter hangs on this board")
+            raise FirmwareError("this board has no external converter")
         if 0 in self.masters:
             raise FirmwareError("the SSP is a master of words already, so the external converter cannot have it")
         adc = Ads7871(self.chip, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)

@@ -68,7 +68,7 @@ def tried(
         else f"it ended its process with code {code}"
     )
     when = "start" if reached == LOADED else "loading (what runs in it before firmware_start, such as a constructor)"
-    raise FirmwareError(f"{what}: its program does not get through its {when}: {how}")
+    raise FirmwareError(f"{what}: its program fails in its {when}: {how}")
 
 
 def _load_and_start(

@@ -68,7 +68,7 @@ class TimerCapture(Peripheral):
         self.hz = hz if hz else chip.hz
         if period * 1_000_000_000 % self.hz:
             raise FirmwareError(
-                f"{chip.name}: timer {number}: {period} counts at {self.hz} Hz are no whole number of ns"
+                f"{chip.name}: timer {number}: {period} counts at {self.hz} Hz: not a whole number of ns"
             )
         self.period_ns = period * 1_000_000_000 // self.hz
         self.counts_per_ns = chip.crystal.cycles_per_ns(self.hz)

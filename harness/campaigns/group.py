@@ -154,7 +154,7 @@ def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
         name, digest = request["fault_module"]
         settings.subject.catalogue.load_file(name)
         if digest_of(name) != digest:
-            raise CampaignError(f"campaign: fault module {name}: it is not the file that was asked for")
+            raise CampaignError(f"campaign: fault module {name}: it differs from the requested file")
     watch = Watch.from_dict(request["watch"])
     healthy = Healthy.from_dict(request["healthy"]) if request.get("healthy") else None
     cases = request["cases"]

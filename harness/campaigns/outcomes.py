@@ -15,10 +15,10 @@ CRITERIA = {
     "1.2 times what 3.1 A (steering 0.3 A) sustain",
     "fall": "the robot fell",
     "no effect": "the fault acted, and no frame, no variable of the main brain and no error count differs",
-    "masked": "the firmware differs, no error tells of it, and the gait stays inside its band",
+    "masked": "the firmware differs, no error reports it, and the gait stays inside its band",
     "detected and safe": "an error, or its rate, that healthy walks do not have; the gait stays inside its band",
     "degraded gait": "detected; the robot walks on, its gait outside the band",
-    "undetected wrong": "the robot walks on with its gait outside the band, and no error tells of it",
+    "undetected wrong": "the robot walks on with its gait outside the band, and no error reports it",
 }
 OUTCOMES = tuple(CRITERIA)
 # Severity, for the order of worst cases and for searches; a run that proves nothing has none.

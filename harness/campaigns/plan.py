@@ -296,7 +296,7 @@ def of_data(data: dict[str, Any], path: str, walks: str = "") -> Plan:
     tolerances = tuple(tolerances_of(data, path))
     if search and tolerances:
         raise CampaignError(
-            f"{path}: [tolerance] {tolerances[0].what}: the runs of a [search] are chosen and stand for no population"
+            f"{path}: [tolerance] {tolerances[0].what}: runs of a [search] are chosen, do not represent a population"
         )
     plan = Plan(
         path=path,
@@ -389,7 +389,7 @@ def check_faults(plan: Plan) -> None:
             try:
                 text = str(plan.case({**first, **point, "fault": fault}).fault)
             except KeyError as error:
-                raise CampaignError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
+                raise CampaignError(f"{plan.path}: fault {fault!r}: {error} is not a name of [vary]") from None
             except (ValueError, IndexError, AttributeError) as error:
                 raise CampaignError(f"{plan.path}: fault {fault!r}: {error}") from None
             try:

@@ -201,12 +201,11 @@ class DaskPool:
                 try:
                     yield from done.result()
                 except self.distributed.KilledWorker as error:
-                    raise CampaignError(f"campaign: Dask's workers died again and again: {error}") from None
+                    raise CampaignError(f"campaign: Dask's workers died repeatedly: {error}") from None
                 except self.distributed.CancelledError:
                     where = f" at {self.address}" if self.address else ""
                     raise CampaignError(
-                        f"campaign: the Dask scheduler{where} went away; results are kept, and the same command runs "
-                        "what is missing"
+                        f"campaign: the Dask scheduler{where} ended; results are kept, and the same command continues"
                     ) from None
                 done.release()
         finally:

@@ -40,7 +40,7 @@ class Store:
                 self.results[result["key"]] = result
             except (ValueError, KeyError, TypeError):
                 self.file.close()
-                raise CampaignError(f"{self.path}:{number}: this is no result; move the file away") from None
+                raise CampaignError(f"{self.path}:{number}: this is not a result; move the file away") from None
             whole += len(line)
         self.file.truncate(whole)
         self.file.seek(0, os.SEEK_END)

@@ -33,10 +33,10 @@ CRITERIA = {
     "proves nothing",
     "fall": "the machine could go no further: its plant says so",
     "no effect": "the fault acted, and no frame and no error count differs",
-    "masked": "the firmware differs, no error tells of it, and the body stays inside its band",
+    "masked": "the firmware differs, no error reports it, and the body stays inside its band",
     "detected and safe": "an error, or its rate, that healthy runs do not have; the body stays inside its band",
     "degraded gait": "detected; a quantity of the body leaves its band",
-    "undetected wrong": "a quantity of the body leaves its band, and no error tells of it",
+    "undetected wrong": "a quantity of the body leaves its band, and no error reports it",
 }
 
 
@@ -155,7 +155,7 @@ class OwnMachine:
         for name in band:
             if name not in self.shown.plant.sample_names:
                 known = ", ".join(self.shown.plant.sample_names) or "none"
-                raise CampaignError(f"[band] {name}: it is no quantity of the body, but {known}")
+                raise CampaignError(f"[band] {name}: it is not a quantity of the body (available: {known})")
 
     def judge(
         self, proof: Proof, golden: Record, record: Record, since_ns: int, band: Mapping[str, float], is_sweep: bool

@@ -115,7 +115,7 @@ def interval_text(plan: Plan, finished: bool) -> str:
         return "Shares are of the runs that are there and of nothing else: those that end soon come first."
     if plan.search:
         return (
-            "The runs were chosen to find the worst case: shares describe the search and stand for no population, so "
+            "The runs were chosen to find the worst case: shares describe the search, not a population, so "
             "they have no interval."
         )
     if plan.sample is None:
@@ -124,8 +124,8 @@ def interval_text(plan: Plan, finished: bool) -> str:
     if plan.sample.stopping:
         rule, looks = plan.sample.stopping.rule, plan.sample.stopping.looks
         return (
-            f"A random sample that was looked at up to {looks} times: repeated intervals of {percent} by the {rule} "
-            "rule, which hold at whatever look it stopped."
+            f"A random sample that was analysed up to {looks} times: repeated intervals of {percent} by the {rule} "
+            "rule, which hold at whichever analysis it stopped."
         )
     return f"A random sample of the population, with replacement: {plan.sample.interval} intervals of {percent}."
 
@@ -168,7 +168,7 @@ def tolerance(plan: Plan, wanted: Tolerance, felt: Sequence[Row]) -> dict[str, A
     elif shown_to_miss(within, len(times), wanted.share, wanted.confidence):
         verdict = "not met"
     else:
-        verdict = "open: neither it nor its contrary is shown by so many runs"
+        verdict = "open: this many runs show neither it nor its contrary"
     return {**told, "verdict": verdict, "by": f"{100 * wanted.confidence:g} %", "upper_ms": finite(limit)}
 
 

@@ -96,7 +96,7 @@ class BabblingNode(IntruderFault):
     meaning = "has a node that sends frames of one identifier all the time"
     unit = "frames"
     parameters = (
-        name_parameter("frame", "0", "variable or identifier that it sends", "chosen by us: what beats everybody"),
+        name_parameter("frame", "0", "variable or identifier that it sends", "chosen by us: wins against all"),
         Parameter("period_us", "us", 0.0, 0.0, 1e6, "from frame to frame; 0: one after another", "chosen by us: worst"),
     )
 
@@ -138,7 +138,7 @@ class DuplicateIdentifier(IntruderFault):
     def connect(self) -> None:
         IntruderFault.connect(self)
         if not self.values["frame"] or self.values["frame"] == ANY:
-            raise FaultError(f"fault {self.text()}: say by frame= which identifier is there twice")
+            raise FaultError(f"fault {self.text()}: give the duplicate identifier by frame=")
         self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
 
     def made_outside(self) -> OutsideIntruder:
@@ -153,7 +153,7 @@ class Noise(BusFault):
     """Bits inverted for all nodes, at random: a bad termination, a motor's leads next to the cable."""
 
     mode = "noise"
-    meaning = "has bits inverted at random, for everybody"
+    meaning = "has bits inverted at random, at all nodes"
     unit = "error frames"
     parameters = (
         Parameter("rate", "1", 1e-4, 0.0, HIGHEST_RATE, "chance of each bit", "chosen by us: about a frame in eighty"),

@@ -137,7 +137,7 @@ class Catalogue:
             return
         spec = importlib.util.spec_from_file_location(f"ranger_sim_fault_module_{path.stem}", path)
         if spec is None or spec.loader is None:
-            raise FaultError(f"fault module {path}: it is no Python file (.py)")
+            raise FaultError(f"fault module {path}: it is not a Python file (.py)")
         module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)

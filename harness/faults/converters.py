@@ -30,7 +30,7 @@ class ConverterFault(Fault):
     def connect(self) -> None:
         board = self.robot.loop.board(self.place.details["board"])
         if board.apart:
-            raise FaultError(f"fault {self.text()}: {board.name} runs in a process of its own; its converter is there")
+            raise FaultError(f"fault {self.text()}: {board.name} runs in a separate process; its converter is there")
         emulated(self.robot, board.name, f"fault {self.text()}")
         self.board: Any = board
         self.inside = board.name
@@ -167,7 +167,7 @@ class LateConversion(TimeFault):
 
     mode = "late_conversion"
     kinds = AWAITED
-    needs = "a converter that somebody waits for"
+    needs = "a converter whose result a program waits for"
     meaning = "takes longer for each conversion"
     parameters = (
         Parameter("late_us", "us", 300.0, 1.0, 1e6, "by how much", "chosen by us: the sequence ends after its slot"),
@@ -191,7 +191,7 @@ class MissingConversion(TimeFault):
 
     mode = "missing_conversion"
     kinds = AWAITED
-    needs = "a converter that somebody waits for"
+    needs = "a converter whose result a program waits for"
     meaning = "begins a conversion and never ends it"
 
     def connect(self) -> None:

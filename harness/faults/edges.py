@@ -229,7 +229,7 @@ class EdgesSaturation(SignalOnEdges):
 
     mode = "saturation"
     kinds = (EDGES,)
-    meaning = "shows no more than so many edges to either side of where it starts"
+    meaning = "shows at most this many edges to either side of where it starts"
     parameters = (
         Parameter("low", COUNTS.unit, -50.0, -20_000.0, 0.0, "the least, from the start on", COUNTS.source),
         Parameter("high", COUNTS.unit, 50.0, 0.0, 20_000.0, "the most, from the start on", COUNTS.source),

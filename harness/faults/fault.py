@@ -152,7 +152,7 @@ class Fault(StepWatch):
         where = f"fault {place.name}:{cls.mode}"
         for name, value in parameters.items():
             if name not in known:
-                raise FaultError(f"{where}: there is no parameter {name!r}, but {', '.join(known) or 'none at all'}")
+                raise FaultError(f"{where}: unknown parameter {name!r} (available: {', '.join(known) or 'none'})")
             values[name] = known[name].checked(value, where)
         return cls(place, None if start is None else condition(start), end_condition(end, condition), values)
 

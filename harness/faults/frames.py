@@ -24,7 +24,7 @@ COUNT = WholeNumber(
     0,
     0,
     1e9,
-    "so many at most; 0: until the fault ends",
+    "at most this many; 0: until the fault ends",
     "chosen by us: no end",
 )
 SHARE = Parameter("share", "1", 1.0, 0.0, 1.0, "chance of each, by the fault's own seeded stream", "chosen by us: all")
@@ -149,7 +149,7 @@ ERROR_MODES = {
         ("BIT_STUFFING", 0, "samples six equal bits where five are the most"),
         ("FORM", 0, "samples a dominant CRC delimiter"),
         ("CRC", 0, "reads a frame whose CRC is wrong"),
-        ("ACK", 1, "sends a frame that nobody seems to acknowledge"),
+        ("ACK", 1, "sends a frame that no node seems to acknowledge"),
         ("BROKEN_ERROR_FRAME", 1, "sees an error, and its error flag broken in the third bit"),
     )
 }
@@ -212,7 +212,7 @@ class Delay(Reception):
     """Frames reach the program late, as through a slow gateway; later ones may overtake them."""
 
     mode = "delay"
-    meaning = "has frames later than they came"
+    meaning = "has frames later than they arrived"
     unit = "us"
     parameters = (
         *FrameFault.parameters,

@@ -76,7 +76,7 @@ def lasting(meaning: str, length_ms: float, pause_ms: float) -> tuple[Parameter,
 
 def stuck(q: Quantity) -> tuple[Parameter, ...]:
     """The parameter for a given level."""
-    return (number(q, "level", math.nan, -q.limit, q.limit, "where it stands; none given: as it is"),)
+    return (number(q, "level", math.nan, -q.limit, q.limit, "value that it keeps; default: its present value"),)
 
 
 def scaled(q: Quantity) -> tuple[Parameter, ...]:

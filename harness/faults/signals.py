@@ -1,7 +1,7 @@
 """How a value is falsified, whatever it represents: counts of an encoder, volts at a pin, a rate in a packet.
 
 A signal takes the true value at a time and returns the one shown instead. It depends neither on the sensor
-nor on the robot; `harness/faults/values.py` and `edges.py` bring it to the wire. Calls are in order of time.
+nor on the robot; `edges.py`, `words.py`, `voltages.py` and `imu.py` bring it to the wire. Calls are in order of time.
 """
 
 from collections import deque

@@ -41,7 +41,7 @@ def open_doors(
             if getattr(board, "core", None) is None:
                 raise FirmwareError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")
             if any(door.board is board for door in doors):
-                raise FirmwareError(f"gdb {text}: {place.board} has a door already")
+                raise FirmwareError(f"gdb {text}: {place.board} has a port already")
             doors.append(GdbServer(board, place.port, place.host, allow_network, ends))
     except BaseException:
         close_doors(doors)

@@ -99,7 +99,7 @@ def fresh_c(master: pathlib.Path) -> pathlib.Path:
     stale = generate.stale(load_table(master), master / "generated")
     if stale:
         raise FirmwareError(
-            f"{master}: what was generated is not of the table as it is now ({stale[0]}): "
+            f"{master}: the generated files are older than the table ({stale[0]}): "
             f"ranger-sim table generate --master {master}"
         )
     return master / GENERATED_C

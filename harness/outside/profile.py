@@ -220,16 +220,14 @@ def _schedule(name: str, folder: pathlib.Path, table: Table, faults: list[Profil
                 value,
                 f"is in the occasional list of {listed[0]}: give [occasional] {listed[0]}"
                 if listed
-                else "no row of a board's schedule sends it and it is no command of the main brain",
+                else "no row of a board's schedule sends it and it is not a command of the main brain",
             )
         else:
             every[key] = reader.whole(value, f"every.{key}", 1, MOST_TURNS, 1)
     occasional: dict[str, int] = {}
     for key, value in reader.table(content, "occasional").items():
         if key not in {board.name for board in table.with_role("satellite") if board.occasional}:
-            reader.fault(
-                f"occasional.{key}", value, "no board of that name has an occasional list and a CAN bus of its own"
-            )
+            reader.fault(f"occasional.{key}", value, "no board of that name has both an occasional list and a CAN bus")
         else:
             occasional[key] = reader.whole(value, f"occasional.{key}", 1, MOST_TURNS, 1)
     in_turn = reader.whole(content.get("commands_in_turn", 0), "commands_in_turn", 0, MOST_TURNS, 0)
@@ -273,7 +271,7 @@ def default() -> Profile:
     schedule = full_schedule()
     buses = {name: BusProfile(name, None, None, table.bit_rates[name.upper()], FULL, schedule, {}) for name in BUSES}
     boards = dict.fromkeys(boards_of(table), EMULATED)
-    return Profile("default", "", "the robot as it is", "", boards, buses)
+    return Profile("default", "", "the robot unchanged", "", boards, buses)
 
 
 @functools.cache
@@ -366,9 +364,7 @@ def _buses(
         if interface is None:
             for key in ("channel", "options"):
                 if entry.get(key):
-                    reader.fault(
-                        f"{place}.{key}", entry[key], "means nothing without interface: the bus is emulated inside"
-                    )
+                    reader.fault(f"{place}.{key}", entry[key], "needs `interface`: without one the bus is emulated")
         for key in options:
             if key in ("interface", "channel", "bitrate", "fd"):
                 reader.fault(
@@ -382,7 +378,7 @@ def _buses(
             reader.fault(
                 f"{place}.bit_rate",
                 rate if "bit_rate" in entry else None,
-                f"{'' if 'bit_rate' in entry else f'is missing, so {rate}: '}adapters for classic CAN end at "
+                f"{'' if 'bit_rate' in entry else f'is missing, so {rate}: '}adapters for classic CAN reach at most "
                 f"{ADAPTER_BIT_RATE} bit/s",
             )
         wanted = reader.text(entry, "schedule", place, FULL) or FULL
@@ -432,5 +428,5 @@ def _with_router(reader: _Reader, boards: Mapping[str, str], table: Table) -> No
         reader.fault(f"boards.{external}", EXTERNAL, WITHOUT_CAN)
     elif boards[router] == ABSENT and boards[brain] == EMULATED:
         reader.fault(
-            f"boards.{router}", ABSENT, f"without the router {brain} reaches nobody: make {brain} absent as well"
+            f"boards.{router}", ABSENT, f"without the router {brain} reaches no board: make {brain} absent as well"
         )

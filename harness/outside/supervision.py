@@ -178,7 +178,7 @@ class Watch:
         variable = one.variable
         value = value_of_word(variable.type, word & 0xFFFFFFFF)
         if not math.isfinite(value):
-            self._note(one, "out of range", f"{value} is no number")
+            self._note(one, "out of range", f"{value} is not a number")
         elif (variable.minimum is not None and value < variable.minimum) or (
             variable.maximum is not None and value > variable.maximum
         ):

@@ -42,7 +42,7 @@ class Apart:
         self.robot = robot
         if not sys.platform.startswith("linux"):
             raise UserError(
-                f"{', '.join(names)}: a process of its own needs Linux (eventfd, pidfd); elsewhere --in-process, or "
+                f"{', '.join(names)}: a separate process needs Linux (eventfd, pidfd); elsewhere --in-process, or "
                 "Ranger(in_process=True)"
             )
         self.names = names

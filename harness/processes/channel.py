@@ -76,7 +76,7 @@ FAULTS = {
     CHECK_WRONG: "its check is wrong",
     NO_IDENTIFIER: "its identifier does not fit in 11 bits",
     BAD_PAYLOAD: "its payload is out of range",
-    OUT_OF_TIME: "its stamp lies more than a second from the turn's instant",
+    OUT_OF_TIME: "its stamp is more than a second from the turn's time",
 }
 
 

@@ -113,7 +113,7 @@ class Health:
             *amount("lost frames", wanted.lost_frames, lost, off),
             *amount("error frames", wanted.bus_errors, broken, off),
             *amount("bus-off", wanted.bus_off, self._bus_off(now, before)),
-            *amount("boards that stand still", wanted.dead, self._dead(now)),
+            *amount("boards that do not run", wanted.dead, self._dead(now)),
             *self._fall(wanted),
             *amount("injected faults that did not act", wanted.idle_faults, self._idle()),
         ]

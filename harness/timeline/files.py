@@ -29,7 +29,7 @@ LIBRARIES = {
 def format_of(path: pathlib.Path) -> Callable[[Events, IO[bytes], str], None]:
     """The writer of such a file. UserError for an unknown suffix."""
     if path.suffix not in FORMATS:
-        raise UserError(f"trace {path}: suffix {path.suffix!r} is no format; there are {', '.join(FORMATS)}")
+        raise UserError(f"trace {path}: suffix {path.suffix!r} is not a format (available: {', '.join(FORMATS)})")
     return FORMATS[path.suffix]
 
 

@@ -136,7 +136,7 @@ def index_of(path: pathlib.Path, data: Any) -> np.ndarray:
         index = np.empty(3 * count, dtype=np.int64)
         count = index_packets(data, index)
     if count <= 0:
-        raise UserError(f"trace {path}: is no Perfetto trace")
+        raise UserError(f"trace {path}: not a Perfetto trace")
     return index[: 3 * count].reshape(-1, 3)
 
 

@@ -59,7 +59,7 @@ def slot_view(robot: Any, name: str) -> MachineSlots:
     def find_log() -> Any:
         log = activity_of(robot, name)
         if log is None:
-            raise UserError(f"slots of {name}: this board runs elsewhere and shows nothing of its activity")
+            raise UserError(f"slots of {name}: this board is external and reports no activity")
         return log
 
     begun_ns = robot.loop.time - robot.start_ns

@@ -277,8 +277,8 @@ class SlotView:
         kept_ns = int(rows[0, COLUMN_START]) if self.recording.lost and len(rows) else 0
         if self.from_ns < kept_ns:
             raise UserError(
-                f"{self}: the oldest were given up, what is kept begins {duration_text(kept_ns)} after power-up; "
-                f"ask .between(...) two instants after that, or forget() now and then"
+                f"{self}: the oldest were dropped, the rest begins {duration_text(kept_ns)} after power-up; "
+                f"ask .between(...) two times after that, or call forget() now and then"
             )
         if not len(places):
             raise UserError(

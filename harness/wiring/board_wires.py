@@ -56,7 +56,7 @@ class WordWire:
 class SspWire:
     """The serial link between two boards; an exchange that the master starts takes `exchange_ns`.
 
-    `tampering`: a fault that changes what arrives, or None (`harness/faults/link.py`).
+    `tampering`: a fault that changes what arrives, or None (`harness/faults/links.py`).
     """
 
     master: "EventQueue"
@@ -161,7 +161,7 @@ class BoardWires(Outbox):
         The bus writes the ends of its transmissions where the controller reads them.
         """
         if bus is not None and not isinstance(bus, Bus):  # used as one without a further check
-            raise UserError(f"{self.board.name}: {bus!r} is no Bus")
+            raise UserError(f"{self.board.name}: {bus!r} is not a Bus")
         if self.buses[controller] is not None:
             self.buses[controller].nodes[self.nodes[controller]].connect(None)
         self.buses[controller] = bus

@@ -104,7 +104,7 @@ class PackLost(BatteryFault):
 
     mode = "pack_lost"
     meaning = "loses packs: the others carry the current"
-    parameters = (WholeNumber("packs", "1", 1, 1, 100, "so many of them", "chosen by us: a plug; the robot has seven"),)
+    parameters = (WholeNumber("packs", "1", 1, 1, 100, "number of packs", "chosen by us: a plug; the robot has seven"),)
 
     def connect(self) -> None:
         BatteryFault.connect(self)

@@ -79,12 +79,12 @@ FIGURES = (
     Figure("heel_strike_delay_ms.std", REAL, "ms", "standard deviation of these delays", "none was noticed"),
     Figure("heel_strike_delay_ms.count", COUNT, "", "strikes that were noticed"),
     Figure("heel_strike_delay_ms.unmatched", COUNT, "", "flips of the swing leg without a new strike"),
-    Figure("heel_strike_delay_ms.missed", COUNT, "", "strikes of which no flip told"),
+    Figure("heel_strike_delay_ms.missed", COUNT, "", "strikes that no flip reported"),
     # not in a textbook gait
     Figure("oddities.contact", TEXT, "", "how feet meet the floor: coulomb, sticking, unilateral or compliant"),
     Figure("oddities.touches", COUNT, "", "times that a foot met the floor"),
     Figure("oddities.lift_offs", COUNT, "", "times that a foot left it, other than in the strike of the other one"),
-    Figure("oddities.bounces", COUNT, "", "touches of a leading foot that had left the floor and came back"),
+    Figure("oddities.bounces", COUNT, "", "touches of a leading foot that had left the floor and returned to it"),
     Figure("oddities.recontacts", COUNT, "", "touches out of turn"),
     Figure(
         "oddities.scuffs", COUNT, "", "times that the swing foot's sole touched after it had passed the stance foot"
@@ -131,7 +131,7 @@ FIGURES = (
         "can.{bus}.lost",
         COUNT,
         "",
-        "frames accepted for sending that a listening board did not get, on the wire or in its buffers",
+        "frames accepted for sending that a receiving board did not get, on the wire or in its buffers",
     ),
     Figure(
         "can.{bus}.queue_full", COUNT, "", "frames that a full transmit ring of a board or of the router did not take"
@@ -156,9 +156,7 @@ FIGURES = (
     ),
     # the run
     Figure("realtime_factor", REAL, "1", "virtual time over wall-clock time of the stepping loop"),
-    Figure(
-        "cpu_factor", REAL, "1", "virtual time over the processor's time for it", "it took no time that can be told"
-    ),
+    Figure("cpu_factor", REAL, "1", "virtual time over the processor's time for it", "it took no measurable time"),
     Figure("compiled", FLAG, "", "compiled modules ran, not the plain sources"),
     Figure("controller", TEXT, "", "parameter set, as asked for"),
     Figure("body", TEXT, "", "body that walked, as asked for"),
@@ -170,13 +168,13 @@ FIGURES = (
     Figure("electronics_off", TEXTS, "", "electronics that drew no power"),
     Figure("trace_digest", TEXT, "", "BLAKE2b-256 of every frame and of the body's samples: equal for equal runs"),
     Figure("interrupted", FLAG, "", "Ctrl-C or another signal ended the walk"),
-    Figure("command", TEXT, "", "walks the same again: equal digest, as long as nothing came in from outside"),
+    Figure("command", TEXT, "", "walks the same again: equal digest, unless anything arrived from outside"),
     Figure("complete", FLAG, "", "every file of the run's folder is whole"),
     Figure("files.{file}", TEXT, "", "`complete`, or `incomplete` and why: then it has `.partial` in its name"),
     # programs in C
     Figure("firmware.{board}.name", TEXT, "", "of the program in C that this board ran"),
     Figure("firmware.{board}.folder", TEXT, "", "where its sources are, as asked for"),
-    Figure("firmware.{board}.own_process", FLAG, "", "it had a process of its own, which it could end alone"),
+    Figure("firmware.{board}.own_process", FLAG, "", "it had a separate process, which it could end alone"),
     Figure("firmware.{board}.lost_s", REAL, "s", "when its process was gone, since power-up", "it was not"),
     Figure(
         "firmware.{board}.why",
@@ -193,7 +191,7 @@ FIGURES = (
         "firmware.{board}.findings[].count",
         COUNT,
         "",
-        "reports; a process tells of a place once. Of a source that several boards run the first board has them",
+        "reports; a process reports a place once. A source that several boards run counts for the first of them",
     ),
     Figure("firmware.{board}.coverage.lines", COUNT, "", "lines with code", NO_COVERAGE),
     Figure("firmware.{board}.coverage.covered", COUNT, "", "of them those that ran", NO_COVERAGE),
@@ -207,7 +205,7 @@ FIGURES = (
     Figure("firmware.{board}.coverage.files[].taken", COUNT, "", "of them those that were taken"),
     Figure("firmware.{board}.coverage.files[].missed", TEXT, "", "lines that did not run, as 3-7, 12"),
     # faults that were injected
-    Figure("faults[].fault", TEXT, "", "as it is typed: place, mode, parameters, begin, end"),
+    Figure("faults[].fault", TEXT, "", "as typed: place, mode, parameters, begin, end"),
     Figure("faults[].armed_s", REAL, "s", "when it was armed, since power-up", NOT_YET),
     Figure("faults[].activated_s", REAL, "s", "when it began", NOT_YET),
     Figure("faults[].acted_s", REAL, "s", "when its place first showed something else for it", NOT_YET),

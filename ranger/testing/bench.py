@@ -462,7 +462,7 @@ class BoardAlone(Bench):
                 if frame.bus in ("can1", "can2", "can3", "can4"):
                     continue  # of a walk's folder, but not of this board
                 raise UserError(
-                    f"replay: channel {frame.bus!r} is no bus of {self.name}: "
+                    f"replay: channel {frame.bus!r} is not a bus of {self.name}: "
                     f"read_log(path, bus={next(iter(self.buses), 'can1')!r}) says which it is"
                 )
             if frame.identifier in own:

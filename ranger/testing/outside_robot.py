@@ -76,7 +76,7 @@ def vcan_buses() -> dict[str, dict[str, Any]]:
 def buses_of_profile(profile: Profile | None) -> dict[str, dict[str, Any]]:
     """The buses that a profile puts on interfaces; UserError without a profile, or for one without such buses."""
     if profile is None:
-        raise UserError("backend hardware: a profile says what is real: --ranger-profile my.toml")
+        raise UserError("backend hardware: it needs a profile: --ranger-profile my.toml")
     found = {name: keywords for name, bus in profile.buses.items() if (keywords := bus.python_can()) is not None}
     if not found:
         raise UserError(f"backend hardware: the profile {profile.name} puts no bus on an interface")

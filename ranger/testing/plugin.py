@@ -253,7 +253,7 @@ class Maker:
 
         machine: Machine | None = self.hook.pytest_machine(wanted=wanted)
         if machine is None:
-            raise UserError("fixture machine: which one? conftest.py says it: def pytest_machine(wanted): return ...")
+            raise UserError("fixture machine: conftest.py must choose it: def pytest_machine(wanted): return ...")
         return machine
 
     def __eq__(self, other: object) -> bool:

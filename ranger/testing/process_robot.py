@@ -49,7 +49,7 @@ class ProcessRobot(Ranger):
         """The built board, before time passes; MissingError afterwards, because it is in another process."""
         if self.processes is not None:
             raise MissingError(
-                f"backend processes has no board memory: {name} runs in a process of its own; "
+                f"backend processes has no board memory: {name} runs in a separate process; "
                 "variable(), counters(), wire() and until() see it"
             )
         return Ranger.board(self, name)  # type: ignore[call-overload]

@@ -343,4 +343,4 @@ def services(
         return periods(slot_ns, CAPTURE_WRAP_NS), 0, 0, "the capture timer's wraps"
     if kind in (DMA_DONE, SOFTWARE):
         return periods(slot_ns, COMPUTER_SEGMENT_NS), 0, 0, "segments to the computer"
-    return 0, 0, 0, "only beside errors of the bus"
+    return 0, 0, 0, "only with errors of the bus"

@@ -58,7 +58,7 @@ class Simulated:
         runs = [np.array([each.figures[name] for each in at if name in each.figures]) for at in self.outcomes]
         told = [number for number, each in enumerate(runs) if len(each)]
         if not told:
-            raise UserError(f"figure {name}: none of {sum(map(len, self.outcomes))} simulated runs came to it")
+            raise UserError(f"figure {name}: none of {sum(map(len, self.outcomes))} simulated runs reached it")
         return Surface(np.array(self.places)[told], [runs[number] for number in told])
 
     def nearest(self, place: Array) -> float:

@@ -71,7 +71,7 @@ def column(dataset: Dataset, name: str, bench: str, default: float | None = None
     value = dataset[name].value
     if not np.all(np.isfinite(value)):
         raise UserError(
-            f"{dataset.name}: {name} has {np.count_nonzero(~np.isfinite(value))} values that are no numbers"
+            f"{dataset.name}: {name} has {np.count_nonzero(~np.isfinite(value))} values that are not numbers"
         )
     return value
 

@@ -86,7 +86,7 @@ class LegSwing:
         kinds = {self._of(recording).with_voltage for recording in recordings}
         if len(kinds) > 1:
             without = ", ".join(r.table.name for r in recordings if "voltage_V" not in r.table)
-            raise ModelError(f"{without}: no voltage_V, which the other recordings have; diagnose them apart")
+            raise ModelError(f"{without}: no voltage_V, which the other recordings have; diagnose it separately")
         return self._of(recordings[0]).effects(recordings)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:

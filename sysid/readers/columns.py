@@ -120,4 +120,4 @@ def check_mapping(dataset: Dataset, mapping: Mapping[str, str], columns: list[st
     """UserError for a column that `mapping` names and the file does not have."""
     for old in mapping:
         if old not in columns:
-            raise DataError(f"{dataset.name}: --map {old}=...: there is no such column; there are {', '.join(columns)}")
+            raise DataError(f"{dataset.name}: --map {old}=...: unknown column (available: {', '.join(columns)})")

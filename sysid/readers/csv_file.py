@@ -70,7 +70,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
         columns.add(dataset, name, named, time_s[kept], value[kept], finest, lost)
     if not dataset.channels:
         called = " and ".join(names[index] for index in sorted(time_columns))
-        raise DataError(f"{path}: there is no channel beside the time column {called}")
+        raise DataError(f"{path}: there is no channel except the time column {called}")
     return dataset
 
 
@@ -94,7 +94,7 @@ def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
         text = content.decode("latin-1")
         encoding = "latin-1"
     if "\0" in text:
-        raise DataError(f"{path}: this is no text table, it has bytes of value 0")
+        raise DataError(f"{path}: this is not a text table, it has bytes of value 0")
     if encoding != "utf-8-sig":
         dataset.repairs.append(Repair("", "encoding", 0, f"the text is read as {encoding}, it is not UTF-8"))
     found = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" \t\r,;")]
@@ -332,7 +332,7 @@ def _numbers(
     odd = [i for i in np.flatnonzero(np.isnan(value) & present) if not re.fullmatch("[-+]?nan", cells[i].lower())]
     if odd:
         first = odd[0]
-        text = f"{len(odd)} cells are no numbers, the first in line {rows[first][0]}: {cells[first][:30]!r}"
+        text = f"{len(odd)} cells are not numbers, the first in line {rows[first][0]}: {cells[first][:30]!r}"
         place = [float(time_s[i]) if np.isfinite(time_s[i]) else 0.0 for i in (first, odd[-1])]
         dataset.findings.append(Finding(channel, "unreadable", place[0], place[1], float(len(odd)), "samples", text))
     return value, present, _last_digit(cells)

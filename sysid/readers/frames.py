@@ -128,7 +128,7 @@ def _tell(
     if several:
         message, buses = next(iter(several.items()))
         text = (
-            f"{len(several)} messages came on several buses ({message} on {', '.join(buses)}) and are as many channels "
+            f"{len(several)} messages were on several buses ({message} on {', '.join(buses)}) and are as many channels "
             f"({buses[0]}.{message} ...); --bus chooses one"
         )
         dataset.findings.append(Finding("", "several_buses", 0.0, 0.0, float(len(several)), "messages", text, "note"))

@@ -76,7 +76,7 @@ def read(
     except OSError as error:
         raise DataError(f"{path}: the log cannot be read ({error.strerror or error})") from None
     if not samples:
-        raise DataError(f"{path}: this is no log of the robot: no line reads id, value and time in ms between tabs")
+        raise DataError(f"{path}: this is not a log of the robot: no line reads id, value and time in ms between tabs")
     if odd:
         text = f"{len(odd)} lines are not id, value, time, and are left out (the first: line {odd[0]})"
         dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(odd)), "rows", text))

@@ -15,7 +15,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     """The variables that the boards knew, named like the folder; that the robot fell is a finding."""
     folder = pathlib.Path(path)
     if not (folder / VARIABLES).is_file():
-        raise DataError(f"{folder}: this is no folder of a walk, it has no {VARIABLES} (walk --log decides)")
+        raise DataError(f"{folder}: this is not a folder of a walk, it has no {VARIABLES} (walk --log decides)")
     dataset = measurement.read(folder / VARIABLES, mapping, truth)
     dataset.name = printable(folder.resolve().name)
     try:
@@ -26,6 +26,6 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
         return dataset
     if isinstance(summary, dict) and summary.get("fell"):
         ends = max((float(channel.time_s[-1]) for channel in dataset.channels.values()), default=0.0)
-        text = f"the robot fell ({summary.get('fall_cause') or 'no cause told'}): the last step is no walking"
+        text = f"the robot fell ({summary.get('fall_cause') or 'no cause given'}): the last step is not walking"
         dataset.findings.append(Finding("", "fell", ends, ends, 1.0, "", text))
     return dataset

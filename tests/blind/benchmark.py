@@ -6,11 +6,11 @@
     DIR/table.txt, table.md   figures, methods side by side, and which causes are missed or misnamed
     DIR/score.json            the figures by method, for a program
 
-The generator and each diagnosis run in processes of their own. Measured data lie in a folder of their own elsewhere and
+The generator and each diagnosis run in separate processes. Measured data lie in their own folder elsewhere and
 are gone when they are answered; `tests.blind.generate` with the same seed and --count makes them again.
 
 Fixed, as a benchmark of system identification fixes it: a.csv of a case is the training run, b.csv the test run, with
-another trajectory, supply, room and state of warming (experiment.py `prepare`). Both begin at rest: the first 0.5 s
+another trajectory, supply, room temperature and warming (experiment.py `prepare`). Both begin at rest: the first 0.5 s
 (excitation.py STILL_S) are the window in which initial states may be estimated; no other sample of b.csv may serve for
 anything but the gain.
 """
@@ -88,7 +88,7 @@ class Benchmark:
         return [(first, min(first + BATCH, self.cases)) for first in range(0, self.cases, BATCH)]
 
     def is_done(self, part):
-        """Whether every method has said something on each case of a part."""
+        """Whether every method has an answer for each case of a part."""
         known = {truth["number"]: key for key, truth in read_folder(self.truth).items()}
         keys = [known.get(number) for number in range(*part)]
         return all(key and self.has(method, key) for key in keys for method in self.methods)
@@ -98,7 +98,7 @@ class Benchmark:
         return (folder / f"{key}.json").exists() or (folder / f"{key}.txt").exists()
 
     def generation(self, part, folder):
-        """The command that makes a part's data; the truth goes where no diagnosis is told of."""
+        """The command that makes a part's data; the truth goes to a folder that no diagnosis knows."""
         command = [sys.executable, "-m", "tests.blind.generate", "--experiment", self.experiment]
         command += ["--count", str(self.cases), "--seed", str(self.seed), "--slice", f"{part[0]}:{part[1]}"]
         command += ["--seconds", str(self.seconds)] if self.seconds else []
@@ -166,7 +166,7 @@ class Benchmark:
 
 
 def side_by_side(figures):
-    """Markdown: a row for each figure, the first method with its interval, the others beside it."""
+    """Markdown: a row for each figure, the first method with its interval, the others next to it."""
     first, *others = figures
     lines = [f"| figure | cases | target | {' | '.join((first, '95 % interval', *others))} |"]
     lines.append("|---|---|---|" + "---|" * (2 + len(others)))

@@ -1,7 +1,7 @@
 """Bounds for the score of one run of the blind cases that a method keeps at any seed if it meets the targets.
 
 A share with target p over n independent cases is binomial. A method that is just good enough falls below k successes
-with a probability that the binomial law tells; the bound is the largest k for which that is at most the risk. The risk
+with a probability from the binomial law; the bound is the largest k for which that is at most the risk. The risk
 of one run, 1e-6, is divided by the number of bounds (Bonferroni), so that a run fails falsely at most once in a million
 whatever the figures have to do with each other. Few cases make weak bounds; what they refuse for certain is shown in
 test_bounds.py: a refit, one label for all, a diagnosis that lacks a balance.

@@ -77,7 +77,7 @@ def singles(truths, answers):
 
 
 def _label(truth):
-    """A cause with the place where it sits, and with what it cannot be told apart from."""
+    """A cause with the place where it sits, and with what it cannot be distinguished from."""
     (cause,) = truth["causes"]
     place = cause.get("at") or cause.get("shape", {}).get("channel", "")
     tied = f" = {', '.join(truth['ties'])}" if truth["ties"] else ""

@@ -4,12 +4,12 @@
     answers/ID.json    what `ranger-sim diagnose ... --json` says of the case; a missing one counts as wrong
 
 Every figure comes with how many cases it rests on and its 95 % interval (Clopper and Pearson for shares; order
-statistics for a median and a percentile) beside its target.
+statistics for a median and a percentile) next to its target.
 
 What counts as named: the causes of an answer that does not abstain. A set: the causes with all that they are tied with.
-What theory cannot tell apart is not asked for: a cause with a twin in the truth (`ties`, cosine above 0.95) is outside
+What theory cannot distinguish is not asked for: a cause with a twin in the truth (`ties`, cosine above 0.95) is outside
 the first cause's figures and inside those of ties; an effect outside the catalogue that looks like a cause is left out.
-Parameters: the first one of a cause, which is its size. The gain is the answer's own word; beside it stands what the
+Parameters: the first one of a cause, which is its size. The gain is the answer's own word; next to it is what the
 truth says of it, for effects that grow with their size: an effect of size s, modelled with s', leaves (1 - s'/s)^2 of
 its square on whatever run. A wrong phase or time constant is not in that figure.
 """
@@ -195,7 +195,7 @@ class Answer:
         return None
 
     def _per_kelvin(self, cause, given):
-        """A slope over its base parameter, whose own error (of tenths of a per cent) is nothing beside the slope's."""
+        """A slope over its base parameter, whose own error (of tenths of a per cent) is negligible for the slope."""
         slope, base = PER_KELVIN.get(cause, ("", ""))
         heat = _value(given.get("time_constant_s", {"value": 0.0}))
         found, over = _value(given.get(slope, {})), _value(self.base.get(base, {}))
@@ -234,7 +234,7 @@ def relative_error(cause, name, value):
 
 
 def matched(groups, wanted):
-    """(how many of the wanted names are met each by a group of its own, groups that meet none).
+    """(how many of the wanted names are met each by its own group, groups that meet none).
 
     Two effects, so trying every order is cheap.
     """

@@ -14,7 +14,7 @@ NUMBER = iter(range(1000))
 
 
 def hidden(*causes, kind="single", strength=4.0, ties=(), variant="", channel=None):
-    """A truth with a number of its own."""
+    """A truth with its own number."""
     shape = {"channel": channel} if channel else {}
     listed = [{"name": name, "balance": "M", "strength": strength, "shape": shape, "parameters": {}} for name in causes]
     return {"number": next(NUMBER), "kind": kind, "variant": variant, "causes": listed, "ties": list(ties)}
@@ -96,7 +96,7 @@ def test_the_table_for_a_document_counts_only_strong_cases():
 
 
 def run(folder, *arguments):
-    """The command in a process of its own, which leaves nothing of its pool in this one."""
+    """The command in a separate process, which leaves nothing of its pool in this one."""
     command = [sys.executable, "-m", "tests.blind.benchmark", *at(folder), *arguments]
     subprocess.run(command, check=True, capture_output=True)
 

@@ -2,7 +2,7 @@
 
 Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
 diagnosis itself is held to these bounds on fresh cases in every run; RANGER_SIM_BLIND (a seed, or "fresh") has the
-comparators beside it, on the cases of that seed.
+comparators as well, on the cases of that seed.
 """
 
 import os
@@ -193,14 +193,14 @@ def test_comparators_speak_the_form_of_an_answer():
 
 
 def generated(folder, *arguments):
-    """(folder of the data, {id: truth}) of cases made in a process of its own, which prints the seed."""
+    """(folder of the data, {id: truth}) of cases made in a separate process, which prints the seed."""
     command = [sys.executable, "-m", "tests.blind.generate", "--out", str(folder), *arguments]
     print(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     return folder / "data", read_folder(folder / "truth")
 
 
 def answered(name, data, out, *arguments):
-    """{id: answer} of a method, asked in processes of their own."""
+    """{id: answer} of a method, asked in separate processes."""
     command = [sys.executable, "-m", "tests.blind.answers", "--data", str(data), "--by", name, "--out", str(out)]
     subprocess.run([*command, "--processes", "2", *arguments], capture_output=True, check=True)
     return read_folder(out)

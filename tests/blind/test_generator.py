@@ -1,4 +1,4 @@
-"""The blind generator: it shares no model with the diagnosis, hides what it says, and tells nothing."""
+"""The blind generator: it shares no model with the diagnosis, hides what it says, and reports nothing."""
 
 import ast
 import json
@@ -218,7 +218,7 @@ def test_an_experiment_without_effects_keeps_its_own_balances(experiment, monkey
 
 def test_what_no_recording_can_tell_apart_is_a_tie_of_the_truth(monkeypatch):
     """Friction by direction is an offset of the load cell, also where only the current's offset is hidden; a torque
-    ripple that goes with the voltage is no cogging, though both have the same period and phase.
+    ripple that goes with the voltage is not cogging, though both have the same period and phase.
     """
     monkeypatch.setattr(MOTOR_BENCH, "SAMPLES", 2000)
     for name, other, tied in (
@@ -263,7 +263,7 @@ def test_a_fast_effect_counts_less_where_the_speed_is_differentiated_and_a_slow_
 
 
 def test_two_effects_on_one_quantity_both_act():
-    """Of a warm magnet's loss as much is left beside the ripple of the torque constant as alone."""
+    """As much of a warm magnet's loss is left with the ripple of the torque constant as alone."""
     amplitudes = {"torque_constant_temperature": 0.005, "commutation_ripple": 0.01}
     shown = {}
     for names in (("torque_constant_temperature",), ("commutation_ripple", "torque_constant_temperature"), ()):

@@ -183,7 +183,7 @@ def test_outside_the_catalogue_an_answer_abstains_or_names_wrongly_or_sees_nothi
 
 
 def test_an_effect_outside_that_looks_like_a_cause_is_not_asked_for():
-    """With a cosine above 0.95 to a cause of the catalogue nobody could know; nearer than 0.84 it is told apart."""
+    """With a cosine above 0.95 to a cause of the catalogue it cannot be known; below 0.84 it is distinguished."""
     twin, near = hidden("eddy", kind="outside", ties=["stribeck"]), hidden("eddy", kind="outside")
     twin["cosines"], near["cosines"] = {"stribeck": 0.97}, {"stribeck": 0.90}
     named_one = named(("stribeck", ()))

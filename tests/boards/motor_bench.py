@@ -92,7 +92,7 @@ class Bench:
         self.volts(place, counts * 2.5 / (gain * 8192.0))
 
     def edge(self, a, b, pair="01", after_ns=0):
-        """An edge of channel A to level `a` while B stands at `b`."""
+        """An edge of channel A to level `a` while B is at `b`."""
         self.board.inbox.push(
             self.now + after_ns,
             256,

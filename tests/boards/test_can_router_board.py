@@ -47,7 +47,7 @@ def test_the_count_follows_the_routers_own_crystal():
 
 
 def errors_but_the_first(board):
-    """Errors of the router beside the SSP_LOW_RATE of its first tick, before which no exchange can have been."""
+    """Errors of the router other than the SSP_LOW_RATE of its first tick, before which no exchange can have been."""
     assert board.errors.totals[errors.SSP_LOW_RATE] == 1
     return sum(board.errors.totals) - 1
 

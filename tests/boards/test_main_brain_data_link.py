@@ -26,7 +26,7 @@ PASS_NS = 22_000_000
 
 
 class Desk:
-    """The computer's end of the line, by hand. `run_ms` passes time, `segments` is what came, `send` what goes."""
+    """The computer's end of the line, by hand. `run_ms` passes time, `segments` is what arrived, `send` what goes."""
 
     def __init__(self, quirks=None):
         self.board = MainBrainBoard(Crystal(), quirks if quirks is not None else Quirks())

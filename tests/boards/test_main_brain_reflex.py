@@ -54,7 +54,7 @@ class Script:
 
 
 class Oracle:
-    """PaperGait told where the legs are; `amperes`: hip, outer, inner, before any limit."""
+    """PaperGait with given positions of the legs; `amperes`: hip, outer, inner, before any limit."""
 
     def __init__(self) -> None:
         self.gait = PaperGait({**PaperGait.ROBUST, "push_s": 0.019})  # it leaves when more has passed: at 20 ms

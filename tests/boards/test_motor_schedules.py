@@ -490,7 +490,7 @@ def test_the_receive_ring_holds_63_frames(report):
 
 
 def stalled(quirks, frames):
-    """The hip after a task of 4 ms during which `frames` frames came, 50 us apart, and 20 ms more."""
+    """The hip after a task of 4 ms during which `frames` frames arrived, 50 us apart, and 20 ms more."""
     bench = Bench("MCH", quirks, sync=False).run(ms=3)
     task = bench.board.scheduler.find("hb_beat")
     cost, task.cost = task.cost, 4 * 60_000

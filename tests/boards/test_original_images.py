@@ -1,4 +1,4 @@
-"""Our motor boards beside the robot's own firmware of 2016: the same stimulus, frame by frame."""
+"""Our motor boards compared with the robot's own firmware of 2016: the same stimulus, frame by frame."""
 
 import functools
 

@@ -1,4 +1,4 @@
-"""What boards publish: lines of a room's table, laid out as the master table says; and how a variable is added."""
+"""What boards publish: lines of a package's table, laid out as the master table says; and how a variable is added."""
 
 import os
 import pathlib
@@ -105,10 +105,10 @@ def test_an_error_goes_out_only_while_one_waits_with_the_stamp_of_its_first_time
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (lines()[:1] + lines()[2:], "LEG: line 2 of what is sent is ERROR_LEG in the board's room; .* it is KEYS"),
-        (lines()[:3], r"line 4 of what is sent is no more in the board's room; .* it is \(sweep\)"),
-        ([*lines(), Send("SPEED", 1.0, 1, 2)], "line 5 of what is sent is SPEED in the board's room; .* it is no more"),
-        ([lines()[1], lines()[0], *lines()[2:]], "line 1 of what is sent is KEYS in the board's room; .* it is ANGLE"),
+        (lines()[:1] + lines()[2:], "LEG: line 2 of what is sent is ERROR_LEG in the board's package; .* has KEYS"),
+        (lines()[:3], r"line 4 of what is sent is no more in the board's package; .* has \(sweep\)"),
+        ([*lines(), Send("SPEED", 1.0, 1, 2)], "line 5 of what is sent is SPEED in the board's .* has no more"),
+        ([lines()[1], lines()[0], *lines()[2:]], "line 1 of what is sent is KEYS in the board's package; .* has ANGLE"),
     ],
     ids=["missing", "missing at the end", "too many", "another order"],
 )
@@ -121,7 +121,7 @@ def test_a_line_that_is_not_the_tables_is_refused_by_its_place_and_name(given, m
 
 
 def copy_of_the_house(folder):
-    """The package and its rooms, without what was built."""
+    """The packages without what was built."""
     unwanted = shutil.ignore_patterns("__pycache__", "*.so", "build_record.json", "*.c")
     for name in ("ranger_sim", *packages(), "profiles"):
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=unwanted)
@@ -135,7 +135,7 @@ def edit(path, before, after):
 
 
 def run(folder, *arguments):
-    """Python in the copy, which knows nothing of the house that it was copied from."""
+    """Python in the copy, which knows nothing of the repository that it was copied from."""
     environment = os.environ | {"RANGER_SIM_INTERPRETED": "1", "PYTHONPATH": str(folder)}
     return subprocess.run(
         [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
@@ -156,7 +156,7 @@ while board.outbox.take():
 
 
 def test_adding_a_variable_takes_a_line_a_name_in_a_row_and_a_send_and_nothing_else(tmp_path):
-    """The three steps of "How to add a variable", on a copy; what is forgotten is told at once."""
+    """The three steps of "How to add a variable", on a copy; what is forgotten is reported at once."""
     house = copy_of_the_house(tmp_path)
     generate = ("-m", "ranger_sim", "table", "generate")
     with open(house / "datatable/master/variables.csv", "a", encoding="utf-8") as variables:
@@ -167,7 +167,7 @@ def test_adding_a_variable_takes_a_line_a_name_in_a_row_and_a_send_and_nothing_e
     done = run(house, *generate)
     assert done.returncode == 0, done.stderr
     forgotten = run(house, "-c", HEAR_A_NEW_VARIABLE)
-    assert "line 2 of what is sent is MCH_ANG_RATE in the board's room" in forgotten.stderr
+    assert "line 2 of what is sent is MCH_ANG_RATE in the board's package" in forgotten.stderr
     hip = house / "boards/hip.py"
     line = re.search(r'^ *Send\("MCH_ANGLE".*\n', hip.read_text(encoding="utf-8"), re.MULTILINE).group(0)
     edit(hip, line, line + " " * 16 + 'Send("MCH_SPIKES", lambda: board.encoder.value, 260, 400),\n')

@@ -1,4 +1,4 @@
-"""The user interface board whole: what it sends, shows, sounds and hears; alone on the table."""
+"""The user interface board whole: what it sends, shows, sounds and receives; alone on the table."""
 
 import pathlib
 import struct

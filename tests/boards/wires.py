@@ -68,7 +68,7 @@ class Wires:
                 raise AssertionError("no board aborts a frame")
 
     def frame(self, time, bus, identifier, word0=0, word1=0, flags=8):
-        """A frame of somebody else, whole at `time`."""
+        """A frame of another node, whole at `time`."""
         self.board.inbox.push(time, STAGE_BUS * 256, CAN_RX, bus, identifier, flags, word0, word1)
 
     def pin(self, time, pin, level):

@@ -1,4 +1,4 @@
-"""A CAN bus bit by bit, as ISO 11898-1 tells a node what to do: slow, and independent of `ranger_sim.can_bus`.
+"""A CAN bus bit by bit, as ISO 11898-1 describes each node: slow, and independent of `ranger_sim.can_bus`.
 
 Every node samples the one level of the bus in every bit and decides from that alone what it drives in the next one. No
 frame is known as a whole to anybody but its sender. Levels: 0 dominant, 1 recessive. Classical frames only; standard
@@ -483,7 +483,7 @@ def arbitration_key(frame):
 
 
 class Bus:
-    """Nodes on a wire. `inverted`: numbers of the bits that everybody samples inverted."""
+    """Nodes on a wire. `inverted`: numbers of the bits that every node samples inverted."""
 
     def __init__(self, nodes):
         self.nodes = nodes

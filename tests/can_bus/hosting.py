@@ -57,7 +57,7 @@ def hosted(*channels, name=None, speed=1.0, servers=(), **options):
 
 
 class Program:
-    """A program in a process of its own, on pipes or (terminal=True) on a pseudo-terminal of 120 x 40.
+    """A program in a separate process, on pipes or (terminal=True) on a pseudo-terminal of 120 x 40.
 
     together: standard error comes with the output.
     """
@@ -111,7 +111,7 @@ class Program:
             self.text += data.decode("utf-8", "replace")
 
     def errors(self):
-        """What the program has said on standard error; it must be about to end."""
+        """What the program has written to standard error; it must be about to end."""
         if self.process.poll() is None:
             self.process.kill()
         return self._said()

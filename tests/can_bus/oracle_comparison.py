@@ -41,7 +41,7 @@ STATES = {OPERATING: "on", RESET: "off", BUS_OFF: "bus-off"}
 @dataclasses.dataclass(frozen=True)
 class Scenario:
     """`requests`: (first bit at which it may start, node, Frame with its buffer 1 ... 3). `counters`: (transmit
-    errors, receive errors) of each node at the start. `inverted`: bits that everybody samples inverted. `modes`: (bit,
+    errors, receive errors) of each node at the start. `inverted`: bits that every node samples inverted. `modes`: (bit,
     node, OPERATING or RESET): what the program asks for just before that bit."""
 
     nodes: int

@@ -18,7 +18,7 @@ def seen(node, what):
 
 
 def error_end(bus, first):
-    """The bit at which every node stands in intermission for the first time after `first`."""
+    """The bit at which every node is in intermission for the first time after `first`."""
     while bus.bit <= first or any(node.state != "intermission" for node in bus.nodes):
         bus.step()
     return bus.bit

@@ -1,7 +1,7 @@
-"""Bounds on response times beside what they are by definition, in exact fractions of a bit and by listing releases.
+"""Bounds on response times compared with their definition, in exact fractions of a bit and by listing releases.
 
 `equations` is equations 7 to 11 of Davis, Burns, Bril, Lukkien 2007, for frames that have buffers to themselves.
-`Listed` is the analysis of queues and trains as the module's text tells it, with every release of some cycles in a list
+`Listed` is the analysis of queues and trains as in the module's docstring, with every release of some cycles in a list
 where the module counts by distances kept in order.
 """
 
@@ -207,7 +207,7 @@ def test_as_many_frames_of_a_queue_wait_as_are_released_within_its_longest_respo
 
 
 def test_what_has_no_bound_in_a_queue_gives_none_to_those_above_it():
-    """Its frames may come in any number at once, since nobody knows how long they waited."""
+    """Its frames may come in any number at once, since it is unknown how long they waited."""
     full = [message("high", 1, MS, queue="q"), message("low", 50, 136_000, queue="q")]  # 13.5 and 99.3 %
     above = message("above", 20, 5 * MS)
     bounds = response_times([*full, above], 1_000_000)

@@ -368,7 +368,7 @@ def test_noise_can_be_switched_off_and_its_rate_is_checked():
 
 @pytest.mark.parametrize("flags", [8, 5, 1, 0, 8 | FLAG_EXTENDED])
 def test_a_frame_that_is_hit_anywhere_is_hit_in_its_middle_or_behind_its_arbitration(flags):
-    """The bit that is told is the middle one of an odd number of bits, of an even number the one before the middle."""
+    """The reported bit is the middle one of an odd number of bits, of an even number the one before the middle."""
     lengths = set()
     for lo in range(12):
         wired = Wired(2)

@@ -100,7 +100,7 @@ class BusMachine(RuleBasedStateMachine):
         self.wired.bus.inject_errors(count)
 
     def read(self):
-        """Compare what came out since the last time with the model."""
+        """Compare the new output since the last time with the model."""
         for time, identifier, flags, lo, _hi, node in self.wired.log():
             if flags & FLAG_ERROR:
                 if lo == FIELD_END:

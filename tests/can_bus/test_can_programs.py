@@ -1,4 +1,4 @@
-"""Programs of others against our buses, each in a process of its own: python-can's and cantools' command lines."""
+"""Programs of others against our buses, each in a separate process: python-can's and cantools' command lines."""
 
 import pathlib
 

@@ -39,7 +39,7 @@ ACTIVE_FLAG, INTERMISSION, DELIMITER, OVERLOAD_FLAG = 17, 18, 23, 28
 
 
 def met(frame, *inverted):
-    """{node: [(bit, field, kind, as a receiver)]} of the errors that each node told of."""
+    """{node: [(bit, field, kind, as a receiver)]} of the errors that each node reported."""
     inboxes = run_on_our_bus(Scenario(3, 400, ((START, SENDER, frame),), ((0, 0),) * 3, inverted))[1]
     found = {}
     for number, inbox in enumerate(inboxes):
@@ -98,7 +98,7 @@ def test_a_dominant_bit_in_a_delimiter_is_an_error_of_form_in_it():
 
 @pytest.mark.parametrize("first", [1, 2])
 def test_an_overload_flag_that_does_not_show_is_an_error_in_it(first):
-    """A dominant bit in one of the first two of the intermission calls for an overload frame of everybody."""
+    """A dominant bit in one of the first two of the intermission calls for an overload frame of every node."""
     behind = START + len(fields_of(STANDARD)) - 1 + first
     for n in range(1, 7):
         found = met(STANDARD, behind, behind + n)
@@ -116,7 +116,7 @@ def test_an_undisturbed_frame_and_an_overload_frame_are_no_errors():
 
 
 def test_a_captured_error_has_one_of_six_names_or_is_no_new_one():
-    """By field and kind of UM10114: 0 bit, 1 form, 2 stuff, 3 other; whatever else the interrupt word tells."""
+    """By field and kind of UM10114: 0 bit, 1 form, 2 stuff, 3 other; whatever else is in the interrupt word."""
     for rest in (0, ICR_RECEIVING, ICR_BUS_ERROR | 0x4, 0xFF000000 | ICR_RECEIVING | 0xFFFF):
 
         def name(field, kind, rest=rest):

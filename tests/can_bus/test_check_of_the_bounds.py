@@ -1,4 +1,4 @@
-"""The check of the bounds checked: sets, releases, what is played and what is counted, beside hand-made answers."""
+"""The check of the bounds checked: sets, releases, what is played and what is counted, by hand-made answers."""
 
 import dataclasses
 import itertools
@@ -123,7 +123,7 @@ def test_frames_answer_in_the_order_of_their_identifiers_with_the_intermission_b
 
 
 def test_a_queue_sends_two_at_once_by_priority_and_the_rest_in_its_order():
-    """Four of one queue at one instant, last priority first: two buffers take two, of which the better wins."""
+    """Four of one queue at one time, last priority first: two buffers take two, of which the better wins."""
     senders = [sender(f"m{n}", 0x400 - n * 0x100, queue="q") for n in range(4)]
     bits = [length(each.identifier, 0) for each in senders]
     worst = play(senders, RATE, [[(0, 0)]] * 4)
@@ -215,7 +215,7 @@ def test_a_train_begins_with_the_message_or_with_its_first_priority():
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Contents are not searched for, which takes most of the time: those that a set asks for can be told."""
+    """Contents are not searched for, which takes most of the time: those that a set asks for can be given."""
     monkeypatch.setattr(bound_check, "longest_content", lambda identifier, flags: (identifier & 0xFFFF, flags))
 
 

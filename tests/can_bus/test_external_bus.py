@@ -134,7 +134,7 @@ def test_a_flood_is_counted_and_does_not_run_ahead(bus):
 
 
 def test_a_frame_of_the_bus_is_recorded_once(bus):
-    """The first peer hears what others send; what it sends itself it does not hear, so that is recorded as it goes."""
+    """The first peer receives what others send, but not its own frames, so these are recorded as it sends them."""
     bus.peers[0].from_board(CAN_REQUEST, 0, 1, 0x101, 8, 1, 2)
     bus.peers[1].from_board(CAN_REQUEST, 0, 1, 0x102, 8, 3, 4)
     bus.wires[0].to_read = bus.wires[1].sent[:]
@@ -264,7 +264,7 @@ def test_only_the_first_peer_counts_for_the_load(bus):
 
 
 def test_an_interface_with_a_file_is_read_when_that_says_so(bus):
-    """A pipe stands for a socket: `recv` is asked only when something lies in it."""
+    """A pipe represents a socket: `recv` is asked only when something lies in it."""
     reading, writing = os.pipe()
     asked = []
 

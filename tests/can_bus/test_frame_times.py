@@ -1,4 +1,4 @@
-"""When each frame was asked for, began and ended, as a bus tells it; and that telling changes nothing."""
+"""When each frame was asked for, began and ended, as a bus reports it; and that reporting changes nothing."""
 
 import array
 

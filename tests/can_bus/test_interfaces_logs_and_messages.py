@@ -394,7 +394,7 @@ def test_below_10000_a_bit_rate_is_in_kbit_s(tmp_path, told, rate):
 def test_a_dbc_file_without_a_rate_or_with_can_fd_is_refused(tmp_path):
     path = tmp_path / "net.dbc"
     path.write_text(DBC.replace("RATE", "0"))
-    with pytest.raises(UserError, match=r"net.dbc: says nothing of the bit rate .*--bit-rate"):
+    with pytest.raises(UserError, match=r"net.dbc: has no bit rate .*--bit-rate"):
         dbc.read_messages(path, None)
     assert dbc.read_messages(path, 250_000)[1] == 250_000
     path.write_text(DBC.replace("RATE", "500").replace("SILENT: 1", "SILENT: 9"))

@@ -154,7 +154,7 @@ def test_a_welcome_may_come_in_pieces_with_more_behind_it(monkeypatch, cut):
 @pytest.mark.parametrize(
     ("pieces", "words"),
     [
-        ([], "'name' ended the connection without a word"),
+        ([], "'name' ended the connection without a message"),
         ([struct.pack("<IB", 4, 3) + b"why"], "why"),
         ([struct.pack("<IB", 1, 5)], "'name' does not speak the attach protocol"),
         ([struct.pack("<IBHHI", 9, 2, 1, 64, 5)], "'name' does not speak the attach protocol"),
@@ -850,7 +850,7 @@ def test_interfaces_are_opened_as_the_table_says(monkeypatch):
 
 
 class Air:
-    """An interface of the test: every other bus hears each message but for each `lose`-th, and every `swap`-th late."""
+    """An interface of the test: every other bus receives each message but each `lose`-th, and every `swap`-th late."""
 
     def __init__(self, lose=0):
         self.buses, self.lose, self.count, self.sent = [], lose, 0, []

@@ -1,4 +1,4 @@
-"""The parts of a bus beside plain second derivations: load by listing bits, lists of what waits, states by field."""
+"""The parts of a bus against plain second derivations: load by listing bits, lists of what waits, states by field."""
 
 import array
 import dataclasses
@@ -433,7 +433,7 @@ def test_bit_rates_have_two_limits(rate, fits):
 
 @pytest.mark.parametrize("kind", comparison.KINDS)
 def test_a_bus_that_is_asked_only_when_it_wants_to_be_does_the_same(kind):
-    """`next_time` is all that the harness goes by: between two of its instants nothing needs the bus."""
+    """`next_time` is all that the harness goes by: between two of its times nothing needs the bus."""
     for seed in range(4):
         scenario = comparison.scenario_of(kind, seed)
         if kind == "recovery":

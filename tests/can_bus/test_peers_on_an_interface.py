@@ -1,4 +1,4 @@
-"""An external bus in figures: every frame in and out, and every count, beside what its bits and its limits give."""
+"""An external bus in figures: every frame in and out, and every count, compared with its bits and its limits."""
 
 import errno
 import os
@@ -73,7 +73,7 @@ class Wire:
 
 
 class Outside:
-    """An external bus with two peers, `wires` and `inboxes` by peer, and the frames that its sink has heard."""
+    """An external bus with two peers, `wires` and `inboxes` by peer, and the frames that its sink has received."""
 
     def __init__(self, rate=1_000_000, peers=2):
         self.wires, self.heard = [], []

@@ -1,4 +1,4 @@
-"""Clients of a bus, event by event: how frames are laid into three buffers, what is told, who is seen off."""
+"""Clients of a bus, event by event: how frames are laid into three buffers, what is reported, who is seen off."""
 
 import struct
 
@@ -220,7 +220,7 @@ def test_what_has_not_come_by_now_is_left_for_later():
 
 
 def error(event):
-    """(classes, bytes) of an error frame told to a client."""
+    """(classes, bytes) of an error frame sent to a client."""
     kind, _, classes, flags, low, high = event
     assert (kind, flags) == (RECEIVED, 8 | FLAG_ERROR)
     return classes, struct.pack("<II", low, high)

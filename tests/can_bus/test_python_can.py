@@ -283,7 +283,7 @@ def test_who_joins_a_private_bus_cannot_change_it(bus):
     bus(bitrate=250_000, speed="max")
     bus(bitrate="250000", speed="max")
     with pytest.raises(
-        can.CanInitializationError, match="open with bitrate 250000, not 500000: who opens it first sets it"
+        can.CanInitializationError, match="open with bitrate 250000, not 500000: the first to open it sets it"
     ):
         bus(bitrate=500_000)
     with pytest.raises(can.CanInitializationError, match="open with speed 0, not 1"):

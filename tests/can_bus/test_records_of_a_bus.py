@@ -1,4 +1,4 @@
-"""What a bus counts, logs and times beside what the oracle of ISO 11898-1 saw happen, recomputed from its events.
+"""What a bus counts, logs and times against what the oracle of ISO 11898-1 saw happen, recomputed from its events.
 
 A scenario counts here when it is over before its end: what a bus has decided beyond that the oracle does not know.
 """

@@ -1,4 +1,4 @@
-"""What the servers of a bus answer to each command, and how they tell each event: bytes and counts, without waiting.
+"""What the servers of a bus answer to each command, and how they report each event: bytes and counts, without waiting.
 
 Requests are laid where the terminal or the connection would put them, and answers taken from where they wait.
 """
@@ -171,7 +171,7 @@ def test_slcan_lines_may_come_in_pieces_and_empty_ones_are_no_command(line):
 
 @pytest.mark.parametrize(("length", "answer"), [(30, "\r"), (31, "\r"), (32, "\a"), (33, "\a"), (90, "\a")])
 def test_slcan_31_characters_wait_for_their_end_and_more_are_given_up(line, length, answer):
-    """LIMITS has 32 bytes for a command: so many that still have no end are forgotten, and a bell tells it then."""
+    """LIMITS has 32 bytes for a command: so many that still have no end are forgotten, and a bell reports it then."""
     assert LIMITS["slcan"].longest == 32
     assert line.say("S" + "0" * (length - 1)) == ""
     assert len(line.program.incoming) == (length if length < 32 else 0)
@@ -396,7 +396,7 @@ def test_socketcand_messages_may_come_in_pieces_with_space_around_them(daemon):
 
 def test_socketcand_a_bus_that_is_not_there_ends_the_connection(daemon):
     client = daemon.client()
-    assert daemon.say(client, "< open can7 >") == "< error could not open bus, there are can1 >"
+    assert daemon.say(client, "< open can7 >") == "< error could not open bus (available: can1) >"
     assert client.ending
     counted(daemon.server, refused=1, sent_away_malformed=1)
 

@@ -61,7 +61,7 @@ class Owner:
 
 @pytest.fixture
 def line():
-    """(owner, say): say(text) writes to the pseudo-terminal, lets time pass and returns what came back."""
+    """(owner, say): say(text) writes to the pseudo-terminal, lets time pass and returns the answer."""
     owner = Owner(lambda bus: SlcanServer("can1", bus))
     end = os.open(owner.server.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
@@ -98,7 +98,7 @@ def test_slcan_commands_have_the_answers_of_the_protocol(line):
     ("length", "answer"), [(31, "Z\r"), (32, "Z\r"), (33, "\a"), (64, "\a"), (65, "\a"), (200, "\a")]
 )
 def test_slcan_a_command_has_32_bytes_at_most_and_the_next_one_is_heard(line, length, answer):
-    """An extended frame has 26 and may carry a stamp behind it; what is longer is no command, however much comes."""
+    """An extended frame has 26 and may carry a stamp behind it; a longer line is not a command, at any length."""
     _, say = line
     say("O\r")
     frame = "T0000012380102030405060708"
@@ -215,7 +215,7 @@ def test_python_cans_slcan_client_meets_the_others():
 
 @pytest.fixture
 def daemon(monkeypatch):
-    """(owner, connect): connect() gives say(text) over a connection of its own."""
+    """(owner, connect): connect() gives say(text) over its own connection."""
     clock = [0.0]
     monkeypatch.setattr(wallclock, "monotonic_s", lambda: clock[0])
     owner = Owner(lambda bus: SocketcandServer({"can1": bus}, 0))
@@ -288,7 +288,7 @@ def test_socketcand_nothing_follows_the_answer_to_rawmode_at_once(daemon):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("< open can9 >", "could not open bus, there are can1"),
+        ("< open can9 >", "could not open bus (available: can1)"),
         ("< rawmode >", "rawmode is not understood"),
         ("< open can1 >< bcmmode >", "bcmmode is not understood"),
         ("< open can1 >< rawmode >< send 800 0 >", "impossible identifier"),

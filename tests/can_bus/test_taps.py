@@ -1,4 +1,4 @@
-"""Clients that leave a bus: what they had queued is still sent, for a while, if somebody is there to hear it."""
+"""Clients that leave a bus: what they had queued is still sent, for a while, if a node is there to receive it."""
 
 import pytest
 

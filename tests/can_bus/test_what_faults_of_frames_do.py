@@ -1,4 +1,4 @@
-"""Faults of frames one by one: which frames they take, what each node then has and is told, and when, by hand."""
+"""Faults of frames one by one: which frames they take, what each node then has and receives, and when, by hand."""
 
 import pytest
 from hypothesis import given, settings

@@ -79,7 +79,7 @@ class Grammar:
         return tag, block, repeated, inner
 
     def check(self, name, tokens):
-        """Raises AssertionError unless `tokens`, what stands in a block of this name, is what the grammar allows."""
+        """Raises AssertionError unless `tokens`, what is in a block of this name, is what the grammar allows."""
         end = match(self.blocks[name], tokens, 0)
         assert end == len(tokens), f"IF_DATA: {tokens[end : end + 4]} is not allowed here"
 

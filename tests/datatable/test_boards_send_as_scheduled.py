@@ -1,4 +1,4 @@
-"""boards.toml against the firmware: each board runs alone on a bench, and what it sends is laid beside its lists.
+"""boards.toml against the firmware: each board runs alone on a bench, and what it sends is compared with its lists.
 
 Nothing is read out of the boards' tables but the numbers of slots, rows and entries: the names are those of the
 frames that come out.

@@ -60,7 +60,7 @@ def test_the_robot_runs_on_it_and_carries_what_ours_has_not(mine):
 def test_a_table_that_changed_after_its_code_was_made_is_refused(mine, monkeypatch):
     datatable.check_own_table()  # nobody's own: nothing to say
     monkeypatch.setattr(loading, "OWN_TABLE", mine)
-    with pytest.raises(UserError, match=r"mine: changed since its code was made: .*--master"):
+    with pytest.raises(UserError, match=r"mine: changed after code generation: .*--master"):
         datatable.check_own_table()
 
 
@@ -72,4 +72,4 @@ def test_a_folder_without_generated_code_is_named(tmp_path, monkeypatch):
 
 def test_a_copy_never_goes_over_a_folder_that_is_there(tmp_path, capsys):
     assert cli.main(["table", "copy", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"ranger-sim: {tmp_path}: File exists: the copy needs a folder of its own\n"
+    assert capsys.readouterr().err == f"ranger-sim: {tmp_path}: File exists: the copy needs a new folder\n"

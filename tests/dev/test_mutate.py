@@ -1,4 +1,4 @@
-"""The mutation tool: which faults it makes, how it draws them, and that it tells noticed ones from survivors."""
+"""The mutation tool: which faults it makes, how it draws them, and that it separates noticed ones from survivors."""
 
 import dataclasses
 import pathlib
@@ -161,7 +161,7 @@ def test_mutants_that_are_listed_as_equivalent_exist_and_have_reasons(tmp_path):
     with pytest.raises(UserError, match="an entry has key and reason"):
         work.known(listed)
     listed.write_text('[[mutant]]\nkey = "a"\nreason = "b"\n' * 2, encoding="utf-8")
-    with pytest.raises(UserError, match="stands there twice"):
+    with pytest.raises(UserError, match="is listed twice"):
         work.known(listed)
 
 
@@ -262,7 +262,7 @@ def test_mutants_are_noticed_or_survive_in_a_copy_and_verdicts_are_kept(tried):
 
 
 def test_a_mutant_is_noticed_as_well_by_a_second_server_that_has_a_map_already(house, tried, monkeypatch):
-    """It must have imported everything when the first mutant is put into a file; folders may be told from here."""
+    """It must have imported everything when the first mutant is put into a file; folders may be given from here."""
     monkeypatch.chdir(house.parent)
     copy = work.Copy(pathlib.Path("work/copy"), house)
     (copy.folder / "seen").unlink()

@@ -13,7 +13,7 @@ TICK_NS = 1_416  # 85 cycles at 60 MHz, rounded down
 
 
 class Log:
-    """Tasks and handlers that note (name, instant), and the chip they run on."""
+    """Tasks and handlers that note (name, time), and the chip they run on."""
 
     def __init__(self, crystal=None, hz=FULL_SPEED_HZ):
         self.chip = Microcontroller("TEST", hz, crystal)

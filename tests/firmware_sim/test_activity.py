@@ -270,7 +270,7 @@ def test_a_log_that_is_taken_off_gets_no_more_rows():
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_busy_board_does_the_same_with_a_log_and_without(seed):
-    """Every instant of every task and handler, every message, and the final records."""
+    """Every time of every task and handler, every message, and the final records."""
     log = ActivityLog()
     assert run(seed, 20_000_000, log)[0] == run(seed, 20_000_000)[0]
     assert log.written > 1000

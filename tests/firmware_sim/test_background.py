@@ -1,4 +1,4 @@
-"""What a chip's main loop does beside the scheduler."""
+"""What a chip's main loop does in addition to the scheduler."""
 
 from ranger_sim.firmware_sim.activity import MAIN_LOOP_RAN
 from ranger_sim.foundation.events import CAN_RX

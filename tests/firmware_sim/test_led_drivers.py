@@ -26,7 +26,7 @@ class Chain:
         return self.drivers.on_select(level)
 
     def send(self, *words):
-        """Words between two edges of the select pin; returns what came back."""
+        """Words between two edges of the select pin; returns the answer."""
         assert not self.select(0)
         came = [self.port.word(word) for word in words]
         assert self.select(1)

@@ -20,7 +20,7 @@ def test_only_peripherals_can_be_reached_from_outside():
         lambda: chip.claim_pin(3, 0, object()),
         lambda: chip.new_alarm(object(), 0),
     ):
-        with pytest.raises(UserError, match="no Peripheral"):
+        with pytest.raises(UserError, match="not a Peripheral"):
             connect()
 
 

@@ -46,7 +46,7 @@ def sent(chip):
 
 
 def served(chip, kind, index, slot=1):
-    """Attach a handler to a source; the list of instants at which it is served."""
+    """Attach a handler to a source; the list of times at which it is served."""
     times = []
     chip.vic.attach(kind, index, lambda queue: times.append(chip.now), cost=0, slot=slot, latency=0)
     return times
@@ -573,7 +573,7 @@ def test_a_segment_that_comes_in_interrupts_and_is_taken_once():
     "make, told",
     [
         (lambda chip: TimerCapture(chip, period=0), "period 0"),
-        (lambda chip: TimerCapture(chip, period=7), "no whole number of ns"),
+        (lambda chip: TimerCapture(chip, period=7), "not a whole number of ns"),
         (lambda chip: TimerCapture(chip).use_channel(4, 22), "channel 4"),
         (lambda chip: TimerCapture(chip).use_channel(0, 64), "pin 64"),
         (lambda chip: [TimerCapture(chip).use_channel(0, 22) for _ in range(2)], "pin 22 is claimed twice"),

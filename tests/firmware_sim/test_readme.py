@@ -1,4 +1,4 @@
-"""The example board of firmware_sim/README.md is run as it stands there."""
+"""The example board of firmware_sim/README.md is run as written there."""
 
 import contextlib
 import io

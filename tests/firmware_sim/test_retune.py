@@ -1,4 +1,4 @@
-"""A crystal that runs otherwise from an instant on: slots, timers, cycles and serial lines go on at the new rate."""
+"""A crystal that runs otherwise from a time on: slots, timers, cycles and serial lines go on at the new rate."""
 
 import pytest
 

@@ -390,7 +390,7 @@ def test_a_schedule_that_names_no_speakers_promises_silence_only_until_the_next_
 
 
 def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_them():
-    """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 has none of its own."""
+    """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 is empty."""
     chip = speaking(speakers=("b",)).chip
     assert chip.speaks_from() == 10_000  # a before the first b of the slot that begins at 0
     chip.advance(TICK_NS + 5_000)
@@ -433,7 +433,7 @@ def test_a_replaced_function_may_speak_whatever_the_schedule_said():
 
 def test_a_speaker_that_is_no_task_of_every_slot_is_refused():
     log = Log()
-    with pytest.raises(UserError, match="speaker 'x' is no task of every slot; there are a, b"):
+    with pytest.raises(UserError, match=r"speaker 'x' is not a task of every slot \(available: a, b\)"):
         Schedule(every=(log.task("a", 1),), last=(log.task("b", 1),), speakers=("x",))
 
 

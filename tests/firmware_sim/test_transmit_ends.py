@@ -1,4 +1,4 @@
-"""The ends of transmissions, written by the bus beforehand or sent as messages: a program cannot tell which."""
+"""The ends of transmissions, written by the bus beforehand or sent as messages: a program sees no difference."""
 
 import pytest
 
@@ -27,7 +27,7 @@ TRANSMIT_INTERRUPTS = (0, ICR_TI1, ICR_TI2, ICR_TI3, ICR_TI1 | ICR_TI2 | ICR_TI3
 class Sender:
     """A board whose slots do anything to its controller at random, on a bus with errors and a rival.
 
-    `seen`: what it read, each with the instant.
+    `seen`: what it read, each with the time.
     """
 
     def __init__(self, seed, beforehand):

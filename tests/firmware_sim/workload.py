@@ -1,6 +1,6 @@
 """A board with every peripheral under seeded random inputs; `python -m tests.firmware_sim.workload` prints a digest.
 
-The digest covers every instant of every task and handler, every message sent, and the final records.
+The digest covers every time of every task and handler, every message sent, and the final records.
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""What peers may ask: bytes and requests of a look, answers that nobody takes, places, and whose they are."""
+"""What peers may ask: bytes and requests of a poll, answers that no peer reads, places, and their owners."""
 
 import os
 import socket
@@ -183,7 +183,7 @@ def test_all_places_taken_by_partakers_one_more_is_told_and_closed(door):
 
 
 def test_who_knocks_without_end_is_taken_in_at_a_rate_and_keeps_nobody_waiting(door):
-    """250 in a second of the wall clock: 1 in 4 ms. Connections once ate the room of requests."""
+    """250 in a second of the wall clock: 1 in 4 ms. Connections once used up the share of requests."""
     now = [0.0]
     door.clock = lambda: now[0]
     modest = door.connect()

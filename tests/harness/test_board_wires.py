@@ -42,7 +42,7 @@ class Ends(Board):
 
 
 class Line:
-    """Something outside that hears a board."""
+    """Something outside that receives a board."""
 
     def __init__(self):
         self.heard = []
@@ -61,7 +61,7 @@ def wires():
 
 
 def on_a_bus(wires, controller=1):
-    """The bus at a controller of the board, with another node that hears; that one's inbox."""
+    """The bus at a controller of the board, with another node that receives; that one's inbox."""
     bus = Bus("can1", MBIT)
     inboxes = [EventQueue(), EventQueue()]
     nodes = [bus.add_node(name, inbox, 1, 500 + n) for n, (name, inbox) in enumerate(zip("ab", inboxes, strict=True))]
@@ -156,7 +156,7 @@ def test_a_controller_moves_from_one_bus_to_another_and_off_it(wires):
     wires.push(1_000_001, 0, events.CAN_REQUEST, 1, 1, 0x100, 8, 0, 0)
     second.advance(2_000_000)
     assert second.counters.frames == 1
-    with pytest.raises(UserError, match="MCH: 'can1' is no Bus"):
+    with pytest.raises(UserError, match="MCH: 'can1' is not a Bus"):
         wires.connect_bus(1, "can1", 0)
 
 

@@ -1,4 +1,4 @@
-"""A branch that dies, raises or hangs is a result, and harms nobody."""
+"""A branch that dies, raises or hangs is a result, and harms no other."""
 
 import os
 import signal
@@ -58,7 +58,7 @@ def test_a_branch_that_dies_while_it_tells_has_crashed():
         branching.os.fdopen = half  # in the forked process alone
         return {}
 
-    with pytest.raises(BranchError, match="its process ended with -9 while it told its result") as error:
+    with pytest.raises(BranchError, match="its process ended with -9 while it sent its result") as error:
         branched(work)
     assert error.value.outcome == "crashed"
 

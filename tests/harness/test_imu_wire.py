@@ -11,7 +11,7 @@ from ranger_sim.ranger.robot import Ranger
 
 @pytest.fixture
 def sent():
-    """What the board's inbox holds of bytes that left the unit at these instants (ns): (time, count, bytes)."""
+    """What the board's inbox holds of bytes that left the unit at these times (ns): (time, count, bytes)."""
     robot = Ranger()
     unit, board = robot.plant.imu, robot.board("UI")
 

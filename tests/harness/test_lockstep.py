@@ -63,7 +63,7 @@ def test_a_board_that_hears_in_its_slots_misses_nothing_by_running_later():
 
 
 def test_whoever_looks_between_two_runs_finds_every_board_up_to_date():
-    """Within a run a board that has only heard something is left alone, over many steps of the plant."""
+    """Within a run a board that has only received something is not stepped, over many steps of the plant."""
     robot = Ranger(Scenario())
     for _ in range(40):  # some slices end between a frame and the slot that reads it
         robot.run(StopRule(time_s=RUN_S), 0.000_31)
@@ -76,7 +76,7 @@ def test_whoever_looks_between_two_runs_finds_every_board_up_to_date():
 
 
 def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_hears_in_its_slots(monkeypatch):
-    """Its error interrupt writes the controller's mode register: what the bus tells of errors is urgent.
+    """Its error interrupt writes the controller's mode register: the bus's reports of errors are urgent.
 
     An error shows within a bit (333 ns), so only windows shorter than that leave no freedom at all here.
     """
@@ -139,7 +139,7 @@ class IdleBoard(Board):
         return NEVER
 
     def listen_to_edges(self, buffer, pin, partner_pin):
-        """Nobody looks at them."""
+        """No test reads them."""
 
 
 def test_any_kind_of_board_may_take_the_place_of_an_emulated_one():
@@ -156,5 +156,5 @@ def test_a_board_with_another_inbox_or_of_another_name_takes_no_place():
     robot = Ranger(Scenario())
     with pytest.raises(UserError, match="the inbox of the new MCH is not that of the one whose place it takes"):
         robot.loop.replace(IdleBoard("MCH"))
-    with pytest.raises(UserError, match="no board is called NOPE"):
+    with pytest.raises(UserError, match="no board is named NOPE"):
         robot.loop.replace(IdleBoard("NOPE"))

@@ -132,7 +132,7 @@ def test_waiting_in_vain_says_what_was_nearest_and_why_it_ended(firmware):
 @pytest.mark.parametrize(
     ("wiring", "line"),
     [
-        (Wiring(can=[CanWire("MIDDLE", 1, 1)]), "there is no board 'MIDDLE', but LEFT, RIGHT"),
+        (Wiring(can=[CanWire("MIDDLE", 1, 1)]), r"unknown board 'MIDDLE' \(available: LEFT, RIGHT"),
         (Wiring(can=[CanWire("LEFT", 1, 2)]), "there are buses 1 to 1"),
         (Wiring(encoders=[EncoderWire(1, "LEFT", "a", "b")], names={"LEFT": {"a": 1, "b": 2}}), "the plant has 1"),
         (Wiring(encoders=[EncoderWire(0, "LEFT", "a", "c")], names={"LEFT": {"a": 1}}), "LEFT has no 'c', but a"),
@@ -179,7 +179,7 @@ def test_a_fault_of_the_machines_own_acts_from_its_condition_on_for_its_length(f
 @pytest.mark.parametrize(
     ("asked", "line"),
     [
-        ({"most": 3}, "fault LEFT.encoder:no_edges: there is no parameter 'most', but least"),
+        ({"most": 3}, r"fault LEFT.encoder:no_edges: unknown parameter 'most' \(available: least"),
         ({"least": 0}, "fault LEFT.encoder:no_edges: least is 0, allowed are 1 to 100 edges"),
         ({"at": "hip in HI_premid"}, "it reads like 12.3 s, angle_rad > 0.3, or ended"),
     ],

@@ -117,7 +117,7 @@ def test_an_external_router_with_the_main_brain_is_allowed_and_alone_is_not(tmp_
     [
         ('[boards]\nMCH = "real"\n', "boards.MCH", "'real'", "emulated, external, absent"),
         ('[boards]\nMCX = "absent"\n', "boards.MCX", "'absent'", "the boards are MCH"),
-        ('[boards]\nCSR = "absent"\n', "boards.CSR", "'absent'", "reaches nobody"),
+        ('[boards]\nCSR = "absent"\n', "boards.CSR", "'absent'", "reaches no board"),
         ('[boards]\nMCH = "external"\n', "boards.MCH", "'external'", "can1, which is emulated"),
         ("[boards]\nMCH = 3\n", "boards.MCH", "3", "expected"),
         ('boards = "all"\n', "boards", "'all'", "table"),
@@ -128,7 +128,7 @@ def test_an_external_router_with_the_main_brain_is_allowed_and_alone_is_not(tmp_
         ("[buses.can1]\nbit_rate = true\n", "buses.can1.bit_rate", "True", "whole number"),
         ('[buses.can1]\nschedule = "slow"\n', "buses.can1.schedule", "'slow'", "1mbit, full"),
         ('[buses.can1]\nschedule = "../../x"\n', "buses.can1.schedule", "'../../x'", "no such schedule"),
-        ('[buses.can1]\nchannel = "can0"\n', "buses.can1.channel", "'can0'", "without interface"),
+        ('[buses.can1]\nchannel = "can0"\n', "buses.can1.channel", "'can0'", "needs `interface`"),
         ('[buses.can1]\ninterface = "socketcan"\nbit_rate = 500000\n', "buses.can1.channel", "None", "missing"),
         (
             ON_CAN0.replace("socketcan", "sockets"),

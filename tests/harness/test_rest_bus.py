@@ -1,4 +1,4 @@
-"""Frames of absent boards, counted and timed from the master table and the bus schedule by a reader of its own."""
+"""Frames of absent boards, counted and timed from the master table and the bus schedule by its own reader."""
 
 import collections
 import dataclasses
@@ -23,7 +23,7 @@ def absent(*names):
 
 
 def sent(rest, until_ns, step_ns=MS):
-    """Every frame until then, taken in steps."""
+    """Every frame before that time, taken in steps."""
     found = []
     now = START
     while now < until_ns:

@@ -86,8 +86,8 @@ def test_nineteen_frames_come_within_three_quarters_of_their_time_only_when_they
         (2.0, None),
         (-1.0001, "out of range: -1.0001 is outside -1 ... 2 rad"),
         (2.001, "out of range: 2.001 is outside -1 ... 2 rad"),
-        (math.inf, "out of range: inf is no number"),
-        (math.nan, "out of range: nan is no number"),
+        (math.inf, "out of range: inf is not a number"),
+        (math.nan, "out of range: nan is not a number"),
     ],
 )
 def test_a_value_may_be_its_limit(value, told):

@@ -28,7 +28,7 @@ MS = 1_000_000
 
 
 class Inbox:
-    """Hears what a line pushes."""
+    """Receives what a line pushes."""
 
     def __init__(self):
         self.messages = []

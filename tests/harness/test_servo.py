@@ -27,7 +27,7 @@ needs_a_compiler = pytest.mark.skipif(not COMPILER, reason="no C compiler is ins
 
 
 def said(program, **environment):
-    """What a program printed, run beside the servo's own modules in a fresh process."""
+    """What a program printed, run with the servo's own modules in a fresh process."""
     import os
 
     done = subprocess.run(

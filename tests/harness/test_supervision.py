@@ -30,7 +30,7 @@ def having(base=None, **boards):
 
 
 def hip(until_ms=200, *, every=2, skip=(), value=0.1, stamp=lambda ms: ms, watch=None):
-    """A watch on the hip board that hears the time every ms and the angle every `every` ms."""
+    """A watch on the hip board that receives the time every ms and the angle every `every` ms."""
     watch = watch or supervision.Watch(having(MCH="external"))
     for ms in range(until_ms):
         watch.frame(ms * MS, "can1", SYNC, 8, ms, ms)

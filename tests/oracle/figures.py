@@ -123,7 +123,7 @@ def of_the_battery(body, capacity_Wh, nominal_V):
 
 
 def of_strike_delays(walk):
-    """From each strike to the main brain's flip of the swing leg, of which the table tells every 2 ms."""
+    """From each strike to the main brain's flip of the swing leg, which the table has every 2 ms."""
     flips, _ = walk.body.variable("E_SWING_LEG")
     strikes = walk.body.time_s[walk.strikes]
     flips = flips[flips > strikes[0]]
@@ -158,7 +158,7 @@ def of_a_bus(name, log, time_s):
 
 
 def of_errors(board, log, names):
-    """{path: (told, most that may wait)}: errors by the counts in a board's error frames (appendix 4.9)."""
+    """{path: (reported, most that may wait)}: errors by the counts in a board's error frames (appendix 4.9)."""
     _, words, _ = log.words(ERROR_FRAME[board])
     told, largest = {}, {}
     for word in words.tolist():

@@ -90,7 +90,7 @@ class Variables:
 
     @property
     def time_s(self):
-        """Instants of the samples of the body."""
+        """Times of the samples of the body."""
         return self.channels["plant.mode"][0]
 
     def variable(self, name):

@@ -48,7 +48,7 @@ class Run:
             self.frames = robot.logbook.frames()
 
     def count(self, bus, since_s=0.0, by=None, error=False):
-        """Frames, or error frames, on a bus since an instant; `by`: what its publisher must fulfil."""
+        """Frames, or error frames, on a bus since a time; `by`: what its publisher must fulfil."""
         kept = self.frames
         at = (kept["bus"] == BUSES.index(bus)) & (kept["time_ns"] >= since_s * 1e9)
         at &= ((kept["flags"] & FLAG_ERROR) != 0) == error
@@ -73,7 +73,7 @@ def test_each_board_that_hangs_is_named_and_no_other(hung):
 
 
 def test_frames_that_a_board_never_got_are_lost_once_each(hung):
-    """Of a ring of 63 nobody reads any more what is in it; what comes behind is lost, but for one in each buffer."""
+    """A full ring of 63 is not read any more; later frames are lost, but for one in each buffer."""
     board, run = hung
     lost = {bus: run.summary["can"][bus]["lost"] for bus in BUSES}
     if board == "MB":  # behind its link
@@ -149,7 +149,7 @@ def cut(request):
 
 
 def test_frames_that_no_queue_took_are_counted(cut):
-    """Nobody acknowledges: two buffers and a ring of seven fill, then every frame is one too many."""
+    """No node acknowledges: two buffers and a ring of seven fill, then every frame is one too many."""
     bus, run = cut
     asked = {"CSR": {"can1": 3, "can2": 0, "can3": 3, "can4": 3}[bus] * 160 // 2}  # in each slot of the main brain
     for board in [board for board, name in BUS_OF.items() if name == bus]:  # as often as in the 30 ms before

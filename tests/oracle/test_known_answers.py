@@ -1,4 +1,4 @@
-"""Figures of the summary that a run's files do not tell, each with an answer that is known beforehand."""
+"""Figures of the summary that a run's files do not have, each with an answer that is known beforehand."""
 
 import contextlib
 import hashlib

@@ -1,7 +1,7 @@
 """summary.json against figures found a second time: from the run's own files, or with a known answer.
 
-Each figure is in one of two lists. `figures.py` recomputes what the files tell; `OTHER_ORACLES` names, for each
-of the others, why the files cannot tell it, and the test that holds it to something else.
+Each figure is in one of two lists. `figures.py` recomputes what the files have; `OTHER_ORACLES` names, for each
+of the others, why the files do not have it, and the test that holds it to something else.
 """
 
 import contextlib
@@ -100,7 +100,7 @@ OTHER_ORACLES = (
 
 
 def leaves(value, path=""):
-    """(dotted path, value) of everything in a summary that is no dictionary; empty dictionaries have none."""
+    """(dotted path, value) of everything in a summary that is not a dictionary; empty dictionaries have none."""
     if isinstance(value, dict):
         for name, inner in value.items():
             yield from leaves(inner, f"{path}.{name}" if path else name)

@@ -1,6 +1,6 @@
 """The tutorial and the how-to pages, walked as a reader walks them: `make docs` runs this, not `make test`.
 
-A page is read from top to bottom in a folder of its own. A block whose first line is a comment with a file's name
+A page is read from top to bottom in its own folder. A block whose first line is a comment with a file's name
 (`# mine.toml`, `/* mine.c */`) is that file; a block `sh` is run line by line, and each line of the block `text` below
 it must be in what it printed; a block `python` without a file's name is a program. A block `console` shows what needs
 an adapter, a right or a second terminal, and is not run.

@@ -52,7 +52,7 @@ def read(path):
 
 
 def motion(times, angles, at):
-    """Angle, rate and acceleration at each instant by the cubic about it; nan where samples are missing."""
+    """Angle, rate and acceleration at each time by the cubic about it; nan where samples are missing."""
     found = np.full((len(at), 3), np.nan)
     for row, instant in zip(found, at, strict=True):
         i, j = np.searchsorted(times, [instant - HALF_WINDOW_S, instant + HALF_WINDOW_S])
@@ -64,7 +64,7 @@ def motion(times, angles, at):
 
 
 def equations(q, current):
-    """Unknowns' factors and torque of the fit, one row per current, for the motion `q` at its instants."""
+    """Unknowns' factors and torque of the fit, one row per current, for the motion `q` at its times."""
     angle, rate, acceleration = q.T
     sign = np.tanh(rate / SMOOTHING_RAD_S)
     factors = np.column_stack([acceleration, rate, sign, angle, np.ones_like(angle)])

@@ -1,4 +1,4 @@
-"""The foot of the body `ranger` is the one that the robot's own logs tell of."""
+"""The foot of the body `ranger` is that of the robot's own logs."""
 
 import functools
 import os

@@ -232,7 +232,7 @@ def test_a_model_file_is_read_and_checked(tmp_path):
     "text, words",
     [
         ('[[term]]\nform = "coging"\n', "term 1: unknown form 'coging'"),
-        ('[[term]]\nform = "drag"\nat = "nose"\n', "term 1 \\(drag\\): at is 'nose'; this form can stand at: hip_j"),
+        ('[[term]]\nform = "drag"\nat = "nose"\n', "term 1 \\(drag\\): at is 'nose'; this form can act at: hip_j"),
         ('[[term]]\nform = "drag"\nat = "hip_joint"\n', "quadratic_Nms2 is missing, a number from 0 to 10"),
         (
             '[[term]]\nform = "drag"\nat = "hip_joint"\nquadratic_Nms2 = -1\n',
@@ -243,7 +243,7 @@ def test_a_model_file_is_read_and_checked(tmp_path):
         ('[[term]]\nform = "drag"\nat = "hip_joint"\nquadratic_Nms2 = true\n', "True, it must be a number"),
         (
             '[[term]]\nform = "drag"\nat = "hip_joint"\nquadratic_Nms2 = 1\nquadratic = 1\n',
-            "quadratic is no parameter of this form; it has: quadratic_Nms2",
+            r"quadratic is not a parameter of this form \(available: quadratic_Nms2",
         ),
         ("terms = 1\n", "terms is not known here"),
         ("[term]\nform = 'drag'\n", "written \\[\\[term\\]\\]"),

@@ -112,7 +112,7 @@ def test_waiting_in_pieces_changes_nothing(robot):
 
 
 class Noting(StepWatch):
-    """Notes what it is told."""
+    """Notes what it receives."""
 
     def __init__(self):
         StepWatch.__init__(self)

@@ -1,4 +1,4 @@
-"""Firmware images in the places of the robot's boards: wired, run, and what goes wrong told in one line."""
+"""Firmware images in the places of the robot's boards: wired, run, and each mistake reported in one line."""
 
 import contextlib
 import dataclasses

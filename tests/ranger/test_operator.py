@@ -1,4 +1,4 @@
-"""What the person beside the robot does, and when: holding, keys, the radio's pulses and their spikes, letting go."""
+"""What the robot's operator does, and when: holding, keys, the radio's pulses and their spikes, letting go."""
 
 from types import SimpleNamespace
 

@@ -23,7 +23,7 @@ def bits(value):
 
 
 def words():
-    """The table of ROWS instants, 2 ms apart: an angle that changes twice, states that change once."""
+    """The table of ROWS times, 2 ms apart: an angle that changes twice, states that change once."""
     table = np.zeros((ROWS, max(all_variables.NAMES) + 1), dtype=np.int64)
     table[:, ANGLE] = [bits(each) for each in (0.0, 0.0, 0.25, 0.25, 0.25, -1.5)]
     table[:, HIP_STATE] = [4, 4, 4, 7, 7, 7]

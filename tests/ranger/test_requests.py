@@ -1,4 +1,4 @@
-"""The supervisor's door: what is admitted, what is answered with its fault, and how much a client may ask."""
+"""The supervisor's endpoint: what is admitted, what is answered with its fault, and how much a client may ask."""
 
 import contextlib
 import itertools
@@ -47,10 +47,10 @@ def test_what_is_admitted_arrives_with_its_values_and_their_word():
         (b'{"do": "set", "name": "P_UI_LCD_TIME", "value": NaN}', "NaN is not a finite number"),
         (b'{"do": "set", "name": "P_UI_LCD_TIME", "value": -Infinity}', "-Infinity is not a finite number"),
         (b'{"do": "set", "name": "P_UI_LCD_TIME", "value": 1e999}', "1e999 is not a finite number"),
-        (line(), "None is no request"),
-        (line(do=["status"]), "['status'] is no request"),
-        (line(do="stop"), "'stop' is no request"),
-        (line(do="status", extra=1), "'extra' is no field of it; it has none"),
+        (line(), "None is not a request"),
+        (line(do=["status"]), "['status'] is not a request"),
+        (line(do="stop"), "'stop' is not a request"),
+        (line(do="status", extra=1), "unknown field 'extra' (available: none)"),
         (line(do="key"), "key is missing"),
         *[(line(do="key", key=key), "is not 0 to 5") for key in ("abc", None, 1.5, 10**20, -1, 6, True, [1], {})],
         (line(do="set", name="P_UI_LCD_TIME", value={}), "P_UI_LCD_TIME = {}: a number is expected"),
@@ -63,7 +63,7 @@ def test_what_is_admitted_arrives_with_its_values_and_their_word():
         (line(do="set", name="LV_CH_0", value=1), "LV_CH_0: not a parameter"),
         (line(do="set", name="P_UI_LCD_TIM", value=1), "unknown variable 'P_UI_LCD_TIM'; did you mean 'P_UI_LCD_TIME'"),
         (line(do="set", name="\x1b[2J", value=1), "unknown variable '\\x1b[2J'"),
-        (line(do="set", name={}, value=1), "{} is no name of a parameter"),
+        (line(do="set", name={}, value=1), "{} is not the name of a parameter"),
         (line(do="restart", board="plant"), "'plant' is none of MCH"),
         (line(do="restart", board=["MCH"]), "['MCH'] is none of MCH"),
     ],
@@ -107,7 +107,7 @@ def test_python_writes_a_parameter_by_the_same_check(kind):
 
 
 class Robot:
-    """A door and what passed it; answers each request at once, unless `silent`."""
+    """An endpoint and what passed it; answers each request at once, unless `silent`."""
 
     def __init__(self, name):
         self.requests = []

@@ -1,4 +1,4 @@
-"""What a user imports by name from `ranger_sim`, and what a wrong name is told."""
+"""What a user imports by name from `ranger_sim`, and the message for a wrong name."""
 
 import inspect
 import json

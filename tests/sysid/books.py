@@ -84,7 +84,7 @@ def positive(name, **shape):
 
 
 def hold(found, book, made):
-    """Every cause of `found` beside its row, in order; made(effect, shape) -> what the program has of it."""
+    """Every cause of `found` with its row, in order; made(effect, shape) -> what the program has of it."""
     assert [(each.cause, each.at, each.coefficients) for each in found] == [
         (row.cause, row.at, row.coefficients) for row in book
     ]

@@ -1,6 +1,6 @@
 """Sound recordings of every experiment, and ways to spoil them: `python -m tests.sysid.corruptions --log FILE.jsonl`.
 
-What nobody should believe must end in a line, a finding or an abstention: never in a traceback, never in the name of a
+Spoiled data must end in a line, a finding or an abstention: never in a traceback, never in the name of a
 cause. Each line of the log is one diagnosis; a log that is there is gone on with. The rules that this found are held by
 test_plausibility.py and test_sanity.py; some hundred diagnoses are too many for the suite.
 """
@@ -110,7 +110,7 @@ def _walk() -> Columns:
 
 
 def corruptions(good: Columns) -> dict[str, Columns]:
-    """{name: a spoiled copy}: at least forty of every recording, all of what nobody should believe."""
+    """{name: a spoiled copy}: at least forty of every recording, none of them credible."""
     made: dict[str, Columns] = {}
     names = [name for name in good if name != "t_s"]
     size = len(good["t_s"])

@@ -1,4 +1,4 @@
-"""The ankle's free simulation beside another integrator, on the equations of its module's text written once more.
+"""The ankle's free simulation against another integrator, on the equations of its module's text written once more.
 
 Every term is large here, so that none hides behind another; steps of 0.2 ms, for the current is one of first order.
 """
@@ -71,7 +71,7 @@ def none(p, u, a):
 
 
 CASES = {
-    "as it stands": ({}, 0.0),
+    "unchanged": ({}, 0.0),
     "behind a filter": ({}, 0.02),
     "behind the board's filter": ({}, ankle_motion.RATE_FILTER_S),
     "no load friction": ({"load_friction": 0.0}, 0.0),

@@ -1,4 +1,4 @@
-"""Runs of the benches beside other integrators and balances; terms of a model on them by their own formulas."""
+"""Runs of the benches against other integrators and balances; terms of a model on them by their own formulas."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Channels brought on one time base: known values, gaps that stay gaps, and mistakes told in a line."""
+"""Channels brought on one time base: known values, gaps that stay gaps, and mistakes reported in a line."""
 
 import numpy as np
 import pytest

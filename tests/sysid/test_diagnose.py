@@ -1,4 +1,4 @@
-"""Data with a known fault and what is said of them: a name, a tie, a shrug or nothing; real data; a user's machine."""
+"""Data with a known fault and their diagnosis: a name, a tie, a shrug or nothing; real data; a user's machine."""
 
 import json
 import os
@@ -137,7 +137,7 @@ def test_sound_data_raise_no_alarm():
 
 
 def test_a_small_fault_is_found_as_often_as_its_size_says():
-    """z = sqrt(N) rms(drag beside the base) / noise is about 8: a normal deviate less than 4.4 below it is rare."""
+    """z = sqrt(N) rms(drag outside the base) / noise is about 8: a normal deviate less than 4.4 below it is rare."""
     found = [diagnose(Cart(), [cart_run(seed, drag=0.01)]).answer for seed in range(2000, 2020)]
     assert sum(each["detected"] for each in found) >= 18
     assert sum(bool(each["causes"]) and each["causes"][0]["name"] == "drag" for each in found) >= 18

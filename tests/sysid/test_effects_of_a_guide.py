@@ -1,4 +1,4 @@
-"""What a mass on a guide can have, beside a second book; its signals, its equation and the rows that count."""
+"""What a mass on a guide can have, compared with a second book; its signals, its equation and the rows that count."""
 
 import math
 
@@ -90,7 +90,7 @@ def test_the_balance_of_a_guide_is_force_against_mass_and_friction():
 
 
 def test_the_speed_lies_under_a_gaussian_of_a_quarter_of_6_ms():
-    """Of a jump of the position at steps of 0.25 ms the speed is that Gaussian, whose height tells its width."""
+    """Of a jump of the position at steps of 0.25 ms the speed is that Gaussian, whose height gives its width."""
     t = 0.00025 * np.arange(4000)
     jump = np.where(t < 0.5, 0.0, 0.01)
     made = Positioning().prepare(Table(t, {"position_m": jump + 1e-4 * t, "voltage_V": t}, (slice(0, 4000),)))

@@ -1,4 +1,4 @@
-"""What a swinging leg can have, beside a second book; its signals, inputs, steps and rows that count."""
+"""What a swinging leg can have, compared with a second book; its signals, inputs, steps and rows that count."""
 
 import math
 from types import SimpleNamespace
@@ -153,7 +153,7 @@ def test_signals_of_the_leg_are_what_their_names_say():
 
 
 def test_a_gaussian_of_3_ms_rounds_what_a_sensor_s_lag_is_multiplied_with():
-    """Of a jump at steps of 1 ms the slope is the Gaussian itself: its height tells its width."""
+    """Of a jump at steps of 1 ms the slope is the Gaussian itself: its height gives its width."""
     fine = table()
     fine = type(fine)(0.001 * np.arange(COUNT), {}, (slice(0, COUNT),))
     jump = (np.arange(COUNT) >= 150).astype(float)
@@ -253,7 +253,7 @@ def test_a_step_is_the_midpoint_rule_in_parts_of_2_ms_at_most():
 
 
 def acceleration(leg, q, w, u, p):
-    """The balance is held by a test of its own; here friction's sign and the inertia."""
+    """The balance is held by its own test; here friction's sign and the inertia."""
     torque, friction = leg._torques(np.array([q]), np.array([w]), u, p)
     return float(((torque - friction * math.tanh(w / 0.01)) / p["inertia_kg_m2"])[0])
 

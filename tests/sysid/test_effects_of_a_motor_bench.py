@@ -1,4 +1,4 @@
-"""What a motor on the bench can have, beside a second book; its signals, balances, regimes and rows that count."""
+"""What a motor on the bench can have, compared with a second book; its signals, balances, regimes and valid rows."""
 
 import math
 

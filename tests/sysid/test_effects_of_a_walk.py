@@ -1,4 +1,4 @@
-"""What a walking log can show, beside a second book; strikes, the rows that count, and drives and encoders in them."""
+"""What a walking log can show, compared with a second book; strikes, valid rows, and drives and encoders in them."""
 
 import dataclasses
 import math
@@ -24,7 +24,7 @@ M = "mechanical"
 
 
 def left_by(numbers):
-    """Some balance: what it leaves is linear in every number, each with a slope of its own."""
+    """Some balance: what it leaves is linear in every number, each with its own slope."""
     fields = [each.name for each in dataclasses.fields(Numbers)]
     return sum((place + 1.0) * getattr(numbers, name) for place, name in enumerate(fields)) * np.ones(COUNT)
 

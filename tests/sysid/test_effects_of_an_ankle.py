@@ -1,4 +1,4 @@
-"""What an ankle on its board's law can have, beside a second book: torques at motor and foot, what encoders show."""
+"""What an ankle on its board's law can have, compared with a second book: torques at motor and foot, encoders."""
 
 import dataclasses
 import math

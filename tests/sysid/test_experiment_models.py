@@ -1,4 +1,4 @@
-"""The linearised experiments beside a second book: each number and form of each equation written down once more, from
+"""The linearised experiments compared with a second book: each number and form of each equation written once more, from
 the catalogue's words, the robot's parameters and the data's README, with filters and sums of SciPy and NumPy."""
 
 import math

@@ -41,7 +41,7 @@ def machine(figures, fails=None, ask=None):
 
 
 def three(values):
-    """Three figures of three numbers, bent, each number with a signature of its own."""
+    """Three figures of three numbers, bent, each number with its own signature."""
     a, b, c = (values[name] for name in "abc")
     return {"x": 1.0 + a + 0.3 * a * a + 0.2 * c, "y": 2.0 - 0.5 * a + b, "z": c - 0.4 * b + 0.2 * a * b, "only_b": b}
 

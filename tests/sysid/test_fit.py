@@ -109,10 +109,10 @@ def test_what_is_known_of_a_gain_separates_it_and_widens_its_twin_s_interval():
 def test_a_fit_that_ends_on_a_limit_is_refused(low, high, side):
     x, y = noisy_line()
     found = fit(line(x, y), [Parameter("slope", "V/A", 0.5 * (low + high), low, high), INTERCEPT])
-    assert found.refused == f"slope stands on its {side} V/A"
+    assert found.refused == f"slope is at its {side} V/A"
     assert found.values == {}
     assert found.ended_at["slope"] == pytest.approx(low if low > 0 else high, abs=1e-6)
-    assert found.lines() == [f"refused: slope stands on its {side} V/A"]
+    assert found.lines() == [f"refused: slope is at its {side} V/A"]
 
 
 def test_an_impossible_value_is_refused_with_its_reason():

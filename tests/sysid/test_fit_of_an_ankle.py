@@ -115,7 +115,7 @@ def test_what_is_missed_is_motor_and_joint_against_motor_or_the_joint_alone(moto
 
 
 def held_start(fit):
-    """The start stays: that it goes with the values is told by a test of its own."""
+    """The start stays: another test shows that it goes with the values."""
     start = fit._start(slice(0, LONG), fit.values)
     fit._start = lambda rows, values: start
     fit._take(fit.values, *fit._moved(fit.values))

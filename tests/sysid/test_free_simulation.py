@@ -76,7 +76,7 @@ FOUND = ("inertia_kg_m2", "torque_Nm_per_V", "damping_Nms", "friction_Nm")
 def test_sensitivities_are_those_of_another_integrator():
     """Differences of two whole simulations by solve_ivp; what a gain of nothing leaves is the plain forward recursion.
 
-    At 1 kHz, for a step of the recursion must be short beside friction's turn of sign: J 0.02 / C, 10 ms.
+    At 1 kHz, for a step of the recursion must be short compared with friction's turn of sign: J 0.02 / C, 10 ms.
     """
     volts = waves(5)
     time_s, angle, rate = swung(volts, step_s=0.001)

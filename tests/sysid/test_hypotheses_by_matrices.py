@@ -1,4 +1,4 @@
-"""Surfaces, hypotheses and pieces of the fit beside matrices that are written out whole."""
+"""Surfaces, hypotheses and pieces of the fit against matrices that are written out whole."""
 
 import itertools
 import math
@@ -84,7 +84,7 @@ def test_a_figure_that_does_not_change_is_a_flat_surface():
 
 
 class Flat:
-    """A simulated figure that is linear in the candidates, with a variance of its own."""
+    """A simulated figure that is linear in the candidates, with its own variance."""
 
     def __init__(self, start, slopes, variance):
         self.start, self.each, self.variance = start, np.array(slopes), variance
@@ -334,16 +334,16 @@ def test_identifiability_is_told_by_singular_values_of_the_scaled_derivatives():
 def test_a_value_stands_on_a_limit_within_a_thousandth_of_its_error():
     asked = [Parameter("a", "V", 5.0, 0.0, 10.0), Parameter("b", "A", 1.0, 0.0, 10.0)]
     for a, told in (
-        (0.9e-3, "a stands on its lower limit 0 V"),
+        (0.9e-3, "a is at its lower limit 0 V"),
         (1.1e-3, ""),
-        (10.0 - 0.9e-3, "a stands on its upper limit 10 V"),
+        (10.0 - 0.9e-3, "a is at its upper limit 10 V"),
     ):
         assert fit._limits_met(asked, np.array([a, 5.0]), np.array([1.0, 1.0])) == told
     # with no error at all within a millionth of its step
-    assert fit._limits_met(asked, np.array([4e-6, 5.0]), np.zeros(2)) == "a stands on its lower limit 0 V"
+    assert fit._limits_met(asked, np.array([4e-6, 5.0]), np.zeros(2)) == "a is at its lower limit 0 V"
     assert fit._limits_met(asked, np.array([6e-6, 5.0]), np.zeros(2)) == ""
     both = fit._limits_met(asked, np.array([0.0, 10.0]), np.ones(2))
-    assert both == "a stands on its lower limit 0 V; b stands on its upper limit 10 A"
+    assert both == "a is at its lower limit 0 V; b is at its upper limit 10 A"
 
 
 # --- what was simulated -----------------------------------------------------------------------------------------------
@@ -361,6 +361,6 @@ def test_outcomes_are_gathered_by_place_and_a_figure_of_no_run_is_told():
     assert found.unseen == 30.0 and found.places.tolist() == [[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]]
     assert found.surfaces["f"].means.tolist() == [2.0, 2.0]
     assert made.evidence(["g"], 3).surfaces["g"].places.tolist() == [[0.0, 0.0, 0.0]]
-    with pytest.raises(UserError, match="figure h: none of 4 simulated runs came to it"):
+    with pytest.raises(UserError, match="figure h: none of 4 simulated runs reached it"):
         made.evidence(["h"], 3)
     assert made.nearest(np.array([1.0, 3.0, -2.0])) == pytest.approx(math.sqrt(1.0 + 9.0 + 4.0))

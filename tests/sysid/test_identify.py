@@ -144,7 +144,7 @@ def test_a_torque_that_counts_the_other_way_is_refused_as_impossible():
         ("stall", lambda d: without(d, "current_A"), "stall needs the channel current_A; there are voltage_V"),
         ("stall", lambda d: altered(d, "current_A", np.abs(d["current_A"].value)), "current in both directions"),
         ("cantilever", lambda d: altered(d, "speed_rad_per_s", 0.0 * d["torque_Nm"].value), "needs 10 readings above"),
-        ("level", lambda d: altered(d, "force_N", np.full(16, np.nan)), "force_N has 16 values that are no numbers"),
+        ("level", lambda d: altered(d, "force_N", np.full(16, np.nan)), "force_N has 16 values that are not numbers"),
         ("pendulum", lambda d: altered(d, "angle_rad", np.linspace(0.0, 1.0, 1200)), "less than two periods"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Every cause of the catalogue has a sentence that tells an engineer where to look, and places are told apart."""
+"""Every cause of the catalogue has a sentence on where to look, and places are distinguished."""
 
 import pytest
 

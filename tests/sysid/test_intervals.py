@@ -52,7 +52,7 @@ def test_a_shape_on_no_scale_keeps_to_its_grid():
 
 
 def test_intervals_of_size_and_shape_hold():
-    """Of 100 each as many as 100 tosses of a 95 % coin allow, one time in 10^4 apart; few are too wide to tell."""
+    """Of 100 each as many as 100 tosses of a 95 % coin allow, one time in 10^4 apart; few are too wide to decide."""
     held = {"height": 0, "width": 0}
     lengths = []
     for seed in range(100):

@@ -1,4 +1,4 @@
-"""Fits of data that are not what they say: told by their parameters, and no cause is named from them."""
+"""Fits of data that are not what they say: found by their parameters, and no cause is named from them."""
 
 import dataclasses
 
@@ -47,7 +47,7 @@ def test_a_channel_that_does_not_belong_to_the_others_is_told():
 
 
 def test_a_channel_in_another_unit_is_told_by_the_parameters():
-    """Force in mN under the name of N: a mass of 1.1 t, within no limit of 10 kg; in units of 0.1 N: 11 kg, told."""
+    """Force in mN under the name of N: a mass of 1.1 t, within no limit of 10 kg; in 0.1 N: 11 kg, reported."""
     force = cart_run(1, drag=0.02)["force_N"]
     assert "impossible" in kinds(diagnose(Cart(), [changed(force_N=1000.0 * force)]).answer)
     found = diagnose(Cart(), [changed(force_N=6.0 * force)]).answer

@@ -1,4 +1,4 @@
-"""Ties predicted by structure, confirmed or broken by data; and those that nobody predicted."""
+"""Ties predicted by structure, confirmed or broken by data; and those that were not predicted."""
 
 import pytest
 
@@ -37,7 +37,7 @@ DROP, DEAD = ("contact_drop_change", "hip_motor"), ("dead_time", "hip_motor")  #
 @pytest.mark.parametrize(
     ("tied", "rivals", "data", "text"),
     [
-        ([DEAD], [(*DEAD, 0.4)], predicted_ties.CONFIRMED, "confirmed, these data cannot tell either"),
+        ([DEAD], [(*DEAD, 0.4)], predicted_ties.CONFIRMED, "confirmed, these data cannot decide either"),
         ([], [(*DEAD, 31.7)], predicted_ties.BROKEN, "broken by the data, it is 31.7 behind"),
         ([], [(*DEAD, 2.0)], predicted_ties.IMPOSSIBLE, "with a value that no machine has"),
         ([], [], predicted_ties.BROKEN, "broken by the data, it is far behind"),
@@ -61,7 +61,7 @@ def test_a_tie_that_was_not_predicted_is_told(bench):
     found = predicted_ties.of(*bench, named("stribeck", "hip_motor", [("presliding", "hip_motor")]))
     assert [(each["with"], each["data"]) for each in found["ties"]] == [("presliding", predicted_ties.NOT_PREDICTED)]
     assert predicted_ties.told(found) == [
-        "a tie with presliding was not predicted, and these data cannot tell: another motion may"
+        "a tie with presliding was not predicted, these data cannot decide: another motion may"
     ]
 
 

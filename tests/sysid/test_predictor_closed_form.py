@@ -1,4 +1,4 @@
-"""The predictor and smoother of a linearised simulator beside dense matrices: all outputs of a segment at once.
+"""The predictor and smoother of a linearised simulator against dense matrices: all outputs of a segment at once.
 
 With every noise Gaussian, the outputs of a segment have one covariance matrix. What a Kalman predictor whitens
 sample by sample, the inverse of that matrix's Cholesky factor whitens at once; the most probable states are

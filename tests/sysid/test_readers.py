@@ -1,4 +1,4 @@
-"""Files of every format as datasets: known values, units turned into SI, and mistakes told in a line."""
+"""Files of every format as datasets: known values, units turned into SI, and mistakes reported in a line."""
 
 import math
 import os
@@ -281,7 +281,7 @@ def test_a_column_is_called_as_the_mapping_says_and_takes_its_unit_where_it_has_
     assert data["current_A"].value.tolist() == pytest.approx([0.005, 0.006])
     with pytest.raises(UserError, match=r"i_mA is in A, it cannot become voltage_V \(V\)"):
         table(text, mapping={"i_mA": "voltage_V"})
-    with pytest.raises(UserError, match="there is no such column; there are t_s, q, i_mA"):
+    with pytest.raises(UserError, match=r"unknown column \(available: t_s, q, i_mA"):
         table(text, mapping={"x": "voltage_V"})
 
 
@@ -325,14 +325,14 @@ def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
         ("# nothing\n", "comment lines only"),
         ("t_s,a_V\n", "no row below its header"),
         ("a_V,b_V\n0,1\n1,2\n", "there is no time column"),
-        ("t_s\n0\n1\n", "no channel beside the time column"),
+        ("t_s\n0\n1\n", "no channel except the time column"),
         ("t_s,a_V,a_V\n0,1,2\n", "two columns are called a_V"),
         ("t_s,a_V,a_mV\n0,1,2\n", "two columns would be called a_V"),
         ("t_A,a_V\n0,1\n", "the time column t_A is in A, not in a time"),
-        ("t_s,a_V\n0,x\n1,y\n", "no channel beside"),
+        ("t_s,a_V\n0,x\n1,y\n", "no channel except"),
         (b"t_s,a_V\n0,\x00\n", "bytes of value 0"),
         (b"\x89PNG\r\n\x1a\n\xff\xfe\x9c", "no row below|no time column|empty"),
-        (b"\xff\xfe\x00", "no text table|no row|no time column|empty"),
+        (b"\xff\xfe\x00", "not a text table|no row|no time column|empty"),
     ],
 )
 def test_what_is_no_table_is_told_in_a_line(table, text, line):
@@ -526,7 +526,7 @@ def test_a_broken_measurement_file_is_told_in_a_line(tmp_path):
         path.write_bytes(content)
         with pytest.raises(UserError, match="not a measurement file that asammdf can read|no channel with numbers"):
             read(path)
-    with pytest.raises(UserError, match="this is no folder of a walk"):
+    with pytest.raises(UserError, match="this is not a folder of a walk"):
         read(tmp_path)
     with pytest.raises(UserError, match="there is no such file"):
         read(tmp_path / "none.csv")

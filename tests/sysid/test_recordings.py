@@ -60,7 +60,7 @@ def holes(share):
         (lambda name, value: value * 100.0 if name == "t_s" else value, "stamps are probably in ms"),
         (holes(3), "a.csv: torque_Nm: 134 of 400 samples are lost, 33.5 % where 1 % are accepted: 134 for values"),
         (lambda name, value: np.where(np.arange(400) > 150, value[150], value) if name == "speed_rad_per_s" else value,
-         "speed_rad_per_s: it stands at"),
+         "speed_rad_per_s: it stays at"),
         (lambda name, value: np.floor(value * 20.0) / 20.0 if name == "t_s" else value,
          "voltage_V: 320 of 400 samples are lost, 80 % where 1 % are accepted: 320 for stamps that come twice"),
         (lambda name, value: np.where(value < 2.0, value, value - 2.0) if name == "t_s" else value,

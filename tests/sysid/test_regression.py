@@ -233,7 +233,7 @@ def test_an_equation_has_no_less_noise_than_its_floor():
 
 
 def two_equations(names, seed=9):
-    """A recording in which each of these equations has a slope of its own, and noise in common."""
+    """A recording in which each of these equations has its own slope, and noise in common."""
     rng = generator(seed, "two equations")
     common, x = rng.normal(size=SIZE), np.sin(np.arange(SIZE) * 0.1)
     table = Table(np.arange(SIZE) * 1e-3, {}, (slice(0, SIZE),), "held")

@@ -1,4 +1,4 @@
-"""The regression, the naming and the general tests on small data, beside dense matrices and sums of squares."""
+"""The regression, the naming and the general tests on small data, against dense matrices and sums of squares."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Rows of every block of the identification, worked out once more; simulations in them beside another integrator."""
+"""Rows of every block of the identification, worked out once more; simulations in them against another integrator."""
 
 import math
 
@@ -343,7 +343,7 @@ def test_columns_are_there_finite_and_of_one_length_or_that_is_told():
     assert blocks.column(made, "c", "bench", 0.5).tolist() == [0.5, 0.5]
     with pytest.raises(UserError, match="d: bench needs the channel c; there are a, b"):
         blocks.column(made, "c", "bench")
-    with pytest.raises(UserError, match="d: b has 1 values that are no numbers"):
+    with pytest.raises(UserError, match="d: b has 1 values that are not numbers"):
         blocks.column(made, "b", "bench")
     blocks.same_rows(made, "bench", np.zeros(2), np.ones(2))
     with pytest.raises(UserError, match=r"d: the channels of bench must have the same rows, they have \[2, 3\]"):

@@ -198,7 +198,7 @@ def test_judgements_are_asked_for_by_name_and_undo_what_they_name():
     part = repairs.cut(data, 2.0, 100.0)
     assert part["current_A"].time_s[-1] < 2.0 <= part["current_A"].time_s[-1] + 0.0041
     assert [each.kind for each in part.repairs] == ["converted", "cut"]
-    with pytest.raises(UserError, match="'furlong' is no unit"):
+    with pytest.raises(UserError, match="unknown unit 'furlong'"):
         repairs.converted(data, "joint_angle_rad", "furlong")
     with pytest.raises(UserError, match="samples outside"):
         repairs.cut(data, 0.0, 100.0)
@@ -268,7 +268,7 @@ def test_an_angle_at_rest_is_not_stuck_because_a_temperature_moves():
 
 
 def bench_at_first_at_rest(**changes):
-    """A motor that stands for half a second of five and then turns to and fro; torque by a noisy load cell."""
+    """A motor that rests for half a second of five and then turns to and fro; torque by a noisy load cell."""
     time_s = np.arange(2500) * 0.002
     noise = generator(5, "a load cell").normal(size=(3, len(time_s)))
     turning = np.where(time_s < 0.508, 0.0, np.sin(3.0 * (time_s - 0.508)))

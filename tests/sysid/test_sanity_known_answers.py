@@ -89,7 +89,7 @@ def test_stamps_and_values_that_are_no_numbers_are_counted():
     value[1] = math.nan
     fatal = of("not_finite", channel("current_A", value, "A"))
     assert fatal[0].severity == "fatal"
-    with pytest.raises(UserError, match=r"data: current_A: 1999 of 2000 values are no numbers"):
+    with pytest.raises(UserError, match=r"data: current_A: 1999 of 2000 values are not numbers"):
         sanity.stop_if_fatal("data", fatal)
 
 
@@ -300,7 +300,7 @@ def test_values_in_another_unit_are_converted_and_that_is_told(unit, factor, zer
 
 def test_no_unit_is_no_conversion():
     for unit in ("furlongs", " "):
-        with pytest.raises(UserError, match="is no unit that is known here"):
+        with pytest.raises(UserError, match="unknown unit"):
             repairs.converted(recording(), "a", unit)
 
 

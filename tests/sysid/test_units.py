@@ -1,4 +1,4 @@
-"""Units beside what prefixes, degrees, turns and minutes are: a known word is a prefix and a base, or one of few."""
+"""Units against the definitions of prefixes, degrees, turns and minutes: a word is a prefix and a base."""
 
 import math
 

@@ -1,6 +1,6 @@
 """Trace digests of short runs: python -m tests.system.digest_of CASES, a JSON list of what `Case` holds.
 
-Prints a line for each case: the digest, then what has happened until then.
+Prints a line for each case: the digest, then what has happened by its end.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ from ranger_sim.ranger.scenario import Scenario
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """One run of `seconds` after power-up; what is not said is as in `ranger-sim walk`."""
+    """One run of `seconds` after power-up; all else is as in `ranger-sim walk`."""
 
     seconds: float
     seed: int = 1

@@ -26,7 +26,7 @@ def buses_of(robot):
 
 
 class Client:
-    """A client of a robot in the same thread: everything it has heard, and frames kept on the way."""
+    """A client of a robot in the same thread: everything it has received, and frames kept on the way."""
 
     def __init__(self, name, channel):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

@@ -27,7 +27,7 @@ PUSHES = {
 
 
 def test_a_start_and_a_time_whose_sum_rounds_up_do_not_keep_a_golden_run_waiting():
-    """As seconds, 0.1 s after such a start is a last digit beyond the instant that the clock reaches.
+    """As seconds, 0.1 s after such a start is a last digit beyond the time that the clock reaches.
 
     Such a start is noticed at 0.25 s, the end of the first slice, which is before 0.1 s have passed.
     """
@@ -42,7 +42,7 @@ def test_a_start_and_a_time_whose_sum_rounds_up_do_not_keep_a_golden_run_waiting
 
 
 class LeftError(Exception):
-    """As if somebody had killed the campaign."""
+    """As if the campaign had been killed."""
 
 
 class ShortLivedPool(pools.LocalPool):
@@ -122,7 +122,7 @@ def test_a_sample_stops_at_the_look_at_which_the_rule_says_so(tmp_path):
 
 
 def test_a_sweeps_slot_margin_falls_by_the_cost_that_was_added(tmp_path):
-    """The task stands in every row, so the longest slot grows by what is added to it.
+    """The task is in every row, so the longest slot grows by what is added to it.
 
     Both factors are above the task's limit, so the error about that costs both the same. What else may differ is how
     many interrupts fall into the slot that is longest: 3 % of a slot is 900 cycles, nine of the encoders' edges.
@@ -195,7 +195,7 @@ def command(path, folder):
 
 
 def test_a_plan_may_name_a_file_with_a_users_own_modes(tmp_path):
-    """In processes of its own: the catalogue of this one stays as it is."""
+    """In separate processes: the catalogue of this one stays as it is."""
     path, folder = tmp_path / "own.toml", tmp_path / "out"
     path.write_text(OWN_PLAN)
     missing = command(path, folder)

@@ -1,4 +1,4 @@
-"""Campaigns of the whole robot: a branch is the run, and whoever is killed, the results are the same."""
+"""Campaigns of the whole robot: a branch is the run, and whichever process is killed, the results are the same."""
 
 import contextlib
 import importlib.util
@@ -46,7 +46,7 @@ def few(tmp_path):
 
 
 def results_in(folder):
-    """{key: result} of a campaign's file, without what the run cost; every key stands there once."""
+    """{key: result} of a campaign's file, without what the run cost; every key is there once."""
     lines = [json.loads(line) for line in (folder / "results.jsonl").read_bytes().splitlines()]
     assert len({line["key"] for line in lines}) == len(lines)
     return {line["key"]: {name: value for name, value in line.items() if name != "spent"} for line in lines}
@@ -125,7 +125,7 @@ def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path, 
     before = results_in(killed)
     assert HEALTHY + 2 <= len(before) < HEALTHY + RUNS
     told = run(few, killed, "--jobs", "2").stderr
-    assert f"{len(before) - HEALTHY} of them are there already" in told
+    assert f"{len(before) - HEALTHY} of them have results already" in told
     after = results_in(killed)
     assert len(after) == HEALTHY + RUNS and after == results_in(whole)
     assert {key: after[key] for key in before} == before
@@ -325,7 +325,7 @@ def test_a_dask_cluster_that_loses_a_part_gives_the_same_results(few, tmp_path, 
     assert "Traceback" not in told
     if killed == "scheduler":
         assert process.returncode == 2, told
-        assert f"campaign: the Dask scheduler at {address} went away" in told
+        assert f"campaign: the Dask scheduler at {address} ended" in told
         run(few, cluster)
     else:
         assert process.returncode == 0, told

@@ -1,6 +1,6 @@
 """`ranger-sim daq` and a whole robot, over a pseudo-terminal, on virtual time that the test drives.
 
-The command looks at its port; each look lets the robot pass some milliseconds first, and the robot's time is the
+The command looks at its port; each poll lets the robot pass some milliseconds first, and the robot's time is the
 clock. So nothing sleeps and nothing depends on how fast the machine is.
 """
 
@@ -45,7 +45,7 @@ class Robot:
         robot = self
 
         class Port(daq.RealPort):
-            """Lets the robot pass some time before each look, and waits for what the kernel carries meanwhile."""
+            """Lets the robot pass some time before each poll, and waits for what the kernel carries meanwhile."""
 
             def __init__(self, *options):
                 super().__init__(*options)
@@ -79,7 +79,7 @@ class Robot:
         monkeypatch.setattr(daq.wallclock, "monotonic_s", lambda: self.ranger.time_s)
 
     def daq(self, *arguments):
-        """(exit code, what it printed, what it said)."""
+        """(exit code, its output, its errors)."""
         code = cli.main(["daq", "--port", self.line.port.path, *map(str, arguments)])
         told = self.capsys.readouterr()
         return code, told.out, told.err
@@ -238,7 +238,7 @@ def test_a_port_that_is_not_there_gets_one_line(capsys):
 
 
 def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
-    """`up` as fast as it goes, `daq` beside it; both are real, and only what was written is looked at."""
+    """`up` as fast as it goes, and `daq`; both are real, and only what was written is looked at."""
     up = subprocess.Popen(
         [sys.executable, "-m", "ranger_sim", "up", "--speed", "max", "--daq-port", "pty", "--json", "-"]
         + ["--name", f"daq-test-{os.getpid()}"],

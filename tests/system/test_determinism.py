@@ -28,7 +28,7 @@ PROCESSES_S = 0.2
 
 
 def elsewhere(module, *arguments, interpreted, hash_seed):
-    """What a module prints that runs as a process of its own."""
+    """What a module prints that runs as a separate process."""
     environment = {
         **os.environ,
         "RANGER_SIM_INTERPRETED": "1" if interpreted else "",

@@ -1,4 +1,4 @@
-"""EXECUTION_TIME of the satellites on the whole robot, beside what the robot's logs have."""
+"""EXECUTION_TIME of the satellites on the whole robot, compared with what the robot's logs have."""
 
 import contextlib
 

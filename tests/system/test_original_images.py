@@ -46,7 +46,7 @@ FIRST_US = 1_500.0  # start-up: how long the PLL takes to lock, nobody knows
 
 
 def path_of(board):
-    """The image of a board; skipped, and told, where it is not at hand."""
+    """The image of a board; skipped visibly where it is not at hand."""
     for kind in (".axf", ".hex"):
         if (FOLDER / (board + kind)).is_file():
             return FOLDER / (board + kind)

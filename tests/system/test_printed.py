@@ -85,7 +85,7 @@ def test_what_a_program_prints_that_does_not_start_is_shown(command, tmp_path):
     done = command("walk", "--firmware", f"MCH={hip}", "--time", "20ms", "--json", "-")
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.splitlines()[0] == "MCH: no sensor"
-    assert "does not get through its start" in done.stderr
+    assert "fails in its start" in done.stderr
 
 
 def test_a_program_that_prints_much_holds_nothing_up(command, tmp_path):

@@ -26,7 +26,7 @@ FACTORS = {"realtime_factor", "cpu_factor"}  # how fast the machine was
 
 
 class Up:
-    """A running `ranger-sim up` (or a script that does the same) with a name of its own."""
+    """A running `ranger-sim up` (or a script that does the same) with its own name."""
 
     def __init__(self, *arguments, script=None, speed="0.05"):
         self.name = f"test-{uuid.uuid4().hex[:12]}"
@@ -80,7 +80,7 @@ class Up:
         return status
 
     def processes(self):
-        """Process ids by name, as the robot tells them, once it runs."""
+        """Process ids by name, as the robot reports them, once it runs."""
         status = self.running()
         found = {name: each["process"] for name, each in status["boards"].items()}
         return {**found, "plant": status["plant"], "supervisor": self.started.pid}
@@ -305,7 +305,7 @@ sys.exit(main(["up", *sys.argv[1:]]))
 
 
 def test_a_run_started_with_all_signals_blocked_ends_and_can_be_interrupted(up):
-    """Blocked signals are inherited from whoever starts it; the end of a process is one."""
+    """Blocked signals are inherited from whichever process starts it; the end of a process is one."""
     assert up("--time", "0.02s", script=BLOCKED, speed="max").end() == 0
     robot = up(script=BLOCKED)
     robot.processes()
@@ -473,7 +473,7 @@ def test_the_timeline_of_a_run_has_the_slots_of_every_board_in_its_process(comma
 
 def test_a_timeline_that_cannot_be_is_refused_before_any_process_begins(command, tmp_path):
     done = command("up", "--time", "0.1s", "--trace", str(tmp_path / "run.txt"))
-    assert done.returncode == 2 and "is no format" in done.stderr and done.stderr.count("\n") == 1
+    assert done.returncode == 2 and "is not a format" in done.stderr and done.stderr.count("\n") == 1
 
 
 def test_a_fault_whose_place_is_taken_when_it_is_to_begin_is_told_by_status_and_by_the_robot(up):

@@ -30,7 +30,7 @@ def test_a_part_that_there_is_not_gets_one_line(capsys):
         cli.main(["bench", "robots"])
     complaint = capsys.readouterr().err
     assert left.value.code == 2 and len(complaint.splitlines()) == 1
-    assert "'robots' is no part; there are robot, robot-with-log" in complaint
+    assert "'robots' is not a part (available: robot, robot-with-log" in complaint
 
 
 def test_what_is_timed_is_compared_with_python_cans_virtual_turn_by_turn(capsys, monkeypatch):

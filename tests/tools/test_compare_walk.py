@@ -299,7 +299,7 @@ def test_the_command_tells_what_differs_and_draws_it(tmp_path, capsys):
     [
         ((), ("0 whole strides", "at least 2")),
         (("--controller", "robust"), ("robust", "'record'", "'head-2015'")),
-        (("--map", "walk_fsm_state=other"), ("walk_state", "no channel")),
+        (("--map", "walk_fsm_state=other"), ("walk_state", "unknown channel")),
         (("--body", "nobody"), ("nobody",)),
     ],
 )
@@ -317,7 +317,7 @@ def test_a_state_that_is_no_whole_number_is_refused(tmp_path, capsys):
     text = path.read_text(encoding="utf-8").replace(",2\n", ",2.5\n")
     path.write_text(text, encoding="utf-8")
     assert cli.main(["compare-walk", str(path)]) == 2
-    assert "no whole number" in capsys.readouterr().err
+    assert "not whole numbers" in capsys.readouterr().err
 
 
 def test_a_walk_whose_rows_are_out_of_order_is_the_same_walk_and_one_with_losses_is_refused(tmp_path, capsys):

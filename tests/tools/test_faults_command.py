@@ -1,4 +1,4 @@
-"""`ranger-sim faults` and `walk --fault` as people type them, modes of their own, and the tables of docs/faults.md."""
+"""`ranger-sim faults` and `walk --fault` as people type them, their own modes, and the tables of docs/faults.md."""
 
 import json
 import re
@@ -104,7 +104,7 @@ def test_a_fault_gives_every_digit_of_its_parameters():
 
 
 def walk(capsys, *arguments):
-    """(exit code, summary, what was said) of a walk."""
+    """(exit code, summary, standard error) of a walk."""
     code = cli.main(["walk", "--json", "-", *arguments])
     printed = capsys.readouterr()
     return code, json.loads(printed.out), printed.err
@@ -151,7 +151,7 @@ def command(*arguments):
 
 
 def test_a_mode_of_a_users_own_is_listed_and_acts(tmp_path):
-    """The example of docs/faults.md, in a process of its own: the catalogue of this one stays as it is."""
+    """The example of docs/faults.md, in a separate process: the catalogue of this one stays as it is."""
     module = tmp_path / "burnt.py"
     module.write_text(OWN, encoding="utf-8")
     done = command("faults", "MCH.battery_voltage", "--fault-module", module)
@@ -231,7 +231,7 @@ TOLD = {
     [
         (
             {},
-            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), told by MCFI_ANKL_LO from MCFI "
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), reported by MCFI_ANKL_LO from MCFI "
             "after 738.5 ms, inner_foot in afterpush instead of prepush after 19 ms, fell after 1275 ms",
         ),
         (
@@ -240,12 +240,12 @@ TOLD = {
         ),
         (
             {"detected": None, "reaction": None, "fall_ms": None},
-            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), no error tells of it",
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), no error reports it",
         ),
         (
             {"detected": {**TOLD["detected"], "rate": True}, "reaction": None, "fall_ms": None},
-            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), told by MCFI_ANKL_LO from MCFI, "
-            "more often than without after 738.5 ms",
+            "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), reported by MCFI_ANKL_LO from "
+            "MCFI, more often than without after 738.5 ms",
         ),
     ],
 )
@@ -272,7 +272,7 @@ def test_a_walk_with_proof_says_when_who_told_and_changes_nothing(capsys, tmp_pa
     # the board reads the word in its next slot, within 0.5 ms; errors are looked at every 0.25 ms
     assert 0.0 < found["detection_ms"] <= 0.75
     assert found["fall_ms"] is None
-    assert "told by AE_SPIKE from MCH" in capsys.readouterr().err
+    assert "reported by AE_SPIKE from MCH" in capsys.readouterr().err
 
 
 def test_several_faults_are_held_against_one_golden_run_together_from_the_first_one_on(capsys, tmp_path):

@@ -161,7 +161,7 @@ def test_a_mistake_on_the_command_line_is_told_in_a_line(asked, capsys, words, c
     [
         ("steps = 20", "steps = 5", "steps 5"),
         ("steps = 20", 'steps = "20"', "int is expected"),
-        ("steps = 20", "legs = 4", "legs: there is no such key"),
+        ("steps = 20", "legs = 4", "legs: unknown key"),
         ("high = 0.19", "high = 9.0", "outer_ankle_offset_m would be 9"),
         ('"body.hip_spring_Nm_per_rad" = 1', '"body.hips" = 1', "the body has no such number"),
     ],

@@ -42,7 +42,7 @@ def test_an_empty_folder_is_taken_also_the_one_that_a_shell_stands_in(tmp_path, 
     ("there", "asked", "line"),
     [
         ("dir/a.txt", "dir", "the folder is not empty"),
-        ("a.txt", "a.txt", "it is there already and is no folder"),
+        ("a.txt", "a.txt", "it exists and is not a folder"),
         ("a.txt", "a.txt/below", "Not a directory|File exists"),
         ("a.txt", "na\tme", "letters, digits, spaces"),
         ("a.txt", "x" * 61, "60 at most"),

@@ -147,7 +147,7 @@ def test_the_command_keeps_its_words_folder_and_environment(tmp_path):
 
 @pytest.fixture
 def attendant(monkeypatch):
-    """attendant(write, guest) -> an Attendant and the other ends of its sockets by name; the clock stands at 1 s."""
+    """attendant(write, guest) -> an Attendant and the other ends of its sockets by name; the clock is at 1 s."""
     monkeypatch.setattr(machine.wallclock, "monotonic_s", lambda: 1.0)
     with contextlib.ExitStack() as stack:
 
@@ -182,7 +182,7 @@ def test_a_machine_that_stops_by_itself_leaves_its_last_words(attendant):
     guest["console"].send(b"\x1b[2Jbooting\r\nKernel panic - not syncing\r\n")
     for each in guest.values():
         each.close()
-    with pytest.raises(UserError, match="its last words:\nbooting\nKernel panic - not syncing$"):
+    with pytest.raises(UserError, match="its last output:\nbooting\nKernel panic - not syncing$"):
         watcher.attend()
 
 
@@ -207,7 +207,7 @@ def test_without_qemu_the_user_is_told_what_to_run(capfd, monkeypatch):
 
 def test_options_that_cannot_be_are_refused(capfd, tmp_path):
     assert cli.main(["vm", "--shared", str(tmp_path / "none"), "--", "true"]) == 2
-    assert "this is no folder" in capfd.readouterr().err
+    assert "not a folder" in capfd.readouterr().err
     with pytest.raises(SystemExit):
         cli.main(["vm"])
     assert "COMMAND" in capfd.readouterr().err

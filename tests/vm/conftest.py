@@ -62,7 +62,7 @@ class Candump:
         )
 
     def stop(self):
-        """End it when it has written everything that was sent before; what it said on standard error."""
+        """End it when it has written everything that was sent before; what it wrote to standard error."""
         for interface in self.interfaces:
             subprocess.run(["cansend", interface, LAST], check=True)
 

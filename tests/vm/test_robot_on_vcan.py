@@ -1,4 +1,4 @@
-"""The whole robot on vcan0 ... vcan3: its boards hear each other through the kernel, and can-utils listen."""
+"""The whole robot on vcan0 ... vcan3: its boards receive each other through the kernel, and can-utils listen."""
 
 import collections
 import dataclasses
@@ -26,7 +26,7 @@ BUSES = {"can1": "vcan0", "can2": "vcan1", "can3": "vcan2", "can4": "vcan3"}
 
 @dataclasses.dataclass
 class Walked:
-    """What the robot said and what candump saw: {bus: [(identifier, flags, lo, hi), ...]}."""
+    """What the robot printed and what candump saw: {bus: [(identifier, flags, lo, hi), ...]}."""
 
     code: int
     told: str

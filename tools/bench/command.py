@@ -107,9 +107,9 @@ def register(commands: Any) -> None:
         epilog="parts:\n" + named_lines({name: part.line for name, part in PARTS.items()}, 15),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    command.add_argument("part", nargs="*", metavar="PART", help="what is measured; see below")
+    command.add_argument("part", nargs="*", metavar="PART", help="parts to measure; see below")
     command.add_argument(
-        "--runs", type=whole_number(1), default=3, metavar="N", help="turns of what is timed together (default 3)"
+        "--runs", type=whole_number(1), default=3, metavar="N", help="repetitions of timed parts (default 3)"
     )
     command.add_argument(
         "--seconds", type=whole_number(1), default=20, metavar="S", help="virtual seconds per run (default 20)"
@@ -124,7 +124,7 @@ def register(commands: Any) -> None:
         help="times real time of the robot under floods (default: 0.25 to 1 by the number of processors)",
     )
     command.add_argument(
-        "--keep", metavar="FILE", help="of floods: rows that FILE has are not measured again, new ones are added"
+        "--keep", metavar="FILE", help="of floods: rows in FILE are kept, only missing ones are measured"
     )
     command.add_argument("--sets", type=whole_number(1), default=10_000, metavar="N", help="of bounds (default 10000)")
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")
@@ -153,7 +153,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the named measurements; 0 done, 1 when a response on the bus came later than its bound."""
     for name in options.part:
         if name not in PARTS:
-            options.refuse(f"{name!r} is no part; there are {', '.join(PARTS)}")
+            options.refuse(f"{name!r} is not a part (available: {', '.join(PARTS)})")
     json_file = json_target(options.json)
     chosen = [name for name in PARTS if name in (options.part or TOGETHER)]
     result: dict = {"date": wallclock.today_iso(), "machine": machine()}
@@ -216,7 +216,7 @@ def timed_together(cases: list[str], runs: int, seconds: float) -> dict:
 def lines_of(figures: dict, runs: int) -> list[str]:
     """The figures as lines of a table. Simulated seconds are compared by their cost in frames of the yardstick."""
     lines = [
-        f"timed together, {runs} runs of each in turn, each in a process of its own:",
+        f"timed together, {runs} runs of each in turn, each in a separate process:",
         f"  {'per second of processor time':38} {'median':>9} {'least':>9} {'most':>9}  {'':11}  python-can's virtual",
     ]
     for name, figure in figures.items():

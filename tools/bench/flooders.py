@@ -285,11 +285,11 @@ FLOODS = {
     "panel, 100 pages that never show": Flood(page, b"", PAGES, stays=True, robot=SHOWN),
     "panel, broken messages": Flood(page, message("{"), robot=SHOWN),
     "panel, shown without end": Flood(page, wish(do="shown"), PLACES, robot=SHOWN),
-    "panel, wishes without end": Flood(page, wish(do="values", channels=[0], number=1), robot=SHOWN),
+    "panel, requests without end": Flood(page, wish(do="values", channels=[0], number=1), robot=SHOWN),
 }
 
-PEACE, BUSY = "nobody", "a busy program, no door"
-PEACE_OF = {WHOLE: PEACE, DEBUGGED: "nobody, a board runs an image", SHOWN: "nobody, a panel looks on"}
+PEACE, BUSY = "no client", "a busy program, no port"
+PEACE_OF = {WHOLE: PEACE, DEBUGGED: "no client, a board runs an image", SHOWN: "no client, a panel polls"}
 FRAMES_IN_WINDOW = "attach SEND, answers read"
 READ = "feed, 4 viewers that read"
 DRAWN = "panel, 16 pages that show all"

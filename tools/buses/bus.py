@@ -50,7 +50,7 @@ def register(commands: Any) -> None:
         "--seconds",
         type=quantity(TIMES, "s", above=0.0, most=MOST_TIME_S),
         default=math.inf,
-        help="end after so long (default: with Ctrl-C)",
+        help="end after this time (default: with Ctrl-C)",
     )
     command.set_defaults(run=run)
 
@@ -81,7 +81,7 @@ def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: i
             server = SocketcandServer(buses, int(port), host or "127.0.0.1", epoch_ns, options.allow_network)
             tcp = opened.enter_context(closing(server))
             servers.append(tcp)
-            open_to_all = "" if loopback(tcp.host) else ", open to the network: whoever reaches it may send frames"
+            open_to_all = "" if loopback(tcp.host) else ", open to the network: any client there may send frames"
             lines.append(f"socketcand: {tcp.host}:{tcp.port}{open_to_all}")
         opened.pop_all()
         return servers, lines
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
         raise UserError(f"bus: a name is given twice in {' '.join(options.channel)}")
     for channel in options.channel:
         if not channel or "/" in channel or any(c.isspace() for c in channel):
-            raise UserError(f"bus: {channel!r} is no name for a bus: no slash and no blank, please")
+            raise UserError(f"bus: {channel!r} is not a name for a bus: slashes and blanks are not allowed")
     buses = [
         PacedBus(
             channel,

@@ -25,8 +25,8 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "check-bus",
         help="whether the CAN interfaces of a profile are ready",
-        description="Interfaces there, up, bit rate as in the profile, state and error counters, traffic. Each failure "
-        "comes with the command that mends it. Exit code 1 when there is one.",
+        description="Checks each interface: present, up, bit rate of the profile, state and error counters, traffic. "
+        "Prints a command that mends each failure. Exit code 1 when there is one.",
     )
     command.add_argument("profile", metavar="PROFILE", help="name of a profile or a .toml file")
     command.add_argument(
@@ -34,7 +34,7 @@ def register(commands: Any) -> None:
         type=quantity(TIMES, "s", 0.0),
         default=1.0,
         metavar="1s",
-        help="listen for so long (default 1 s)",
+        help="time to listen (default 1 s)",
     )
     command.add_argument("--json", metavar="FILE|-", help="the findings as JSON; - prints them and nothing else")
     command.set_defaults(run=run)

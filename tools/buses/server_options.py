@@ -18,5 +18,5 @@ def add_options(command: Any) -> None:
     command.add_argument(
         "--allow-network",
         action="store_true",
-        help="let --socketcand listen on a HOST beyond this machine; whoever reaches it may then send frames",
+        help="let --socketcand listen on a HOST beyond this machine; any client there may then send frames",
     )

@@ -11,8 +11,8 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "campaign",
         help="run every fault of a plan, a grid or sample of settings, or a search for the worst case",
-        description="Runs what the plan asks for and is not on the disk yet, then writes tables and a page. Killed, it "
-        "goes on where it was when it is started again.",
+        description="Runs the cases of the plan that have no result yet, then writes tables and a page. After a "
+        "kill, the same command continues.",
         epilog="The plan's form: harness/campaigns/README.md; examples: campaigns/.",
     )
     command.add_argument("file", metavar="FILE.toml", help="the plan")
@@ -23,7 +23,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--pool",
         choices=("local", "dask"),
-        help="plain processes of this machine (the default), or a Dask cluster of its own, encrypted",
+        help="plain processes of this machine (the default), or a new Dask cluster, encrypted",
     )
     command.add_argument("--scheduler", metavar="ADDRESS", help="a Dask cluster that runs already, as tls://host:8786")
     for option, what in (
@@ -32,11 +32,11 @@ def register(commands: Any) -> None:
         ("--tls-key", "key"),
     ):
         command.add_argument(option, metavar="FILE", help=f"{what} (PEM) for --scheduler tls://...")
-    command.add_argument("--report", action="store_true", help="run nothing, write tables and page of what there is")
+    command.add_argument("--report", action="store_true", help="run nothing, only write tables and page")
     command.add_argument(
         "--document", metavar="FILE.md", help="also put the tables into this document, between its two marks"
     )
-    command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and tell what happened")
+    command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and print what happened")
     command.set_defaults(run=run)
 
 

@@ -122,7 +122,7 @@ def times(rows: list[dict[str, Any]]) -> str:
     """How soon faults were detected: the share of the runs by the time since the fault's start."""
     figure = go.Figure()
     for name, column in (
-        ("first error that tells", "detection_ms"),
+        ("first error that reports it", "detection_ms"),
         ("first other state", "reaction_ms"),
         ("fall", "fall_ms"),
     ):
@@ -165,7 +165,7 @@ def markdown(told: dict[str, Any]) -> str:
         lines += [
             "",
             f"Healthy walks of seeds {', '.join(map(str, each['seeds']))}, each judged by the others "
-            "from four instants: "
+            "from four times: "
             f"{count} false alarms of {total}" + (f" ({codes})." if codes else "."),
         ]
     heat = told["heat"]
@@ -177,13 +177,14 @@ def markdown(told: dict[str, Any]) -> str:
             lines.append(f"| {place} | " + " | ".join(SHORT[worst_of(cell)] if cell else "" for cell in cells) + " |")
         lines += ["", "; ".join(f"{short}: {name}" for name, short in SHORT.items()) + "."]
     if told["codes"]:
-        lines += ["", "## What told of the faults first", ""]
-        lines += ["| Error | From | First | Of its own board | Median |", "|---|---|---|---|---|"]
+        lines += ["", "## What reported the faults first", ""]
+        lines += ["| Error | From | First | Of the faulty board | Median |", "|---|---|---|---|---|"]
         for each in told["codes"]:
             told_first = f"{each['first']} | {each['own_board']} | {each['median_ms']:.4g} ms"
             lines.append(f"| {each['code']} | {each['board']} | {told_first} |")
     if told["stopped_at_look"] is not None and told["runs"] < told["foreseen"]:
-        lines += ["", f"Stopped early, at look {told['stopped_at_look']}: {told['runs']} of {told['foreseen']} runs."]
+        early = f"Stopped early, at analysis {told['stopped_at_look']}: {told['runs']} of {told['foreseen']} runs."
+        lines += ["", early]
     for each in told["extremes"]:
         lines += ["", extremes_text(each)]
     if told["settings"]:
@@ -233,7 +234,7 @@ def setting_cells(each: dict[str, Any]) -> list[str]:
 
 def extremes_text(each: dict[str, Any]) -> str:
     """What a search found for one listed combination, in a sentence."""
-    parts = [f"{each['cell'] or 'Search'}: {each['hits']} of {each['runs']} runs came to {each['outcome']}"]
+    parts = [f"{each['cell'] or 'Search'}: {each['hits']} of {each['runs']} runs ended as {each['outcome']}"]
     for what in ("least", "soonest"):
         if (found := each[what]) is not None:
             values = ", ".join(f"{name} {value}" for name, value in found["axes"].items())

@@ -94,7 +94,7 @@ def pool_of(options: argparse.Namespace, console: Console) -> Any:
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.scheduler and not options.scheduler.startswith(ENCRYPTED):
         console.print(
-            f"warning: the Dask scheduler at {options.scheduler} is used without TLS: everyone who can reach it can "
+            f"warning: the Dask scheduler at {options.scheduler} is used without TLS: any client that reaches it can "
             "run code on its workers and on this computer",
             highlight=False,
             soft_wrap=True,
@@ -112,7 +112,7 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
     pool = pool_of(options, console)
     console.print(
         f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.told}"
-        + (f"; {before} of them are there already" if before else ""),
+        + (f"; {before} of them have results already" if before else ""),
         highlight=False,
         soft_wrap=True,
     )
@@ -205,7 +205,7 @@ def replay(campaign: engine.Campaign, key: str) -> int:
             result = group.alone(case, campaign.plan.watch, campaign.healthy_of(case))
             print(proof_text(case, result))
             if known is not None and known.get("digest") != result.get("digest"):
-                print(f"not as on the disk: trace {result.get('digest')}, there {known.get('digest')}")
+                print(f"differs from the stored result: trace {result.get('digest')}, there {known.get('digest')}")
                 return EXIT_UNSURE
             return 0
     raise UserError(f"--replay {key!r}: the plan has no such run of this version, {campaign.version}")

@@ -45,7 +45,8 @@ def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:
         table.columns = kept
     console.print(table)
     if gone:
-        console.print(f"no room for {', '.join(map(one_line, gone))}: a wider window or --json has it", soft_wrap=True)
+        names = ", ".join(map(one_line, gone))
+        console.print(f"too narrow for {names}: widen the window or use --json", soft_wrap=True)
 
 
 def one_line(heading: str) -> str:

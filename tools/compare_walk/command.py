@@ -14,9 +14,9 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "compare-walk",
-        help="a walk that the robot logged beside the emulated robot's with the same controller",
+        help="a walk that the robot logged, compared with the emulated robot's under the same controller",
         description="Takes the strides of a logged walk of the controller of 2015 (hip angle, outer leg's lean, state "
-        "of the walk machine), lets the emulated robot walk, and tells what differs, with intervals from the strides' "
+        "of the walk machine), lets the emulated robot walk, and reports what differs, with intervals from their "
         "scatter. With --causes it names the wrong numbers that would explain it, and what they gain on strides held "
         "out. Exit code 1 when the walks differ by more than the scatter.",
     )
@@ -24,7 +24,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--controller", default="head-2015", metavar="NAME", help="parameter set for the program head-2015 (head-2015)"
     )
-    command.add_argument("--body", default="ranger", metavar="NAME", help="what walks, by name or .toml file (ranger)")
+    command.add_argument("--body", default="ranger", metavar="NAME", help="body, by name or as a .toml file (ranger)")
     command.add_argument("--model", metavar="FILE", help="model file (.toml) with additional terms")
     command.add_argument(
         "--slope",

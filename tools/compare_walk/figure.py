@@ -51,7 +51,7 @@ def line(x1: float, y1: float, x2: float, y2: float, colour: str = GRID, width: 
 def heading(answer: Mapping[str, Any]) -> list[str]:
     """Title and legend."""
     strides = ", ".join(str(each) for each in answer["steady"])
-    parts = [text(LEFT, 24, f"{answer['log']}, strides {strides}, beside {answer['controller']}", size=15)]
+    parts = [text(LEFT, 24, f"{answer['log']}, strides {strides}, compared with {answer['controller']}", size=15)]
     x = DOTS[0] - 190
     for key, colour, words in KINDS:
         if key in answer["trajectories"]:

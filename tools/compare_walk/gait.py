@@ -123,7 +123,7 @@ def of_dataset(dataset: Dataset) -> Walk:
         dataset[name]
     states = dataset["walk_state"]
     if not np.all(np.isfinite(states.value)) or np.any(states.value != np.round(states.value)):
-        raise UserError(f"{dataset.name}: walk_state has values that are no whole number, states 0 to 5 are expected")
+        raise UserError(f"{dataset.name}: walk_state has values that are not whole numbers, states 0 to 5 are expected")
     hip, lean = dataset["hip_angle_rad"], dataset["outer_leg_angle_rad"]
     sound = [np.isfinite(each.value) for each in (hip, lean)]
     return Walk(

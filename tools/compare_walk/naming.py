@@ -113,7 +113,7 @@ class Search:
         """Of the settled gait; None where the robot falls, stands, or cannot be."""
         key = tuple(sorted((name, round(value, 9)) for name, value in values.items() if value != 0.0))
         if key not in self.known:
-            self.progress(", ".join(f"{name} {value:+.3g}" for name, value in key) or "as it stands")
+            self.progress(", ".join(f"{name} {value:+.3g}" for name, value in key) or "unchanged")
             try:
                 strides = self.emulator.settled_strides(values)
             except UserError:  # a value that a body or a controller cannot have

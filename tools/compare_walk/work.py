@@ -100,7 +100,7 @@ def compare(log: str, measured: gait.Walk, emulator: emulate.Emulator, causes: b
             f"{log}: {len(every)} whole strides, {len(chosen)} of one gait in a row; at least {FEWEST} are needed"
         )
     scatter, degrees = gait.scatter(chosen)
-    progress("as it stands")
+    progress("unchanged")
     walk = emulator.walk()
     walked = walk.strides()
     if walk.ended or len(walked) < emulator.settled + 2:
@@ -296,7 +296,7 @@ def tell(answer: dict[str, Any], console: Console) -> None:
     """Print the answer."""
     extended = answer.get("extended_features") if answer["causes"] else None
     table = Table(
-        title=f"{answer['log']}, strides {', '.join(map(str, answer['steady']))}, beside {answer['controller']}"
+        title=f"{answer['log']}, strides {', '.join(map(str, answer['steady']))}, compared with {answer['controller']}"
     )
     heads = ("", "measured", "95 %", "emulated", *(("extended",) if extended else ()), "unit")
     for head in heads:
@@ -324,7 +324,7 @@ def tell(answer: dict[str, Any], console: Console) -> None:
         return
     for cause in answer["causes"]:
         value = next(iter(cause["parameters"].values()))
-        tie = f"; not told apart from {', '.join(cause['tied_with'])}" if cause["tied_with"] else ""
+        tie = f"; not distinguished from {', '.join(cause['tied_with'])}" if cause["tied_with"] else ""
         console.print(
             f"{cause['name']} at {cause['at']}: {value['value']:+.3g} {value['unit']} "
             f"({value['ci95'][0]:+.3g} to {value['ci95'][1]:+.3g}), {cause['meaning']}{tie}",
@@ -340,4 +340,4 @@ def tell(answer: dict[str, Any], console: Console) -> None:
         highlight=False,
     )
     if answer["causes"] and not answer["physical"]:
-        console.print("What is left is more than scatter: the values are not physical yet.", highlight=False)
+        console.print("The rest is more than scatter: the values are not physical yet.", highlight=False)

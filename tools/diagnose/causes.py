@@ -28,7 +28,7 @@ def register(commands: Any) -> None:
         "causes",
         help="list what can make a simulation differ from a machine, and what given channels can show of it",
         description="Without --experiment the catalogue of causes. With it: which causes its channels can show and "
-        "tell apart, before any data are taken.",
+        "distinguish, before any data are taken.",
         epilog="ranger-sim causes --experiment motor-bench --channels voltage_V current_A speed_rad_per_s",
     )
     command.add_argument("cause", nargs="?", metavar="CAUSE", help="everything about one cause")
@@ -154,7 +154,7 @@ def print_analysis(told: dict[str, Any]) -> None:
                  if each["status"] == status]  # fmt: skip
         tell(f"\n{heading} ({len(names)}):")
         tell(f"    {', '.join(names) or 'none'}")
-    tell(f"\nNot told apart ({len(told['ties'])} pairs):")
+    tell(f"\nNot distinguished ({len(told['ties'])} pairs):")
     for tie in told["ties"]:
         tell(f"    {' and '.join(tie['causes'])}: {REASONS[tie['reason']]} (cosine {tie['cosine']:.3f})")
     helps = told["what_would_help"]

@@ -17,7 +17,7 @@ def register(commands: Any) -> None:
         help="what the simulation gets wrong about measured data",
         description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
         "says that it cannot, and measures what the extended model gains on held-out data. Exit code 0: nothing was "
-        "found; 1: something was; 2: a mistake, or data that are not what they say they are.",
+        "found; 1: something was; 2: a mistake, or data that contradict their own description.",
         epilog="ranger-sim diagnose run1.csv --holdout run2.csv --experiment motor-bench --out found",
     )
     command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
@@ -39,8 +39,8 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--model",
         metavar="FILE",
-        help="model to start from: the extended.toml of an earlier diagnosis, or [[term]] tables; what it has already "
-        "is no finding",
+        help="model to start from: the extended.toml of an earlier diagnosis, or [[term]] tables; terms that it "
+        "has are not findings",
     )
     command.add_argument(
         "--gear", type=number(least=0.01, most=1e4), metavar="N", help="of the motor bench's gearbox (14)"

@@ -273,7 +273,7 @@ def telling(found: Diagnosis, made: Mapping[str, Sides]) -> Figure | None:
     figure.update_yaxes(title_text=f"what is left, {side.unit}")
     figure.update_xaxes(title_text=label)
     return finished(
-        figure, title, f"The most telling of {len(found.before.tests)} general tests: {test.features}.", 380
+        figure, title, f"The most significant of {len(found.before.tests)} general tests: {test.features}.", 380
     )
 
 
@@ -300,7 +300,7 @@ def heat_map(
     )
     figure.update_xaxes(title_text=label_of(found, names[0]))
     figure.update_yaxes(title_text=label_of(found, names[1]))
-    told = f"The most telling of {len(found.before.tests)} general tests."
+    told = f"The most significant of {len(found.before.tests)} general tests."
     note = f"Means of what is left; a model that misses nothing would be pale all over. {told}"
     return finished(figure, title, note, 420)
 

@@ -23,7 +23,7 @@ def sentence(found: Diagnosis) -> str:
         also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
         return (
             f"{name}: something is wrong in the {answer['subsystem']} part, and no cause of the catalogue explains it"
-            f"{also}.{learned(answer)} Fitted parameters are not physical while this stands."
+            f"{also}.{learned(answer)} Fitted parameters are not physical until it is resolved."
         )
     names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
     return f"{name}: the {answer['subsystem']} part is wrong: {names}."
@@ -83,7 +83,7 @@ def told(found: Diagnosis) -> str:
     parts = []
     for each in answer["causes"]:
         ties = each["evidence"]["ties"]
-        tied = f" (or {', '.join(ties)}: these data cannot tell)" if ties else ""
+        tied = f" (or {', '.join(ties)}: these data cannot decide)" if ties else ""
         words = meaning(found, each)
         parts.append(f"{words[0].upper()}{words[1:]}: {each['name']} at {each['at']}{tied}.")
     return " ".join(parts)
@@ -124,10 +124,10 @@ def next_steps(found: Diagnosis) -> list[str]:
         where = f" with more of the regime '{worst['regime']}', where most of it shows," if worst else ""
         return [
             f"The same run once more{where}: what repeats is the machine's, what does not is noise.",
-            *([f"What the learned term says:{learned(answer)}"] if learned(answer) else []),
+            *([f"The learned term:{learned(answer)}"] if learned(answer) else []),
             "Each part alone: what still shows with the load off, or with the motor off and the load moved by hand?",
             *steps,
         ]
     if answer["gain"] is None:
         return ["Another run, given as --holdout: a cause that is real makes the model better there as well."]
-    return ["Nothing more is needed to tell this cause from its rivals."]
+    return ["Nothing more is needed to distinguish this cause from its rivals."]

@@ -17,8 +17,8 @@ def register(commands: Any) -> None:
         epilog="docs/foot-too-high.md is an example from end to end, and has the form of the file.",
     )
     command.add_argument("file", metavar="FIGURES", help="a TOML file, or record-walk: the figures of May 2011")
-    command.add_argument("--body", metavar="NAME", help="the body that is doubted, in place of the file's")
-    command.add_argument("--controller", metavar="NAME", help="what it walks with, in place of the file's")
+    command.add_argument("--body", metavar="NAME", help="the body to check, in place of the file's")
+    command.add_argument("--controller", metavar="NAME", help="its controller, in place of the file's")
     command.add_argument("--steps", type=whole_number(20), metavar="N", help="of each walk, in place of the file's")
     command.add_argument(
         "--seeds", type=whole_number(2), metavar="N", help="walks of each body, in place of the file's"

@@ -68,7 +68,7 @@ class Setup:
         defaults = dataclasses.asdict(cls())
         for key, value in table.items():
             if key not in defaults:
-                raise UserError(f"{path}: [run] {key}: there is no such key, but {', '.join(defaults)}")
+                raise UserError(f"{path}: [run] {key}: unknown key (available: {', '.join(defaults)})")
             kind = type(defaults[key])
             wanted = (int, float) if kind is float else (kind,)
             if not isinstance(value, wanted) or isinstance(value, bool):

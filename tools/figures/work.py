@@ -73,7 +73,7 @@ def asked(options: argparse.Namespace) -> tuple[Setup, Question]:
     question = dataclasses.replace(question, figures=(*question.figures, *map(typed_figure, options.also)))
     for each in [*(figure.name for figure in question.gait), *(wanted.name for wanted in question.measurements)]:
         if each not in FIGURES:
-            raise UserError(f"{path}: figure {each}: a walk has none of this name, but {', '.join(FIGURES)}")
+            raise UserError(f"{path}: unknown figure {each} (available: {', '.join(FIGURES)})")
     limits_met(path, setup, question.candidates)
     return setup, question
 
@@ -210,7 +210,7 @@ def show(answer: Mapping[str, Any], console: Console) -> None:
         console.print(table)
         return
     console.print(sentence(answer), highlight=False, soft_wrap=True)
-    table = Table("figure", "measured", "as it stands", "at the best", "error allowed", box=None)
+    table = Table("figure", "measured", "unchanged", "at the best", "error allowed", box=None)
     for before, after in zip(answer["misfit"], answer["figures"], strict=True):
         table.add_row(
             before["channel"], *(f"{value:.4g}" for value in (before["measured"], before["simulated"],
@@ -254,15 +254,15 @@ def sentence(answer: Mapping[str, Any]) -> str:
     sharper = f" Within what was known, they say more of {moved}." if moved else ""
     if not answer["detected"]:
         p = answer["evidence"]["p_nothing"]
-        return f"These figures refuse nothing of the body as it stands and as well as it is known (p {p:.2g}).{sharper}"
+        return f"These figures refuse nothing of the unchanged body within its known accuracy (p {p:.2g}).{sharper}"
     if answer["abstained"]:
         return (
             "Something is wrong, and no one or two of the candidates explain the figures "
-            f"(p {answer['evidence']['p_best']:.2g}): their values are not physical while this stands."
+            f"(p {answer['evidence']['p_best']:.2g}): their values are not physical until it is resolved."
         )
     named = [name for cause in answer["causes"] for name in cause["parameters"]]
     if not named:
-        return f"Something is wrong; these figures cannot tell which: {', '.join(answer['suspects'])}."
+        return f"Something is wrong; these figures cannot decide which: {', '.join(answer['suspects'])}."
     values = " and ".join(
         value_text(name, value) for cause in answer["causes"] for name, value in cause["parameters"].items()
     )

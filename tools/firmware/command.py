@@ -30,18 +30,18 @@ FIRMWARE = Option(
 )
 SANITIZE = Option(
     "--sanitize",
-    "compile the firmware with the address and undefined-behaviour sanitizers; what they find is told at the end, with "
-    "file and line, and makes exit code 1",
+    "compile the firmware with the address and undefined-behaviour sanitizers; findings are printed at the end, with "
+    "file and line, and make exit code 1",
     of_run=False,
 )
 IN_PROCESS = Option(
     "--in-process",
-    "run the firmware in the walk's own process instead of one of its own: faster, but a crash ends the walk",
+    "run the firmware in the walk's own process instead of a separate one: faster, but a crash ends the walk",
     of_run=False,
 )
 BOARD_DEADLINE = Option(
     "--board-deadline",
-    f"end the process of a firmware that gives no answer for so long (default {DEADLINE_S:g}s); 0s: never, to debug it",
+    f"end a firmware's process that does not answer for this time (default {DEADLINE_S:g}s); 0s: never, to debug it",
     quantity(TIMES, "s", least=0.0, most=LONGEST_DEADLINE_S),
     f"{DEADLINE_S:g}s",
     DEADLINE_S,

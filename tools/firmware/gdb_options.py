@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 GDB = Option(
     "--gdb",
     "let gdb debug this board, which runs an --image: `target remote :PORT` (0: a free one). The run begins when gdb "
-    "lets it, and virtual time stands whenever gdb has the board. BOARD=HOST:PORT beyond this machine needs "
+    "lets it, and virtual time stops whenever gdb has the board. BOARD=HOST:PORT beyond this machine needs "
     "--allow-network",
     word("BOARD=PORT"),
     "BOARD=PORT",
@@ -30,7 +30,7 @@ GDB = Option(
 )
 ALLOW_NETWORK = Option(
     "--allow-network",
-    "let --gdb BOARD=HOST:PORT listen beyond this machine; whoever reaches it may then do anything to the board",
+    "let --gdb BOARD=HOST:PORT listen beyond this machine; any client there may then do anything to the board",
     of_run=False,
 )
 
@@ -43,9 +43,7 @@ def never() -> bool:
 def line(door: GdbServer) -> str:
     """The line that tells the user how to connect gdb to a port."""
     host = "" if door.host == "127.0.0.1" else door.host
-    open_to_all = (
-        "" if loopback(door.host) else ", open to the network: whoever reaches it may do anything to the board"
-    )
+    open_to_all = "" if loopback(door.host) else ", open to the network: any client there may do anything to the board"
     return f"gdb for {door.board.name}: target remote {host}:{door.port}; the run waits for it{open_to_all}"
 
 

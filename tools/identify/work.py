@@ -27,7 +27,7 @@ from ranger_sim.tools.identify import page
 EXIT_DONE, EXIT_REFUSED = 0, 1
 UNEXPLAINED_TEXT = (
     "the residual is {:.0f} times the instruments' noise: something that is not in the model moves it, "
-    "and these values may stand in for it (not physical)"
+    "and these values may compensate for it (not physical)"
 )
 
 

@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
 def check(folder: pathlib.Path) -> None:
     """UserError for an existing file or link, or a folder that is not empty."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise UserError(f"new {folder}: it is there already and is no folder")
+        raise UserError(f"new {folder}: it exists and is not a folder")
     if folder.is_dir() and any(folder.iterdir()):
         raise UserError(f"new {folder}: the folder is not empty; give one that is not there yet")
 

@@ -34,7 +34,7 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "panel",
         help="RoboDAQ and the robot's front panel in a browser: a running robot, a data link, recordings",
-        description="Without RECORDING: the robot that `up` runs (--name), one of its own (--walk), or a serial port "
+        description="Without RECORDING: the robot that `up` runs (--name), a new one (--walk), or a serial port "
         "with the data link (--port). A second RECORDING is laid over the first.",
     )
     command.add_argument(
@@ -48,12 +48,12 @@ def register(commands: Any) -> None:
         "--align",
         type=word("an event"),
         metavar="EVENT",
-        help="lay the second over the first so that this happens at one instant, e.g. 'FSM_HIP = 3'",
+        help="lay the second over the first so that this happens at the same time, e.g. 'FSM_HIP = 3'",
     )
     command.add_argument(
         "--name", type=word("a name"), default="ranger", help="the robot that `up` runs (default ranger)"
     )
-    command.add_argument("--walk", action="store_true", help="start a robot to look at; it ends with the panel")
+    command.add_argument("--walk", action="store_true", help="start a robot for the panel; it ends with the panel")
     command.add_argument("--port", metavar="PORT", help="a serial port with the data link, real or of `up --daq-port`")
     command.add_argument("--host", default=HERE, help=f"address to listen on (default {HERE})")
     command.add_argument(

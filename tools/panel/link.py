@@ -30,7 +30,7 @@ SLOWEST_S = 0.5  # the slow list comes round in a third of a second (robot.md N4
 STEP_S = 1e-3  # the clock of the robot's stamps
 NOTHING_S = 1e-4  # a NaN point is this long after the last one before a gap
 NO_SLOTS = (
-    "The data link brings no slots one by one. What the boards tell of them themselves are the channels "
+    "The data link brings no slots one by one. The boards report their own in the channels "
     "…_EXECUTION_TIME and …_MAX_EXECUTION_TIME."
 )
 NO_FRAMES = "The data link brings no frames: a program at the bus shows them (docs/how-to/can-tools.md)."
@@ -257,6 +257,6 @@ class LinkSource(Source):
             raise UserError("the data link takes parameters alone")
         name, value = wish.get("name"), wish.get("value")
         if not isinstance(name, str):
-            raise UserError(f"set: {str(name)[:40]!r} is no name of a parameter")
+            raise UserError(f"set: {str(name)[:40]!r} is not the name of a parameter")
         self.session.write(name, value)  # type: ignore[arg-type]  # what is no number is refused there
         return {"sent": name}

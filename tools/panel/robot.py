@@ -98,7 +98,7 @@ class RobotSource(Source):
                 data = self.connection.recv(READ_BYTES)
             except TimeoutError:
                 self.connection.close()
-                raise UserError(f"the robot named {self.name} has said nothing for {CONNECT_S:g} s") from None
+                raise UserError(f"the robot named {self.name} has sent nothing for {CONNECT_S:g} s") from None
             if not data:
                 raise UserError(f"the robot named {self.name} shows itself to {peers.LIMITS['feed'].peers} already")
             self.incoming += data
@@ -246,6 +246,6 @@ class RobotSource(Source):
 
     async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
         if not isinstance(wish.get("do"), str) or wish["do"] not in REQUESTS:
-            raise UserError(f"{str(wish.get('do'))[:40]!r} is no request to a robot")
+            raise UserError(f"{str(wish.get('do'))[:40]!r} is not a request to a robot")
         answer: dict[str, Any] = await asyncio.to_thread(control.ask, self.name, wish)
         return answer

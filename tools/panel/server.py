@@ -139,7 +139,7 @@ class PanelServer:
         try:
             kind = request.path_params["kind"]
             if kind not in export.KINDS:
-                raise UserError(f"{kind[:20]!r} is no kind of file; there are {', '.join(export.KINDS)}")
+                raise UserError(f"{kind[:20]!r} is not a kind of file (available: {', '.join(export.KINDS)})")
             asked = request.query_params
             try:
                 numbers = [int(each) for each in asked.get("channels", "").split(",") if each]
@@ -301,7 +301,7 @@ class Session:
         found = {}
         for number, plot in enumerate(plots):
             if not isinstance(plot, dict):
-                raise UserError(f"look: plot {number} is no object")
+                raise UserError(f"look: plot {number} is not an object")
             found[number] = Plot(
                 channels_of(plot.get("channels"), self.source),
                 seconds(plot.get("begin"), "begin"),
@@ -415,7 +415,7 @@ def seconds(value: Any, what: str) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > 1e9:
-        raise UserError(f"{what}: {str(value)[:20]} is no time in seconds")
+        raise UserError(f"{what}: {str(value)[:20]} is not a time in seconds")
     return float(value)
 
 

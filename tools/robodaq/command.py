@@ -47,7 +47,7 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "daq",
         help="log a robot over its serial line, read and write its parameters",
-        description="The computer's end of the robot's data link. Without --time it ends when everything asked is "
+        description="The computer's end of the robot's data link. Without --time it ends when every request is "
         "done, or with Ctrl-C.",
     )
     command.add_argument("--port", required=True, help="serial port, pseudo-terminal, or a URL that pyserial knows")
@@ -76,7 +76,7 @@ def register(commands: Any) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="keep what comes: FILE.txt in RoboDAQ's format, FILE.mf4 as `walk` writes it (repeatable)",
+        help="store received values: FILE.txt in RoboDAQ's format, FILE.mf4 as `walk` writes it (repeatable)",
     )
     command.add_argument(
         "--read", nargs="+", action="extend", default=[], metavar="NAME", help="wait for a fresh value and print it"
@@ -98,16 +98,16 @@ def register(commands: Any) -> None:
         metavar="NAME",
         help="parameter set whose values a saved .toml leaves out (default robust)",
     )
-    command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="end after so much time")
+    command.add_argument("--time", type=quantity(TIMES, "s", 0.0), metavar="60s", help="end after this time")
     command.add_argument(
         "--timeout",
         type=quantity(TIMES, "s", 0.0),
         default=TIMEOUT_S,
         metavar="10s",
-        help="wait so long for an answer (default 10s)",
+        help="time to wait for an answer (default 10s)",
     )
     command.add_argument(
-        "--json", metavar="FILE|-", help="what came and was read as JSON; - prints it and nothing else"
+        "--json", metavar="FILE|-", help="file for the received values as JSON; - prints them and nothing else"
     )
     command.set_defaults(run=run)
 

@@ -87,7 +87,7 @@ def as_controller(words: dict[str, int], base: str) -> str:
         if name in values and word != word_of_value("f32", values[name])
     }
     lines = [
-        "# Parameters as they stood on the robot, read over its data link.",
+        "# Parameters of the robot, read over its data link.",
         "",
         'title = "read from the robot"',
         f'base = "{base}"',

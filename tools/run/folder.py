@@ -28,7 +28,7 @@ FILES = (*BUS_LOGS, VARIABLES, REPORT, LCOV)  # in addition to the summary
 # Bytes that incomplete.json takes from the disk at the start, so that a summary (some 20 kB) fits into it when the disk
 # is full at the end. Chosen by us.
 RESERVED = 65_536
-BROKEN_OFF = "the run has not ended, or was broken off: what is here is as far as it came"
+BROKEN_OFF = "the run has not ended, or was broken off: this folder is incomplete"
 FAILURES = (OSError, MemoryError)  # of the machine: a file then stays partial, and the run continues
 
 
@@ -155,7 +155,7 @@ class RunFolder:
             foreign = [SUMMARY, *foreign]
         if foreign:
             raise UserError(
-                f"{self.path / foreign[0]}: is there, and of no run that this folder tells of; "
+                f"{self.path / foreign[0]}: exists and belongs to no run of this folder; "
                 "remove it or choose another folder"
             )
         # the summary first: from here on nothing marks the rest as a whole run

@@ -37,7 +37,7 @@ OPTIONS = (
 def add_options(command: Any) -> None:
     """The options `--daq-...` and `--imu-...`."""
     group = command.add_argument_group(
-        "serial lines", "PORT: a serial port, a URL that pyserial knows, or pty for a pseudo-terminal of its own"
+        "serial lines", "PORT: a serial port, a URL that pyserial knows, or pty for a new pseudo-terminal"
     )
     add_all(group, OPTIONS)
 
@@ -107,5 +107,5 @@ def report(ends: dict[str, Any]) -> list[str]:
         counts = ", ".join(f"{key.replace('_', ' ')} {count}" for key, count in end.counters().items() if count)
         lines.append(f"{name}: {counts or 'no traffic'}" + (f"; the port is gone: {end.gone}" if end.gone else ""))
     if any(end.asynchronous for end in ends.values()):
-        lines.append("bytes came in at the wall clock's pace: this run cannot be repeated byte for byte")
+        lines.append("bytes arrived at the wall clock's pace: this run cannot be repeated byte for byte")
     return lines

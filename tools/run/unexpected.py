@@ -69,7 +69,7 @@ def boards(summary: dict) -> Iterator[str]:
     if delay["missed"]:
         yield f"{times(delay['missed'], 'strike')} not noticed"
     if delay["unmatched"]:
-        yield f"{times(delay['unmatched'], 'strike')} told that there was not"
+        yield f"{times(delay['unmatched'], 'strike')} reported that did not happen"
 
 
 def errors(counts: dict, time_s: float) -> Iterator[str]:

@@ -220,7 +220,7 @@ def finish_printed(printed: Printed | None, kept: PrintedFiles | None) -> None:
 def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
     """Arm the faults; with `proof`, also a golden run without any, in parallel."""
     if proof and not wanted:
-        raise UserError("--proof: there is no --fault to hold against the walk without it")
+        raise UserError("--proof: there is no --fault to compare with a walk without it")
     if wanted:
         robot.start()
     twin = None

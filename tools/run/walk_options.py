@@ -37,9 +37,9 @@ def of_scenario(field: str, units: dict[str, float], base: str) -> Quantity:
 
 
 END = (
-    Option("--steps", "end after so many steps", whole_number(1, MOST_STEPS), "N"),
-    Option("--time", "end after so much virtual time", quantity(TIMES, "s", above=0.0, most=MOST_TIME_S), "60s"),
-    Option("--distance", "end after so much distance", quantity(LENGTHS, "m", above=0.0, most=MOST_DISTANCE_M), "65km"),
+    Option("--steps", "end after this many steps", whole_number(1, MOST_STEPS), "N"),
+    Option("--time", "end after this virtual time", quantity(TIMES, "s", above=0.0, most=MOST_TIME_S), "60s"),
+    Option("--distance", "end after this distance", quantity(LENGTHS, "m", above=0.0, most=MOST_DISTANCE_M), "65km"),
 )
 SCENARIO = (
     Option(
@@ -60,7 +60,7 @@ SCENARIO = (
     ),
     Option(
         "--seed",
-        f"chooses crystals, phases, noise and footholds (default {Scenario.seed})",
+        f"of crystals, phases, noise and footholds (default {Scenario.seed})",
         whole_number(0),
         "N",
         Scenario.seed,
@@ -128,7 +128,7 @@ FILES = (
 )
 PROOF = Option(
     "--proof",
-    "hold the walk against itself without its faults: what differs first, which error tells of it and when, what the "
+    "compare the walk with itself without its faults: what differs first, which error reports it and when, what the "
     "machines do (a second process walks that one; 2 MB a second in both)",
     of_run=False,
 )

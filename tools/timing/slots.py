@@ -34,17 +34,17 @@ def register(commands: Any) -> None:
         help="slot timing of the boards: costs, limits, worst seen and worst possible",
         description="The schedule of a board, line by line, in cycles: what each function costs, may cost, cost at "
         "most in a run of the robot, and can cost at most; then rows with their margins, and interrupts. The robot's "
-        "own figures stand beside them (docs/robot.md T). Exit code 1 when a slot of the run overran.",
+        "own figures are next to them (docs/robot.md T). Exit code 1 when a slot of the run overran.",
     )
     command.add_argument(
         "board", nargs="?", metavar="BOARD", help=f"one of {', '.join(BOARD_CLASSES)} (default: all, rows only)"
     )
     length = command.add_mutually_exclusive_group()
-    length.add_argument("--static", action="store_true", help="only what can be said without a run")
+    length.add_argument("--static", action="store_true", help="only what is known without a run")
     length.add_argument(
         "--time", type=quantity(TIMES, "s", 0.0), metavar="2s", help=f"virtual time of the run ({USUAL_TIME_S:g} s)"
     )
-    length.add_argument("--steps", type=whole_number(1), metavar="N", help="run until so many steps")
+    length.add_argument("--steps", type=whole_number(1), metavar="N", help="run for this many steps")
     command.add_argument("--seed", type=whole_number(0), default=1, metavar="N", help="seed of the run (1)")
     command.add_argument(
         "--edge-rate",

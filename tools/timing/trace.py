@@ -39,7 +39,7 @@ OPTIONS = (
     ),
     Option(
         "--trace-last",
-        "keep only the last so many seconds of virtual time; without it everything, 25 MB of disk a second",
+        "keep only this many last seconds of virtual time; without it everything, 25 MB of disk a second",
         quantity(TIMES, "s", above=0.0, most=MOST_TIME_S),
         "10s",
         of_run=False,
@@ -92,11 +92,11 @@ def write(timeline: Timeline | None, given: argparse.Namespace, console: Console
 
 def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
-    command = commands.add_parser("trace", help="look at a timeline that `walk --trace FILE` has written")
+    command = commands.add_parser("trace", help="show a timeline that `walk --trace FILE` has written")
     actions = command.add_subparsers(dest="action", required=True, metavar="ACTION")
     opening = actions.add_parser(
         "open",
-        help="show it in Perfetto's viewer, or offline in a page of its own",
+        help="show it in Perfetto's viewer, or offline in a separate page",
         description="Serves FILE from this machine, to the browser here only, and opens it in Perfetto's viewer, which "
         "reads it there; nothing leaves this machine. --offline: a page that needs no network.",
     )
@@ -105,16 +105,16 @@ def register(commands: Any) -> None:
         "--at",
         type=quantity(TIMES, "s"),
         metavar="12.3s",
-        help="the instant to show (default: where a fault first acted, else the fall, else the last step)",
+        help="the time to show (default: where a fault first acted, else the fall, else the last step)",
     )
     opening.add_argument(
         "--shown",
         type=quantity(TIMES, "s", 0.0),
         default=SHOWN_S,
         metavar="20ms",
-        help="how much around it is shown at first (default 20 ms)",
+        help="length that is shown at first (default 20 ms)",
     )
-    opening.add_argument("--offline", action="store_true", help="write a page beside FILE and open that")
+    opening.add_argument("--offline", action="store_true", help="write a page next to FILE and open that")
     opening.add_argument("--out", type=pathlib.Path, metavar="PAGE.html", help="where the page is written")
     opening.add_argument("--no-browser", action="store_true", help="only print the address")
     opening.set_defaults(run=run_open)

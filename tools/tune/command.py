@@ -124,8 +124,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         description="The best set is written as a .toml file, by `evolution` after each generation.",
     )
     command.add_argument("--method", choices=("pattern", "evolution"), default="pattern", help="default pattern")
-    command.add_argument("--aim", choices=("robot", "energy"), default="robot", help="what is good (default robot)")
-    command.add_argument("--body", default=Scenario.body, metavar="NAME", help="what walks (default ranger)")
+    command.add_argument("--aim", choices=("robot", "energy"), default="robot", help="objective (default robot)")
+    command.add_argument("--body", default=Scenario.body, metavar="NAME", help="body that walks (default ranger)")
     command.add_argument(
         "--base",
         default="record-2011",
@@ -154,7 +154,7 @@ def register(commands: argparse._SubParsersAction) -> None:
         "--worth",
         type=number(least=0.0),
         default=0.05,
-        help="a change is kept that lowers the cost by so much (default 0.05)",
+        help="a change is kept if it lowers the cost by this much (default 0.05)",
     )
     command.add_argument("--generations", type=whole_number(0), default=20, help="of the evolution (default 20)")
     command.add_argument("--population", type=whole_number(4), help="walkers of a generation (default by their number)")

@@ -22,14 +22,14 @@ def register(commands: Any) -> None:
         usage="ranger-sim vm [options] -- COMMAND [ARGUMENT ...]",
         description="Boots Debian's kernel under software emulation and runs COMMAND in it, in this folder and among "
         "the files of this machine, with vcan0 ... vcan3 up and two Kvaser adapters on one bus as can0 and can1. "
-        "What COMMAND writes into files is gone afterwards, except below --shared.",
+        "Files that COMMAND writes are gone afterwards, except below --shared.",
     )
     command.add_argument(
         "--time-limit",
         type=quantity(TIMES, "s", 0.0),
         default=default.time_limit_s,
         metavar="10min",
-        help="the machine is switched off after so long, with exit code 124 (default 10min)",
+        help="the machine is switched off after this time, with exit code 124 (default 10min)",
     )
     command.add_argument(
         "--memory",
@@ -56,7 +56,7 @@ def register(commands: Any) -> None:
         "--kvm", action="store_true", help="use /dev/kvm instead of emulation: far faster where it works"
     )
     command.add_argument("--console", action="store_true", help="show the machine's console on standard error")
-    command.add_argument("command_line", nargs="+", metavar="COMMAND", help="what to run, after --")
+    command.add_argument("command_line", nargs="+", metavar="COMMAND", help="the command to run, after --")
     command.set_defaults(run=run)
 
 
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; returns its exit code."""
     for name in options.shared:
         if not pathlib.Path(name).is_dir():
-            raise UserError(f"--shared {name!r}: this is no folder")
+            raise UserError(f"--shared {name!r}: not a folder")
     if options.kvm and not os.access("/dev/kvm", os.R_OK | os.W_OK):
         raise UserError("--kvm: /dev/kvm is not there or may not be used; leave --kvm out for software emulation")
     guest = machine.Guest(

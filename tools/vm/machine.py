@@ -192,7 +192,7 @@ class Attendant:
                         self.selector.unregister(key.fileobj)
                 if not self.selector.get_map():
                     raise UserError(
-                        "vm: the machine stopped by itself; its last words:", *self.last_words().splitlines()
+                        "vm: the machine stopped by itself; its last output:", *self.last_words().splitlines()
                     )
         return Ended(self.code, self.boot_s, self.seconds())
 

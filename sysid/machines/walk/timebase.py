@@ -48,7 +48,7 @@ def even_table(dataset: Dataset, names: list[str], carrying: tuple[str, ...]) ->
             columns[name + FRESH] = _fresh(channel.time_s, time_s, step_s)
     kept = np.flatnonzero(~lost)
     if len(kept) < 20:
-        raise ModelError(f"{dataset.name}: hardly any time in which all of {', '.join(c.name for c in carriers)} came")
+        raise ModelError(f"{dataset.name}: {', '.join(c.name for c in carriers)} hardly ever arrive at the same time")
     begins = np.flatnonzero(np.diff(kept, prepend=-2) != 1)
     runs = tuple(slice(int(a), int(b)) for a, b in zip(begins, [*begins[1:], len(kept)], strict=True))
     return Table(time_s[kept], {name: column[kept] for name, column in columns.items()}, runs, dataset.name)

@@ -7,7 +7,7 @@ An effect has an amplitude (one number that is found by calibration) and a shape
                 E  V - R I - Vc sgn I - L dI/dt - G K w                                   volt
                 M  G K I - J dw/dt - (C0 + mu G K |I|) sgn w - C1 w - T - leg              newton metre
                 T  d theta/dt / G - w                                                      rad/s
-    tell      the amplitude in the catalogue's parameters, where these mean the same
+    `tell`    the amplitude in the catalogue's parameters, where these mean the same
 """
 
 import dataclasses

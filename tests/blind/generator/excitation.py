@@ -1,7 +1,7 @@
 """What the bench does to the motor: voltage and brake torque as a person would vary them, at the sampling rate.
 
 Segments of random length: held levels, ramps, sines, standstill; both directions, braking and driving. The first half
-second stands still. Sources are not ideal: voltage and brake torque follow their command with a lag.
+second is at rest. Sources are not ideal: voltage and brake torque follow their command with a lag.
 """
 
 import numpy as np

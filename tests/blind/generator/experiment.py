@@ -40,7 +40,7 @@ class Experiment:
     EFFECTS             {name: Effect} that this experiment can hide: CAUSES of the catalogue and OUTSIDE it
     SHADOWS             ((cause, show), ...): causes of the catalogue at other places, which are not hidden here but may
                         look like what is; show as an Effect's
-    CONFUSABLE          causes that the poor experiment cannot tell apart
+    CONFUSABLE          causes that the poor experiment cannot distinguish
     MIX                 shares of the kinds in a set of cases
     ONLY_IN             {balance: causes that show in it alone, or nearly}; CHECK_AT_4 of each, and CHECK_KINDS, are
                         the subset for continuous integration
@@ -328,6 +328,6 @@ class Experiment:
 
 
 def runs_away(plain, *trajectories):
-    """True when a run is much faster than the one without effects, or is no motion at all."""
+    """True when a run is much faster than the one without effects, or is not a motion at all."""
     fastest = RUNAWAY * float(np.max(np.abs(plain.w)))
     return any(not np.max(np.abs(each.w)) <= fastest for each in trajectories)

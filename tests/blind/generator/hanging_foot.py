@@ -250,7 +250,7 @@ class EddyBrake(Law):
 
 
 class LooseMass(Law):
-    """Something on the foot that swings on a soft spring of its own."""
+    """Something on the foot that swings on its own soft spring."""
 
     def prepare(self):
         self.rate = np.zeros(len(self.lane))

@@ -1,7 +1,7 @@
 """Whole walks of the emulated robot, as its own main brain logged them, with something wrong in the body or a sensor.
 
 The robot is the emulator itself, run as a user runs it: `ranger-sim walk` with a body file, a model file, a seed and a
-battery, in a process of its own. From its record only what the main brain knew is taken (never the plant's own values):
+battery, in a separate process. From its record only what the main brain knew is taken (never the plant's own values):
 filtered and rounded by the boards, delayed by the buses. That is logged as RoboDAQ does, every 6 ms the latest value of
 each variable, with single rows and silences of 50 to 180 ms missing.
 
@@ -70,7 +70,7 @@ FOOT_M, MASS_KG_M, LEG_KG, SPRING, LEG_INERTIA = 0.146, 0.04, 4.955, 7.6, 0.55  
 
 @dataclasses.dataclass
 class Asked:
-    """One walk: body parameters beside `ranger`'s, terms of a model file, options of the command."""
+    """One walk: body parameters other than `ranger`'s, terms of a model file, options of the command."""
 
     seed: int
     battery: float
@@ -96,7 +96,7 @@ class Ruler:
 class Effect:
     """name: the catalogue's identifier. smallest, largest: size at the ends of the ladder; places: where it may sit.
 
-    put(asked, size, place) lets it act; tell: what it is called and how large it is.
+    put(asked, size, place) lets it act; `tell`: what it is called and how large it is.
     """
 
     name: str

@@ -18,7 +18,7 @@ class DeadBoard(Board):
         return NEVER
 
     def listen_to_edges(self, buffer, pin, partner_pin):
-        """Nobody looks at them."""
+        """No test reads them."""
 
 
 def test_three_thousand_cases_from_outside_move_the_counters_and_stop_nothing():

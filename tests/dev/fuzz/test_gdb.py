@@ -1,4 +1,4 @@
-"""The fuzzer of a board's gdb door: a sample stands, and what it looks for is found."""
+"""The fuzzer of a board's gdb port: a sample passes, and the faults that it looks for are found."""
 
 import pytest
 

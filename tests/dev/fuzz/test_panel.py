@@ -1,4 +1,4 @@
-"""The fuzzer of the panel's doors: a sample stands, and what it looks for is found."""
+"""The fuzzer of the panel's endpoints: a sample passes, and the faults that it looks for are found."""
 
 import pytest
 

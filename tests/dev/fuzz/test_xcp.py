@@ -1,4 +1,4 @@
-"""The fuzzer of the XCP door: a sample stands, and what it looks for is found."""
+"""The fuzzer of the XCP port: a sample passes, and the faults that it looks for are found."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def test_a_slave_that_writes_what_is_no_parameter_is_found(monkeypatch):
             self.robot.board("MB").memory[(address - 0x10000) // 4] = 1 + int.from_bytes(data[:3], "little")
 
     monkeypatch.setattr(TableMemory, "write", written)
-    with pytest.raises(Finding, match="a variable that is no parameter was written"):
+    with pytest.raises(Finding, match="a variable that is not a parameter was written"):
         xcp.run(3000, seed=4)
 
 
@@ -37,5 +37,5 @@ def test_a_door_that_takes_too_many_commands_in_a_look_is_found(monkeypatch):
     import dataclasses
 
     monkeypatch.setattr(udp, "RULE", dataclasses.replace(udp.RULE, burst=100_000))
-    with pytest.raises(Finding, match="more commands in a look"):
+    with pytest.raises(Finding, match="more commands in a poll"):
         xcp.run(3000, seed=4)

@@ -191,7 +191,7 @@ def test_a_status_that_msr_changes_keeps_its_state_and_that_of_user_mode_its_low
 
 @pytest.mark.parametrize("mode", [USER, SYSTEM])
 def test_modes_without_a_saved_status_read_their_own_and_write_none(mode):
-    """Unpredictable (A4, MRS and MSR); ours is told here."""
+    """Unpredictable (A4, MRS and MSR); ours is here."""
     made = core(0xE14F2000, 0xE16FF001)  # mrs r2, spsr; msr spsr_fsxc, r1
     made.set_cpsr(0x90000000 | mode)
     made.r[1] = 0x60000000 | FAST

@@ -1,6 +1,6 @@
 """A debugger of a few lines, written from the protocol's description and sharing nothing with ours.
 
-`session` runs one beside a machine: the machine and its door in this thread, the debugger in another.
+`session` runs one with a machine: the machine and its gdb port in this thread, the debugger in another.
 """
 
 import concurrent.futures
@@ -69,10 +69,10 @@ class Client:
 
 
 def session(machine, until, talk, clients=1, beside=(), run=None, **options):
-    """What `talk(client, ...)` returns, with so many clients connected, and the door.
+    """What `talk(client, ...)` returns, with this many clients connected, and the gdb server.
 
-    The machine has run to `until` (None: for as long as the talk takes); `beside`: doors of the same process. `run`
-    is how it passes time to an instant, in units of `until`.
+    The machine has run to `until` (None: while the talk takes); `beside`: gdb servers of the same process. `run`
+    is how it passes time to a time, in units of `until`.
     """
     run = run or machine.run
     with contextlib.ExitStack() as stack:

@@ -17,7 +17,7 @@ FRAME_NS = 40_000
 
 
 def words_of(name):
-    """The words beside the assembly."""
+    """The words next to the assembly."""
     return [int(word, 16) for word in (HERE / f"{name}.words").read_text(encoding="utf-8").split()]
 
 
@@ -30,7 +30,7 @@ def linked(name, folder):
 
 
 def content(words):
-    """Words as they stand in memory."""
+    """Words as they are in memory."""
     return array.array("I", words).tobytes()
 
 

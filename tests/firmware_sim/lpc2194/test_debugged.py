@@ -104,7 +104,7 @@ def test_looking_at_a_board_of_the_chip_leaves_its_run_as_it_is():
 
 
 def test_a_program_that_waits_for_ever_without_an_interrupt_is_found_by_a_debugger_and_goes_on_as_without():
-    """`b .` is skipped at once; the door is looked at all the same, and nothing but that."""
+    """`b .` is skipped at once; the gdb port is polled all the same, and nothing else."""
     alone, board = board_with([0xEAFFFFFE]), board_with([0xEAFFFFFE])
     with contextlib.closing(GdbServer(board, 0, ends=lambda: True)) as server:  # held, it is let go
         server.begin()

@@ -1,6 +1,6 @@
 """Each block by its registers, with known answers: the LPC2194 user manual's words, in numbers worked out by hand.
 
-The processor stands in a loop at the crystal's 10 MHz, and so do the peripherals: a count lasts 100 ns.
+The processor is in a loop at the crystal's 10 MHz, and so do the peripherals: a count lasts 100 ns.
 """
 
 import pytest
@@ -27,7 +27,7 @@ class Chip:
         self.write(SYSTEM + 0x100, 1)  # VPBDIV: the peripherals' clock is the processor's
 
     def at(self, us):
-        """Pass time to this instant."""
+        """Pass time to this time."""
         self.board.advance(round(us * 1000))
         self.board.catch_up()
         self.board.core.began = round(us * 1000) // COUNT_NS

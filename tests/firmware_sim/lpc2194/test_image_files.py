@@ -117,13 +117,13 @@ WRONG = {
     "header only": (elf()[:20], "damaged or truncated ELF file"),
     "high": (elf(((0, 0x00080000, CODE),)), "16 bytes at 0x00080000 are outside the chip's flash"),
     "edge": (elf(((0, 0x0003FFF8, CODE),)), "16 bytes at 0x0003fff8 are outside the chip's flash"),
-    "twice": (elf(((0, 0x100, CODE), (0, 0x108, CODE))), "two pieces of it are at 0x00000108"),
-    "nothing": (elf(()), "there is nothing in it for flash or RAM"),
+    "twice": (elf(((0, 0x100, CODE), (0, 0x108, CODE))), "two segments overlap at 0x00000108"),
+    "nothing": (elf(()), "it has no data for flash or RAM"),
     "checksum": (":0400000001020304F3\n" + END, r"program:1: checksum 0xf3 is wrong: the record's bytes ask for 0xf2"),
     "short": (":0400000001020304\n" + END, "program:1: no whole record"),
     "letters": (":04000000010203ZZF2\n" + END, "program:1: no whole record"),
     "no end": (record(0, 0, CODE), "truncated: there is no end record"),
-    "behind": (END + record(0, 0, CODE), "program:2: more lines behind the end record"),
+    "behind": (END + record(0, 0, CODE), "program:2: more lines after the end record"),
     "kind": (record(7, 0, CODE) + END, r"program:1: record type 7 is none of Intel HEX"),
     "long address": (record(4, 0, b"\x00\x00\x00") + END, "program:1: a record of type 4 has 2 bytes, this one 3"),
     "S-records": (
@@ -133,7 +133,7 @@ WRONG = {
     "a plain binary": (CODE, "begins with .*: arm-none-eabi-objcopy -I binary -O ihex program program.hex$"),
     "in RAM": (elf(((0x40000000, 0x40000000, CODE),)), r"linked into RAM \(0x40000000\), where a debugger loads it"),
     "HEX in RAM": (record(4, 0, b"\x40\x00") + record(0, 4, b"ram!") + END, r"linked into RAM \(0x40000004\)"),
-    "only an end": (END, "there is nothing in it for flash or RAM"),
+    "only an end": (END, "it has no data for flash or RAM"),
 }
 
 

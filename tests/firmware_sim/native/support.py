@@ -1,4 +1,4 @@
-"""Small programs in C for tests, built into folders of their own."""
+"""Small programs in C for tests, built into their own folders."""
 
 import pathlib
 import shutil

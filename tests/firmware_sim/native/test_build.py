@@ -1,4 +1,4 @@
-"""Building firmware: what is wrong with a folder, its sources or a library is told in plain lines."""
+"""Building firmware: what is wrong with a folder, its sources or a library is reported in plain lines."""
 
 import os
 import re
@@ -30,8 +30,8 @@ def lines(action, *arguments, **how):
         ("[firmware]\nname = 'a b'\n", "firmware.name 'a b': letters, digits, _ and - are expected"),
         ("[firmware]\nsources = ['other.c']\n", "firmware.sources: 'other.c' matches no file in"),
         ("[firmware]\nsources = 'small.c'\n", "firmware.sources is 'small.c', a list of texts is expected"),
-        ("[firmware]\ninclude = ['inc']\n", "firmware.include: 'inc' is no folder in"),
-        ("[defines]\n'A B' = 1\n", "defines: 'A B' is no name in C"),
+        ("[firmware]\ninclude = ['inc']\n", "firmware.include: 'inc' is not a folder in"),
+        ("[defines]\n'A B' = 1\n", "defines: 'A B' is not a name in C"),
         ("[hardware]\nhz = '60 MHz'\n", "hardware.hz is '60 MHz', a whole number is expected"),
         ("[hardware.external]\ninputs = { 2 = 8 }\n", "hardware.external.inputs is {'2': 8}, channel = analog place"),
         ("[hardware.spi.0]\nwords = 1\n", "hardware.spi.0.words: not known here; there are word, bits,"),
@@ -97,7 +97,7 @@ def test_a_function_that_no_source_defines_is_told_by_name_and_line(tmp_path):
     [
         (START, "no firmware_schedule() or firmware_main() in it"),
         (TIMER + SCHEDULE, "no firmware_start() in it"),
-        (TIMER + SCHEDULE + START + "void firmware_main(void) {}", "are both there: one of them is too many"),
+        (TIMER + SCHEDULE + START + "void firmware_main(void) {}", "are defined; one is allowed"),
     ],
 )
 def test_a_library_without_the_entry_points_is_refused_when_it_is_built(tmp_path, source, told):

@@ -1,4 +1,4 @@
-"""Which lines and branches of a program in C ran is told as it was: counts known by hand, in every kind of process."""
+"""Executed lines and branches of a program in C are reported: counts known by hand, in every kind of process."""
 
 import json
 import pathlib
@@ -140,5 +140,5 @@ def test_a_compiler_without_gcov_is_told(tmp_path, monkeypatch):
     alone.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("CC", "gcc")
-    with pytest.raises(UserError, match=r"gcc has no gcov beside it: --coverage needs gcc with its gcov"):
+    with pytest.raises(UserError, match=r"gcc has no gcov in its folder: --coverage needs gcc with its gcov"):
         coverage.gcov()

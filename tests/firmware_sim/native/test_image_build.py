@@ -1,4 +1,4 @@
-"""Firmware in C for the chip: what is linked, how it stands in memory, and what is told when it cannot be built."""
+"""Firmware in C for the chip: what is linked, how it lies in memory, and what is reported when it cannot be built."""
 
 import pathlib
 import re

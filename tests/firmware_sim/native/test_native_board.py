@@ -1,4 +1,4 @@
-"""Firmware in C on the emulated chip: the same as the same program in Python, stamp for stamp; faults told plainly."""
+"""Firmware in C on the emulated chip: equal to the same program in Python, stamp for stamp; faults reported plainly."""
 
 import contextlib
 import io
@@ -132,7 +132,7 @@ static const fw_schedule schedule = {.slot_ns = 500000, .every = FW_TASKS(every)
         ("fw_pin_write(64, 1)", "fw_pin_write: pin 64 is not 0 ... 63"),
         ("fw_pwm_start(600)", "fw_pwm_start: PWM 0 is started twice"),
         ("fw_spi_start(3)", "fw_spi_start: nothing hangs on SPI 3 of this board"),
-        ("fw_idle()", "fw_idle: only a main loop of its own can sleep, not a task or a handler"),
+        ("fw_idle()", "fw_idle: only a board's own main loop can sleep, not a task or a handler"),
         ("fw_can_buffer_free(2, 4)", "fw_can_buffer_free: CAN: transmit buffer 4 is not 1 ... 3"),
         ("fw_uart_start(0, 0, 0, 1, 8)", "fw_uart_start: EXAMPLE: UART 0: divisor 0, fraction 0/1 is impossible"),
     ],

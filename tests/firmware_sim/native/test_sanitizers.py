@@ -1,4 +1,4 @@
-"""What the compiler's sanitizers find in a program is told with file and line, and the run is otherwise the same."""
+"""Findings of the compiler's sanitizers are reported with file and line, and the run is otherwise the same."""
 
 import contextlib
 import json

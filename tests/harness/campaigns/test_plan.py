@@ -127,7 +127,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
     [
         ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "unknown mode 'stuk'"),
         ({"vary": {"fault": ["MCH.encoder:stuck"]}}, "fault place 'MCH.encoder'"),
-        ({"vary": {"fault": [STUCK]}}, "'start' is no name of [vary]"),
+        ({"vary": {"fault": [STUCK]}}, "'start' is not a name of [vary]"),
         ({"vary": {"fault": ["MCH.joint_encoder:stuck@{"]}}, "Single '{'"),
         ({"vary": {"fault": {"low": 1, "high": 2}}}, "[vary] fault = {'low': 1, 'high': 2}: a list of texts"),
         ({"vary": {"fault": ["MCH.joint_encoder:stuck@{at}"], "at": ["step 3", "soon"]}}, "condition 'soon'"),
@@ -149,7 +149,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
                 "search": {},
                 "tolerance": {"detection": {"within": "1 s"}},
             },
-            "the runs of a [search] are chosen",
+            "runs of a [search] are chosen",
         ),
         ({"vary": {"seed": [1]}, "sample": {"runs": 5, "interval": ["wilson"]}}, "allowed are clopper-pearson, wilson"),
         (

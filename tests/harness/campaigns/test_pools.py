@@ -1,4 +1,4 @@
-"""Who does the runs: what is closed starts nothing any more, and a run at which processes die is told as such."""
+"""Who does the runs: what is closed starts nothing any more, and a run at which processes die is reported as such."""
 
 import subprocess
 import sys

@@ -46,7 +46,7 @@ def test_a_line_that_was_cut_short_is_dropped_and_written_again(tmp_path, cut):
 def test_a_file_that_is_something_else_is_left_alone(tmp_path):
     path = tmp_path / "results.jsonl"
     path.write_bytes(b"something else\n")
-    with pytest.raises(UserError, match=r"results\.jsonl:1: this is no result"):
+    with pytest.raises(UserError, match=r"results\.jsonl:1: this is not a result"):
         Store(path)
     assert path.read_bytes() == b"something else\n"
 

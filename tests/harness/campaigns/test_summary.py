@@ -76,7 +76,7 @@ def test_a_tolerance_is_open_when_neither_it_nor_its_contrary_is_shown(campaign_
     for number, result in enumerate(campaign.store.results.values()):
         result["detected"] = [] if number == 0 else result["detected"]
     (told,) = summary.of(campaign)["tolerances"]
-    assert (told["within"], told["of"]) == (7, 8) and told["verdict"].startswith("open: neither")
+    assert (told["within"], told["of"]) == (7, 8) and told["verdict"].startswith("open: this many runs")
 
 
 def test_a_replay_has_every_digit_of_the_run_and_ends_when_it_did(campaign_of):

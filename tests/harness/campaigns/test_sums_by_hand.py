@@ -70,7 +70,7 @@ def test_how_shares_are_to_be_read_is_told_by_the_design():
         (plan(search=Search()), True, "The runs were chosen to find the worst case"),
         (plan(), True, "A census"),
         (plan(sample=sample), True, "A random sample of the population, with replacement: clopper-pearson intervals"),
-        (plan(sample=looks), True, "A random sample that was looked at up to 3 times: repeated intervals of 95 %"),
+        (plan(sample=looks), True, "A random sample that was analysed up to 3 times: repeated intervals of 95 %"),
     ):
         assert summary.interval_text(made, finished).startswith(expected)
     assert summary.interval_text(plan(sample=sample), True).endswith("of 90 %.")
@@ -90,7 +90,7 @@ def test_how_shares_are_to_be_read_is_told_by_the_design():
         (
             [10, 20, 30, 40],
             0.6,
-            {"within": 3, "of": 4, "median_ms": 30.0, "verdict": "open: neither", "by": "60 %", "upper_ms": 40.0},
+            {"within": 3, "of": 4, "median_ms": 30.0, "verdict": "open: this", "by": "60 %", "upper_ms": 40.0},
         ),
         ([10, 20, 30], 0.6, {"within": 3, "of": 3, "median_ms": 20.0, "verdict": "open: 4 runs", "by": "60 %"}),
         (

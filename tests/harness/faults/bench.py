@@ -25,7 +25,7 @@ class Loop:
 
 
 class Bench:
-    """Stands for a robot: `inject` and `step`. `seed`: of the faults' randomness."""
+    """Takes the place of a robot: `inject` and `step`. `seed`: of the faults' randomness."""
 
     catalogue = CATALOGUE
 
@@ -43,7 +43,7 @@ class Bench:
         self.boards = {}
 
     def inject(self, place, mode, at=None, until=None, **parameters):
-        """As Ranger.inject; conditions are instants."""
+        """As Ranger.inject; conditions are times."""
         fault = CATALOGUE.fault(place, mode, at, until, parameters)
         fault.arm(self)
         self.faults.append(fault)
@@ -125,7 +125,7 @@ class PlantBench(Bench):
 
 
 class EdgeBench(Bench):
-    """One joint encoder whose joint stands at `angle(seconds)` rad; `board` decodes as the firmware does."""
+    """One joint encoder whose joint is at `angle(seconds)` rad; `board` decodes as the firmware does."""
 
     PLACES = ("MCH.joint_encoder", "MCFO.joint_encoder")
 

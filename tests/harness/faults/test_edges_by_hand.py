@@ -211,7 +211,7 @@ def test_after_the_end_the_levels_are_the_sensors_and_the_miscount_stays():
 
 
 class Gaps:
-    """On between these instants, us after the start."""
+    """On between these times, us after the start."""
 
     def __init__(self, *spans):
         self.spans = spans

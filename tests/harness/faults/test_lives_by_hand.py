@@ -1,4 +1,4 @@
-"""A fault from being armed until its place is clear, step by step, and what two faults may do beside each other."""
+"""A fault from being armed until its place is clear, step by step, and what two faults may do at the same time."""
 
 import math
 from types import SimpleNamespace as Made
@@ -275,7 +275,7 @@ def test_a_whole_number_is_one(number):
             Wrong.parameters[1].checked(wrong, "here")
     with pytest.raises(UserError, match=r"allowed are -1 to 5 V$"):
         Wrong.parameters[0].checked(5.1, "here")
-    with pytest.raises(UserError, match=r"fault A.x:wrong: there is no parameter 'y', but size, times, level"):
+    with pytest.raises(UserError, match=r"fault A.x:wrong: unknown parameter 'y' \(available: size, times, level"):
         Robot().inject(y=1)
 
 

@@ -131,7 +131,7 @@ def test_a_word_is_clear_when_it_is_that_of_the_joints_angle(more, expected):
 
 
 class Ground:
-    """A floor and a body on it; `slopes`: those that the body was told."""
+    """A floor and a body on it; `slopes`: those set on the body."""
 
     def __init__(self, kind, contact="coulomb", **values):
         self.slopes = []

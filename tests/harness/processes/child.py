@@ -1,4 +1,4 @@
-"""A process that a test forks, and a second one that watches it: nobody waits for ever for one that is gone."""
+"""A process that a test forks, and a second one that watches it: no process waits for ever for one that is gone."""
 
 import os
 import signal
@@ -27,7 +27,7 @@ class Child:
     """Runs `body` on the board's side of `block`.
 
     As the supervisor does with a board's process, the one that watches marks the block and rings the answer's bell
-    when the child has ended. It does so as well when the child stands still: after PATIENCE_S.
+    when the child has ended. It does so as well when the child hangs: after PATIENCE_S.
     """
 
     def __init__(self, block, body):
@@ -52,12 +52,12 @@ class Child:
         os.close(self.watch)
 
     def answered(self, bell, turn):
-        """Wait until it has rung `turn` times; fails when it has ended instead or stands still."""
+        """Wait until it has rung `turn` times; fails when it has ended instead or hangs."""
         while not bell.wait(turn):
             assert self.block.words[places.FATE] == 0, f"no answer in turn {turn}: {self._fate()}"
 
     def ended(self):
-        """Wait for its end; how it ended, as os.waitid has it. Fails when it stands still."""
+        """Wait for its end; how it ended, as os.waitid has it. Fails when it hangs."""
         assert descriptors.wait([self.watch], [], PATIENCE_S)[0], f"does not end: {self._fate()}"
         return os.waitid(os.P_PID, self.process, os.WEXITED | os.WNOWAIT)
 

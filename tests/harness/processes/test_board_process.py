@@ -1,4 +1,4 @@
-"""A board in a process of its own, alone: it answers whatever it is told."""
+"""A board in a separate process, alone: it answers all that it receives."""
 
 import contextlib
 import os
@@ -46,7 +46,7 @@ def served():
 
 @pytest.fixture
 def lone():
-    """lone(patience_s=...): a board of its own for a test that ends it."""
+    """lone(patience_s=...): its own board for a test that ends it."""
     with contextlib.ExitStack() as stack:
         robot = stack.enter_context(contextlib.closing(Ranger()))
         yield lambda **how: stack.enter_context(contextlib.closing(LoneBoard(robot, "MCSI", **how)))
@@ -113,7 +113,7 @@ def test_a_program_that_raises_says_what_and_where():
 
 
 def put_out(board, instants):
-    """Everything the board puts out when it is asked up to one instant after the other: stamps, kinds and fields."""
+    """Everything the board puts out when it is asked up to one time after the other: stamps, kinds and fields."""
     reader = Mailbox(
         board.words, "of the test", board.block.from_board_first, places.SLOTS, places.ANSWER_USED, FROM_BOARD
     )

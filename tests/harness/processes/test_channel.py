@@ -27,7 +27,7 @@ NEAR = 1_000_000  # ns; stamps of the tests
 
 
 class Pair:
-    """Both ends of one mailbox of a board's block. Nobody rings here: the bells are closed at once."""
+    """Both ends of one mailbox of a board's block. They do not ring: the bells are closed at once."""
 
     def __init__(self, direction):
         self.block = Block("MCH", 0, 0)
@@ -151,7 +151,7 @@ def test_a_message_that_means_nothing_is_named_and_not_delivered(message, reason
 def test_a_stamp_far_from_the_turn_is_refused():
     pair = Pair(FROM_BOARD)
     pair.put(NEAR + 2_000_000_000, 0, events.PIN_OUTPUT, 1, 1)
-    assert pair.delivered() == [] and "stamp lies more than a second" in pair.reader.last_damage
+    assert pair.delivered() == [] and "stamp is more than a second" in pair.reader.last_damage
 
 
 @pytest.mark.parametrize("used", [-1, SLOTS + 1, 1 << 40])

@@ -1,4 +1,4 @@
-"""Firmware in C that crashes, hangs or uses up its stack ends its own process only, and it is told where it was."""
+"""Firmware in C that crashes, hangs or uses up its stack ends its own process only, and it is reported where it was."""
 
 import contextlib
 import dataclasses
@@ -110,7 +110,7 @@ def program(function, slots=3):
 
 
 def broken(folder, function):
-    """What is told of the program after it ended its process, and the lines of its remarks."""
+    """What is reported of the program after it ended its process, and the lines of its remarks."""
     source, remarks = program(function)
     folder = folder_with(folder, source, MANIFEST)
     with (
@@ -263,7 +263,7 @@ def test_what_is_in_the_process_of_a_program_in_c_is_out_of_reach_and_said_so(tm
         with pytest.raises(UserError, match=r"MCH is not emulated in this process.*Ranger\(in_process=True\)"):
             robot.inject("MCH.processor", "extra_cycles", task="control")
         robot.run_for(0.001)
-        with pytest.raises(UserError, match=r"MCH runs in a process of its own.*Ranger\(in_process=True\)"):
+        with pytest.raises(UserError, match=r"MCH runs in a separate process.*Ranger\(in_process=True\)"):
             robot.board("MCH")
         with pytest.raises(UserError, match="its process runs already; replace before time passes"):
             robot.replace("MCH", "control", lambda: None, cost=1)
@@ -312,7 +312,7 @@ def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tm
     source = program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start").replace("stdlib", "unistd")
     done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
     assert (done.returncode, found) == (2, None)
-    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program does not get through its start: {told}\n", done.stderr)
+    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program fails in its start: {told}\n", done.stderr)
 
 
 EXITS = ("exit(0);", "_exit(0);", "_Exit(0);", "quick_exit(0);")
@@ -341,7 +341,7 @@ def test_a_library_that_ends_the_process_that_loads_it_is_refused_and_never_a_su
     """Whatever code it ends with: the trial says how far it came over a pipe."""
     source = program(leaving(WELL + "\n" + CONSTRUCTOR % end))[0]
     line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
-    assert "its program does not get through its loading (what runs in it before firmware_start" in line
+    assert "its program fails in its loading (what runs in it before firmware_start" in line
     assert line.endswith("): it ended its process with code 0")
 
 
@@ -352,7 +352,7 @@ def test_a_library_that_is_up_to_date_is_tried_before_a_walk_loads_it(tmp_path):
     folder = folder_with(tmp_path / "fw", program(leaving(WELL + "\n" + CONSTRUCTOR % end))[0], MANIFEST)
     assert walked(folder)[1]["failed_boards"] == []
     (tmp_path / "now").touch()
-    assert "fw: MCH: its program does not get through its loading" in refused(folder)
+    assert "fw: MCH: its program fails in its loading" in refused(folder)
 
 
 @needs_compiler
@@ -360,9 +360,7 @@ def test_a_library_that_is_up_to_date_is_tried_before_a_walk_loads_it(tmp_path):
 def test_a_start_that_calls_exit_is_refused_with_its_place(tmp_path):
     source = program(WELL)[0].replace("{ fw_can_start", "{ exit(0); fw_can_start")
     line = refused(folder_with(tmp_path / "fw", source, MANIFEST))
-    assert re.search(
-        r"does not get through its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line
-    )
+    assert re.search(r"fails in its start: it called exit\(0\) in firmware_start\(\) at small\.c:\d+$", line)
 
 
 @needs_compiler
@@ -458,7 +456,7 @@ def test_a_start_without_a_sign_of_life_is_refused(tmp_path, monkeypatch, start,
     head = "#define _POSIX_C_SOURCE 200809L\n#include <signal.h>\n#include <unistd.h>\n"
     source = head + program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start")
     folder = folder_with(tmp_path / "fw", source, MANIFEST)
-    with pytest.raises(UserError, match=re.escape(f"MCH: its program does not get through its start: {told}")):
+    with pytest.raises(UserError, match=re.escape(f"MCH: its program fails in its start: {told}")):
         Ranger(firmware={"MCH": folder})
 
 

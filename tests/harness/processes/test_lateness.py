@@ -1,4 +1,4 @@
-"""How late slots are: bins, quantiles and what is said without slots."""
+"""How late slots are: bins, quantiles and the report without slots."""
 
 from hypothesis import given
 from hypothesis import strategies as st

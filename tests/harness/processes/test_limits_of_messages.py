@@ -36,7 +36,7 @@ class Line:
         block[self.pair.used_word] = self.slots
 
     def read(self):
-        """(how many messages arrived, what was said of it)."""
+        """(how many messages arrived, what was reported of it)."""
         arrived = self.pair.read()
         reader = self.pair.reader
         assert reader.damaged == (0 if arrived or reader.notes else 1)
@@ -61,7 +61,7 @@ def test_a_stamp_lies_within_a_second_of_the_turn(kind):
         assert Line(kind, time_ns=NEAR + off).read() == (1, "")
     for off in (-SECOND - 1, SECOND + 1):
         count, damage = Line(kind, time_ns=NEAR + off).read()
-        assert count == 0 and "stamp lies more than a second" in damage
+        assert count == 0 and "stamp is more than a second" in damage
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ BOARDS = ("MCH", "MB", "CSR", "UI")
 
 
 def logged(slow):
-    """{board: (instant, cycles) of every slot}, of a robot in this process."""
+    """{board: (time, cycles) of every slot}, of a robot in this process."""
     with contextlib.closing(Ranger(Scenario(seed=4))) as robot:
         rows = {name: [] for name in BOARDS}
         for name in BOARDS:

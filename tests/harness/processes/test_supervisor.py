@@ -16,7 +16,7 @@ from tests.harness.processes.child import Child, fork
 
 
 class Said(View):
-    """Everything that was said."""
+    """Everything that was reported."""
 
     def __init__(self):
         self.lines = []
@@ -35,7 +35,7 @@ def alone():
 
 
 def test_orders_to_a_plant_that_does_not_listen_are_not_waited_for(alone):
-    """Whoever waited would notice neither that it hangs nor Ctrl-C."""
+    """A process that waited would notice neither that it hangs nor Ctrl-C."""
 
     def order():
         for number in range(5000):
@@ -47,7 +47,7 @@ def test_orders_to_a_plant_that_does_not_listen_are_not_waited_for(alone):
 
 
 def test_a_board_that_ended_because_it_was_told_to_is_no_news_even_when_it_is_found_first(alone):
-    """The plant's process has said that it collects, and nobody has listened since."""
+    """The plant's process has reported that it collects, and no process has read since."""
 
     def find():
         process = fork(lambda: 0)

@@ -18,7 +18,7 @@ from ranger_sim.ranger.robot import Ranger
 
 
 class Said(supervisor.View):
-    """Everything that was said and shown."""
+    """Everything that was reported and shown."""
 
     def __init__(self):
         self.lines, self.shown = [], []
@@ -30,7 +30,7 @@ class Said(supervisor.View):
         self.shown.append(state)
 
     def heard(self):
-        """What was said since the last call."""
+        """What was reported since the last call."""
         lines, self.lines = self.lines, []
         return lines
 
@@ -43,7 +43,7 @@ def robot():
 
 @pytest.fixture
 def alone(robot, monkeypatch):
-    """A supervisor that has started nothing. `clock`, `kernel`: what it is told of time and processes; `killed`."""
+    """A supervisor that has started nothing. `clock`, `kernel`: what they return for time and processes; `killed`."""
     settings = Settings(None, name=f"by-hand-{os.getpid()}", real_time=False)
     with contextlib.closing(Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())) as made:
         made.clock = Made(now=100.0)

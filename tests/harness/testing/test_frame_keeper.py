@@ -1,4 +1,4 @@
-"""Blocks of frames that a keeper keeps: of its window, passed on to whoever listened before."""
+"""Blocks of frames that a keeper keeps: of its window, passed on to whichever process listened before."""
 
 from types import SimpleNamespace as Made
 

@@ -152,7 +152,7 @@ def test_every_count_of_buses_and_boards_is_told_with_its_place():
         "lost frames: can1 7, can2 8",
         "error frames: can1 3",
         "bus-off: A 1, B 3",
-        "boards that stand still: A 1",
+        "boards that do not run: A 1",
     ]
     robot.passes(1)
     robot.totals["B"][OFF] = 2

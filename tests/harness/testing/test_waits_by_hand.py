@@ -1,4 +1,4 @@
-"""Frames as tests read them, assertions on their times, and the instants of a bench: on rows and buses made by hand."""
+"""Frames as tests read them, assertions on their times, and the times of a bench: on rows and buses made by hand."""
 
 from types import SimpleNamespace as Made
 

@@ -70,7 +70,7 @@ def test_before_it_was_looked_at_a_condition_did_not_hold():
 def test_a_board_that_shows_no_activity_is_refused_by_name():
     with contextlib.closing(Ranger()) as robot:
         robot.loop = types.SimpleNamespace(board=lambda name: Board(name), time=robot.loop.time)
-        with pytest.raises(UserError, match="slots of MCH: this board runs elsewhere and shows nothing"):
+        with pytest.raises(UserError, match="slots of MCH: this board is external and reports"):
             robot.slots("MCH")
         with pytest.raises(UserError, match="board 'MCX'"):
             robot.slots("MCX")

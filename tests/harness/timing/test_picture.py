@@ -138,7 +138,7 @@ def test_sources_without_edges_or_work_of_their_own_are_never_served():
     edge = Made(kind=static_check.PIN_EDGE, name="another", index=0)
     assert static_check.services(made, edge, 1_000_000, {"encoder_edge_0": 6}, {})[0] == 0
     fault = Made(kind=-77, name="errors", index=0)
-    assert static_check.services(made, fault, 1_000_000, {}, {}) == (0, 0, 0, "only beside errors of the bus")
+    assert static_check.services(made, fault, 1_000_000, {}, {}) == (0, 0, 0, "only with errors of the bus")
     board = Made(vic=Made(sources={1: Made(attached=False)}))
     assert static_check.interrupts_of(board, 1, {}, {}) == []
 

@@ -13,7 +13,7 @@ from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, raise_at
 
 
 def recorded(until_ns=2_000_000, phase_ns=0, interrupt_at=None, most_rows=1 << 20, origin_ns=0, **table):
-    """The view of a chip that ran this table, recorded from the start; one interrupt of 600 cycles at an instant."""
+    """The view of a chip that ran this table, recorded from the start; one interrupt of 600 cycles at a time."""
     log = Log()
     log.start(phase_ns=phase_ns, **{name: task(log) if callable(task) else task for name, task in table.items()})
     if interrupt_at is not None:
@@ -272,9 +272,9 @@ def test_what_was_given_up_for_newer_rows_is_told_and_a_selection_of_what_is_kep
         log.chip.advance(end * 500_000)
         recording.update()
     assert recording.lost > 0
-    with pytest.raises(UserError, match="the oldest were given up, what is kept begins"):
+    with pytest.raises(UserError, match="the oldest were dropped, the rest begins"):
         view.assert_no_overrun()
-    with pytest.raises(UserError, match="the oldest were given up"):  # a part of it is kept
+    with pytest.raises(UserError, match="the oldest were dropped"):  # a part of it is kept
         view.between("1 ms", "20 ms").assert_within("52 us")
     kept = view.between("18 ms", "20 ms")
     assert len(kept) == 4

@@ -1,4 +1,4 @@
-"""pyxcp as the master, in a process of its own; prints what it found as JSON.
+"""pyxcp as the master, in a separate process; prints what it found as JSON.
 
 Arguments: the port of UDP, or the channel of python-can's interface ranger_sim with the two identifiers behind it, as
 "robot/can2,2000,2001"; then three addresses.

@@ -1,4 +1,4 @@
-"""XCP on CAN: a master that is a node of the bus, by frames at instants of virtual time."""
+"""XCP on CAN: a master that is a node of the bus, by frames at times of virtual time."""
 
 import contextlib
 import os

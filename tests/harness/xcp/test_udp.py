@@ -159,7 +159,7 @@ def test_strangers_are_not_asked_about_but_for_connecting_and_then_so_often_in_a
 
 
 def test_what_strangers_pour_does_not_reach_the_masters_queue(robot):
-    """More than the kernel keeps for a socket: of the master's commands none is lost, each look has its share."""
+    """More than the kernel keeps for a socket: of the master's commands none is lost, each poll has its share."""
     with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
         client.socket.send(CONNECT)
         server.poll(robot.loop.time)

@@ -1,6 +1,6 @@
 """Windings and bridges against their equations (EQUATIONS 10), integrated by scipy over what the bridge is at any time.
 
-The bridge is told from the list of everything that was ever written to it: no queue, no state.
+The bridge's state follows from the list of everything that was ever written to it: no queue, no state.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ NEVER = 1 << 62
 
 
 class Written:
-    """All changes of one bridge, and what it is at an instant by the last of each kind."""
+    """All changes of one bridge, and what it is at a time by the last of each kind."""
 
     def __init__(self, watchdog_ns=10_000_000):
         self.watchdog_ns = watchdog_ns
@@ -33,7 +33,7 @@ class Written:
         return any(edge <= time < edge + self.watchdog_ns for edge in self.edges)
 
     def at(self, time, held=True):
-        """(duty, open, leads that switch, whether lead 2 does) at an instant."""
+        """(duty, open, leads that switch, whether lead 2 does) at a time."""
         *match, period = self.last(self.pwm, time)
         conducts = self.powered(time) and all(self.last(self.sides, time))
         for place, leg in enumerate((2, 6)):
@@ -47,17 +47,17 @@ class Written:
         return shares[0] - shares[1], False, sum(switching), switching[0]
 
     def changes(self, begin, end):
-        """Instants after `begin` and up to `end` at which it may change."""
+        """Times after `begin` and up to `end` at which it may change."""
         times = [time for time, _ in self.pwm + self.sides] + self.edges
         times += [edge + self.watchdog_ns for edge in self.edges]
         return sorted({time for time in times if begin < time < end} | {end})
 
     def matters(self, time):
-        """Whether something is written or the power goes or comes at one of these instants."""
+        """Whether something is written or the power goes or comes at one of these times."""
         return any(time == when for when, _ in self.pwm + self.sides) or self.powered(time) != self.powered(time - 1)
 
     def losses(self, time):
-        """How often it has lost its power up to an instant."""
+        """How often it has lost its power up to a time."""
         ends = {edge + self.watchdog_ns for edge in self.edges if edge + self.watchdog_ns <= time}
         return sum(not self.powered(end) for end in ends)
 

@@ -1,7 +1,7 @@
-"""A step of the body beside steps of its own accelerations, and terms of a model file beside drives that do the same.
+"""A step of the body against steps of its own accelerations, and terms of a model file against drives that do the same.
 
-`test_body_equations.py` holds the accelerations at one instant against two other derivations. Here they are
-asked for at instants only, and Nystrom's method of EQUATIONS 15 is written down again around them, with steps so short
+`test_body_equations.py` holds the accelerations at one time against two other derivations. Here they are
+asked for at times only, and Nystrom's method of EQUATIONS 15 is written down again around them, with steps so short
 that it is exact: what a whole step makes of them must be that.
 """
 
@@ -41,7 +41,7 @@ LONG_ARC = dataclasses.replace(SMOOTH, arc_heel_rad=-1.0, arc_toe_rad=2.0)
 
 
 def look(body):
-    """Accelerations at this instant, of angles as `state` has them."""
+    """Accelerations at this time, of angles as `state` has them."""
     if body.mode in (SINGLE, DOUBLE):
         on_feet(body, 0.0, 1)
     else:

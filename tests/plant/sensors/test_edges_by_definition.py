@@ -1,7 +1,7 @@
 """Every edge of an encoder against its definition: edges lie at whole numbers and the disc's errors, times by splines.
 
 The position between the ends of a step is scipy's Hermite spline; where it runs one way at about the same speed, it is
-the spline of time over position. Which edge comes next is told by where the position lies, one edge at a time.
+the spline of time over position. The next edge follows from the position, one edge at a time.
 """
 
 import cmath

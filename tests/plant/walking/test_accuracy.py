@@ -49,7 +49,7 @@ def test_smoothing_of_friction_costs_what_the_table_says():
 
 
 def first_strike(parts):
-    """Instant (ns) of the first strike of the robust gait with each step cut in `parts`."""
+    """Time (ns) of the first strike of the robust gait with each step cut in `parts`."""
     body = Body()
     mid_stance_start(body)
     walker = Walker(body, PaperGait())

@@ -1,7 +1,7 @@
 """Every mode at every kind of sensor, on the plant alone: it differs at its place and nowhere else, and ends.
 
 The plant moves on its own here, whatever its sensors show. So a run with a fault can be held against one without, byte
-for byte: before, beside the fault's place, and after its end.
+for byte: before, at other places than the fault's, and after its end.
 """
 
 import functools
@@ -172,7 +172,7 @@ def test_two_faults_one_after_the_other_leave_the_second_alone():
 
 
 def rates(seen, first, last):
-    """Rates about x that the packets of these steps tell, with their sums held against their bytes."""
+    """Rates about x in the packets of these steps, with their sums held against their bytes."""
     line = [byte for step in range(first, last) for _, byte in seen[step]["UI.imu"]]
     found = []
     while len(line) >= 31:

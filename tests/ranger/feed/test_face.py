@@ -133,7 +133,7 @@ def test_a_board_without_power_shows_nothing_and_the_feed_says_why():
     ("state", "sentence"),
     [
         ("external", "The user interface board is outside: its own display, lights and buzzer show what it drives."),
-        ("absent", "There is no user interface board in this run."),
+        ("absent", "This run does not have a user interface board."),
     ],
 )
 def test_of_a_board_that_does_not_run_here_nothing_is_made_up(state, sentence):

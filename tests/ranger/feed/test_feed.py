@@ -1,4 +1,4 @@
-"""The feed: who looks sees what the log would keep, changes nothing, and waits for nobody."""
+"""The feed: a reader gets what the log would keep, changes nothing, and the robot waits for no reader."""
 
 import contextlib
 import json
@@ -190,7 +190,7 @@ def test_a_robot_that_keeps_no_log_has_variables_only_while_somebody_looks():
 
 def test_a_name_that_is_taken_is_told(shown):
     robot, _, _ = shown
-    with pytest.raises(UserError, match="a robot named feed-of-a-test shows itself already"):
+    with pytest.raises(UserError, match="a robot named feed-of-a-test is already running"):
         FeedServer(robot, "feed-of-a-test")
 
 

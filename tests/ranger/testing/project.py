@@ -1,4 +1,4 @@
-"""A project of somebody else's in a folder, and pytest in it, as its engineer would start it."""
+"""A user's project in a folder, and pytest in it, as its engineer would start it."""
 
 import dataclasses
 import functools
@@ -42,7 +42,7 @@ def environment():
 
 @dataclasses.dataclass
 class Done:
-    """What pytest said. `cases`: {name: (outcome, text, properties)}, from its JUnit XML."""
+    """What pytest printed. `cases`: {name: (outcome, text, properties)}, from its JUnit XML."""
 
     code: int
     text: str

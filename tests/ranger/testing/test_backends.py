@@ -1,4 +1,4 @@
-"""The backends: the same robot by the same methods, and what one has not is told by name."""
+"""The backends: the same robot by the same methods, and what one has not is reported by name."""
 
 import contextlib
 import os
@@ -26,7 +26,7 @@ schedule = "1mbit"
 
 
 def without_sent(counters):
-    """A controller learns of the end of a transmission when somebody asks it: inside later than in a process."""
+    """A controller learns of the end of a transmission when it is asked: inside later than in a process."""
     return {name: replace(board, can=[replace(end, sent=0) for end in board.can]) for name, board in counters.items()}
 
 
@@ -50,7 +50,7 @@ def test_what_is_in_another_process_is_out_of_reach_and_said_so():
     with contextlib.closing(new_robot(backend="processes")) as robot:
         assert robot.board("MCH").name == "MCH"  # before time passes it is here
         robot.run_for(0.001)
-        with pytest.raises(MissingError, match="backend processes has no board memory: MCH runs in a process"):
+        with pytest.raises(MissingError, match="backend processes has no board memory: MCH runs in a separate process"):
             robot.board("MCH")
         with pytest.raises(UserError, match="its process runs already; replace before time passes"):
             robot.replace("MCH", "mc_compliant_control", lambda: None, cost=1)
@@ -58,7 +58,7 @@ def test_what_is_in_another_process_is_out_of_reach_and_said_so():
 
 def test_a_fault_inside_a_board_is_refused_and_one_at_its_sensor_acts():
     with contextlib.closing(new_robot(seed=3, backend="processes")) as robot:
-        with pytest.raises(UserError, match="MCH runs in a process of its own; its converter is there"):
+        with pytest.raises(UserError, match="MCH runs in a separate process; its converter is there"):
             robot.inject("MCH.adc_external", "gain", factor=1.1)
         fault = robot.inject("MCH.absolute_encoder", "offset", at="0.02 s")
         robot.run_for(0.06)
@@ -110,7 +110,7 @@ def test_a_machine_without_vcan_is_told_what_it_lacks(monkeypatch):
 def test_hardware_needs_a_profile_with_a_bus_outside(tmp_path):
     inside = tmp_path / "inside.toml"
     inside.write_text('title = "nothing outside"\n[buses.can1]\nbit_rate = 1_000_000\n', encoding="utf-8")
-    with pytest.raises(UserError, match="backend hardware: a profile says what is real: --ranger-profile my.toml"):
+    with pytest.raises(UserError, match="backend hardware: it needs a profile: --ranger-profile my.toml"):
         new_robot(backend="hardware")
     with pytest.raises(UserError, match="backend hardware: the profile .* puts no bus on an interface"):
         new_robot(backend="hardware", profile=str(inside))
@@ -157,4 +157,4 @@ def test_of_the_moon(ranger):
     done = pytest_in(tmp_path, RANGER_SIM_BACKEND="processes")
     assert [done.outcome(f"test_{name}") for name in names] == ["skipped", "skipped", "skipped", "error"]
     assert "backend processes has no board memory" in done.reason("test_looks_inside")
-    assert "MCH runs in a process of its own" in done.reason("test_looks_inside_without_saying_so")
+    assert "MCH runs in a separate process" in done.reason("test_looks_inside_without_saying_so")

@@ -36,7 +36,7 @@ NAME = "test_my_law_leaves_the_slots_their_time"
 
 @pytest.fixture
 def project(tmp_path):
-    """Folders called as ours are, so that nobody's are mixed up."""
+    """Folders called as ours are, so that they are not mixed up."""
     write(tmp_path, tests__test_hip=TEST, boards__hip_law=LAW, tools__mine="print('mine')\n")
     return tmp_path
 

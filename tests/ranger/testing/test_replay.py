@@ -1,4 +1,4 @@
-"""A recording into one board: the same frames at the same instants, whatever the format."""
+"""A recording into one board: the same frames at the same times, whatever the format."""
 
 import pathlib
 
@@ -84,7 +84,7 @@ def test_the_same_recording_gives_the_same_answers(recorded):
 
 def test_what_cannot_be_replayed_is_told(recorded, tmp_path):
     board = BoardAlone("MCH")
-    with pytest.raises(UserError, match=r"channel 'vcan0' is no bus of MCH: read_log\(path, bus='can1'\)"):
+    with pytest.raises(UserError, match=r"channel 'vcan0' is not a bus of MCH: read_log\(path, bus='can1'\)"):
         board.replay([Frame(0, "vcan0", 14, 8, 0, 0)])
     with pytest.raises(UserError, match="a folder without can1.log"):
         read_log(tmp_path)

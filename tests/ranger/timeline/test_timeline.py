@@ -280,7 +280,7 @@ def test_a_time_that_is_no_time_is_refused(last_s):
 
 @pytest.mark.parametrize(
     ("name", "reason"),
-    [("run.txt", "'.txt' is no format"), ("missing/run.pftrace", "No such file"), ("", "is no format")],
+    [("run.txt", "'.txt' is not a format"), ("missing/run.pftrace", "No such file"), ("", "is not a format")],
 )
 def test_a_file_that_cannot_be_is_refused_in_one_line(run, tmp_path, name, reason):
     with contextlib.closing(Ranger(Scenario())) as robot:

@@ -1,4 +1,4 @@
-"""What the robot's images took, as data for tables, is what docs/robot.md T2 tells."""
+"""What the robot's images took, as data for tables, is what docs/robot.md T2 has."""
 
 import pathlib
 import re
@@ -28,7 +28,7 @@ ROWS = {
 
 
 def told(row, board):
-    """Least and most instructions that T2 tells; None where it tells nothing."""
+    """Least and most instructions in T2; None where it has none."""
     text = ROBOT.read_text(encoding="utf-8").split("## T2 ")[1].split("\n## T3")[0]
     cells = next(line for line in text.splitlines() if line.startswith(f"| {row}")).strip("|").split("|")
     numbers = [int(each) for each in re.findall(r"\d+", cells[COLUMNS[board]])]

@@ -68,7 +68,7 @@ def test_it_ends_by_itself_when_asked_to(capsys):
         (["--socketcand", "99999"], "socketcand on 127.0.0.1:99999"),
         (["--name", "a b"], "name 'a b' is not"),
         (["can1", "can1"], "a name is given twice in can1 can1"),
-        (["a/b"], "'a/b' is no name for a bus"),
+        (["a/b"], "'a/b' is not a name for a bus"),
         (["--seconds", "-1"], "--seconds: '-1' must be above 0 s"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,

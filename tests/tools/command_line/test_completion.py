@@ -1,4 +1,4 @@
-"""What a shell is told for completing commands comes from the parser, and a shell makes of it what it should."""
+"""The completion script of a shell comes from the parser, and the shell completes as it should."""
 
 import shutil
 import subprocess

@@ -15,8 +15,8 @@ from ranger_sim.tools.command_line import terminal
     ("words", "whole", "told"),
     [
         (["can-bounds"], "14  MCH_ANGLE", ""),
-        (["slots", "MCH", "--static"], "qdc_cap01_rate", "no room for robot's image"),
-        (["table", "list", "--board", "MCH"], "MCH_ANGLE", "no room for descriptions"),
+        (["slots", "MCH", "--static"], "qdc_cap01_rate", "too narrow for robot's image"),
+        (["table", "list", "--board", "MCH"], "MCH_ANGLE", "too narrow for descriptions"),
         (["body", "show", "ranger"], "total_mass_kg", ""),
     ],
 )
@@ -46,8 +46,8 @@ def test_columns_are_given_up_in_their_order_and_only_for_want_of_room():
         return [line.split() for line in text.getvalue().splitlines()]
 
     assert printed(64)[-1] == ["a" * 20, "b" * 20, "c" * 20]
-    assert printed(63)[-2:] == [["a" * 20, "b" * 20], "no room for two: a wider window or --json has it".split()]
-    assert printed(25)[-1] == "no room for two, one: a wider window or --json has it".split()
+    assert printed(63)[-2:] == [["a" * 20, "b" * 20], "too narrow for two: widen the window or use --json".split()]
+    assert printed(25)[-1] == "too narrow for two, one: widen the window or use --json".split()
 
 
 def test_bounds_have_units(capsys):

@@ -1,4 +1,4 @@
-"""Files that are no recordings, or not what they say: a line and exit code 2 or a finding, never a traceback."""
+"""Files that are not recordings, or not what they say: a line and exit code 2 or a finding, never a traceback."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""The page of a diagnosis: it says what the answer says, draws where the cause shows, and needs nothing beside it."""
+"""The page of a diagnosis: it says what the answer says, draws where the cause shows, and needs no other file."""
 
 import re
 
@@ -52,7 +52,7 @@ def test_the_page_is_one_file_and_the_same_each_time(found, drawn):
 
 
 def test_a_cause_is_drawn_where_it_shows_and_the_model_with_it_leaves_nothing_there(found):
-    """F = 0.02 v |v|: over the speed its part beside the base is largest at the ends; with it the means are noise."""
+    """F = 0.02 v |v|: over the speed its part outside the base is largest at the ends; with it the means are noise."""
     made = figures.sides(found)
     (each,) = found.named
     side = made["force"]
@@ -104,7 +104,7 @@ def test_an_unknown_fault_is_drawn_where_the_general_tests_see_it_and_its_parame
 def test_a_tie_names_both_and_tells_where_to_look_for_each():
     found = diagnose(Cart(), [cart_run(1, slope=0.02)])
     said = text_of(page.render(found))
-    assert "these data cannot tell" in said
+    assert "these data cannot decide" in said
     assert "A spirit level along the path" in said and "power-up" in said
     assert "a tie" in said
 

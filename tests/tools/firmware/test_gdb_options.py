@@ -37,7 +37,7 @@ def image(tmp_path_factory):
 
 
 def started(command, *words):
-    """The command line in a process of its own; a robot of processes under a name of its own."""
+    """The command line in a separate process; a robot of processes under its own name."""
     words = (*words, "--name", f"gdb-{os.getpid()}") if command == "up" else words
     return subprocess.Popen(
         [sys.executable, "-m", "ranger_sim", command, *words],
@@ -56,7 +56,7 @@ def ended(run):
 
 
 def port_of(run):
-    """The port that a line of it tells."""
+    """The port that a line of it names."""
     for line in run.stdout:
         if found := re.search(r"target remote :(\d+)", line):
             return int(found[1])
@@ -121,7 +121,7 @@ def test_ctrl_c_at_the_robots_terminal_ends_a_run_that_a_debugger_holds_and_fini
         (("HIP=3333",), "gdb HIP=3333: unknown board 'HIP' (available: MCH, UI"),
         (("MCH=here",), "gdb 'MCH=here': BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333"),
         (("3333",), "gdb '3333': BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333"),
-        (("MCH=0", "MCH=0"), "gdb MCH=0: MCH has a door already"),
+        (("MCH=0", "MCH=0"), "gdb MCH=0: MCH has a port already"),
         (("MCH=70000",), "gdb for TINY on 127.0.0.1:70000: a port is 0 ... 65535"),
         (("MCH=0.0.0.0:0",), "gdb for TINY on 0.0.0.0:0: 0.0.0.0 is reached from beyond this machine, by anybody"),
     ],

@@ -1,4 +1,4 @@
-"""FMPy lets a unit run in a process of its own. Arguments: the unit, inputs and outputs (.npz), plant steps at once.
+"""FMPy lets a unit run in a separate process. Arguments: the unit, inputs and outputs (.npz), plant steps at once.
 
 The inputs file has `names` and `rows`; written are `rows` of the outputs named in `outputs`, one for each of its rows.
 """

@@ -1,4 +1,4 @@
-"""Connections to the panel: who keeps one, who makes room, what becomes of who takes nothing; on a clock of ours."""
+"""Connections to the panel: which are kept, which are dropped, and what happens to those that read nothing."""
 
 import asyncio
 import socket
@@ -47,7 +47,7 @@ class Panel(Fuzz):
 
 
 def on_a_panel(test):
-    """Run `test(panel)` beside a server; what it met is no exception."""
+    """Run `test(panel)` with a server, which must meet no exception."""
 
     async def run():
         panel = Panel()

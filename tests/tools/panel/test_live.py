@@ -1,4 +1,4 @@
-"""What the page shows of a robot that walks: another gait after another parameter, and slots at the mark's instant."""
+"""What the page shows of a robot that walks: another gait after another parameter, and slots at the mark's time."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def durations(times, angle):
 
 
 def traces(page, place):
-    """Of each channel of a plot: (3, n) with instants, lowest and highest values."""
+    """Of each channel of a plot: (3, n) with times, lowest and highest values."""
     plot = f"window.rangerPanel.plots.all().at({place})"
     page.until(f"{plot}.strip === null && {plot}.found?.length === {plot}.numbers.length")
     rows = "({ x, low, high }) => [x, low, high ?? low].map((each) => Array.from(each))"
@@ -38,7 +38,7 @@ def traces(page, place):
 
 
 def steps_shown(page, since_s):
-    """Durations of the steps that the first plot shows, once it shows WINDOW_S from an instant on."""
+    """Durations of the steps that the first plot shows, once it shows WINDOW_S from a time on."""
     page.until(f"window.rangerPanel.span()[1] > {since_s + WINDOW_S}")
     Hand(page).click("#freeze", "Hold")
     assert page.value("document.querySelector('.chip span').textContent") == "hip_rad, rad"

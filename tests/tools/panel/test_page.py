@@ -1,4 +1,4 @@
-"""The page in a real browser, on a robot that walks beside it and on what was recorded."""
+"""The page in a real browser, on a robot that walks meanwhile and on recordings."""
 
 import contextlib
 import json
@@ -219,7 +219,7 @@ def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, 
 
 
 def test_inside_of_a_recording_stands_at_the_instant_to_which_it_is_scrubbed(tmp_path):
-    """Frames and loads on the page against those that the robot of the same walk had until then."""
+    """Frames and loads on the page against those that the robot of the same walk had at that time."""
     from ranger_sim.tools import cli
 
     assert cli.main(["walk", "--time", "2s", "--log", "full", "--out", str(tmp_path / "run")]) == 0

@@ -37,7 +37,7 @@ def looked_through(page, views):
 
 
 def named(page):
-    """{role: names} of what the browser tells a screen reader."""
+    """{role: names} of what the browser reports to a screen reader."""
     found = {}
     for node in page.call("Accessibility.getFullAXTree")["nodes"]:
         if not node.get("ignored"):

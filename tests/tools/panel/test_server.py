@@ -1,4 +1,4 @@
-"""The panel's door: who is served, what a page may say, and that nothing it does stops the others."""
+"""The panel's server: which clients are served, what a page may send, and that no page stops the others."""
 
 import asyncio
 import contextlib
@@ -62,14 +62,14 @@ class Ramp(Source):
 
     async def request(self, wish):
         if wish.get("do") != "key":
-            raise UserError(f"{wish.get('do')!r} is no request")
+            raise UserError(f"{wish.get('do')!r} is not a request")
         self.asked.append(wish)
         return {"time_s": 1.5}
 
 
 @pytest.fixture
 def panel():
-    """(server, its address, what it told)."""
+    """(server, its address, what it printed)."""
     told = []
     with listening("127.0.0.1", 0) as listener:
         port = listener.getsockname()[1]
@@ -120,7 +120,7 @@ def heard(socket, wanted):
 
 
 def answer(socket, **wish):
-    """What the server answers to a wish."""
+    """What the server answers to a request."""
     socket.send(json.dumps({**wish, "number": 7}))
     return heard(socket, lambda kind, body: kind == messages.TEXT and body.get("answer") == 7)
 
@@ -255,7 +255,7 @@ def test_requests_reach_the_robot_and_what_it_refuses_is_answered(panel):
     with page(address) as socket:
         assert answer(socket, do="key", key=1) == {"answer": 7, "time_s": 1.5}
         assert it.source.asked == [{"do": "key", "key": 1}]
-        assert "is no request" in answer(socket, do="jump")["error"]
+        assert "is not a request" in answer(socket, do="jump")["error"]
         assert answer(socket, do="values", channels=[0], at=3)["values"] == [3.0]
 
 
@@ -263,17 +263,17 @@ def test_requests_reach_the_robot_and_what_it_refuses_is_answered(panel):
     ("wish", "words"),
     [
         ({"do": "look"}, "a list of up to"),
-        ({"do": "look", "plots": [1]}, "plot 0 is no object"),
+        ({"do": "look", "plots": [1]}, "plot 0 is not an object"),
         ({"do": "look", "plots": [{"channels": [1], "points": 5}]}, "1 is not 0 to 0"),
         ({"do": "look", "plots": [{"channels": [True], "points": 5}]}, "True is not 0 to 0"),
         ({"do": "look", "plots": [{"channels": [0], "points": 0}]}, "points: 0 is not 1 to"),
-        ({"do": "look", "plots": [{"channels": [0], "points": 5, "begin": "x"}]}, "begin: x is no time"),
-        ({"do": "look", "plots": [{"channels": [0], "points": 5, "end": 1e300}]}, "is no time"),
+        ({"do": "look", "plots": [{"channels": [0], "points": 5, "begin": "x"}]}, "begin: x is not a time"),
+        ({"do": "look", "plots": [{"channels": [0], "points": 5, "end": 1e300}]}, "is not a time"),
         ({"do": "look", "plots": [{"channels": [0] * (MOST_CHANNELS + 1), "points": 5}]}, "channels at a time"),
         ({"do": "look", "plots": [], "hidden": [0] * (MOST_CHANNELS + 1)}, "channels at a time"),
         ({"do": "look", "plots": [], "hidden": [1]}, "1 is not 0 to 0"),
         ({"do": "values", "channels": "RAMP"}, "a list of numbers"),
-        ({"do": None}, "is no request"),
+        ({"do": None}, "is not a request"),
     ],
 )
 def test_a_wish_that_cannot_be_is_answered_with_its_fault(panel, wish, words):
@@ -324,7 +324,7 @@ def test_when_all_places_are_taken_one_more_is_told_and_pages_that_never_read_ke
 
 
 def test_a_page_gets_two_pictures_ahead_of_what_it_has_shown_and_no_third(panel):
-    """The bound of what a dead page costs: two pictures. A page beside it shows how many there are meanwhile."""
+    """The bound of what a dead page costs: two pictures. Another page shows how many there are meanwhile."""
     _, address, _ = panel
 
     def seen_beside():
@@ -381,11 +381,11 @@ def test_a_selection_is_saved_as_it_came(panel, tmp_path):
 @pytest.mark.parametrize(
     ("query", "kind", "words"),
     [
-        ("channels=0&begin=0&end=1", "exe", "'exe' is no kind of file; there are csv, mf4"),
+        ("channels=0&begin=0&end=1", "exe", "'exe' is not a kind of file (available: csv, mf4"),
         ("channels=1&begin=0&end=1", "csv", "1 is not 0 to 0"),
         ("channels=x&begin=0&end=1", "csv", "channels, begin and end are numbers"),
-        ("channels=0&end=1", "csv", "begin: nan is no time"),
-        ("channels=0&begin=0&end=1e400", "csv", "end: inf is no time"),
+        ("channels=0&end=1", "csv", "begin: nan is not a time"),
+        ("channels=0&begin=0&end=1e400", "csv", "end: inf is not a time"),
         ("channels=0&begin=50&end=60", "mf4", "there are no samples"),
     ],
 )

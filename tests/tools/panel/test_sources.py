@@ -154,7 +154,7 @@ def test_the_robot_stands_at_an_instant_as_its_body_did(walked):
 
 def test_what_nobody_may_wish_is_refused(walked):
     _, source = walked
-    with pytest.raises(UserError, match="'stop' is no request"):
+    with pytest.raises(UserError, match="'stop' is not a request"):
         asyncio.run(source.request({"do": "stop"}))
     assert source.lost == "the robot panel-of-a-test has ended"
 
@@ -169,7 +169,7 @@ def test_a_robot_that_says_nothing_is_told(monkeypatch):
     monkeypatch.setattr("ranger_sim.tools.panel.robot.CONNECT_S", 0.1)
     robot = Ranger()
     feed = FeedServer(robot, "silent-robot-of-a-test")
-    with pytest.raises(UserError, match=r"silent-robot-of-a-test has said nothing for 0\.1 s"):
+    with pytest.raises(UserError, match=r"silent-robot-of-a-test has sent nothing for 0\.1 s"):
         RobotSource("silent-robot-of-a-test")
     feed.close()
     robot.close()
@@ -310,7 +310,7 @@ def test_frames_with_their_dbc_file_are_shown_by_it_and_their_load_is_not_known(
         assert [row[name] for name in ("id", "data", "count")] == [by_dbc[name] for name in ("id", "data", "count")]
         assert by_dbc["name"].startswith(row["name"])
     assert shown["buses"]["can1"]["errors"] is None
-    assert shown["buses"]["can1"]["load"] is None and "do not tell the bit rate" in shown["missing"]["buses"]
+    assert shown["buses"]["can1"]["load"] is None and "do not show the bit rate" in shown["missing"]["buses"]
     assert source.can == {"play"}
 
 
@@ -335,7 +335,7 @@ def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
     source.close()
 
 
-@pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "no folder of a walk")])
+@pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "not a folder of a walk")])
 def test_what_is_no_recording_is_told(tmp_path, monkeypatch, path, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=words):

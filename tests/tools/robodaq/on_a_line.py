@@ -41,7 +41,7 @@ class OnALine:
         self.robot.board("MB").computer.rate_sum = 40_960  # not ten seconds of ramp
 
     def pass_on(self, session, seconds, loses=False):
-        """Let time pass; bytes of the robot are heard, or lost on the line."""
+        """Let time pass; bytes of the robot are received, or lost on the line."""
         for _ in range(round(seconds / LOOK_S)):
             self.port.to_robot += session.outgoing(self.robot.time_s)
             self.robot.run_for(LOOK_S)

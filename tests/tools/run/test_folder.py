@@ -67,7 +67,7 @@ def test_what_a_killed_run_left_goes_too(tmp_path, lines):
 @pytest.mark.parametrize("name", ["report.html", "can1.log", "summary.json", "variables.partial.mf4"])
 def test_a_users_file_of_one_of_our_names_is_not_touched(tmp_path, lines, name):
     (tmp_path / name).write_text("mine")
-    with pytest.raises(UserError, match=f"{name}: is there, and of no run"):
+    with pytest.raises(UserError, match=f"{name}: exists and belongs to no run"):
         RunFolder(tmp_path, "", lines.append)
     assert names(tmp_path) == [name] and (tmp_path / name).read_text() == "mine"
 

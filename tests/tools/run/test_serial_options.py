@@ -11,7 +11,7 @@ from ranger_sim.tools.run import walk
 
 @pytest.fixture(autouse=True)
 def no_waiting(monkeypatch):
-    """The walk is paced by the wall clock: let the clock stand still where it would wait."""
+    """The walk is paced by the wall clock: let the clock stop where it would wait."""
     slept = []
     monkeypatch.setattr(walk.wallclock, "sleep_s", slept.append)
     return slept

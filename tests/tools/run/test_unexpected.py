@@ -1,4 +1,4 @@
-"""What a healthy walk has not is told, each thing in a line; a healthy one has no line."""
+"""What a healthy walk has not is reported, each thing in a line; a healthy one has no line."""
 
 import copy
 import math
@@ -62,7 +62,7 @@ def test_a_healthy_walk_has_no_line(healthy):
             "UI: 1 slot overrun, the longest of 1203 µs",
         ),
         (lambda s: s["heel_strike_delay_ms"].update(missed=2), "2 strikes not noticed"),
-        (lambda s: s["heel_strike_delay_ms"].update(unmatched=1), "1 strike told that there was not"),
+        (lambda s: s["heel_strike_delay_ms"].update(unmatched=1), "1 strike reported that did not happen"),
         (lambda s: s["errors"].update(MCFI={"ADCI_DNF": 3}), "errors of MCFI: ADCI_DNF x 3"),
     ],
 )

@@ -1,4 +1,4 @@
-"""`ranger-sim walk`: distances and charges as people type them, what is told while it walks, and how it may end."""
+"""`ranger-sim walk`: distances and charges as people type them, what is reported while it walks, and how it may end."""
 
 import contextlib
 import io

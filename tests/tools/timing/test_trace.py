@@ -61,9 +61,9 @@ def test_only_the_last_part_is_written_where_that_is_asked_for(tmp_path, capsys)
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["--trace", "run.txt"], "suffix '.txt' is no format; there are .pftrace"),
+        (["--trace", "run.txt"], "suffix '.txt' is not a format (available: .pftrace"),
         (["--trace", "nowhere/run.pftrace"], "cannot be written"),
-        (["--trace", "."], "is no format"),
+        (["--trace", "."], "is not a format"),
         (["--trace-last", "10s"], "--trace-last needs --trace"),
     ],
 )
@@ -125,8 +125,8 @@ def test_what_cannot_be_shown_is_told_in_one_line(file, arguments, reason, capsy
     [
         ("run.vcd", b"", "only .pftrace files"),
         ("none.pftrace", None, "cannot be read: No such file"),
-        ("run.pftrace", b"\x00 this is something else", "is no Perfetto trace"),
-        ("empty.pftrace", b"", "is no Perfetto trace"),
+        ("run.pftrace", b"\x00 this is something else", "not a Perfetto trace"),
+        ("empty.pftrace", b"", "not a Perfetto trace"),
         # a packet with time stamp 5 and an instant on track 7, which no descriptor has told of
         ("foreign.pftrace", b"\x0a\x08\x40\x05\x5a\x04\x48\x03\x58\x07", "none that ranger-sim wrote"),
         # the same with a track event whose last field has no value
@@ -213,7 +213,7 @@ def test_only_the_viewers_page_gets_the_trace(file, method, headers, status):
 
 
 def visit(server, said=b""):
-    """A connection that has said this, taken in."""
+    """A connection that has sent this, taken in."""
     client = socket.create_connection(("127.0.0.1", server.port))
     client.setblocking(False)
     client.send(said)
@@ -222,7 +222,7 @@ def visit(server, said=b""):
 
 
 def test_connections_that_say_nothing_keep_nobody_waiting_and_floods_are_bounded(tmp_path):
-    """A browser opens some in advance; one that said nothing once kept all others waiting for ever."""
+    """A browser opens some in advance; one that sent nothing once kept all others waiting for ever."""
     file = tmp_path / "a.pftrace"
     file.write_bytes(bytes(5_000_000))
     limits = LIMITS["trace"]

@@ -24,14 +24,14 @@ from ranger_sim.tools.run.folder import BUS_LOGS
 
 NO_SLOTS = "A recording keeps no slots one by one."
 TOLD_SLOTS = (
-    "What the boards tell of them themselves are the channels …_EXECUTION_TIME and …_MAX_EXECUTION_TIME; "
+    "The boards report their own in the channels …_EXECUTION_TIME and …_MAX_EXECUTION_TIME; "
     "a running robot shows every one (ranger-sim panel --name)."
 )
 NO_FRAMES = (
     "This recording keeps no frames; a walk's folder does (ranger-sim walk --log full --out), or frames with --dbc."
 )
-NO_RATE = "Frames alone do not tell the bit rate, so the load is not known; error frames are left out."
-NO_RATE_OF_PROFILE = "The walk had a profile, whose bit rates its log does not tell: loads are not known."
+NO_RATE = "Frames alone do not show the bit rate, so the load is not known; error frames are left out."
+NO_RATE_OF_PROFILE = "The walk had a profile, whose bit rates its log does not have: loads are not known."
 
 
 class RunLogs:

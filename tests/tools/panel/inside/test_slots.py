@@ -1,4 +1,4 @@
-"""The slots of a running robot's boards at an instant, from rows of the feed by hand."""
+"""The slots of a running robot's boards at a time, from rows of the feed by hand."""
 
 import numpy as np
 import pytest
