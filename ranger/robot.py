@@ -1,6 +1,7 @@
 """The whole robot, wired: seven boards, four buses, one link, one body.
 
-`Ranger.__init__` builds the plant and the boards; harness/machine.py connects them and the buses by the tables of
+`Ranger.__init__` takes the body from `plant_of` and the boards from a factory (board_programs.py); harness/machine.py
+connects them and the buses by the tables of
 ranger/wiring.py; `harness/lockstep.py` then passes time and carries what goes over the wires.
 """
 
@@ -28,12 +29,10 @@ from ranger_sim.boards.steering import SteeringBoard
 from ranger_sim.boards.user_interface import UserInterfaceBoard
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.firmware_sim.native import coverage, crash
 from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.quantities import Duration
-from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
@@ -50,6 +49,7 @@ from ranger_sim.harness.wiring.imu_wire import ImuWire
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
 from ranger_sim.ranger import wiring
+from ranger_sim.ranger.board_programs import BOARD_CLASSES, BoardFactory, Emulated, InC, OfImage
 from ranger_sim.ranger.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
 from ranger_sim.ranger.faults.catalogue import CATALOGUE
 from ranger_sim.ranger.faults.error_watch import ErrorWatch
@@ -63,20 +63,35 @@ if TYPE_CHECKING:
     from ranger_sim.harness.processes.apart import Apart
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
-# Boards are powered up together but their resets and start-up code differ: first slots spread over 2 ms.
-POWER_UP_SPREAD_NS = 2_000_000
 GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
 
 BoardName = Literal["MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB"]
-BOARD_CLASSES: dict[str, Any] = {
-    "MCH": HipBoard,
-    "MCFO": OuterFeetBoard,
-    "MCFI": InnerFeetBoard,
-    "MCSI": SteeringBoard,
-    "UI": UserInterfaceBoard,
-    "CSR": CanRouterBoard,
-    "MB": MainBrainBoard,
-}
+
+
+def plant_of(scenario: Scenario, body: body_files.BodyFile) -> RangerPlant:
+    """The body of a scenario, with its sensors."""
+    return RangerPlant(
+        seed=scenario.seed,
+        slope_rad=scenario.slope_rad,
+        floor_roughness_m=scenario.floor_roughness_m,
+        model_file=scenario.model_file,
+        start_ns=scenario.start_uptime_ms * 1_000_000,
+        parameters=body.parameters,
+        electrics=scenario.electrics(body.electrics),
+    )
+
+
+def with_counts(firmware: dict[str, Firmware]) -> tuple[dict[str, Firmware], tempfile.TemporaryDirectory[str] | None]:
+    """The programs, each compiled for coverage with a folder for its counts; and the folder made for them, if any."""
+    if not any(each.coverage and each.counts is None for each in firmware.values()):
+        return firmware, None
+    folder = tempfile.TemporaryDirectory(prefix="ranger-sim-counts-")
+    place = pathlib.Path(folder.name)
+    found = {
+        name: dataclasses.replace(each, counts=each.counts or place / name) if each.coverage else each
+        for name, each in firmware.items()
+    }
+    return found, folder
 
 
 class Ranger(Machine):
@@ -109,26 +124,12 @@ class Ranger(Machine):
         # plant -> sensors
         self.body = body_files.load(self.scenario.body)
         datatable.check_own_table()
-        plant = RangerPlant(
-            seed=seed,
-            slope_rad=self.scenario.slope_rad,
-            floor_roughness_m=self.scenario.floor_roughness_m,
-            model_file=self.scenario.model_file,
-            start_ns=start_ns,
-            parameters=self.body.parameters,
-            electrics=self.scenario.electrics(self.body.electrics),
-        )
+        plant = plant_of(self.scenario, self.body)
         self.is_watched = False
-        self.firmware: dict[str, Firmware] = native_boards.built(firmware if firmware is not None else {})
-        self.counts = None
-        if any(each.coverage and each.counts is None for each in self.firmware.values()):
-            self.counts = tempfile.TemporaryDirectory(prefix="ranger-sim-counts-")
-            place = pathlib.Path(self.counts.name)
-            self.firmware = {
-                name: dataclasses.replace(each, counts=each.counts or place / name) if each.coverage else each
-                for name, each in self.firmware.items()
-            }
+        self.firmware, self.counts = with_counts(native_boards.built(firmware if firmware is not None else {}))
         self.printed = printed
+        self.factory = BoardFactory(seed, Emulated(self.quirks, self.controller))
+        self.factory.programs |= {name: InC(each, self._printing) for name, each in self.firmware.items()}
         self._try_firmware(start_ns)
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
         self.board_deadline_s = board_deadline_s
@@ -138,8 +139,9 @@ class Ranger(Machine):
         for name in self.images:
             if name in self.firmware:
                 raise UserError(f"{name} is to run both {self.firmware[name].folder} and {self.images[name].path}")
+        self.factory.programs |= {name: OfImage(each) for name, each in self.images.items()}
         # interrupts and slots: each board on its own crystal, powered up at its own time
-        boards = {name: self.new_board(name, start_ns + self._stream(name)[1]) for name in BOARD_CLASSES}
+        boards = {name: self.new_board(name, self.factory.first_power_up_ns(name, start_ns)) for name in BOARD_CLASSES}
         if "CSR" not in self.images:
             boards["CSR"].time.ms = self.scenario.start_uptime_ms
         said = {name: first_outputs(boards[name]) for name in self.firmware}  # while their programs started
@@ -165,17 +167,12 @@ class Ranger(Machine):
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
         self.catalogue = CATALOGUE
 
-    def _stream(self, board: str) -> tuple[Any, int]:
-        """(crystal, power-up time after the robot's in ns) of a board, drawn from the scenario's seed."""
-        stream = RandomStream(self.scenario.seed, f"board {board}")
-        return seeded_crystal(stream), stream.integer(POWER_UP_SPREAD_NS)
-
     def _try_firmware(self, start_ns: int) -> None:
         """Start each program once in a process that it may crash. UserError where it does."""
         for name, firmware in self.firmware.items():
 
             def start(record: Any, name: str = name) -> None:
-                board = self.new_board(name, start_ns + self._stream(name)[1], record)
+                board = self.new_board(name, self.factory.first_power_up_ns(name, start_ns), record)
                 board.counters()
 
             with self._printing(name):
@@ -192,29 +189,13 @@ class Ranger(Machine):
 
         record: memory in which a program in C leaves its position when it ends this process.
         """
-        crystal = self._stream(name)[0]
-        if name in self.firmware:
-            from ranger_sim.ranger.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
-
-            with self._printing(name):
-                board = RobotNativeBoard(name, self.firmware[name], crystal, power_up_ns, record)
-            board.counts = self.firmware[name].counts
-            if record is None and self.is_watched:  # it replaces another board
-                self._watch(board)
-            return board
-        if name in self.images:
-            from ranger_sim.ranger.firmware.robot_image_board import (
-                RobotImageBoard,  # only here: a processor, and ELF files
-            )
-
-            return RobotImageBoard(name, self.images[name], crystal, power_up_ns)
-        if name == "MB":
-            return MainBrainBoard(crystal, self.quirks, power_up_ns, controller=self.controller)
-        return BOARD_CLASSES[name](crystal, self.quirks, power_up_ns)
+        board = self.factory.board(name, power_up_ns, record)
+        if name in self.firmware and record is None and self.is_watched:  # it replaces another board
+            self._watch(board)
+        return board
 
     def waits_for_slots(self, board: Any) -> bool:
-        """Not a board with a firmware image, whose handlers are unknown, nor a program in C whose handlers may send."""
-        return board.name not in self.images and (board.name not in self.firmware or board.scheduler.announces)
+        return self.factory.program(board.name).waits_for_slots(board)
 
     def _connect(self) -> None:
         """Connect every wire of the tables, and what only Ranger has: the serial link and the inertial unit."""

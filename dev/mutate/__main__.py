@@ -49,6 +49,7 @@ ALSO = {
     "datatable": ("tests/ranger/test_requests.py", "tests/tools/robodaq/test_robodaq.py"),
     "can_bus": ("tests/dev/fuzz/test_can.py", "tests/tools/buses/test_bus.py"),
     "plant": ("tests/oracle/test_known_answers.py",),
+    "harness": ("tests/ranger",),
     "sysid": ("tests/blind/test_generator.py", "tests/tools/diagnose/test_bad_data.py", "tests/tools/test_identify.py"),
 }
 # Walks, which finish in time only compiled; there they are among the tests tried.
@@ -56,6 +57,7 @@ WALKS = {
     "can_bus": ("tests/oracle", "tests/system/test_walking.py"),
     "plant": ("tests/oracle", "tests/system/test_walking.py"),
     "harness": ("tests/oracle", "tests/system"),
+    "ranger": ("tests/oracle", "tests/system"),
 }
 
 

@@ -256,13 +256,13 @@ class CrystalOff(ProcessorFault):
         self._set(0, now_ns)
 
     def _set(self, more_ppb: int, now_ns: int) -> None:
-        bought: Crystal = self.robot._stream(self.name)[0]
+        bought: Crystal = self.robot.factory.crystal(self.name)
         with reaching_into(self.robot, self.name, now_ns) as board:
             board.retune(bought.ppb + more_ppb, now_ns)
 
     def is_clear(self, start_ns: int, end_ns: int) -> bool:
         """Whether it runs at its own rate."""
-        return bool(self.board.crystal.ppb == self.robot._stream(self.name)[0].ppb)
+        return bool(self.board.crystal.ppb == self.robot.factory.crystal(self.name).ppb)
 
 
 @mode

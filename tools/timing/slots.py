@@ -13,7 +13,8 @@ from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.timing.slots import SlotView, Statistics
-from ranger_sim.ranger.robot import BOARD_CLASSES, Ranger
+from ranger_sim.ranger.board_programs import BOARD_CLASSES
+from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.ranger.timing import robot_figures, static_check
 from ranger_sim.ranger.timing.static_check import OVERRUNS, BoardBound, FunctionBound

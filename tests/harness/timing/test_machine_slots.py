@@ -9,8 +9,9 @@ import pytest
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.timing.machine_slots import Held
+from ranger_sim.ranger.board_programs import BOARD_CLASSES
 from ranger_sim.ranger.conditions import condition
-from ranger_sim.ranger.robot import BOARD_CLASSES, Ranger
+from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.timeline import Timeline
 
 

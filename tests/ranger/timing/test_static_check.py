@@ -8,7 +8,8 @@ import pytest
 from ranger_sim.firmware_sim.scheduler import Occasional, Task, Wait
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.ranger import wiring
-from ranger_sim.ranger.robot import BOARD_CLASSES, Ranger
+from ranger_sim.ranger.board_programs import BOARD_CLASSES
+from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.timing import robot_figures, static_check
 from ranger_sim.ranger.timing.static_check import FITS, OVERRUNS, check
 from tests.firmware_sim.board import TICK_CYCLES, Log
