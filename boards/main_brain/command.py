@@ -15,6 +15,12 @@ def table_id(name):
     return getattr(table, name)
 
 
+def variables_of(machine: type) -> tuple[str, ...]:
+    """Names of the variables of the data table of which a machine's class declares a field, in alphabetical order."""
+    fields = {*vars(machine), *vars(machine).get("__annotations__", ())}
+    return tuple(sorted(name for name in fields if name.isupper()))
+
+
 @cython.cclass
 class MotorCommand:
     """The three words of the compliant law I = I0 - K p - D dp/dt of one motor board.

@@ -9,58 +9,10 @@ it was off and all its gains were 0.
 
 import cython
 
-from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.command import MotorCommand, variables_of
 from ranger_sim.boards.main_brain.state_machine import State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
-
-READS = (
-    "MCH_ANGLE",
-    "E_MCH_ANG_RATE",
-    "E_LO_ANGLE",
-    "E_LI_ANGLE",
-    "E_SWING_LEG",
-    "E_T_AFTER_HS",
-    "E_AM_L_ABSRATE",
-    "E_AM_H_ANG",
-    "E_AM_H_RATE",
-    "E_AM_TIMER",
-    "MCFO_RIGHT_ANKLE_RATE",
-    "MCFI_ANKLE_RATE",
-    "FSM_LEG",
-    "FSM_RESET",
-    "C_H_OUTER_STIFFNESS",
-    "C_H_PM_H_RATE",
-    "P_H_PM_H_TRATE",
-    "P_H_PM_TIME",
-    "P_H_PM_F_RATE",
-    "C_HI_SH_H_ANG",
-    "C_HI_SH_H_RATE",
-    "P_HI_SH_H_TANG",
-    "C_H_EH_H_ANG",
-    "C_H_EH_H_RATE",
-    "P_H_EH_H_TANG",
-    "P_H_EHOLD_ANG",
-    "P_H_EHOLD_ANG2",
-    "P_H_EH_L_TRATE",
-    "D_H_ON",
-    "DP_F_PP_L_ABSRATE",
-    "DP_H_AM_H_ANG",
-    "DP_H_AM_L_ABSRATE",
-    "DP_H_AM_H_RATE",
-    "DP_H_AM_TIME1",
-    "DP_H_AM_TIME2",
-    "DC2_H_AM_H_ANG1",
-    "DC2_H_AM_H_ANG2",
-    "DC2_H_AM_H_RATE1",
-    "DC2_H_AM_H_RATE2",
-    "DC3_H_AM_H_ANG1",
-    "DC3_H_AM_H_ANG2",
-    "DC3_H_AM_L_ABSRATE1",
-    "DC3_H_AM_L_ABSRATE2",
-    "DC3_H_AM_H_RATE1",
-    "DC3_H_AM_H_RATE2",
-)
-WRITES = ("E_H_DI1", "E_H_DI2", "FSM_HIP")
 
 
 @cython.cclass
@@ -68,7 +20,7 @@ class HipMachine:
     """States 0 HI_starthold ... 9 stop; `machine` is stepped after the leg machine."""
 
     store: DataStore
-    # variables of the data table
+    # ids of the variables of the data table, by their names
     MCH_ANGLE: cython.longlong
     E_MCH_ANG_RATE: cython.longlong
     E_LO_ANGLE: cython.longlong
@@ -127,8 +79,54 @@ class HipMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.MCH_ANGLE = table.MCH_ANGLE
+        self.E_MCH_ANG_RATE = table.E_MCH_ANG_RATE
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.E_LI_ANGLE = table.E_LI_ANGLE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_T_AFTER_HS = table.E_T_AFTER_HS
+        self.E_AM_L_ABSRATE = table.E_AM_L_ABSRATE
+        self.E_AM_H_ANG = table.E_AM_H_ANG
+        self.E_AM_H_RATE = table.E_AM_H_RATE
+        self.E_AM_TIMER = table.E_AM_TIMER
+        self.MCFO_RIGHT_ANKLE_RATE = table.MCFO_RIGHT_ANKLE_RATE
+        self.MCFI_ANKLE_RATE = table.MCFI_ANKLE_RATE
+        self.FSM_LEG = table.FSM_LEG
+        self.FSM_RESET = table.FSM_RESET
+        self.C_H_OUTER_STIFFNESS = table.C_H_OUTER_STIFFNESS
+        self.C_H_PM_H_RATE = table.C_H_PM_H_RATE
+        self.P_H_PM_H_TRATE = table.P_H_PM_H_TRATE
+        self.P_H_PM_TIME = table.P_H_PM_TIME
+        self.P_H_PM_F_RATE = table.P_H_PM_F_RATE
+        self.C_HI_SH_H_ANG = table.C_HI_SH_H_ANG
+        self.C_HI_SH_H_RATE = table.C_HI_SH_H_RATE
+        self.P_HI_SH_H_TANG = table.P_HI_SH_H_TANG
+        self.C_H_EH_H_ANG = table.C_H_EH_H_ANG
+        self.C_H_EH_H_RATE = table.C_H_EH_H_RATE
+        self.P_H_EH_H_TANG = table.P_H_EH_H_TANG
+        self.P_H_EHOLD_ANG = table.P_H_EHOLD_ANG
+        self.P_H_EHOLD_ANG2 = table.P_H_EHOLD_ANG2
+        self.P_H_EH_L_TRATE = table.P_H_EH_L_TRATE
+        self.D_H_ON = table.D_H_ON
+        self.DP_F_PP_L_ABSRATE = table.DP_F_PP_L_ABSRATE
+        self.DP_H_AM_H_ANG = table.DP_H_AM_H_ANG
+        self.DP_H_AM_L_ABSRATE = table.DP_H_AM_L_ABSRATE
+        self.DP_H_AM_H_RATE = table.DP_H_AM_H_RATE
+        self.DP_H_AM_TIME1 = table.DP_H_AM_TIME1
+        self.DP_H_AM_TIME2 = table.DP_H_AM_TIME2
+        self.DC2_H_AM_H_ANG1 = table.DC2_H_AM_H_ANG1
+        self.DC2_H_AM_H_ANG2 = table.DC2_H_AM_H_ANG2
+        self.DC2_H_AM_H_RATE1 = table.DC2_H_AM_H_RATE1
+        self.DC2_H_AM_H_RATE2 = table.DC2_H_AM_H_RATE2
+        self.DC3_H_AM_H_ANG1 = table.DC3_H_AM_H_ANG1
+        self.DC3_H_AM_H_ANG2 = table.DC3_H_AM_H_ANG2
+        self.DC3_H_AM_L_ABSRATE1 = table.DC3_H_AM_L_ABSRATE1
+        self.DC3_H_AM_L_ABSRATE2 = table.DC3_H_AM_L_ABSRATE2
+        self.DC3_H_AM_H_RATE1 = table.DC3_H_AM_H_RATE1
+        self.DC3_H_AM_H_RATE2 = table.DC3_H_AM_H_RATE2
+        self.E_H_DI1 = table.E_H_DI1
+        self.E_H_DI2 = table.E_H_DI2
+        self.FSM_HIP = table.FSM_HIP
         motor: object = MotorCommand(store, "MCH")  # untyped, so that its methods are plain ones
         self.motor = motor
         self.premid_time = 0  # ms after heel strike at which premid began
@@ -357,3 +355,5 @@ NOT_STOP = (
     "HI_ehold",
     "HO_ehold",
 )
+
+READS = variables_of(HipMachine)

@@ -2,7 +2,9 @@
 
 import pytest
 
+from ranger_sim.boards.main_brain import hip_machine
 from ranger_sim.boards.quirks import Quirks
+from ranger_sim.datatable.generated import mb as table
 from tests.boards.main_brain_bench import Bench
 
 OFF = (0.0, 0.0, 0.0)
@@ -157,6 +159,13 @@ def test_mid_stance_in_a_stopped_clock_does_not_divide_by_zero(bench):
 
 
 # --- hip machine ----------------------------------------------------------------------------------------
+
+
+def test_each_variable_of_the_hip_machine_has_the_id_of_its_name(bench):
+    names = hip_machine.READS
+    assert len(names) == 48
+    assert {"MCH_ANGLE", "DC3_H_AM_H_RATE2", "FSM_HIP"} <= set(names)
+    assert {name: getattr(bench.modes.hip, name) for name in names} == {name: getattr(table, name) for name in names}
 
 
 def test_the_start_hold_keeps_the_inner_legs_ahead(bench):
