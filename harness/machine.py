@@ -108,8 +108,8 @@ class Machine:
         """Connect every wire of the tables."""
         loop, wiring = self.loop, self.wiring
         place = {name: number for number, name in enumerate(self.boards)}
-        for name in wiring.hear_in_slots:
-            loop.hears_in_its_slots(self._wired(name))
+        for name in wiring.receive_in_slots:
+            loop.receives_in_its_slots(self._wired(name))
         for wire in wiring.encoders:
             pins = (wiring.number(wire.board, wire.pin_a), wiring.number(wire.board, wire.pin_b))
             loop.connect_encoder(self._part("encoders", wire.encoder), self._wired(wire.board), *pins)

@@ -188,9 +188,9 @@ def condition(
     if match := re.fullmatch(COMPARED, text):
         name, sign, value = match.groups()
         if name not in quantities:
-            told = ", ".join(quantities) or "none"
+            available = ", ".join(quantities) or "none"
             raise UserError(
-                f"condition {text!r}: {name!r} is no quantity of the body, but {told}{meant(name, quantities)}"
+                f"condition {text!r}: {name!r} is no quantity of the body, but {available}{meant(name, quantities)}"
             )
         return Comparison(text, name, sign, float(value), quantities)
     if match := re.fullmatch(NOTED, text):

@@ -28,8 +28,8 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # a broken file makes cantools raise many types
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise UserError(f"{path}: not a DBC file that cantools can read: {said}") from None
+        cause = " ".join(f"{type(error).__name__}: {error}".split())
+        raise UserError(f"{path}: not a DBC file that cantools can read: {cause}") from None
     if not isinstance(database, cantools.database.can.Database):
         raise UserError(f"{path}: holds no CAN messages")
     rate = bit_rate if bit_rate is not None else _baudrate(database)

@@ -71,7 +71,7 @@ from ranger_sim.harness.processes.places import (
     URGENT,
     WATCHED,
 )
-from ranger_sim.harness.wiring.ranger import HEAR_IN_SLOTS
+from ranger_sim.harness.wiring.ranger import RECEIVE_IN_SLOTS
 
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.stage import Audience
@@ -132,7 +132,7 @@ class Endpoint:
         self.counts_errors = hasattr(board, "errors")
         self.runs_c = hasattr(board, "write_counts")
         self.activity: object = ActivityStore(board, shared.words)
-        self.can_wait = SLOT_KINDS if board.name in HEAR_IN_SLOTS else 0
+        self.can_wait = SLOT_KINDS if board.name in RECEIVE_IN_SLOTS else 0
         self.promised = 0
         self.clock: object = wallclock.monotonic_ns
         self.pending = EventQueue(64)
@@ -156,11 +156,13 @@ class Endpoint:
             if command == COMMAND_ADVANCE:
                 self._advance()
             elif command == COMMAND_COUNTERS:
-                self.tell(NOTE_COUNTERS, json.dumps(as_dict(self.board.counters()), separators=(",", ":")).encode())
+                self.send_note(
+                    NOTE_COUNTERS, json.dumps(as_dict(self.board.counters()), separators=(",", ":")).encode()
+                )
                 if self.runs_c:
                     self.board.write_counts()
             elif command == COMMAND_ACTIVITY:
-                self.tell(NOTE_ACTIVITY, self.activity.next())
+                self.send_note(NOTE_ACTIVITY, self.activity.next())
             self.block[RESULT] = RESULT_MORE if self._put_out() else RESULT_DONE
             self._show()
             self.answer.ring()
@@ -305,7 +307,7 @@ class Endpoint:
                 self.board.store.set_word(a, b, self.board.time.ms)
         self.to_board.notes.clear()
 
-    def tell(self, what, data) -> None:
+    def send_note(self, what, data) -> None:
         """Queue bytes for the other side, in parts."""
         parts = [data[i : i + NOTE_BYTES] for i in range(0, len(data), NOTE_BYTES)] or [b""]
         for number, part in enumerate(parts):

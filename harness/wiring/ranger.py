@@ -13,7 +13,7 @@ BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
 
 # Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once, or reads
 # a sensor because of them.
-HEAR_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
+RECEIVE_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
 
 
 CAN = (

@@ -15,7 +15,7 @@ from rich.table import Table
 from ranger_sim import loading
 from ranger_sim.datatable.addresses import XCP_BUS, XCP_MASTER_ID, XCP_SLAVE_ID
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import told
+from ranger_sim.foundation.peers import reasons_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.feed.server import FeedServer
@@ -376,7 +376,7 @@ def print_processes(found: dict, console: Console) -> None:
         used = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in counts.items() if value)
         console.print(f"{name} outside: {used or 'no traffic'}", highlight=False, soft_wrap=True)
     for door, counts in found["sent_away"].items():
-        console.print(f"{door}: sent away {told(counts)}", highlight=False, soft_wrap=True)
+        console.print(f"{door}: sent away {reasons_text(counts)}", highlight=False, soft_wrap=True)
     for death in found["deaths"]:
         console.print(walk.loss_text(death), highlight=False, soft_wrap=True)
 

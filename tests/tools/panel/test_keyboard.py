@@ -41,7 +41,7 @@ def plots(page):
     return page.value(f"window.rangerPanel.plots.all().map((p) => {names})")
 
 
-def test_the_help_tells_of_every_key_that_does_something(tmp_path, recording):
+def test_the_help_lists_every_key_that_does_something(tmp_path, recording):
     with served(str(recording)) as (address, _), page_of(address, tmp_path) as page:
         page.value("window.rangerPanel.plots.setMark(1)")
         Hand(page).give("#note", "a step")
@@ -74,7 +74,7 @@ def test_channels_go_from_plot_to_plot_and_out_again_by_keys_alone(tmp_path, rec
         assert page.value("document.activeElement.closest('.plot') !== null")
 
 
-def test_cursor_window_mark_and_notes_are_moved_by_keys_and_what_stands_there_is_said(tmp_path, recording):
+def test_cursor_window_mark_and_notes_are_moved_by_keys_and_their_values_are_announced(tmp_path, recording):
     with served(str(recording)) as (address, _), page_of(address, tmp_path) as page:
         press(page, "ArrowRight", SHIFT)
         press(page, "ArrowRight")
