@@ -469,6 +469,16 @@ def test_an_identifier_outside_the_list_is_dropped():
     assert link.can.ignored == 1
 
 
+def test_the_old_name_of_subscribe_warns_at_the_caller():
+    link, current = Link(), FloatReceiver()
+    with pytest.warns(DeprecationWarning, match=r"^CanLink.listen is now subscribe; the old name ends") as warned:
+        link.can.listen(18, current)
+    assert warned[0].filename == __file__
+    link.push(CAN_RX, 1, 18, 8, 0xBFC00000, 5)
+    link.can.receive_all()
+    assert current.value == -1.5
+
+
 def test_two_receivers_for_one_identifier_are_a_mistake():
     link = Link()
     link.can.subscribe(18, Ignored())

@@ -60,6 +60,6 @@ def test_a_panel_that_does_not_answer_is_found(source, monkeypatch):
         return ""
 
     monkeypatch.setattr(panel, "TURNS_TO_ANSWER", 50)
-    monkeypatch.setattr(server.Session, "hear", silent)
+    monkeypatch.setattr(server.Session, "on_text", silent)
     with pytest.raises(Finding, match="a well-behaved page is not answered"):
         run(100, 4, source)
