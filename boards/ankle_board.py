@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False
 # (results are those of SEQUENCE)
-"""What the boards of the outer and the inner feet share: two feet, two limit switches, one ankle motor.
+"""The common part of the boards of the outer and the inner feet: two feet, two limit switches, one ankle motor.
 
-Source: robot.md N4.2, N4.7-N4.9, N5. The two rooms hold their constants and their tables.
+Source: robot.md N4.2, N4.7-N4.9, N5. The modules of the two boards have their constants and tables.
 """
 
 from typing import TYPE_CHECKING, Final
@@ -42,8 +42,8 @@ FOOT_ON_LEVEL = 2000  # counts
 FOOT_OFF_LEVEL = 1000
 REZERO_ANGLE_RAD = 0.3
 REZERO_RATE_RAD_S = 0.01
-# Setting the motor's angle costs this beside the look: with it the slot is the 301 us of MCFI's image with the ankle at
-# 0.1 rad, and within the logs' 286 to 313 (robot.md T1).
+# Setting the motor's angle costs this in addition to the check: with it the slot is the 301 us of MCFI's image with the
+# ankle at 0.1 rad, and within the logs' 286 to 313 (robot.md T1).
 SET_CYCLES = 2 * 4010
 
 

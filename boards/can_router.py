@@ -52,12 +52,12 @@ SEGMENT_TIMER_CYCLES = 140  # counters, segment bookkeeping, transmit interrupt 
 # 31 half-words pass a FIFO of eight: about eight entries of 30 cycles, and 14 cycles per half-word both ways
 SEGMENT_CYCLES = 240
 HALF_WORD_CYCLES = 14
-ROUTE_IDLE_CYCLES = 60  # three empty rings looked at
+ROUTE_IDLE_CYCLES = 60  # three empty rings checked
 ROUTE_FRAME_CYCLES = 220  # table, learning, one push
 FLUSH_IDLE_CYCLES = 25
 FLUSH_FRAME_CYCLES = 110  # status, four registers, command
 ERROR_CYCLES = 150  # the capture registers of four controllers
-LOOP_CYCLES = 20  # the scheduler's look at its flag, once per turn of four
+LOOP_CYCLES = 20  # the scheduler's check of its flag, once per turn of four
 ERROR_SLOT = 10  # of the VIC (robot.md N4.16)
 SEGMENT_PERIOD_CYCLES = 12_000  # of Timer1: 200 us
 # Supply of the electronics (robot.md N5): ten-bit readings, gain and offset
@@ -214,7 +214,7 @@ class CanRouterBoard(FirmwareBoard):
         self.start(self.schedule(), phase_ns)
 
     def _time_turns(self) -> None:
-        """What a turn of the main loop takes, by the frames it moves: one each from three sources; into two buffers."""
+        """Cycles of a turn of the main loop, by the frames it moves: one each from three sources; into two buffers."""
         route_cycles = [ROUTE_IDLE_CYCLES + ROUTE_FRAME_CYCLES * moved for moved in range(4)]
         flush_cycles = [FLUSH_IDLE_CYCLES + FLUSH_FRAME_CYCLES * moved for moved in range(3)]
         self.route_ns = [int(cycles * self.ns_per_cycle) for cycles in route_cycles]
@@ -290,14 +290,14 @@ class CanRouterBoard(FirmwareBoard):
         return SEGMENT_HALF_WORDS
 
     def on_can_error(self, queue) -> None:
-        """Look at every controller: read its capture register, restart it when it is bus-off."""
+        """Check every controller: read its capture register, restart it when it is bus-off."""
         for controller in self.can_errors:
-            controller.look()
+            controller.check()
 
     # --- main loop --------------------------------------------------------------------------------------
 
     def urgent_kinds(self) -> cython.longlong:
-        """Any kind, but that a transmit buffer comes free when nothing waits for it."""
+        """Any kind, except that a transmit buffer becomes free when nothing waits for it."""
         return EVERY_KIND if self.router.waiting else EVERY_KIND & ~(1 << CAN_TX_DONE)
 
     @cython.ccall
@@ -354,13 +354,13 @@ class CanRouterBoard(FirmwareBoard):
             if self.router.tx_read[channel] != self.router.tx_write[channel]:
                 controller = self.controllers[channel - 1]
                 if not controller.free_at(FIRST_BUFFER, at) and not controller.free_at(SECOND_BUFFER, at):
-                    controller.tell_first_end()
+                    controller.report_first_end()
                 elif not controller.MOD & MOD_RESET:
                     return True
         return False
 
     def main_loop(self) -> cython.longlong:
-        """Move what waits, until nothing does or something else is due; returns the instant reached, 0 when it idles.
+        """Move waiting frames, until none waits or something else is due; returns the time reached, 0 when it idles.
 
         An idle loop spins through its four pairs of "route, flush", so work that comes up waits for the
         pair in progress to end and is met wherever the loop happens to be.
@@ -420,7 +420,7 @@ class CanRouterBoard(FirmwareBoard):
         self.own.send_words(table.TIMESTAMP, self.time.ms, self.time.ms)
 
     def update_errors(self) -> object:
-        """Collect the errors of the slot; frames lost to full transmit rings since the last look are one."""
+        """Collect the errors of the slot; frames lost to full transmit rings since the last call are one."""
         lost: cython.longlong = 0
         i: cython.longlong
         if self.own.report_full:
@@ -438,7 +438,7 @@ class CanRouterBoard(FirmwareBoard):
     def show_load(self) -> None:
         """One light per bus: 0 silent, 1 traffic, 2 from 20 frames/ms, 3 from 30.
 
-        ROBOT PARITY: which pins they hang on is not known, so they are state only.
+        ROBOT PARITY: their pins are not known, so they are state only.
         """
         i: cython.longlong
         count: cython.longlong

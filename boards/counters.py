@@ -1,4 +1,4 @@
-"""What the boards of the robot count beyond slots and CAN, and how that travels between processes."""
+"""Counters of the robot's boards beyond slots and CAN, and their form between processes."""
 
 import dataclasses
 from typing import Any
@@ -37,7 +37,7 @@ class RangerCounters(ProgramCounters):
 
 
 def of_board(board: Any, can: list[CanCounters], link: Any = None, router: Any = None) -> RangerCounters:
-    """What every board of the robot has, and what the caller adds; `link` and `router` are the board's objects."""
+    """The counters of any board of the robot, with those of the caller; `link`, `router`: the board's objects."""
     return RangerCounters(
         hz=board.hz,
         unclaimed=board.unclaimed,
@@ -56,7 +56,7 @@ def of_can_link(link: Any) -> CanCounters:
 
 
 def of_controller(controller: Any, receive_lost: int, queue_full: int, skipped: int = 0) -> CanCounters:
-    """A controller, with what the program's queues at it lost."""
+    """A controller, with the losses of the program's queues at it."""
     return CanCounters(
         controller=controller.number,
         received=controller.received,

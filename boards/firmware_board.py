@@ -1,4 +1,4 @@
-"""What every board of the robot has: its part of the master table, switches, the network time, an error module.
+"""The common part of the robot's boards: their part of the master table, switches, network time, error module.
 
 Below, in the order of building: FirmwareBoard (all), SatelliteBoard (one CAN bus), MotorBoard (a motor), AnkleBoard.
 """
@@ -69,7 +69,7 @@ class FirmwareBoard(Microcontroller):
             self.on_near_limit = board.note_near_limit
 
     def schedule(self) -> Schedule:
-        """The board's table; every room has its own."""
+        """The board's table; every board's module has its own."""
         raise FirmwareError(f"{self.name}: this board has no schedule")
 
     @cython.ccall

@@ -1,12 +1,13 @@
-"""What the four motor boards (B2A) share: chip, peripherals, modules, publishing, start-up.
+"""The common part of the four motor boards (B2A): chip, peripherals, modules, publishing, start-up.
 
 Each board's module (hip.py, outer_feet.py, inner_feet.py, steering.py) holds its constants and its table
 of what runs when. Source: robot.md N1.2, N4, N5, N6.1.
 
 Where the numbers of cycles come from: two per instruction, as counted in the images (robot.md T2); tables read
 `2 * instructions`. Where least, median and most differ by the work done, the difference is in what is counted per item
-or spent by the work itself; where they differ without a reason that is modelled, the median stands. MCFO has no
-counted figures: it is MCFI with another encoder's sign, and has its. What else is derived says so at its line.
+or spent by the work itself; where they differ without a reason that is modelled, the median is used. MCFO has no
+counted figures: it is MCFI with another encoder's sign, and has its figures. Other derived numbers have their reason
+at the line.
 A task's limit is about a third above the most that was counted, or can be for a full ring: 63 edges, 20 frames of
 gains, ten errors at once; a Wait's is its converter's whole sequence.
 """
@@ -70,7 +71,7 @@ ANALOG = {
     "steering_sensor": 4,
     "battery_voltage": 5,
 }
-NOT_CONVERTED = 0.0  # what is sent of the bridge's temperature on AIN3, which no board converts (robot.md N4.6)
+NOT_CONVERTED = 0.0  # sent as the bridge's temperature on AIN3, which no board converts (robot.md N4.6)
 # Places on `chip.words`.
 WORDS = {"absolute_encoder": 0}
 
@@ -86,8 +87,8 @@ CONVERSION_NS = 31_000
 
 BATTERY_VOLTAGE_CHANNEL: Final = 1  # AIN1, P0.28
 
-# Receive lists, which are searched from the first entry: MCH's is told (robot.md N2.4). The others' order is chosen by
-# us: on MCFI the time and three gains take 632 instructions for MCH's 716 (T2), so they stand a place or two earlier.
+# Receive lists, which are searched from the first entry: MCH's is known (robot.md N2.4). The others' order is chosen by
+# us: on MCFI the time and three gains take 632 instructions for MCH's 716 (T2), so they are a place or two earlier.
 RECEIVE_LIST = {
     "MCH": ("MOTOR_TARGET_CURRENT", "TIMESTAMP", "SHUTDOWN", "COMMAND_CURRENT", "STIFFNESS", "DAMPNESS", "SLEEP"),
 }
@@ -243,11 +244,11 @@ class MotorBoard(SatelliteBoard):
         self.encoder_select = 0
         self.rezeroing = False
         self.rezero_count = 0
-        self.listen()
+        self.subscribe()
         self.power_up = PowerUp(self, self)
         self.power_up.begin(phase_ns)
 
-    def listen(self) -> None:
+    def subscribe(self) -> None:
         """Fill the receive list, in the order of RECEIVE_LIST."""
         name = self.table.BOARD + "_"
         receivers = {
@@ -260,9 +261,9 @@ class MotorBoard(SatelliteBoard):
         }
         for entry in RECEIVE_LIST.get(self.name, USUAL_RECEIVE_LIST):
             if entry == "TIMESTAMP":
-                self.can.listen(self.table.TIMESTAMP, self.time)
+                self.can.subscribe(self.table.TIMESTAMP, self.time)
             else:
-                self.can.listen(getattr(self.table, name + entry), receivers[entry])
+                self.can.subscribe(getattr(self.table, name + entry), receivers[entry])
 
     def add_encoders(self, phase_ns, cap01, cap23) -> None:
         """The two incremental encoders on timer 0: (pulses, gear) of the pairs 0/1 and 2/3."""
@@ -371,7 +372,7 @@ class MotorBoard(SatelliteBoard):
         self.rezeroing = True
 
     def end_line(self) -> None:
-        """Slot task: what the row's line does at its end, send its frame or set the motor's count."""
+        """Slot task: the end of the row's line, which sends its frame or sets the motor's count."""
         if self.rezeroing:
             self.rezeroing = False
             self.motor.count = self.rezero_count

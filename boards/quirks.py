@@ -1,4 +1,4 @@
-"""Every switch between what the appendix describes and what the firmware of 2016 did.
+"""The switches between the appendix and the firmware of 2016.
 
 `boards/QUIRKS.md` is the readable table: one line per disagreement, with the switch named there; a test
 holds table and dataclass against each other. Rule of the defaults: errata of the appendix first, then the

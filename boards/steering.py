@@ -83,7 +83,7 @@ class SteeringBoard(MotorBoard):
     def schedule(self) -> Schedule:
         """One pass takes 2 ms; each row's variable goes out at 500 Hz, the occasional ones at 100 Hz.
 
-        What was not counted here costs what its like does on MCFI; the lines of a row cost the most that one was
+        Functions not counted here cost the same as similar ones on MCFI; the lines of a row cost the most that one was
         counted to (robot.md T2: 154 to 284).
         """
         board: object = self
@@ -136,7 +136,7 @@ class SteeringBoard(MotorBoard):
     @cython.ccall
     @cython.exceptval(check=False)
     def controlled_position(self) -> cython.longlong:
-        """Steering angle in counts x 65536: there is no other unit on this board."""
+        """Steering angle in counts x 65536, the only unit on this board."""
         return (self.adc_external.results[SENSOR] - self.zero) << 16
 
     @cython.ccall
@@ -178,7 +178,7 @@ class SteeringBoard(MotorBoard):
     def check(self) -> None:
         """The limit check of the firmware, which never calls it: +/-200 counts about 4803.
 
-        Positive duty turns towards higher counts (chosen by us: no record tells).
+        Positive duty turns towards higher counts (chosen by us: no record shows it).
         """
         counts: cython.longlong = self.adc_external.results[SENSOR] - CENTRE_COUNTS
         high: cython.bint = counts > LIMIT_COUNTS

@@ -1,7 +1,7 @@
 """The user interface board (UI, B8A): IMU, keys, radio control, display, colour lights, buzzer.
 
-Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. The devices that a person sees and hears are connected to
-its pins: `board.panel.text()`, `board.panel.colour(i)`, `board.panel.hertz`; `board.memory` has all of it as words,
+Source: robot.md N3.6, N4.10-N4.12, N4.16; appendix 3.7, 3.8. The devices for a person are connected to its pins:
+`board.panel.text()`, `board.panel.colour(i)`, `board.panel.hertz`; `board.memory` has all of it as words,
 also for a board in a separate process, and for any program (modules/front_panel.py).
 """
 
@@ -105,7 +105,7 @@ class UserInterfaceBoard(SatelliteBoard):
         for channel in (0, 1, 3):
             self.timer0.use_channel(channel, RC_PINS[channel], source=captures)
         self.vic.attach(TIMER_MATCH, 0, self.on_rc_edge, RC_CYCLES, slot=RC_SLOT, name="timer0 capture")
-        # what a person touches, sees and hears
+        # keys, display, lights and buzzer
         panel = FrontPanel(self)
         self.carry(panel)
         self.keypad = Keypad(self.gpio, board.report)
@@ -114,23 +114,23 @@ class UserInterfaceBoard(SatelliteBoard):
         pwm = Pwm(self, period=PERIOD_AT_START, phase_ns=phase_ns)
         self.buzzer = Buzzer(pwm, quirks.buzzer_beeps, quirks.song_repeats_for_ever)
         self.sync_light = SyncLight(self.gpio, self.keypad, self.leds)
-        self.listen()
+        self.subscribe()
         self.on_timer_tick = self.lcd_tick
         self.start(self.schedule(), phase_ns)
 
-    def listen(self) -> None:
+    def subscribe(self) -> None:
         """Fill the receive list (robot.md N2.4)."""
-        listen = self.can.listen
-        listen(table.TIMESTAMP, self.time)
+        subscribe = self.can.subscribe
+        subscribe(table.TIMESTAMP, self.time)
         for quarter in range(4):
-            listen(getattr(table, f"UI_SET_LCD_QUAD_{quarter + 1}"), LcdQuarter(self.lcd, quarter))
+            subscribe(getattr(table, f"UI_SET_LCD_QUAD_{quarter + 1}"), LcdQuarter(self.lcd, quarter))
         for led in range(6):
-            listen(getattr(table, f"UI_SET_LED_{led + 1}"), LedReceiver(self.leds, led))
-        listen(table.UI_SET_BUZZER_FREQ, BuzzerFrequency(self.buzzer))
-        listen(table.UI_SET_BUZZER_AMPL, TuneStart(self.buzzer))
-        listen(table.UI_EMPTY_TX2, TuneStart(self.buzzer))
+            subscribe(getattr(table, f"UI_SET_LED_{led + 1}"), LedReceiver(self.leds, led))
+        subscribe(table.UI_SET_BUZZER_FREQ, BuzzerFrequency(self.buzzer))
+        subscribe(table.UI_SET_BUZZER_AMPL, TuneStart(self.buzzer))
+        subscribe(table.UI_EMPTY_TX2, TuneStart(self.buzzer))
         if self.quirks.buzzer_beeps:
-            listen(table.ERROR_LCD, ErrorSound(self.buzzer))
+            subscribe(table.ERROR_LCD, ErrorSound(self.buzzer))
 
     def schedule(self) -> Schedule:
         """Source: robot.md N3.6.

@@ -40,7 +40,7 @@ class BitLevel:
     `bit`: the next one to pass; `first_bit`: the start of this stretch. `quiet`: number of recessive bits passed last;
     `levels`: of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been
     recessive for long enough; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
-    `heard_bit`: the bit after which a listening node had a frame, `sent_bit`: after which a transmitter was done.
+    `received_bit`: the bit after which a listening node had a frame, `sent_bit`: after which a transmitter was done.
     `in_error`: an error frame is under way, which began in the frame of `error_begun`; `counted`: the bus has counted
     it. `tampering`: what faults do to frames (`tampering.py`), or None. `bitrate`: of the bus.
     """
@@ -53,7 +53,7 @@ class BitLevel:
     first_bit: cython.longlong
     bit: cython.longlong
     quiet: cython.longlong
-    heard_bit: cython.longlong
+    received_bit: cython.longlong
     sent_bit: cython.longlong
     bitrate: cython.longlong
     tampering: object
@@ -81,7 +81,7 @@ class BitLevel:
         self.first_bit = 0
         self.bit = 0
         self.quiet = 0
-        self.heard_bit = -1
+        self.received_bit = -1
         self.sent_bit = -1
         self.open = False
         self.at_rest = False
@@ -117,7 +117,7 @@ class BitLevel:
             cython.cast(MediumAccess, machine).place(bit, free_bit)
 
     @cython.cfunc
-    def look(self) -> None:
+    def prepare_bit(self) -> None:
         """Set `open`, `at_rest` and `away` for the next bit."""
         machine: MediumAccess
         quiet: cython.bint = self.quiet >= SEQUENCE_BITS
@@ -274,13 +274,13 @@ class BitLevel:
 
     @cython.cfunc
     def error_is_over(self) -> cython.bint:
-        """True when no node is in an error frame any more, and no node still receives a frame that is no longer sent.
+        """True when no node is in an error frame any more, and none still receives a frame that is no longer sent.
 
         The latter happens when the transmitter has gone bus-off: its receivers have yet to detect an error.
         """
         machine: MediumAccess
         carried: cython.bint = False
-        heard: cython.bint = False
+        any_received: cython.bint = False
         for machine in self.machines:
             if machine.signals_error():
                 return False
@@ -288,8 +288,8 @@ class BitLevel:
                 if machine.sending:
                     carried = True
                 else:
-                    heard = True
-        return carried or not heard
+                    any_received = True
+        return carried or not any_received
 
     # ---- nodes that leave and join
 

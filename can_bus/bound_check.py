@@ -1,6 +1,6 @@
 """Compare the bounds of `can_bus.bounds` with the simulated bus: play message sets on a `Bus`, measure responses.
 
-A message set is played twice: at its critical instant (the whole level of the second lowest priority is released at
+A message set is simulated twice: at its critical instant (the whole level of the second lowest priority is released at
 once, just after the longest frame of lower priority has started, every frame as long as stuffing makes it) and at
 random (phases, jitters and contents). Functions return figures; nothing is printed.
 """
@@ -106,7 +106,7 @@ def play(
     for n, inbox in enumerate(inboxes):
         bus.add_node(f"n{n}", inbox, 1, STAGE_BUS * 256 + n)
     # time; -1 an instance is queued, or the buffer that is free again; message
-    events = [(queued, -1, index) for index, instants in enumerate(releases) for _, queued in instants]
+    events = [(queued, -1, index) for index, times in enumerate(releases) for _, queued in times]
     heapq.heapify(events)
     loaded: dict[tuple[int, int], int] = {}  # node, buffer -> message
     answered = [0] * len(senders)
@@ -165,11 +165,11 @@ def critical_releases(
             train = [m for m in messages if m.queue == one.queue]
             first = messages[place] if messages[place].queue == one.queue else min(train, key=lambda m: m.key)
             released += (one.offset_ns - (first.offset_ns or 0)) % one.period_ns
-        instants = []
+        times = []
         while released <= start + busy_ns:
-            instants.append((released, max(released, start)))
+            times.append((released, max(released, start)))
             released += one.period_ns
-        releases.append(instants)
+        releases.append(times)
     return releases
 
 
@@ -218,15 +218,15 @@ def random_releases(senders: Sequence[Sender], stream: RandomStream, length_ns: 
         one = sender.message
         released = stream.integer(one.period_ns) if one.offset_ns is None else phase + one.offset_ns
         queued = 0
-        instants = []
+        times = []
         while released < length_ns:
             delay = stream.integer(one.jitter_ns + 1) if one.jitter_ns else 0
             queued = max(queued, released + delay)  # two instances are not queued in the wrong order
-            instants.append((released, queued))
+            times.append((released, queued))
             released += one.period_ns
             if one.offset_ns is None and stream.integer(8) == 0:
                 released += stream.integer(one.period_ns)
-        releases.append(instants)
+        releases.append(times)
     return releases
 
 

@@ -477,7 +477,7 @@ class Bus:
             self.next_strike = -1
         if strike != self.strike_bit:
             self.strike_bit = strike
-            self._look_ahead()
+            self._find_next()
             self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
 
     # ---- passing of time
@@ -503,11 +503,11 @@ class Bus:
                 self.next_bit = NEVER
                 self.next_time = NEVER
             else:
-                self._look_ahead()
+                self._find_next()
         return self.next_time
 
     @cython.cfunc
-    def _look_ahead(self) -> cython.void:
+    def _find_next(self) -> cython.void:
         """Set `next_bit` and `next_time` from the waiting frames; bit by bit, the next bit that waits for programs."""
         first: cython.longlong = self.buffers.first_ready()
         if first <= self.free_bit or self.disturbed:
@@ -618,7 +618,7 @@ class Bus:
         self.joining -= 1
         self.acknowledging += not node.silent
         if node.join():
-            node.tell(self.edge_ns(bit), ICR_ERROR_WARNING)
+            node.report_status(self.edge_ns(bit), ICR_ERROR_WARNING)
             self._note_result(self.edge_ns(bit))
         for row in self.buffers.waiting_of(node.index):
             self.buffers.rows[row + READY] = max(self.buffers.rows[row + READY] - NEVER, bit)
@@ -646,10 +646,10 @@ class Bus:
             self.buffers.rows[row + FREE_AT] = time
         return waited
 
-    def look_again(self) -> None:
+    def recompute_next(self) -> None:
         """Recompute the next event and its time after nodes or requests were exchanged directly."""
         self._note_changes()
-        self._look_ahead()
+        self._find_next()
         self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
 
     # ---- one frame
@@ -663,7 +663,7 @@ class Bus:
         """
         row: cython.longlong = self.buffers.first
         merged: cython.bint = False
-        heard: cython.bint = False
+        any_received: cython.bint = False
         identifier: cython.longlong
         flags: cython.longlong
         lo: cython.longlong
@@ -735,9 +735,9 @@ class Bus:
                 if node.listening:
                     node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
                     node.received += 1
-                    heard = True
+                    any_received = True
             node = node.following
-        if not heard:
+        if not any_received:
             self.counters.lost += 1
         if not flags & FLAG_EXTENDED:
             self.counters.note_answer(identifier, done - asked)
@@ -936,7 +936,7 @@ class Bus:
         machine: MediumAccess
         last: cython.longlong = self.bit_of(until)
         while True:
-            level.look()
+            level.prepare_bit()
             if level.at_rest and level.bit > level.first_bit and not level.away:
                 break
             if level.open or level.at_rest:
@@ -946,7 +946,7 @@ class Bus:
                     self._decided(level.bit)
                     return
                 level.levels.clear()
-                level.look()
+                level.prepare_bit()
                 if level.at_rest and level.bit > level.first_bit:
                     break
                 level.start_frames()
@@ -984,7 +984,7 @@ class Bus:
                 time, node.order, CAN_RX, node.controller, machine.identifier, flags, machine.lo, machine.hi, 0
             )
             node.received += 1
-            self.bit_level.heard_bit = bit
+            self.bit_level.received_bit = bit
             self._note_result(time)
         if met & MET_SENT:
             self._sent(node, row, bit)
@@ -1031,7 +1031,7 @@ class Bus:
         else:
             self.bit_level.sent_bit = bit
             self.counters.frames += 1
-            if self.bit_level.heard_bit != bit - 1:
+            if self.bit_level.received_bit != bit - 1:
                 self.counters.lost += 1
             if not flags & FLAG_EXTENDED:
                 self.counters.note_answer(identifier, time - slots[row + ASKED])

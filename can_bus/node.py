@@ -172,11 +172,11 @@ class Node:
         if off:
             self.mode = BUS_OFF
             interrupts |= ICR_ERROR_WARNING
-        self.tell(time, interrupts)
+        self.report_status(time, interrupts)
         return off
 
     @cython.cfunc
-    def tell(self, time: cython.longlong, interrupts: cython.longlong) -> None:
+    def report_status(self, time: cython.longlong, interrupts: cython.longlong) -> None:
         """CAN_STATUS to the node's program."""
         off: cython.longlong = 1 if self.mode == BUS_OFF else 0
         shown: cython.longlong = TRANSMIT_ERRORS_OFF if off else self.transmit_errors

@@ -29,7 +29,7 @@ def unplug(bus: Any, node: int, time: int) -> list[tuple[int, int, int, int, int
     if bus.disturbed:
         bus.bit_level.leave(controller)
     waited = bus.take_out(node, time)
-    bus.look_again()
+    bus.recompute_next()
     return waited
 
 
@@ -39,7 +39,7 @@ def plug(bus: Any, node: int, time: int) -> None:
     if controller.mode == UNPLUGGED:
         controller.leave()
         bus._set_going(controller, time)
-        bus.look_again()
+        bus.recompute_next()
 
 
 def check_rate(bus: Any, rate: int, where: str) -> None:
@@ -66,7 +66,7 @@ def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
     bus.bit_level.machines[node].own_rate = rate
     if takes_part:
         bus._set_going(controller, time)
-    bus.look_again()
+    bus.recompute_next()
 
 
 class Cut:
@@ -105,6 +105,6 @@ def _move(source: Any, place: int, target: Any, to: int, time: int) -> None:
         plug(target, to, time)
     else:  # off by its program or bus-off: it remains so
         after.mode = mode
-        target.look_again()
+        target.recompute_next()
     for buffer, identifier, flags, low, high in waited:
         target.request(to, buffer, time, identifier, flags, low, high)

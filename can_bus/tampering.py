@@ -428,11 +428,11 @@ class Babbling(Tamper):
         self.due_ns = 0
         self.buffer = 1
 
-    def speak(self, time: int) -> None:
+    def start_from(self, time: int) -> None:
         """Allow the first frame to start after `time` (ns)."""
         self.due_ns = time
         self._offer(self.intruder.bus.bit_of(time) + 1)
-        self.intruder.bus.look_again()
+        self.intruder.bus.recompute_next()
 
     def _offer(self, bit: int) -> None:
         """Offer the next frame, from `bit` on."""

@@ -54,8 +54,8 @@ def run_generate(arguments: argparse.Namespace) -> int:
     from ranger_sim.datatable.generate import GENERATED_FOLDER, stale, write
 
     table = load(arguments)
-    beside = pathlib.Path(arguments.master) / "generated" if arguments.master else GENERATED_FOLDER
-    folder = pathlib.Path(arguments.out) if arguments.out else beside
+    default = pathlib.Path(arguments.master) / "generated" if arguments.master else GENERATED_FOLDER
+    folder = pathlib.Path(arguments.out) if arguments.out else default
     changed = stale(table, folder) if arguments.check else write(table, folder)
     if arguments.json:
         print(json.dumps({"folder": str(folder), "checked": arguments.check, "changed": changed}))
@@ -140,8 +140,8 @@ def run_list(arguments: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.table import Table as Grid
 
-    said = sys.stdout.isatty() or "COLUMNS" in os.environ
-    console = Console(width=None if said else FILE_COLUMNS, markup=False, highlight=False)
+    known_width = sys.stdout.isatty() or "COLUMNS" in os.environ
+    console = Console(width=None if known_width else FILE_COLUMNS, markup=False, highlight=False)
     described = console.width >= WIDE
     grid = Grid(box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("id", "name", "type", "unit", "from", "to", "period (ms)", *["description"] * described):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 
-from ranger_sim.datatable.generate_python import heard_by, known_to, sent_by
+from ranger_sim.datatable.generate_python import known_to, received_by, sent_by
 from ranger_sim.datatable.model import Board, Table, Variable
 from ranger_sim.datatable.routing import destination_masks
 
@@ -64,7 +64,7 @@ def board_header(table: Table, board: Board) -> str:
     """Ids, structure and declarations of one board."""
     small = board.name.lower()
     known = known_to(table, board)
-    send, receive = sent_by(table, board), heard_by(table, board)
+    send, receive = sent_by(table, board), received_by(table, board)
     guard = f"RANGER_{board.name}_TABLE_H"
     lines = [
         HEADER,
@@ -112,7 +112,7 @@ def board_source(table: Table, board: Board) -> str:
         "",
         *list_lines(small, "send", sent_by(table, board)),
         "",
-        *list_lines(small, "receive", heard_by(table, board)),
+        *list_lines(small, "receive", received_by(table, board)),
     ]
     if board.role == "router":
         masks = destination_masks(table)

@@ -68,7 +68,7 @@ def sent_by(table: Table, board: Board) -> list[Variable]:
     ]
 
 
-def heard_by(table: Table, board: Board) -> list[Variable]:
+def received_by(table: Table, board: Board) -> list[Variable]:
     """Variables that a board receives from a bus or link: subscribed ones that some bus carries.
 
     ROBOT PARITY: the robot's satellites keep hand-written receive lists, which omit their spares, the main
@@ -93,7 +93,7 @@ def id_lines(variables: Iterable[Variable]) -> list[str]:
 def board_module(table: Table, board: Board) -> str:
     """The module that one board's firmware imports."""
     known = known_to(table, board)
-    send, receive = sent_by(table, board), heard_by(table, board)
+    send, receive = sent_by(table, board), received_by(table, board)
     schedule = schedule_of(board)
     own_error = [variable.id for variable in send if variable.is_error_word]
     lines = [

@@ -1,4 +1,4 @@
 """A microcontroller as its program sees it: clock, slot scheduler, interrupts, cycle costs, peripherals.
 
-Nothing of any particular robot is known here; README.md beside this file shows a complete board.
+This package knows nothing of any particular robot; README.md in this folder shows a complete board.
 """

@@ -2,15 +2,15 @@
 # (every index below is a place of a ring of whole rows)
 """What a board's processor did, row by row: every task, wait, interrupt and slot, as it ran.
 
-A log is attached to a board (`Microcontroller.keep_activity`), and its processor writes into it; without one it
-writes nothing and loses no time. What the robot does is the same with a log and without.
+A log is attached to a board (`Microcontroller.keep_activity`), and its processor writes into it; without a log it
+writes nothing and loses no time. The robot behaves the same with and without a log.
 
 **A row** is ACTIVITY_COLUMNS whole numbers of 64 bits:
 
     COLUMN_KIND     one of the kinds below
     COLUMN_NUMBER   of the task (`Legend.tasks`), of the interrupt (`Legend.interrupts`), or of the slot (1: the first)
-    COLUMN_START    instant (ns) at which it had the processor for the first time
-    COLUMN_END      instant (ns) at which its code was through
+    COLUMN_START    time (ns) at which it had the processor for the first time
+    COLUMN_END      time (ns) at which its code was through
     COLUMN_CYCLES   what it cost itself, without what interrupted it; of a slot: from its tick to its end, all in all
     COLUMN_LATENCY  of an interrupt: ns from its request to the first instruction of its handler; otherwise 0
     COLUMN_ROW      row of the schedule to which it belongs; of an interrupt: the one that ran
@@ -19,7 +19,7 @@ writes nothing and loses no time. What the robot does is the same with a log and
     TASK_RAN        a task of the schedule
     WAIT_RAN        a task that spins; items: cycles for which it span
     INTERRUPT_RAN   a service; cycles and start include the processor's way to the handler (the source's `latency`)
-    MAIN_LOOP_RAN   the main loop beside the scheduler was at work, as the router's; its number is 0. Turns that follow
+    MAIN_LOOP_RAN   the main loop outside the scheduler was at work, as the router's; its number is 0. Turns that follow
                     each other without a gap are one row, so that it does not matter in which steps time passes
     SLOT_BEGAN      start and end: the timer's match; items: tasks that the slot is to run
     SLOT_ENDED      start: the match; end: the last task is through, the one running at an overrun too; items: 1 if so
@@ -28,8 +28,8 @@ writes nothing and loses no time. What the robot does is the same with a log and
     TASK_DROPPED    one of them; start and end: that tick's match
 
 **How rows nest.** Between start and end of a row lie those that interrupted it: an interrupt's in a task's or in
-another interrupt's (a FIQ's in an IRQ's), never two that overlap by halves. So who had the processor at any instant is
-the innermost row around it. `end - start` of a row less the cycles of the rows inside is its own cycles, but for the
+another interrupt's (a FIQ's in an IRQ's), never two that overlap partly. So the innermost row around a time is the one
+that had the processor then. `end - start` of a row less the cycles of the rows inside is its own cycles, but for the
 rounding: each time is whole nanoseconds, rounded down. An entry of an occasional list has a row inside its list's row,
 with the same start and end; the cycles of the list are those of choosing.
 A slot that was dropped as a whole has a SLOT_BEGAN and a SLOT_OVERRAN, and no SLOT_ENDED; one in which the processor

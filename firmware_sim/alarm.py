@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
 # (places in a chip's order of alarms lie between the one that never comes and the last one set)
-"""Alarms of a chip: a peripheral's own instants, and those of the timer that steps the scheduler."""
+"""Alarms of a chip: times set by peripherals, and those of the timer that steps the scheduler."""
 
 import cython
 
@@ -15,8 +15,8 @@ from ranger_sim.foundation.events import NEVER
 class Alarm:
     """An alarm of a chip: when it is due, `owner.on_alarm(number, time)` runs.
 
-    The chip keeps those that are set in the order of their instants, the first one last; of two at one instant the
-    one that was made first comes first.
+    The chip keeps the alarms that are set in the order of their times, the earliest one last; of two at the same time
+    the one that was made first comes first.
     """
 
     chip: "Chip"
@@ -61,7 +61,7 @@ class Alarm:
     @cython.exceptval(check=False)
     @cython.final
     def _set_again(self, time: cython.longlong) -> cython.longlong:
-        """It is set already: take it out, and set it."""
+        """Move an alarm that is set already."""
         at: cython.longlong = 1
         while self.chip.alarm_places[at] != self.place:
             at += 1
@@ -76,14 +76,14 @@ class Alarm:
     @cython.cfunc
     @cython.final
     def _move(self, a: cython.longlong, b: cython.longlong) -> cython.void:
-        """What stands at `a` in the chip's order goes to `b`."""
+        """Move the alarm at `a` in the chip's order to `b`."""
         self.chip.alarm_times[b] = self.chip.alarm_times[a]
         self.chip.alarm_places[b] = self.chip.alarm_places[a]
 
     @cython.cfunc
     @cython.final
     def ring(self, time: cython.longlong) -> InterruptSource | None:
-        """It is the chip's first one, and due. Returns what its owner does."""
+        """Run the owner's handler; this is the chip's first alarm, and due. Returns the handler's result."""
         self.chip.now = time
         self.chip.alarms_set -= 1
         self.chip.alarm_time = self.chip.alarm_times[self.chip.alarms_set - 1]

@@ -1,7 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-# (pins are 0 ... 31, held against that where they are set; places are those of the table that is followed; what is
-# divided by is above 0)
-"""Analog voltages at a chip's pins: a straight line per pin between two instants, set from outside."""
+# (pins are 0 ... 31, checked where they are set; places are those of the table that is followed; divisors are above 0)
+"""Analog voltages at a chip's pins: a straight line per pin between two times, set from outside."""
 
 import cython
 
@@ -36,14 +35,14 @@ class AnalogPins:
         self.end_times = [0] * 32
         self.start_values = [0.0] * 32
         self.end_values = [0.0] * 32
-        self.places = [-1] * 32  # in the table outside; -1: the pin has a line of its own
+        self.places = [-1] * 32  # in the table outside; -1: the pin has its own line
         self.feed = None
 
     def follow(
         self, index, times: cython.longlong[::1], starts: cython.double[::1], ends: cython.double[::1], place
     ) -> None:
-        """From now on pin `index` runs from `starts[place]` at `times[0]` to `ends[place]` at `times[1]`, whatever
-        stands there when it is read. All pins of a chip follow the same three arrays (int64 ns, V, V)."""
+        """From now on pin `index` runs from `starts[place]` at `times[0]` to `ends[place]` at `times[1]`, with their
+        values at the time of reading. All pins of a chip follow the same three arrays (int64 ns, V, V)."""
         self._check(index)
         self.feed = (times, starts, ends)  # keeps them alive
         if cython.compiled:

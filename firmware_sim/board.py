@@ -11,6 +11,7 @@ import cython
 from ranger_sim.firmware_sim.analog import AnalogPins
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import NEVER, EventQueue, Outbox
+from ranger_sim.foundation.renamed import renamed
 
 WORDS = 16
 EVERY_KIND = 0xFFFF  # bits of the message kinds to a board
@@ -21,11 +22,11 @@ class Board:
     """A board called `name`. Every kind of board implements `advance`; the rest has a meaning for any board.
 
     Inputs: `inbox`, the stamped messages; `analog`, the voltages at its pins; `words`, digital words that sensors
-    provide; the edges of encoders (`listen_to_edges`). Outputs: `outbox` takes each message as it is output.
+    provide; the edges of encoders (`connect_edges`). Outputs: `outbox` takes each message as it is output.
     `next_time`: the time (ns) at which it must run if no input arrives; NEVER for none. `edge_time`: that of the first
     edge that waits. `horizon`: how far it runs at most, or has run.
-    `apart`: it runs in a separate process, in parallel with the others: between `begin` and `advance` of one time
-    others may begin as well.
+    `out_of_process`: it runs in a separate process, in parallel with the others: between `begin` and `advance` of one
+    time others may begin as well.
     `memory`: the words of its program's memory that others may read at any time (None: none are shown).
     """
 
@@ -37,7 +38,7 @@ class Board:
     analog: AnalogPins
     words: cython.longlong[::1]
     name: str
-    apart: cython.bint
+    out_of_process: cython.bint
     memory: object
 
     def __init__(self, name) -> None:
@@ -49,7 +50,7 @@ class Board:
         self.next_time = 0
         self.edge_time = NEVER
         self.horizon = 0
-        self.apart = False
+        self.out_of_process = False
         self.memory = None
 
     # --- passing time -------------------------------------------------------------------------------------
@@ -73,7 +74,7 @@ class Board:
         return self.horizon
 
     @cython.ccall
-    def speaks_from(self) -> cython.longlong:
+    def earliest_transmit_ns(self) -> cython.longlong:
         """Earliest time (ns) at which the board can send on a bus, unless an urgent message arrives."""
         return self.next_time
 
@@ -92,13 +93,13 @@ class Board:
     # --- what is connected to it --------------------------------------------------------------------------
 
     @cython.ccall
-    def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
-        """Take edges of `buffer` on `pin`, each with the level of `partner_pin`; `edges_came` announces them."""
+    def connect_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
+        """Take edges of `buffer` on `pin`, each with the level of `partner_pin`; `note_edges` announces them."""
         raise NotImplementedError(f"{self.name}: this kind of board has no pins for an encoder")
 
     @cython.ccall
     @cython.exceptval(check=False)
-    def edges_came(self) -> cython.longlong:
+    def note_edges(self) -> cython.longlong:
         """Note that the buffers of encoders may hold new edges; returns `edge_time`."""
         return self.edge_time
 
@@ -106,6 +107,21 @@ class Board:
     def transmit_ends(self, controller: cython.longlong) -> object:
         """The buffer for the ends of a CAN controller's transmissions; None: the bus sends them as messages."""
         return None
+
+    def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:
+        """The old name of `connect_edges`."""
+        renamed("Board.listen_to_edges", "connect_edges")
+        self.connect_edges(buffer, pin, partner_pin)
+
+    def edges_came(self) -> int:
+        """The old name of `note_edges`."""
+        renamed("Board.edges_came", "note_edges")
+        return self.note_edges()
+
+    def speaks_from(self) -> int:
+        """The old name of `earliest_transmit_ns`."""
+        renamed("Board.speaks_from", "earliest_transmit_ns")
+        return self.earliest_transmit_ns()
 
     # --- inspection ---------------------------------------------------------------------------------------
 

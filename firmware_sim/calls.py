@@ -9,7 +9,7 @@ from typing import Any
 
 
 def call(function: Callable[[], Any]) -> Any:
-    """What `function()` returns."""
+    """The result of `function()`."""
     return function()
 
 
@@ -24,10 +24,10 @@ def owner_of(function: Callable[..., Any], arguments: int) -> Any:
 
 
 def call_with(code: Any, owner: Any, argument: Any) -> Any:
-    """What the function returns for one argument."""
+    """The function's result for one argument."""
     return code(argument)
 
 
 def run(code: Any, owner: Any) -> Any:
-    """What the function without arguments returns, None as 0."""
+    """The result of the function without arguments, None as 0."""
     return code() or 0

@@ -1,4 +1,4 @@
-"""What a chip's peripherals and its processor share: time, interrupts, pins, and the order of the alarms."""
+"""The state that a chip's peripherals and its processor share: time, interrupts, pins, and the order of the alarms."""
 
 from typing import Final
 
@@ -27,7 +27,7 @@ class Chip(Board):
 
     # Fields that nearly every event touches come first, close together.
     now: cython.longlong
-    instant: cython.longlong
+    input_time: cython.longlong
     code_time: cython.longlong
     stop_time: cython.longlong
     alarm_time: cython.longlong
@@ -69,16 +69,15 @@ class Chip(Board):
         self.pwm_follower = None
         self.panel = None
         self.now = 0
-        self.instant = 0  # up to which inputs have been taken in
+        self.input_time = 0  # up to which inputs have been taken in
         self.code_time = 0  # when the processor goes on with its code
         self.stop_time = 0  # how far the processor may run before it checks the inputs again
         self.waiting = False  # a task waits for a condition
         self.check_wait = False  # which may hold now
-        # alarms that are set: instants and places in the order of making, the first to come last; at 0 stands one
-        # that never comes
+        # alarms that are set: times and places in the order of making, the earliest last; the one at 0 never comes
         self.alarm_times = [NEVER] * 18  # ALARM_PLACES
         self.alarm_places = [0] * 18
-        self.alarms_set = 1  # where the next one would stand
+        self.alarms_set = 1  # place of the next one
         self.alarm_time = NEVER  # of the first to come
         self.ticks = TickTrain(self.crystal, 1, 0)
         self.tick_source = self.vic.source(SLOT_TIMER, 0)

@@ -45,13 +45,13 @@ class Crystal:
 
     @cython.ccall
     def local_ns(self, true_ns: cython.longlong) -> cython.longlong:
-        """What this clock counts (ns) in `true_ns`."""
+        """The time (ns) that this clock counts in `true_ns`."""
         rate: cython.longlong = 1000000000 + self.ppb
         quotient: cython.longlong = true_ns // 1000000000
         return quotient * rate + (true_ns - quotient * 1000000000) * rate // 1000000000
 
     def in_its_time(self, true_ns, before) -> int:
-        """True duration (ns) in which this clock counts what `before` counts in `true_ns`."""
+        """True duration (ns) in which this clock counts as much as `before` counts in `true_ns`."""
         return self.true_ns(before.local_ns(true_ns))
 
     @cython.ccall
@@ -81,7 +81,7 @@ class Crystal:
 @cython.final
 @cython.cclass
 class TickTrain:
-    """The instants of a timer's ticks on a crystal, one after another: exactly `Crystal.tick_time_ns`, by addition.
+    """The times of a timer's ticks on a crystal, one after another: exactly `Crystal.tick_time_ns`, by addition.
 
     `number` and `time` (true ns) are those of the present tick; tick 0 is at `phase_ns`. The crystal's `ppb` is taken
     when the train is made.

@@ -1,4 +1,4 @@
-"""What a board counted, by name. A board says it itself (`Board.counters`), whether it runs here or elsewhere."""
+"""A board's counters, by name. The board reports them itself (`Board.counters`), in this process or another."""
 
 import dataclasses
 import types
@@ -61,8 +61,8 @@ class ProcessorCounters:
 
 @dataclasses.dataclass(frozen=True)
 class ProgramCounters(BoardCounters):
-    """What its program tells besides. `time_ms`: the machine's time as it has it; `errors`: how often it noted each
-    error, by error number.
+    """Further values of its program. `time_ms`: the machine's time as the program has it; `errors`: how often it noted
+    each error, by error number.
     """
 
     time_ms: int = 0

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class EdgeLine:
     """An encoder on two pins: its edges are read where its sensor writes them, each at its stamp.
 
-    Channel A changes on `pin`; channel B, whose level each edge brings along, hangs on `partner_pin`.
+    Channel A changes on `pin`; channel B, whose level comes with each edge, is connected to `partner_pin`.
     """
 
     next_time: cython.longlong
@@ -43,7 +43,7 @@ class EdgeLine:
     @cython.exceptval(check=False)
     @cython.final
     def find_next(self) -> cython.longlong:
-        """Look at the first edge of the buffer that has not been taken: its instant, NEVER for none, and its levels."""
+        """Find the first edge of the buffer that has not been taken: its time, NEVER for none, and its levels."""
         edge: cython.longlong
         if self.buffer.read < self.buffer.count:
             edge = self.buffer.packed[self.buffer.read]

@@ -1,11 +1,11 @@
-"""What the numbers in a board's activity log stand for: its tasks, interrupts, slots, by name."""
+"""The meaning of the numbers in a board's activity log: its tasks, interrupts, slots, by name."""
 
 import dataclasses
 
 
 @dataclasses.dataclass(frozen=True)
 class TaskLegend:
-    """One line of a board's schedule, in cycles; `limit` 0: held against nothing. `entries`: of an occasional list."""
+    """One line of a board's schedule, in cycles; `limit` 0: no limit. `entries`: of an occasional list."""
 
     name: str
     cost: int
@@ -29,9 +29,9 @@ class InterruptLegend:
 
 @dataclasses.dataclass(frozen=True)
 class Legend:
-    """A board of `hz` core clock. Tasks and interrupts stand at their numbers; `rows`: task numbers by row, in order.
+    """A board of `hz` core clock. Tasks and interrupts are at their numbers; `rows`: task numbers by row, in order.
 
-    `cycles_per_ns` is that of its own crystal, `slot_ns` and `slot_cycles` the slot as its schedule has it.
+    `cycles_per_ns` is that of its own crystal, `slot_ns` and `slot_cycles` the length of a slot of its schedule.
     """
 
     board: str

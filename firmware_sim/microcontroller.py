@@ -149,8 +149,8 @@ class Microcontroller(Chip):
         self.pin_sources[pin] = source if source is not None else self.vic.source(PIN_EDGE, pin)
         return self.pin_sources[pin]
 
-    def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
-        """Take edges of `buffer` on `pin`, claimed before, with the level of `partner_pin`; `edges_came` announces
+    def connect_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
+        """Take edges of `buffer` on `pin`, claimed before, with the level of `partner_pin`; `note_edges` announces
         them.
 
         Two encoders can be connected this way; the edges of further ones must arrive as messages.
@@ -165,7 +165,7 @@ class Microcontroller(Chip):
         else:
             raise FirmwareError(f"{self.name}: pin {pin} would be the third with the edges of an encoder")
 
-    def edges_came(self) -> cython.longlong:
+    def note_edges(self) -> cython.longlong:
         """Note that the buffers of the edge lines may hold new edges; returns the first edge's time.
 
         Edges of two lines at the same time come in the order in which the lines were connected, and before messages.
@@ -300,9 +300,9 @@ class Microcontroller(Chip):
     @cython.ccall
     def request(self, source: InterruptSource) -> cython.longlong:
         """Raise an interrupt line; it is served as soon as its priority allows. 1 if newly pending."""
-        if self.now > self.instant:  # a task requests it, and it began after others of its row
-            self.instant = self.now
-        self.next_time = self.instant
+        if self.now > self.input_time:  # a task requests it, and it began after others of its row
+            self.input_time = self.now
+        self.next_time = self.input_time
         return self.vic.raise_source(source, self.now)
 
     def stop_at(self, time: cython.longlong) -> cython.longlong:
@@ -354,16 +354,16 @@ class Microcontroller(Chip):
             own = NEVER
             if vic.pending != 0:
                 own = self.fiq_free if vic.pending >= FIRST_FIQ else self.irq_free
-                own = own if own > self.instant else self.instant
+                own = own if own > self.input_time else self.input_time
             elif not scheduler.done:
                 if not self.waiting or self.check_wait:
                     own = self.code_time
             elif self.background_wanted and self.background is not None:
-                own = self.code_time if self.code_time > self.instant else self.instant
+                own = self.code_time if self.code_time > self.input_time else self.input_time
             if own < first:
                 if own >= self.horizon:
                     break
-                self.instant = own
+                self.input_time = own
                 if vic.pending != 0:
                     self._serve(vic.take_first(), inbox, own)
                     continue
@@ -401,7 +401,7 @@ class Microcontroller(Chip):
             if self.edge_time == first:
                 self._edges()
                 continue
-            self.instant = first
+            self.input_time = first
             if inbox.head_time == first:
                 inbox.take()
                 asking = self._input(inbox)
@@ -425,7 +425,7 @@ class Microcontroller(Chip):
         self.next_time = own
         return own
 
-    def speaks_from(self) -> cython.longlong:
+    def earliest_transmit_ns(self) -> cython.longlong:
         """Earliest time (ns) at which the board can send on a bus, unless an urgent message arrives.
 
         That is its next event, or later where its schedule names the tasks that send (`Schedule.speakers`).
@@ -435,7 +435,7 @@ class Microcontroller(Chip):
             return self.next_time
         if self.waiting and self.horizon > time:  # the condition that the task spins for is not met before that
             time = self.horizon
-        return self.scheduler.speaks_from(time, self.tick_time)
+        return self.scheduler.earliest_transmit_ns(time, self.tick_time)
 
     def quiet_until(self) -> cython.longlong:
         """Earliest time (ns) at which the board can output anything, whatever non-urgent input arrives."""
@@ -463,7 +463,7 @@ class Microcontroller(Chip):
             time = self.edge_time
             line = self.first_line if self.first_line.next_time == time else self.second_line
             level = line.levels >> 1
-            self.instant = time
+            self.input_time = time
             self.now = time
             self.pins[line.pin] = level
             self.pins[line.partner_pin] = line.levels & 1
@@ -493,7 +493,7 @@ class Microcontroller(Chip):
     @cython.final
     def _input(self, queue: EventQueue) -> InterruptSource | None:
         """Handle the message just taken: hardware first. Returns the interrupt source that it makes pending."""
-        self.now = self.instant
+        self.now = self.input_time
         self.background_wanted = True
         if queue.kind == PIN_EDGE:
             return self._pin_edge(queue)
@@ -532,10 +532,10 @@ class Microcontroller(Chip):
     @cython.final
     def _background(self) -> cython.longlong:
         """Run one turn of the main loop outside the scheduler."""
-        if self.code_time < self.instant:
+        if self.code_time < self.input_time:
             if self.scheduler.recording:
                 self._log_end_of_code()
-            self.code_time = self.instant
+            self.code_time = self.input_time
         self.now = self.code_time
         done: cython.longlong = self.main_loop()
         cycles: cython.longlong

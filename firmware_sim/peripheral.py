@@ -1,4 +1,4 @@
-"""What all peripherals of a chip share, and where messages end that none of them has claimed."""
+"""The base of all peripherals of a chip, and the receiver of messages that none of them has claimed."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @cython.cclass
 class Peripheral:
-    """What all peripherals share: the chip, and the ways in which the outside reaches them."""
+    """The base of all peripherals: the chip, and the calls by which the outside reaches them."""
 
     chip: "Chip"
 
@@ -22,34 +22,34 @@ class Peripheral:
         chip.peripherals.append(self)
 
     def retune(self, now, before) -> None:
-        """The chip's crystal runs at another rate from `now` (ns) on than `before` (a Crystal)."""
+        """Adapt to the chip's crystal, whose rate from `now` (ns) on differs from that of `before` (a Crystal)."""
 
     @cython.ccall
     def on_message(self, queue: EventQueue) -> InterruptSource | None:
-        """A message of a kind claimed by this peripheral; it is in the fields of `queue`.
+        """Take a message of a kind claimed by this peripheral; it is in the fields of `queue`.
 
-        Returns the interrupt source that shall be served because of it, if any.
+        Returns the interrupt source that is to be served because of it, if any.
         """
         return None
 
     @cython.ccall
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """The pin of `channel` changed to `level` at `time`; returns 1 to ask for the pin's interrupt, else 0."""
+        """Take a change of the pin of `channel` to `level` at `time`; returns 1 to request its interrupt, else 0."""
         return 0
 
     @cython.ccall
     def on_level(self, pin: cython.longlong, level: cython.longlong) -> cython.int:
-        """The level of a pin that this follows (`Chip.followers`) is `level` from now on, driven by whomever."""
+        """Take the new level of a pin that this follows (`Chip.followers`), whatever drives it."""
         return 0
 
     @cython.ccall
     def on_pwm(self, pwm: object) -> cython.int:
-        """What the PWM unit drives is what `pwm` has latched from now on (`Chip.pwm_follower`)."""
+        """Take the values that `pwm` has latched and drives from now on (`Chip.pwm_follower`)."""
         return 0
 
     @cython.ccall
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """The alarm that this peripheral numbered `alarm` is due; returns what `on_message` does."""
+        """Handle the alarm that this peripheral numbered `alarm`, which is due; returns as `on_message` does."""
         return None
 
     @cython.ccall
@@ -61,7 +61,7 @@ class Peripheral:
 @cython.final
 @cython.cclass
 class Unclaimed(Peripheral):
-    """Where messages end that no peripheral has claimed."""
+    """The receiver of messages that no peripheral has claimed."""
 
     def on_message(self, queue: EventQueue) -> InterruptSource | None:
         """Keep it in the interrupt source of its kind and index, if a handler is attached there."""

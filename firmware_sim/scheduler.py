@@ -476,7 +476,7 @@ class SlotScheduler:
                 self.leads_kept[place] = lead
 
     @cython.ccall
-    def speaks_from(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
+    def earliest_transmit_ns(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
         """Earliest time (ns) at which a task sends on a bus.
 
         `code_time`: no task of the row that runs starts earlier; `tick_time`: no slot.

@@ -198,7 +198,7 @@ class InterruptSource:
 
     @cython.ccall
     def give_message(self, queue: EventQueue) -> None:
-        """Put the kept message into the fields of `queue`, where a handler looks for it."""
+        """Put the kept message into the fields of `queue`, where a handler finds it."""
         queue.time = self.time
         queue.order = self.order
         queue.kind = self.kind

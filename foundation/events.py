@@ -111,7 +111,7 @@ class EventQueue(Outbox):
     rows: cython.p_longlong
     place: cython.longlong
     pushed: cython.longlong
-    came: cython.p_longlong
+    arrival: cython.p_longlong
     ref: object
     time: cython.longlong
     order: cython.longlong
@@ -127,7 +127,7 @@ class EventQueue(Outbox):
     refs: list
     # the targets of the three addresses: kept here, replaced only by methods that also set the addresses
     rows_kept: Annotated[cython.longlong[::1], "readonly"]
-    came_kept: Annotated[cython.longlong[::1], "readonly"]
+    arrival_kept: Annotated[cython.longlong[::1], "readonly"]
     due_kept: Annotated[cython.longlong[::1], "readonly"]
 
     def __init__(self, capacity=256) -> None:
@@ -149,7 +149,7 @@ class EventQueue(Outbox):
         self.e = 0
         self.f = 0
         self.ref = None
-        self.came_kept = integers(1)
+        self.arrival_kept = integers(1)
         self.due_kept = integers(1)
         self.place = 0
         self.urgent_until = -1
@@ -157,17 +157,17 @@ class EventQueue(Outbox):
 
     @cython.cfunc
     def _find_numbers(self) -> None:
-        """Set `rows`, `came` and `due`, through which the arrays of the same names are read and written.
+        """Set `rows`, `arrival` and `due`, through which the arrays of the same names are read and written.
 
         Compiled, they are addresses: three fit in one cache line, where a memoryview takes 208 bytes.
         """
         if cython.compiled:
             self.rows = cython.address(self.rows_kept[0])
-            self.came = cython.address(self.came_kept[0])
+            self.arrival = cython.address(self.arrival_kept[0])
             self.due = cython.address(self.due_kept[0])
         else:
             self.rows = self.rows_kept
-            self.came = self.came_kept
+            self.arrival = self.arrival_kept
             self.due = self.due_kept
 
     @property
@@ -175,9 +175,9 @@ class EventQueue(Outbox):
         """Number of messages that wait."""
         return (self.tail - self.head) // ROW
 
-    def wake(self, came, due, place) -> None:
-        """From now on a new first message lowers `came[place]` to its time (ns), and any urgent one `due[place]`."""
-        self.came_kept = came
+    def wake(self, arrival, due, place) -> None:
+        """From now on a new first message lowers `arrival[place]` to its time (ns), and any urgent one `due[place]`."""
+        self.arrival_kept = arrival
         self.due_kept = due
         self.place = place
         self._find_numbers()
@@ -268,8 +268,8 @@ class EventQueue(Outbox):
             self.rows[at : at + 10] = (time, order, kind, a, b, c, d, e, f, 0)
         if at == self.head:
             self.head_time = time
-            if time < self.came[self.place]:
-                self.came[self.place] = time
+            if time < self.arrival[self.place]:
+                self.arrival[self.place] = time
         self.pushed += 1
         return at
 

@@ -3,9 +3,9 @@
 Every server follows it: attach, slcan, socketcand, the supervisor's requests, the serial lines, gdb, the feed, `trace
 open`. Nothing here blocks, uses a thread, or raises because of a peer.
 
-1. A poll (`Door.look`) reads at most `read_bytes` from each peer and executes at most `burst` requests of all peers,
-   one of each in turn; over time at most `requests` per millisecond of robot time. It accepts at most ARRIVALS_PER_S
-   connections per second of wall time, beyond those that would fill every place twice.
+1. A poll (`PeerServer.receive`) reads at most `read_bytes` from each peer and executes at most `burst` requests of
+   all peers, one of each in turn; over time at most `requests` per millisecond of robot time. It accepts at most
+   ARRIVALS_PER_S connections per second of wall time, beyond those that would fill every place twice.
 2. A peer that does not read is not read: while `unread` bytes of answers wait for it, nothing more is read from it.
    From `backlog` bytes on, data that it did not request (frames of a bus) is dropped and counted.
 3. A poll writes at most `write_bytes` to each peer.
@@ -212,7 +212,7 @@ class Peer:
         self.outgoing += data
         self.answers += len(data)
 
-    def deaf(self, limits: Limits) -> bool:
+    def reads_too_little(self, limits: Limits) -> bool:
         """True while too many of its answers wait: nothing is read from it."""
         return self.answers >= limits.unread
 
@@ -237,7 +237,7 @@ def _use_of_place(peer: Peer) -> tuple[bool, int]:
     return not peer.lost, peer.last
 
 
-class Door(Generic[P]):
+class PeerServer(Generic[P]):
     """A server endpoint: accepts peers, reads, has their requests executed, writes; a bounded amount per poll.
 
     A protocol adds `_welcome`, `_take`, and optionally `_takes_part` and `_closed`.
@@ -253,13 +253,13 @@ class Door(Generic[P]):
         self.sent_away: Counter[str] = Counter()
         self.worked = 0  # requests executed so far
         self.arrived = 0  # connections accepted so far
-        self.room = float(self.limits.burst)  # requests allowed now
+        self.allowance = float(self.limits.burst)  # requests allowed now
         self.time_ns = 0
         self.first = 0  # whose turn it is
         self.left_over = False  # whole requests wait for the next poll
-        self.knocking = False  # connections wait for it
+        self.connections_wait = False  # connections wait for it
         self.clock = wallclock.monotonic_s  # patience is measured on it
-        self.looked_s = self.moved_s = -math.inf  # on `clock`: the last poll, the last one with virtual time advanced
+        self.polled_s = self.moved_s = -math.inf  # on `clock`: the last poll, the last one with virtual time advanced
         self.arrivals = 2.0 * self.limits.peers  # connections allowed now
         self.watch = select.poll()
         if listener is not None:
@@ -279,7 +279,7 @@ class Door(Generic[P]):
         """True for a peer that keeps its place even when others want one."""
         return False
 
-    def _apology(self, reason: str) -> bytes:
+    def _last_bytes(self, reason: str) -> bytes:
         """Last bytes to a peer that is disconnected."""
         return b""
 
@@ -288,20 +288,20 @@ class Door(Generic[P]):
 
     # ---- for the process that owns it
 
-    def look(self, now_ns: int) -> None:
+    def receive(self, now_ns: int) -> None:
         """Accept peers, read, and execute requests, within the limits; `now_ns`: virtual time."""
-        self._make_room(now_ns)
+        self._set_allowance(now_ns)
         ready = self._ready()
-        knocks = self.listener is not None and self.listener.fileno() in ready
-        self.knocking = knocks and self.arrivals < 1.0
+        arrives = self.listener is not None and self.listener.fileno() in ready
+        self.connections_wait = arrives and self.arrivals < 1.0
         self.left_over = False
         peers = self.peers[self.first :] + self.peers[: self.first]
-        waiting = [peer for peer in peers if self._hear(peer, peer.stream.fileno() in ready)]
-        if knocks:  # peers that have gone have released their places by now
-            waiting += [peer for peer in self._accept() if self._hear(peer, True)]
-        while waiting and self.room >= 1.0:  # one of each in turn
-            waiting = [peer for peer in waiting if self.room >= 1.0 and self._one(peer)]
-        self.left_over = any(self._is_heard(peer) for peer in waiting)
+        waiting = [peer for peer in peers if self._read_from(peer, peer.stream.fileno() in ready)]
+        if arrives:  # peers that have gone have released their places by now
+            waiting += [peer for peer in self._accept() if self._read_from(peer, True)]
+        while waiting and self.allowance >= 1.0:  # one of each in turn
+            waiting = [peer for peer in waiting if self.allowance >= 1.0 and self._one(peer)]
+        self.left_over = any(self._is_served(peer) for peer in waiting)
         self.first = (self.first + 1) % len(self.peers) if self.peers else 0
 
     def write(self) -> None:
@@ -311,8 +311,8 @@ class Door(Generic[P]):
 
     def filenos(self) -> list[int]:
         """Descriptors that become readable when a peer has a request that may be executed."""
-        found = [] if self.listener is None or self.knocking else [self.listener.fileno()]
-        return found + [peer.stream.fileno() for peer in self.peers if self._is_heard(peer) and not peer.gone]
+        found = [] if self.listener is None or self.connections_wait else [self.listener.fileno()]
+        return found + [peer.stream.fileno() for peer in self.peers if self._is_served(peer) and not peer.gone]
 
     def filenos_to_write(self) -> list[int]:
         """Descriptors with output that waits until the peer takes more."""
@@ -323,7 +323,7 @@ class Door(Generic[P]):
         if peer.ending or peer not in self.peers:
             return
         self.sent_away[reason] += 1
-        peer.answer(apology or self._apology(reason))
+        peer.answer(apology or self._last_bytes(reason))
         peer.incoming.clear()
         peer.ending = True
         self._closed(peer)
@@ -356,24 +356,24 @@ class Door(Generic[P]):
 
     # ---- a poll
 
-    def _make_room(self, now_ns: int) -> None:
+    def _set_allowance(self, now_ns: int) -> None:
         """Set how many requests and connections the time since the last poll allows. now_ns 0: no robot."""
         now_s = self.clock()
-        passed_s = now_s - self.looked_s
+        passed_s = now_s - self.polled_s
         passed, self.time_ns = now_ns - self.time_ns, now_ns
         if passed > 0 or self.moved_s < 0.0:
             self.moved_s = now_s
         if now_ns == 0:  # the caller waits between two polls
-            fresh = float(self.limits.burst)
+            added = float(self.limits.burst)
         elif passed > 0:
-            fresh = self.limits.requests * passed / MS
+            added = self.limits.requests * passed / MS
         elif now_s - self.moved_s > PAUSED_S:
-            fresh = self.limits.requests * passed_s * 1e3
+            added = self.limits.requests * passed_s * 1e3
         else:
-            fresh = 0.0
-        self.room = min(float(self.limits.burst), self.room + fresh)
+            added = 0.0
+        self.allowance = min(float(self.limits.burst), self.allowance + added)
         self.arrivals = min(2.0 * self.limits.peers, self.arrivals + ARRIVALS_PER_S * passed_s)
-        self.looked_s = now_s
+        self.polled_s = now_s
 
     def _ready(self) -> set[int]:
         """Descriptors with something to read."""
@@ -409,9 +409,9 @@ class Door(Generic[P]):
                 new.append(peer)
         return [peer for peer in new if peer in self.peers]
 
-    def _hear(self, peer: P, comes: bool) -> bool:
+    def _read_from(self, peer: P, comes: bool) -> bool:
         """Read what is allowed from one peer; True when it may have a request."""
-        if not self._is_heard(peer):
+        if not self._is_served(peer):
             if peer.ending or not peer.waits and (comes or peer.incoming):
                 self._wait_for(peer)
             return False
@@ -427,16 +427,16 @@ class Door(Generic[P]):
             self.drop(peer)
         return bool(peer.incoming)
 
-    def _is_heard(self, peer: P) -> bool:
+    def _is_served(self, peer: P) -> bool:
         """False for a peer that is being disconnected, has a request under way, or does not read its answers."""
-        return not (peer.ending or peer.waits or peer.deaf(self.limits))
+        return not (peer.ending or peer.waits or peer.reads_too_little(self.limits))
 
     def _one(self, peer: P) -> bool:
         """Execute one request of a peer; True when it may have another."""
-        if not self._is_heard(peer):
+        if not self._is_served(peer):
             return False
         if self._take(peer):
-            self.room -= 1.0
+            self.allowance -= 1.0
             self.worked += 1
             peer.last = self.worked + self.arrived
             return True
@@ -485,7 +485,7 @@ def user_behind(connection: socket.socket) -> int | None:
     with suppress(OSError, ValueError):
         here, there = connection.getsockname()[:2], connection.getpeername()[:2]
         try:
-            return _owner_told(_asked_of_kernel(there, here))
+            return _owner_in(_asked_of_kernel(there, here))
         except (OSError, struct.error):  # a kernel that does not report one connection has a table of all
             return _owner_of(there, here, Path("/proc/net/tcp").read_text(encoding="ascii"))
     return None
@@ -513,7 +513,7 @@ def _asked_of_kernel(end: tuple[str, int], other: tuple[str, int]) -> bytes:
         return kernel.recv(4096)
 
 
-def _owner_told(answer: bytes) -> int | None:
+def _owner_in(answer: bytes) -> int | None:
     """Owner of the end that a kernel answer describes; None when it is closed. OSError: unknown to the kernel."""
     _, kind, *_ = HEADER.unpack_from(answer)
     if kind == NLMSG_ERROR:
@@ -584,6 +584,6 @@ def connected(address: str, whose: str, patience_s: float | None) -> socket.sock
     return connection
 
 
-def told(counts: dict[str, int] | Sequence[tuple[str, int]]) -> str:
+def reasons_text(counts: dict[str, int] | Sequence[tuple[str, int]]) -> str:
     """`2 did not speak the protocol, 1 ...` for the user; empty when no peer was disconnected."""
     return ", ".join(f"{count} {REASONS[reason]}" for reason, count in dict(counts).items() if count)

@@ -73,12 +73,12 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     if not answer:
         raise BranchError("crashed", f"its process ended with {code}")
     try:
-        told: dict[str, Any] = json.loads(answer)
+        result: dict[str, Any] = json.loads(answer)
     except ValueError:
         raise BranchError("crashed", f"its process ended with {code} while it sent its result") from None
-    if "raised" in told:
-        raise BranchError("crashed", told["raised"])
-    return told
+    if "raised" in result:
+        raise BranchError("crashed", result["raised"])
+    return result
 
 
 def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int, writing: int, cpu_s: float) -> None:

@@ -19,13 +19,14 @@ is due. It stops earlier where an answer to its own output could reach it (`Boar
 is: plant, pins, buses, then the boards with their interrupts and slots, then their outputs.
 
 A board is due when it has something to do: an alarm, a slot, a task, an interrupt, a message. On some boards frames,
-edges and bytes wait for a task (`hears_in_its_slots`). Such a board is due only when it may put something on a bus
-(`Board.speaks_from`). Before that the loop leaves it alone; it then handles everything else late, each event at its
-time. Edges and voltages are kept for one step of the plant, so the board has caught up with its own events by the end
-of the step. A frame or a byte that it has only received may wait longer: until the board is due, or `run` returns.
+edges and bytes wait for a task (`receives_in_its_slots`). Such a board is due only when it may put something on a bus
+(`Board.earliest_transmit_ns`). Before that the loop leaves it alone; it then handles everything else late, each event
+at its time. Edges and voltages are kept for one step of the plant, so the board has caught up with its own events by
+the end of the step. A frame or a byte that it has only received may wait longer: until the board is due, or `run`
+returns.
 
-Boards that run out of process (`Board.apart`), one process each, run in parallel: in windows as long as the lookahead,
-each from the first time at which anything is due, all boards that are due in a window at once.
+Boards that run out of process (`Board.out_of_process`), one process each, run in parallel: in windows as long as the
+lookahead, each from the first time at which anything is due, all boards that are due in a window at once.
 
 ROBOT PARITY: the plant moves in steps of 250 us. What a board writes to its bridge acts from the next step on, so up
 to 250 us late. Sensors show a straight line over a step (voltages) or a constant (words).
@@ -78,7 +79,7 @@ class Lockstep:
     serial_device: SerialDevice
     encoder_boards: cython.longlong[::1]
     due: cython.longlong[::1]
-    came: cython.longlong[::1]
+    arrival: cython.longlong[::1]
     prompt: cython.longlong[::1]
     step_times: cython.longlong[::1]
     side_by_side: cython.bint
@@ -106,37 +107,37 @@ class Lockstep:
         self.wires = []
         for place, board in enumerate(boards):
             self.wires.append(BoardWires(board, WINDOW_NS))
-            self._put(place, board)
-        self._seat()
+            self._set_board(place, board)
+        self._rebuild_due_table()
         self.word_wires = []
         self.encoder_wires = []  # (place of the board, edges, two pins)
         self.encoder_boards = array.array("q")  # places of the boards with encoders on their pins
         self.serial_device = None
 
-    def _put(self, place, board) -> None:
+    def _set_board(self, place, board) -> None:
         """Set `board` at index `place`, on the wires there."""
         self.boards[place] = board
         self.wires[place].lead_from(board)
-        self.side_by_side = any(each.apart for each in self.boards)
+        self.side_by_side = any(each.out_of_process for each in self.boards)
 
-    def _seat(self) -> None:
+    def _rebuild_due_table(self) -> None:
         """Rebuild the due table of all boards, in which senders note when a board must run."""
         count = len(self.boards)
         # per board the time (ns) at which it must run, and that at which an input arrives that may wait; after the
         # boards' the time at which a bus must decide
         self.due = integers(count + 1, self.time)
-        self.came = integers(count, self.time)
+        self.arrival = integers(count, self.time)
         before, self.prompt = list(self.prompt), integers(count, 1)
         for place in range(count):
             if place < len(before):
                 self.prompt[place] = before[place]
-            self._hear(place)
+            self._register_wakeup(place)
         for bus in self.buses:
             bus.wake(self.due, count)
 
-    def _hear(self, place) -> None:
+    def _register_wakeup(self, place) -> None:
         """Let that board's inbox report when it must run: at once, or by `prompt` at a time of its choice."""
-        self.boards[place].inbox.wake(self.due if self.prompt[place] else self.came, self.due, place)
+        self.boards[place].inbox.wake(self.due if self.prompt[place] else self.arrival, self.due, place)
 
     # --- wiring -------------------------------------------------------------------------------------------
 
@@ -158,8 +159,8 @@ class Lockstep:
         wires = BoardWires(board, WINDOW_NS)
         self.boards.append(board)
         self.wires.append(wires)
-        self._put(len(self.boards) - 1, board)
-        self._seat()
+        self._set_board(len(self.boards) - 1, board)
+        self._rebuild_due_table()
         return wires
 
     def replace(self, board) -> None:
@@ -173,10 +174,10 @@ class Lockstep:
             raise UserError(f"lockstep: {board!r} is not a Board")
         if board.inbox is not before.inbox:
             raise UserError(f"lockstep: the inbox of the new {board.name} is not that of the one whose place it takes")
-        self._put(place, board)
+        self._set_board(place, board)
         for wire in self.encoder_wires:
             if wire[0] == place:
-                board.listen_to_edges(*wire[1:])
+                board.connect_edges(*wire[1:])
         for wire in self.word_wires:
             if wire.board is before:
                 wire.board = board
@@ -184,16 +185,16 @@ class Lockstep:
             if watcher is not None and watcher.board is before:
                 watcher.board = board
 
-    def hears_in_its_slots(self, board) -> None:
+    def receives_in_its_slots(self, board) -> None:
         """Messages that are not urgent (`EventQueue.put`) wait for tasks of `board`; no handler sends or senses."""
         place = self.place(board.name)
         self.prompt[place] = 0
-        self._hear(place)
+        self._register_wakeup(place)
 
     def connect_encoder(self, encoder, board, pin_a, pin_b) -> None:
         """Connect channels A and B of `encoder` on two pins of `board`."""
         place = self.place(board.name)
-        board.listen_to_edges(encoder.edges, pin_a, pin_b)
+        board.connect_edges(encoder.edges, pin_a, pin_b)
         self.encoder_wires.append((place, encoder.edges, pin_a, pin_b))
         self.encoder_boards = array.array("q", sorted({wire[0] for wire in self.encoder_wires}))
 
@@ -241,12 +242,12 @@ class Lockstep:
         boards: list = self.boards
         board_count: cython.longlong = len(boards)
         due: cython.longlong[::1] = self.due
-        came: cython.longlong[::1] = self.came
+        arrival: cython.longlong[::1] = self.arrival
         due[board_count] = self.time  # a bus may have been changed between two runs
         for i in range(board_count):
             # a board may have been changed between two runs
             board = boards[i]
-            due[i] = came[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
+            due[i] = arrival[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
             wires = self.wires[i]
             wires.silent_until = 0
         while self.time < until:
@@ -272,7 +273,7 @@ class Lockstep:
                 self._run_in_turn(end, end == until)
             self.time = end
             if self.strikes is not None:
-                cython.cast(StepEnd, self.strikes).look()
+                cython.cast(StepEnd, self.strikes).observe()
         due[board_count] = self._decide(self.time - 1)
         return reason
 
@@ -292,7 +293,7 @@ class Lockstep:
         later: cython.longlong
         # compiled, addresses: a memoryview in a variable costs an atomic reference count
         due: cython.p_longlong = cython.address(self.due[0]) if cython.compiled else self.due
-        came: cython.p_longlong = cython.address(self.came[0]) if cython.compiled else self.came
+        arrival: cython.p_longlong = cython.address(self.arrival[0]) if cython.compiled else self.arrival
         board_count: cython.longlong = len(self.boards)
         while True:
             if cython.compiled:  # without a branch: a processor cannot predict which board is next
@@ -316,7 +317,7 @@ class Lockstep:
                 second += self.window_ns
                 due[alone] = self._advance(alone, second if second < end else end)
         for i in range(board_count):
-            if came[i] < end:
+            if arrival[i] < end:
                 board = cython.cast(Board, self.boards[i])
                 if last or board.next_time < end or board.edge_time < end:
                     due[i] = self._advance(i, end)
@@ -333,7 +334,7 @@ class Lockstep:
         first: cython.longlong
         board: Board
         due: cython.longlong[::1] = self.due
-        came: cython.longlong[::1] = self.came
+        arrival: cython.longlong[::1] = self.arrival
         board_count: cython.longlong = len(self.boards)
         while now < end:
             first = due[board_count]
@@ -348,11 +349,11 @@ class Lockstep:
             if now >= end:
                 now = late = end
             for i in range(board_count):
-                if due[i] < now or came[i] < late:
+                if due[i] < now or arrival[i] < late:
                     board = cython.cast(Board, self.boards[i])
                     board.begin(now)
             for i in range(board_count):
-                if due[i] < now or came[i] < late:
+                if due[i] < now or arrival[i] < late:
                     due[i] = self._advance(i, now)
             windows += 1
         return windows
@@ -368,9 +369,9 @@ class Lockstep:
             following = board.inbox.head_time
         if board.edge_time < following:
             following = board.edge_time
-        self.came[place] = following
+        self.arrival[place] = following
         if self.prompt[place] == 0 and board.inbox.urgent_until < board.horizon:
-            following = board.speaks_from()
+            following = board.earliest_transmit_ns()
             wires = board.outbox
             wires.silent_until = following
         return following
@@ -418,9 +419,9 @@ class Lockstep:
         for i in range(len(self.encoder_boards)):
             place = self.encoder_boards[i]
             board = cython.cast(Board, self.boards[place])
-            first = board.edges_came()
-            if first < self.came[place]:
-                self.came[place] = first
+            first = board.note_edges()
+            if first < self.arrival[place]:
+                self.arrival[place] = first
                 if self.prompt[place] and first < self.due[place]:
                     self.due[place] = first
         if self.serial_device is not None:

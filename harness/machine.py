@@ -108,9 +108,9 @@ class Machine:
         """Connect every wire of the tables."""
         loop, wiring = self.loop, self.wiring
         place = {name: number for number, name in enumerate(self.boards)}
-        for name in wiring.hear_in_slots:
+        for name in wiring.receive_in_slots:
             if self.waits_for_slots(self._wired(name)):
-                loop.hears_in_its_slots(self.boards[name])
+                loop.receives_in_its_slots(self.boards[name])
         for wire in wiring.encoders:
             pins = (wiring.number(wire.board, wire.pin_a), wiring.number(wire.board, wire.pin_b))
             loop.connect_encoder(self._part("encoders", wire.encoder), self._wired(wire.board), *pins)

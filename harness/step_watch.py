@@ -34,7 +34,7 @@ class StepEnd:
     """An observer at the end of every step, when the boards have run through it (`Lockstep.strikes`)."""
 
     @cython.ccall
-    def look(self) -> object:
+    def observe(self) -> object:
         """Observe; called once per step of the plant."""
         return None
 

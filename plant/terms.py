@@ -496,15 +496,15 @@ def content_of(path: str | pathlib.Path) -> dict[str, Any]:
         )
     if not isinstance(content.get("term", []), list):
         raise ModelError(f"{path}: term is written [[term]], once per term")
-    told = content.get("diagnosis", {})
-    if not isinstance(told, dict) or not isinstance(told.get("effect", []), list):
+    diagnosis = content.get("diagnosis", {})
+    if not isinstance(diagnosis, dict) or not isinstance(diagnosis.get("effect", []), list):
         raise ModelError(f"{path}: [diagnosis] is a table, its effects are written [[diagnosis.effect]]")
-    parameters = told.get("parameters", {})
+    parameters = diagnosis.get("parameters", {})
     if not isinstance(parameters, dict) or not all(map(is_number, parameters.values())):
         raise ModelError(f"{path}: [diagnosis.parameters] holds numbers")
-    if not isinstance(told.get("experiment", ""), str):
-        raise ModelError(f"{path}: diagnosis.experiment is {told['experiment']!r}, a name is expected")
-    gear = told.get("gear", 1.0)
+    if not isinstance(diagnosis.get("experiment", ""), str):
+        raise ModelError(f"{path}: diagnosis.experiment is {diagnosis['experiment']!r}, a name is expected")
+    gear = diagnosis.get("gear", 1.0)
     if not is_number(gear) or gear <= 0.0:
         raise ModelError(f"{path}: diagnosis.gear is {gear!r}, a number above 0 is expected")
     return content

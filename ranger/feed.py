@@ -10,19 +10,19 @@ from collections import Counter
 from typing import Any
 
 from ranger_sim import datatable
-from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Door, Peer, SocketStream
+from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Peer, PeerServer, SocketStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
 from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names
 from ranger_sim.ranger.faults.power import PowerlessBoard
 from ranger_sim.ranger.records.summary import energy
 
-LOOK_NS = 20_000_000  # virtual time between two polls: 50 pictures a second at real time
+POLL_NS = 20_000_000  # virtual time between two polls: 50 pictures a second at real time
 STATE_NS = 100_000_000
 SLOT_BYTES = 24
 
 
-class FeedServer(Door[Peer]):
+class FeedServer(PeerServer[Peer]):
     """Shows `robot` under `name`. Give it to `robot.attach`. UserError when the name is taken.
 
     Without viewers, it costs one poll for connections every 20 ms of the robot's time.
@@ -77,7 +77,7 @@ class FeedServer(Door[Peer]):
 
     def poll(self, now_ns: int) -> int:
         """Accept new viewers and send them what happened; returns the latest time for the next poll, ns."""
-        self.look(now_ns)
+        self.receive(now_ns)
         if self.peers:
             self.robot.logbook.flush()
             self._show_slots()
@@ -87,7 +87,7 @@ class FeedServer(Door[Peer]):
                 for peer in self.peers:
                     self._offer(peer, record, "state", 1)
             self.write()
-        return now_ns + LOOK_NS
+        return now_ns + POLL_NS
 
     def _show_slots(self) -> None:
         """Send the slots that the boards' processes have kept since the last poll."""

@@ -60,7 +60,7 @@ from ranger_sim.ranger.records.strike_watch import StrikeWatch
 from ranger_sim.ranger.scenario import Scenario, StopRule
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.processes.apart import Apart
+    from ranger_sim.harness.processes.apart import RemoteBoards
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
@@ -133,7 +133,7 @@ class Ranger(Machine):
         self._try_firmware(start_ns)
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
         self.board_deadline_s = board_deadline_s
-        self.processes: Apart | None = None
+        self.processes: RemoteBoards | None = None
         self.deaths: list[dict[str, Any]] = []  # boards whose process has ended (harness/processes/apart.py)
         self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})
         for name in self.images:
@@ -144,7 +144,7 @@ class Ranger(Machine):
         boards = {name: self.new_board(name, self.factory.first_power_up_ns(name, start_ns)) for name in BOARD_CLASSES}
         if "CSR" not in self.images:
             boards["CSR"].time.ms = self.scenario.start_uptime_ms
-        said = {name: first_outputs(boards[name]) for name in self.firmware}  # while their programs started
+        sent = {name: first_outputs(boards[name]) for name in self.firmware}  # while their programs started
         # CAN
         self.profile = profile
         rates = {name: bus.bit_rate for name, bus in profile.buses.items()} if profile is not None else {}
@@ -159,7 +159,7 @@ class Ranger(Machine):
             (all_variables.TABLE_SIZE, boards["MB"]),
             RANGER,
         )
-        for name, messages in said.items():
+        for name, messages in sent.items():
             pass_on(messages, self.boards[name].outbox, self.start_ns)
         if profile is not None:
             for board in self.boards.values():
@@ -208,20 +208,20 @@ class Ranger(Machine):
 
     # --- passing time -------------------------------------------------------------------------------------
 
-    def start(self) -> Apart | None:
+    def start(self) -> RemoteBoards | None:
         """Start a process for each board that is to have its own, if that has not been done.
 
         A program in C that runs in this process is monitored from now on.
         """
         if self.processes is None and self.in_own_process:
-            from ranger_sim.harness.processes.apart import Apart
+            from ranger_sim.harness.processes.apart import RemoteBoards
 
-            self.processes = Apart(self, self.in_own_process)
+            self.processes = RemoteBoards(self, self.in_own_process)
             self.deaths = self.processes.deaths
         if not self.is_watched:
             self.is_watched = True
             for name in self.firmware:
-                if not self.loop.board(name).apart:
+                if not self.loop.board(name).out_of_process:
                     self._watch(self.loop.board(name))
         return self.processes
 
@@ -238,13 +238,13 @@ class Ranger(Machine):
         A board whose process ends meanwhile is off its buses from then on, and is listed in `deaths`.
         """
         __tracebackhide__ = True
-        apart = self.start()
-        here = "+".join(name for name in self.firmware if not self.loop.board(name).apart)
+        remote = self.start()
+        here = "+".join(name for name in self.firmware if not self.loop.board(name).out_of_process)
         try:
             with self._printing(here) if here else contextlib.nullcontext():
-                if apart is None:
+                if remote is None:
                     return Machine.run(self, stop, slice_s)
-                with apart.processor():
+                with remote.processor():
                     return Machine.run(self, stop, slice_s)
         finally:
             if self.printed is not None:
@@ -257,10 +257,10 @@ class Ranger(Machine):
         """
         __tracebackhide__ = True
         wanted = self.condition(wanted)
-        apart = self.start()
-        if apart is None or not isinstance(wanted, ErrorNoted):
+        remote = self.start()
+        if remote is None or not isinstance(wanted, ErrorNoted):
             return Machine.until(self, wanted, within)
-        asking = apart.asking(wanted.boards)
+        asking = remote.asking(wanted.boards)
         self.loop.watchers.append(asking)
         try:
             return Machine.until(self, wanted, within)
@@ -355,7 +355,7 @@ class Ranger(Machine):
 
     def write_word(self, number: int, word: int) -> None:
         """Write to the main brain's table, stamped by its clock; through the channel if in another process."""
-        if self.loop.board("MB").apart:
+        if self.loop.board("MB").out_of_process:
             self.loop.board("MB").send(SET_WORD, self.loop.time, number, word)
             return
         board = self.boards["MB"]
@@ -426,7 +426,7 @@ class Ranger(Machine):
         """Boards with programs compiled for coverage write which of their lines ran."""
         for name, firmware in self.firmware.items():
             board = self.loop.board(name)
-            if firmware.coverage and not board.apart:
+            if firmware.coverage and not board.out_of_process:
                 board.write_counts()
             elif firmware.coverage and self.processes is not None and not self.processes.ended:
                 self.processes.fetch_counters((name,))

@@ -13,7 +13,7 @@ BOARDS = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
 
 # Boards on which frames, edges and bytes wait for a task: no handler and no main loop answers them at once, or reads
 # a sensor because of them.
-HEAR_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
+RECEIVE_IN_SLOTS = ("MCH", "MCFO", "MCFI", "MCSI", "UI")
 
 
 CAN = (
@@ -88,7 +88,7 @@ IMU_BOARD, IMU_UART = "UI", user_interface.IMU_UART
 
 MOTOR_BOARDS = ("MCH", "MCFO", "MCFI", "MCSI")
 RANGER = Wiring(
-    hear_in_slots=HEAR_IN_SLOTS,
+    receive_in_slots=RECEIVE_IN_SLOTS,
     can=CAN,
     encoders=ENCODERS,
     analog=ANALOG,

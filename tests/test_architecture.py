@@ -91,7 +91,7 @@ def test_a_package_imports_only_what_the_table_allows(package):
 
 
 @pytest.mark.parametrize("inside", INSIDE)
-def test_arrows_between_rooms_of_a_room_run_one_way(inside):
+def test_imports_between_folders_of_a_package_run_one_way(inside):
     room, _, own = inside.partition("/")
     others = {name.partition("/")[2] for name in INSIDE if name.startswith(f"{room}/")} - {own}
     faults = []
@@ -159,7 +159,7 @@ def test_a_library_with_one_place_stays_there(library):
     assert not faults, "\n".join(faults)
 
 
-def test_nobody_draws_from_a_global_random_generator():
+def test_the_global_random_generator_is_not_used():
     pattern = re.compile(r"\b(?:np|numpy)\.random\b|\bdefault_rng\b")
     faults = [str(p.relative_to(ROOT)) for p in sources() if pattern.search(p.read_text(encoding="utf-8"))]
     assert faults == ["foundation/random_arrays.py"]  # makes generators of their own, from seed and name
@@ -273,7 +273,7 @@ def test_constants_are_the_same_numbers_interpreted_and_compiled():
         assert json.loads(done.stdout) == wanted
 
 
-def test_what_is_long_or_wide_says_why():
+def test_long_or_wide_parts_give_the_reason():
     """A function above 150 lines, a class above 40 fields: its docstring has the reason."""
     silent = []
     for path in sources():

@@ -96,7 +96,7 @@ def test_every_paragraph_says_something():
     assert [number for number, text in known.items() if len(text.strip()) < 20 and number not in chapters] == []
 
 
-def test_who_names_the_document_names_a_paragraph():
+def test_references_to_the_document_name_a_paragraph():
     vague = []
     for path, text in texts():
         for match in re.finditer(r"robot\.md(?!\w)", joined(text)):
@@ -163,7 +163,7 @@ def test_the_figure_of_the_record_walk_is_drawn_out_of_the_walks_that_are_kept()
     assert all(row["steps"] == program["STEPS"] and row["body"] == "ranger" for row in level)
 
 
-def test_the_figure_of_the_foot_that_stood_too_high_is_drawn_out_of_the_answers_that_are_kept():
+def test_the_figure_of_the_foot_that_is_too_high_is_drawn_from_the_answers_that_are_kept():
     program = runpy.run_path(str(ROOT / "docs" / "foot_too_high_figure.py"))
     assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
 
@@ -183,8 +183,8 @@ def test_the_figure_and_the_table_of_the_walk_of_2015_are_those_of_the_answer_th
     page = (ROOT / "docs" / "walk-2015.md").read_text(encoding="utf-8")
     for row, extended in zip(answer["misfit"], answer["extended_features"], strict=True):
         low, high = row["ci95"]
-        told = f"| {row['measured']:.3f} ({low:.3f} to {high:.3f}) | {row['emulated']:.3f} | {extended:.3f} |"
-        assert told in page
+        reported = f"| {row['measured']:.3f} ({low:.3f} to {high:.3f}) | {row['emulated']:.3f} | {extended:.3f} |"
+        assert reported in page
     (cause,) = answer["causes"]
     value = cause["parameters"]["term"]
     assert f"{value['value']:.3f} rad ({value['ci95'][0]:.3f} to {value['ci95'][1]:.3f})" in page

@@ -11,7 +11,7 @@ from tests.can_bus import hosting
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 
 
-def test_a_run_with_a_test_that_stands_still_ends_and_names_the_line(tmp_path):
+def test_a_run_with_a_test_that_hangs_ends_and_names_the_line(tmp_path):
     """Also where no Python runs: in a read of a compiled wait, say."""
     still = tmp_path / "test_still.py"
     still.write_text("import os\n\n\ndef test_still():\n    os.eventfd_read(os.eventfd(0))\n")

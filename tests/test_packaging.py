@@ -193,7 +193,7 @@ def how_it_runs(folder):
 
 
 @needs_compiler
-def test_sources_that_changed_since_the_build_run_and_say_so_until_they_are_as_they_were(checkout):
+def test_sources_that_changed_since_the_build_run_and_are_named_until_they_are_as_before(checkout):
     build_in(checkout)
     numbers, events = (checkout / "foundation" / name for name in ("numbers.py", "events.py"))
     before = numbers.read_text(encoding="utf-8"), events.read_text(encoding="utf-8")
@@ -290,7 +290,7 @@ def test_without_a_compiler_the_sources_run_and_the_reason_is_reported(checkout)
     assert "C compiler '/bin/false'" in reason
 
 
-def test_a_build_can_be_told_not_to_compile(checkout):
+def test_a_build_can_leave_out_compiling(checkout):
     report = build_in(checkout, RANGER_SIM_INTERPRETED="1").stderr
     assert "NOT COMPILED: RANGER_SIM_INTERPRETED was set" in report
     assert all(file.endswith(".py") for file in how_it_runs(checkout)[0])
@@ -413,7 +413,7 @@ def test_modules_that_are_optimised_most_exist():
     assert len(listed) > 20 and set(listed) <= set(loading.declared_modules())
 
 
-def test_every_dependency_has_its_reason_beside_it():
+def test_every_dependency_has_its_reason_next_to_it():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     listed = re.findall(r'^  "[A-Za-z][\w.-]*>=[^"]*",(.*)$', text, re.MULTILINE)
     dependencies, more = wanted_packages()

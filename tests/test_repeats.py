@@ -14,12 +14,12 @@ def row(seed, digest="abc", **outcomes):
     return {"hash_seed": seed, "digest": digest, "outcomes": outcomes}
 
 
-def test_a_report_tells_the_outcome_of_every_test():
+def test_a_report_has_the_outcome_of_every_test():
     names = {"one": "passed", "two": "failed", "three": "skipped", "four": "error"}
     assert repeats.outcomes(REPORT) == {f"tests.a::{name}": outcome for name, outcome in names.items()}
 
 
-def test_the_same_every_time_is_no_difference_and_everything_else_is():
+def test_the_same_every_time_is_not_a_difference_and_everything_else_is():
     assert repeats.differences([row(1, one="passed", two="skipped"), row(2, one="passed", two="skipped")]) == []
     assert repeats.differences([row(1), row(2, "abd")]) == ["2 digests: abc; abd"]
     assert repeats.differences([row(1, one="passed"), row(2, one="failed")]) == ["one: passed 1 times, failed 1 times"]

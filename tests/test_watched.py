@@ -56,7 +56,7 @@ def test_memory_and_processor_time_are_those_of_the_kernel():
 
 
 @pytest.mark.skipif(browser.BROWSER is None, reason="no browser here")
-def test_a_robot_that_is_looked_at_at_48_channels_has_the_digest_of_one_that_is_not():
+def test_a_robot_with_48_channels_viewed_has_the_digest_of_one_without():
     result = watched.watch(8.0, 1.0, seed=3, width=1400, say=lambda line: None)
     assert result["digest"] == result["alone"] and result["time_s"] == pytest.approx(8.0, abs=0.01)
     assert not result["errors"]

@@ -141,9 +141,9 @@ def test_every_command_runs_from_a_project_with_folders_of_the_same_names(instal
     command = python.with_name("ranger-sim")
     assert run([command, "--version"], project) == run([python, "-m", "ranger_sim", "--version"], project)
     assert int(run([python, "-c", COMMANDS], project)) >= 12
-    told = run([command, "walk", "--time", "200ms", "--out", tmp_path / "out", "--json", "-"], project)
+    reported = run([command, "walk", "--time", "200ms", "--out", tmp_path / "out", "--json", "-"], project)
     here = run([sys.executable, "-m", "ranger_sim", "walk", "--time", "200ms", "--json", "-"], ROOT)
-    assert json.loads(told)["trace_digest"] == json.loads(here)["trace_digest"]
+    assert json.loads(reported)["trace_digest"] == json.loads(here)["trace_digest"]
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
     assert "MCH_ANGLE" in run([command, "table", "show", "MCH_ANGLE"], project)
     run([command, "table", "generate", "--check"], project)

@@ -65,7 +65,7 @@ def run_show(options: argparse.Namespace) -> int:
 
 
 def listed(found: list[dict], width: int) -> list[str]:
-    """Lines of a table; in a window of less than WIDE columns each source has a line of its own below its number."""
+    """Lines of a table; in a window of less than WIDE columns each source has a separate line below its number."""
     cells = [("key", "value", "unit", "limits", "source")]
     for row in found:
         value = f"{row['value']:g}" if isinstance(row["value"], float) else str(row["value"])

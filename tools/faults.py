@@ -1,4 +1,4 @@
-"""`ranger-sim faults`: every place where a fault can be injected, its modes, and why it has no others.
+"""`ranger-sim faults`: every place where a fault can be injected, its modes, and the reasons against others.
 
 `python -m ranger_sim.tools.faults` writes the tables of docs/faults.md anew; a test compares them.
 """
@@ -88,27 +88,27 @@ def run(options: argparse.Namespace) -> int:
 def print_place(place: Place, console: Console) -> None:
     """Modes of one place with their parameters, where these come from, and what it refuses."""
 
-    def tell(text: str) -> None:
+    def show(text: str) -> None:
         console.print(text, soft_wrap=True)
 
-    tell(f"{place.name}: {place.what}")
+    show(f"{place.name}: {place.what}")
     sources: dict[str, list[str]] = {}
     for name, kind in CATALOGUE.modes_of(place).items():
-        tell(f"\n{name:20}{kind.meaning}")
+        show(f"\n{name:20}{kind.meaning}")
         if kind.permanent:
-            tell(f"{'':20}stays until: {kind.permanent}")
+            show(f"{'':20}stays until: {kind.permanent}")
         for p in kind.parameters:
             unit = "" if p.unit in ("1", "name") else f" {p.unit}"
-            tell(f"    {p.name:16}{default_text(p)}{unit} ({limits_text(p)}): {p.meaning}")
+            show(f"    {p.name:16}{default_text(p)}{unit} ({limits_text(p)}): {p.meaning}")
             sources.setdefault(p.source, []).append(f"{name} {p.name}")
     units = sorted({kind.unit for kind in CATALOGUE.modes_of(place).values() if kind.unit})
-    tell(f"\nThe difference at the place is given in {' or '.join(units)}. Where the numbers come from:")
+    show(f"\nThe difference at the place is given in {' or '.join(units)}. Where the numbers come from:")
     for source, parameters in sources.items():
-        tell(f"    {', '.join(parameters)}: {source}")
+        show(f"    {', '.join(parameters)}: {source}")
     if reasons := refused(place):
-        tell("\nWhat cannot act there:")
+        show("\nWhat cannot act there:")
         for name, reason in reasons.items():
-            tell(f"    {name:20}{reason}")
+            show(f"    {name:20}{reason}")
 
 
 def refused(place: Place) -> dict[str, str]:
@@ -118,19 +118,19 @@ def refused(place: Place) -> dict[str, str]:
 
 
 def default_text(parameter: Parameter) -> str:
-    """The default as it is shown; none where it means what the parameter says."""
+    """The default as printed; nothing where the parameter's meaning contains it."""
     if isinstance(parameter.default, str):
         return parameter.default or "none"
     return "none" if math.isnan(parameter.default) else f"{parameter.default:g}"
 
 
 def limits_text(parameter: Parameter) -> str:
-    """Its limits as they are shown; of a name, that it is one."""
+    """A parameter's limits as printed; for a name, the word "name"."""
     return "a name" if isinstance(parameter.default, str) else f"{parameter.low:g} to {parameter.high:g}"
 
 
 def place_json(place: Place) -> dict[str, Any]:
-    """Everything about a place, for programs."""
+    """A place as plain data, for programs."""
     return {
         "place": place.name,
         "kind": place.kind,
@@ -141,7 +141,7 @@ def place_json(place: Place) -> dict[str, Any]:
 
 
 def mode_json(name: str, kind: type[Fault]) -> dict[str, Any]:
-    """Everything about a mode."""
+    """A mode as plain data."""
     return {
         "mode": name,
         "meaning": kind.meaning,
@@ -166,7 +166,7 @@ def mode_json(name: str, kind: type[Fault]) -> dict[str, Any]:
 
 
 def fault_text(fault: dict) -> str:
-    """What became of a fault, in a line; of one that did not act, why the run shows nothing about it."""
+    """The course of a fault, in a line; for one that did not act, why the run shows nothing about it."""
     name = f"fault {fault['fault']}"
     if fault["gave_way_s"] is not None:
         return (
@@ -191,19 +191,21 @@ def fault_text(fault: dict) -> str:
 
 
 def proof_text(proof: dict | None) -> str:
-    """What tells the run from the one without the fault; nothing without a golden run."""
+    """The differences from the run without the fault; nothing without a golden run."""
     if proof is None:
         return ""
-    first, told, reacted = proof["first_difference"], proof["detected"], proof["reaction"]
+    first, detected, reacted = proof["first_difference"], proof["detected"], proof["reaction"]
     without = "it" if proof["of_faults"] == 1 else f"the {proof['of_faults']} faults, from the first one's beginning on"
     if first is None:
         return f"; against the run without {without}: NO EFFECT, nothing that the firmware sends differs"
     parts = [f"{first['name']} differs after {first['after_ms']:.4g} ms ({first['where']})"]
-    if told is None:
+    if detected is None:
         parts.append("no error reports it")
     else:
-        more = ", more often than without" if told["rate"] else ""
-        parts.append(f"reported by {told['code']} from {told['board']}{more} after {proof['detection_ms']:.4g} ms")
+        more = ", more often than without" if detected["rate"] else ""
+        parts.append(
+            f"reported by {detected['code']} from {detected['board']}{more} after {proof['detection_ms']:.4g} ms"
+        )
     if reacted is not None:
         instead = f"{reacted['machine']} in {reacted['state']} instead of {reacted['instead_of']}"
         parts.append(f"{instead} after {proof['reaction_ms']:.4g} ms")
@@ -225,7 +227,7 @@ def markdown() -> str:
 
 
 def kind_lines(kind: str, places: list[Place]) -> list[str]:
-    """One kind of place: where, what it takes."""
+    """One kind of place: its places and modes."""
     unit = next((mode.unit for mode in CATALOGUE.modes_of(places[0]).values() if mode.unit), "")
     lines = [f"### {kind}{f', in {unit}' if unit else ''}", ""]
     lines += [f"{', '.join(f'`{place.name}`' for place in places)}", ""]

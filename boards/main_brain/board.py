@@ -152,7 +152,7 @@ class MainBrainBoard(FirmwareBoard):
         controller.apply(self.store)
 
     def move_memory(self, words) -> None:
-        """The data table stands in `words` from now on."""
+        """Keep the data table in `words` from now on."""
         self.store.move(words)
         self.memory = words
 
@@ -213,7 +213,7 @@ class MainBrainBoard(FirmwareBoard):
     # --- interrupt --------------------------------------------------------------------------------------
 
     def on_segment(self, queue: EventQueue) -> None:
-        """An exchange with the router is over: keep what came, load what goes next."""
+        """Keep the segment received in an exchange with the router, and load the next one to send."""
         segment: SspSegment = self.ssp.take()
         if segment is not None:
             self.ssp.load(self.link.exchanged(segment))

@@ -1,4 +1,4 @@
-"""What a machine tells a motor board, and how machines come by the numbers of the data table."""
+"""A machine's commands to a motor board, and the look-up of numbers of the data table."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Controller parameter sets: what the computer would load into the main brain, and the operator's script.
+"""Controller parameter sets, as the computer would load them into the main brain, and the operator's script.
 
 A set is a TOML file: `title`, `description`, `program` (programs.py; `record` if not given), [parameters] name = value,
 [reasons] name = "why", and [operator]. A set with `base = "other set"` holds only what differs, and each difference has

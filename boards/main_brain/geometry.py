@@ -38,7 +38,7 @@ class FloorGeometry:
 
     @cython.ccall
     def solve(self, hip: cython.double, outer: cython.double, inner: cython.double) -> cython.bint:
-        """Pose for hip angle h and the two ankle angles less 1.68 rad; False when there is none.
+        """Pose for hip angle h and the two ankle angles less 1.68 rad; False when no pose fits.
 
         Below 0.05 rad of hip angle the feet are too close for the formula (chosen by us).
         """

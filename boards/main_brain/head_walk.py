@@ -4,7 +4,7 @@ Source: robot.md C6.3 C, with C2.2 for what the log of 20 August 2015 does not s
 pushes begin by the lean of the OUTER leg: while it stands, and while it swings. So the machine itself is not alike for
 the two legs.
 
-It is stepped first; hip and ankles (head_joints.py) take their laws by FSM_LEG, which is told at the beginning of a
+It is stepped first; hip and ankles (head_joints.py) take their laws by FSM_LEG, which is reported at the beginning of a
 tick: commands are those of the state at the tick's start (robot.md C2.2).
 
 Chosen by us, because the log does not show it: setup ends by a time, and flight as in C2.2 when the outer feet stand.
@@ -96,7 +96,7 @@ class HeadWalkMachine:
 
     @cython.ccall
     def preset(self) -> None:
-        """Nothing is remembered from step to step."""
+        """Do nothing: the machine keeps nothing from step to step."""
 
     @cython.ccall
     def publish_state(self, number) -> None:

@@ -50,7 +50,7 @@ class IoData:
         self.slots = 0
 
     def thin(self, send_ids, dividers, turn_ids, turn_every=1) -> None:
-        """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one every so many slots, in turn."""
+        """Send `send_ids` in every n-th slot only, n in `dividers`; in turn one of `turn_ids` in `turn_every` slots."""
         if len(send_ids) != len(dividers):
             raise FirmwareError(f"io data: {len(dividers)} dividers for {len(send_ids)} variables")
         self.send_ids = array.array("q", self.known(send_ids))

@@ -1,4 +1,4 @@
-"""The mode machine: what the keys choose, what the display shows, and the walk's machines inside it.
+"""The mode machine: the mode by the keys, the display's text, and the walk's machines inside it.
 
 Source: robot.md C1.7. Key 0 leads from standby to calibrate, key 1 from either of them to walk, key 2
 from walk back to standby. A key counts when it goes down. Chosen by us, because no source gives it: a fall

@@ -1,10 +1,10 @@
-"""What can walk: programs, each with its machines and the parameters that they read.
+"""The walking programs, each with its machines and the parameters that they read.
 
 A controller file says which one it is for (`program = "reflex"`), and has to give the parameters of that one and of
 what all share: estimator, steering, display. To add a program of your own:
 
 1. a module with its machines next to reflex_hip.py: tables of states and transitions (state_machine.py), and `READS`,
-   the variables that it reads. Without `import cython` it runs interpreted, beside compiled ones;
+   the variables that it reads. Without `import cython` it runs interpreted, together with compiled ones;
 2. its parameters as rows of datatable/master/variables.csv, published by PC for MB, then `ranger-sim table generate`;
 3. a function that builds its machines, and a line in PROGRAMS;
 4. a set in parameters/, or a file of your own: program, parameters, operator.
@@ -36,9 +36,9 @@ from ranger_sim.datatable.loader import load_table
 from ranger_sim.foundation.user_error import ScenarioError, unknown
 
 FIRST_OWN_ID = 314  # ids below are the robot's of 2016
-# What the controller of 2015 reads of the robot's own parameters; the rest belongs to parts that are not emulated.
+# The robot's own parameters that the controller of 2015 reads; the rest belongs to parts that are not emulated.
 OF_THE_ROBOT = tuple(name for name in head_joints.READS if name.startswith("CTRL_"))
-# What the mode machine reads for every program: display, song, light, fall.
+# Variables that the mode machine reads for every program: display, song, light, fall.
 SHARED_BY_ALL = ("P_UI_LCD_TIME", "P_UI_SONG_STEPS", "P_UI_PP2HS_TTIME", "D_UI_STOP_ON_FALL")
 
 

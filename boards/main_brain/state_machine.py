@@ -4,7 +4,7 @@ One tick of a machine (robot.md C1.0): of the transitions declared for the prese
 the first one whose condition holds is taken; with none, the state's main action runs (after its entry
 action, the first time). A transition is complete within its tick: the old state's exit action, then both entry
 and main action of the new state; an old state that was entered but never ran gets its entry and main
-first. A machine takes no second transition in the same tick, and a transition to the present state is no change.
+first. A machine takes no second transition in the same tick, and a transition to the present state changes nothing.
 It reports its state at the beginning of a tick, so that readers of the number see a change one tick later.
 
 A state may hold nested machines. They are stepped after its main action, in their written order,
@@ -52,7 +52,7 @@ class State:
 @cython.final
 @cython.cclass
 class Transition:
-    """What `condition` leads to; made by StateMachine from its table."""
+    """A condition and its target state; made by StateMachine from its table."""
 
     target: State
     condition: object
@@ -79,7 +79,7 @@ class StateMachine:
     changes: cython.longlong
     start: State
     current: State
-    told: State
+    reported: State
     entered: cython.bint
 
     def __init__(self, name, states, transitions, on_change=None) -> None:
@@ -108,23 +108,23 @@ class StateMachine:
                     by_name[origin].transitions.append(Transition(by_name[target], condition))
         self.start = self.states[0]
         self.current = self.start
-        self.told = None
+        self.reported = None
         self.entered = False
 
     @cython.ccall
-    def put(self, name) -> object:
+    def set_state(self, name) -> object:
         """Place the machine in a state whose entry action has yet to run."""
         for state in self.states:
             if state.name == name:
                 self.current = state
                 self.entered = False
-                self._tell()
+                self._report()
                 return
         raise ValueError(f"machine {self.name}: no state {name!r}")
 
     @cython.ccall
-    def _tell(self) -> object:
-        self.told = self.current
+    def _report(self) -> object:
+        self.reported = self.current
         if self.on_change is not None:
             self.on_change(self.current.number)
 
@@ -133,8 +133,8 @@ class StateMachine:
         """One tick."""
         state: State = self.current
         transition: Transition
-        if self.told is not state:
-            self._tell()
+        if self.reported is not state:
+            self._report()
         for transition in state.transitions:
             if call(transition.condition):
                 if not self.entered:

@@ -98,7 +98,7 @@ class SteeringMachine:
 
     @cython.ccall
     def switch(self, shut_down: cython.longlong) -> None:
-        """Tell the board once per change to drive or to shut down."""
+        """Order the board once per change to drive or to shut down."""
         if shut_down != self.shut_down:
             self.shut_down = shut_down
             self.store.set_int(self.MCSI_SHUTDOWN, shut_down)
@@ -138,7 +138,7 @@ class SteeringMachine:
         if not -dead < command < dead:
             self.switch(0)
         elif self.store.get_float(self.D_S_SHUT_DOWN) != 0.0:
-            self.switch(1)  # the count goes on being sent
+            self.switch(1)  # the count is still sent
         else:
             self.off()
 

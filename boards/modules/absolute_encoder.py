@@ -70,5 +70,5 @@ class AbsoluteEncoder:
     @cython.ccall
     @cython.exceptval(check=False)
     def angle_rad(self) -> cython.double:
-        """Angle in rad as it is published."""
+        """Angle in rad, as published."""
         return self.radians

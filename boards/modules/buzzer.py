@@ -2,7 +2,7 @@
 
 Period 60e6 / Hz counts in MR0, half of it in MR5. UI_EMPTY_TX2 or UI_SET_BUZZER_AMPL, when not 0, starts
 the tune. The firmware of 2016 then never stops it, and silences the buzzer in every millisecond without a tune,
-so that a frequency alone is not heard (robot.md N4.11). Appendix 3.8 has beeps on errors and
+so that a frequency alone is not audible (robot.md N4.11). Appendix 3.8 has beeps on errors and
 own sounds for the common ones; `beeps` and `repeats` are the switches buzzer_beeps, song_repeats_for_ever.
 """
 
@@ -16,7 +16,7 @@ from ranger_sim.firmware_sim.peripherals.pwm import LER_MR0, LER_MR5, Pwm
 # Our own tune, a rising and falling fifth: the robot played a song that belongs to others. (Hz, ms)
 TUNE = ((523, 200), (784, 200), (659, 200), (988, 200), (784, 400), (587, 200), (523, 400), (0, 200))
 # Beeps are chosen by us, because the appendix says only that there were some: short enough to count, far
-# enough apart to tell, and at most eight wait (a robot with a lasting fault need not beep for minutes).
+# enough apart to distinguish, and at most eight wait (a robot with a lasting fault need not beep for minutes).
 BEEP_MS = 60
 PAUSE_MS = 60
 MOST_WAITING = 8
@@ -111,7 +111,7 @@ class Buzzer:
     def update(self) -> cython.longlong:
         """One millisecond: a beep goes before the tune, and without either the buzzer is silent.
 
-        With beeps switched on a frequency command alone is heard as well. Returns 1 while something sounds.
+        With beeps switched on a frequency command alone is audible as well. Returns 1 while something sounds.
         """
         if self.silence_left_ms > 0:
             self.silence_left_ms -= 1

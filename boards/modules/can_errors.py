@@ -29,7 +29,7 @@ class CanErrors:
         self.while_receiving = getattr(codes, prefix + "BUS_RX")
         self.while_sending = getattr(codes, prefix + "BUS_TX")
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Restart after bus-off, then read CxICR and report each cause; a data overrun is not cleared."""
         if self.controller.bus_off:
             self.controller.write_MOD(OPERATING)

@@ -5,7 +5,7 @@
 
 Receiving: the interrupt copies the controller's registers into a ring, a slot task delivers what waits.
 Sending: frames are built with the last network time, wait in a ring of 8 and go into the hardware transmit
-buffers 1 and 2 as these fall free: looked after whenever a frame is queued, and in every slot.
+buffers 1 and 2 as these become free: checked whenever a frame is queued, and in every slot.
 """
 
 from typing import Final
@@ -22,6 +22,7 @@ from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, RFS_EIGHT_BYTES, CanController
 from ranger_sim.firmware_sim.vic import IRQ_LATENCY
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, EventQueue
+from ranger_sim.foundation.renamed import renamed
 from ranger_sim.foundation.user_error import FirmwareError
 
 IDENTIFIERS: Final = 2048
@@ -142,8 +143,8 @@ class CanLink(Sender):
             CAN_STATUS, number, self.on_error, cost=ERROR_CYCLES - IRQ_LATENCY, slot=error_slot, name="can_error"
         )
 
-    def listen(self, identifier, receiver: Receiver) -> None:
-        """Frames of `identifier` go to `receiver` from now on; one receiver per identifier and the reverse.
+    def subscribe(self, identifier, receiver: Receiver) -> None:
+        """Deliver frames of `identifier` to `receiver` from now on; one receiver per identifier and the reverse.
 
         The list is searched from its first entry, so later ones cost more.
         """
@@ -156,6 +157,11 @@ class CanLink(Sender):
         self.search_cycles += PLACE_CYCLES
         if receiver is self.time:
             self.time_identifier = identifier
+
+    def listen(self, identifier, receiver: Receiver) -> None:
+        """The old name of `subscribe`."""
+        renamed("CanLink.listen", "subscribe")
+        self.subscribe(identifier, receiver)
 
     # --- receiving --------------------------------------------------------------------------------------
 
@@ -190,8 +196,8 @@ class CanLink(Sender):
         controller.release()
 
     def on_error(self, queue: EventQueue) -> None:
-        """Interrupt: see what it was, restart after bus-off."""
-        self.controller_errors.look()
+        """Interrupt: report the causes, restart after bus-off."""
+        self.controller_errors.check()
 
     def receive_all(self) -> object:
         """Slot task: deliver every frame that waits; returns how many there were."""

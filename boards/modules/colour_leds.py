@@ -92,6 +92,6 @@ class LedReceiver(Receiver):
         self.led = led
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A frame came; the time word is not looked at."""
+        """Take a frame; the time word is not used."""
         self.frames += 1
         self.leds.set_led(self.led, value_word)

@@ -3,7 +3,7 @@
 """Errors of one board: noted anywhere, collected once per slot, sent one at a time (appendix 4.9).
 
 An error frame's value word holds the code (bits 0-15), the board's number (16-21) and how often it came
-since it was last sent (22-31, modulo 1024); its time word is when it first came (robot.md N1.7, N4.12, T4.2).
+since it was last sent (22-31, modulo 1024); its time word is that of the first (robot.md N1.7, N4.12, T4.2).
 """
 
 from typing import Final
@@ -39,7 +39,7 @@ class ErrorModule:
     lose_new_after_repeat: the firmware's fault that new errors of higher codes than a repeated one in a slot are lost.
     """
 
-    # what every slot looks at
+    # used in every slot
     flagged_count: cython.longlong
     waiting: cython.longlong
     # what an error touches

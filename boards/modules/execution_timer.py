@@ -1,4 +1,4 @@
-"""How long the slots take: the variables EXECUTION_TIME and MAX_EXECUTION_TIME
+"""Measured duration of the slots: the variables EXECUTION_TIME and MAX_EXECUTION_TIME
 (robot.md N3.1)."""
 
 from typing import Final
@@ -9,7 +9,7 @@ from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.foundation.numbers import float32
 
-ANEW_MASK: Final = 255  # ms of the network time: the longest slot is looked for anew
+ANEW_MASK: Final = 255  # ms of the network time: the search for the longest slot begins anew
 
 SECONDS_PER_CYCLE = 0.0000000166667  # of 60 MHz, as the firmware has it
 

@@ -8,7 +8,7 @@ import cython
 class Debounce:
     """A level is believed after `equal_samples` equal readings in a row (the first one counts).
 
-    `settled`: the level whose next reading would change nothing, -1 when there is none: readings of it may be left out.
+    `settled`: the level whose next reading would change nothing, -1 without one: readings of it may be left out.
     """
 
     settled: cython.longlong
@@ -39,7 +39,7 @@ class Debounce:
     @cython.ccall
     @cython.exceptval(check=False)
     def contact(self) -> cython.longlong:
-        """The level that is believed, as it is published."""
+        """The level that is believed, as published."""
         return self.state
 
 

@@ -1,9 +1,9 @@
 """The user interface board's front panel: the devices on its processor's pins for a person, and their state as words.
 
-It knows levels of pins, words on the SSP and the PWM unit's registers, of whatever program: robot.md N4.11. `WORDS` of
-them, which others may read at any time: the display's sixteen characters (0 while it is off), the six colour lights
+It knows levels of pins, words on the SSP and the PWM unit's registers, of any program: robot.md N4.11. Its `WORDS`
+words, which others may read at any time: the display's sixteen characters (0 while it is off), the six colour lights
 as command words (red in the lowest byte), the tone in Hz (0: silence), the sync light, the keys that are down and the
-lights beside the processor that are lit (a bit each: green, red, blue).
+lights next to the processor that are lit (a bit each: green, red, blue).
 """
 
 import array
@@ -77,7 +77,7 @@ class FrontPanel(Peripheral):
         chip.pwm_follower = self
 
     def on_level(self, pin: cython.longlong, level: cython.longlong) -> cython.int:
-        """A pin has changed."""
+        """Take a change of a pin."""
         if pin == self.select_pin:
             if self.ssp.on_select(level):
                 self._show_lights()
@@ -108,7 +108,7 @@ class FrontPanel(Peripheral):
 
     @cython.cfunc
     def _show_characters(self) -> cython.int:
-        """The display has taken a byte."""
+        """Update the words after the display has taken a byte."""
         i: cython.longlong
         for i in range(CHARACTERS_PER_LINE):
             self.words[CHARACTERS + i] = self.display.shown(0, i)
@@ -117,7 +117,7 @@ class FrontPanel(Peripheral):
 
     @cython.cfunc
     def _show_lights(self) -> cython.int:
-        """The drivers have taken what was sent."""
+        """Update the words after the drivers have taken their bits."""
         light: cython.longlong
         for light in range(LIGHT_COUNT):
             self.words[LIGHTS + light] = (
@@ -150,5 +150,5 @@ class FrontPanel(Peripheral):
 
     @property
     def hertz(self) -> int:
-        """The tone that is heard; 0: silence."""
+        """The present tone; 0: silence."""
         return self.words[TONE_HZ]

@@ -75,7 +75,7 @@ class ImuParser:
         self.needed = PACKET_BYTES + 1 if late_by_one_byte else PACKET_BYTES
         self.code_ring_full = errors.MSIMU_RX_OF
         self.ring = [0] * 128  # RING_BYTES
-        self.words = [0] * 7  # PACKET_WORDS of the packet that was looked at last: six values and the timer
+        self.words = [0] * 7  # PACKET_WORDS of the packet that was examined last: six values and the timer
         self.ring_write = 0
         self.ring_read = 0
         self.roll = 0.0

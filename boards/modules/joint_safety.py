@@ -52,7 +52,7 @@ class HipSafety:
 class AnkleSafety:
     """Limit switches, cable stretch and the low end block negative current, the high end positive current.
 
-    ANKL_LO is common in a walk, and which of the two boards raises it is no difference between them: the record
+    ANKL_LO is common in a walk, and not a difference between the two boards if only one raises it: the record
     walk's flip-up target is 0.2 rad, the very bound checked here, so a raised foot comes to rest on either side
     of it by friction and by the zero error of its current sensor. That error has the mounting's sign and shifts
     the rest by 0.05 A / 1.5 A/rad = 0.033 rad: with our 0.05 A the inner ankles rest at 0.18 rad and the outer

@@ -160,6 +160,6 @@ class LcdQuarter(Receiver):
         self.quarter = quarter
 
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A frame came; the time word is not looked at."""
+        """Take a frame; the time word is not used."""
         self.frames += 1
         self.lcd.set_quarter(self.quarter, value_word)

@@ -1,4 +1,4 @@
-"""What keeps a motor and its gearhead alive: clips, thermal model, peak current, speed, coupled
+"""The protection of a motor and its gearhead: clips, thermal model, peak current, speed, coupled
 (appendix 4.7; robot.md N4.2, N4.3). All quantities are 16.16 fixed point.
 
 The allowed range of the target current is the motor's clip, narrowed by the thermal state, narrowed again in
@@ -197,7 +197,7 @@ class MotorLimits:
     @cython.ccall
     @cython.exceptval(check=False)
     def limit_duty(self, duty: cython.longlong, current: cython.longlong) -> cython.longlong:
-        """The controller's sum (counts x 65536) after what the measured current asks for.
+        """The controller's sum (counts x 65536), reduced as the measured current requires.
 
         A current beyond its peak would, at the same duty, be there in the next slot too (it settles within
         one), so the duty shrinks in proportion.

@@ -17,7 +17,7 @@ PERIOD_COUNTS: Final = 600  # 100 kHz at 60 MHz
 SLEEP: Final = 1
 SHUTDOWN: Final = 2
 STOPPED: Final = 4
-OFF_UNLESS_0: Final = 0x7FFF  # what SLEEP and SHUTDOWN look at in the word they get
+OFF_UNLESS_0: Final = 0x7FFF  # the bits that SLEEP and SHUTDOWN use of their word
 
 PINS = {
     "pwm_lead_2": p0(7),

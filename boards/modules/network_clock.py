@@ -68,7 +68,7 @@ class NetworkClock:
         controller: CanController
         ms: cython.longlong = self.time.ms
         for controller in self.controllers:
-            if controller.free_at(SYNC_BUFFER, controller.chip.instant) and controller.transmit(
+            if controller.free_at(SYNC_BUFFER, controller.chip.input_time) and controller.transmit(
                 SYNC_BUFFER, SYNC_IDENTIFIER, EIGHT_BYTES | FLAG_SINGLE_SHOT, ms, ms
             ):
                 self.sent[controller.number] += 1

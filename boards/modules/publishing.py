@@ -1,8 +1,8 @@
-"""What a satellite or the router publishes: one line per variable, laid out in rows as the master table says.
+"""The variables that a satellite or the router publishes: a line for each, in rows as the master table says.
 
 The master table (`datatable/master/boards.toml`) says which variable goes out in which row, because bounds, DBC files
-and supervision need that of boards whose firmware is not ours, too. A board's room says where a value comes from and
-what sending it costs: a `Send` for each variable, in the order in which boards.toml names them first.
+and supervision need that of boards whose firmware is not ours, too. A board's module has the source of each value and
+the cost of sending it: a `Send` for each variable, in the order in which boards.toml names them first.
 """
 
 import cython
@@ -73,8 +73,8 @@ class Send:
 
     `value`: a function without arguments, a number that never changes, or the board's ErrorModule. Units are those of
     the master table. `cost` is that of the whole line; what the sender does of it later (`Sender.late_cycles`) is taken
-    off. `more`: cycles that it costs beside that when the value is not 0, or when an error waits: the library's
-    conversion of a whole number has next to nothing to do with a 0.
+    off. `more`: additional cycles when the value is not 0, or when an error waits: the library's conversion of a
+    whole number has next to nothing to do with a 0.
     """
 
     def __init__(self, variable, value, cost, limit, more=0) -> None:

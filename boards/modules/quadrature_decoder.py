@@ -179,7 +179,7 @@ class QuadratureDecoder:
 
     @cython.cfunc
     def _note_glitch(self) -> cython.void:
-        """What was in the ring cannot be: an error, and the next time is not used."""
+        """Report an impossible time in the ring as an error; the next time is not used."""
         self.errors.report(self.glitch_code)
         self.after_glitch = True
 
@@ -212,13 +212,13 @@ class QuadratureDecoder:
     @cython.ccall
     @cython.exceptval(check=False)
     def position_rad(self) -> cython.double:
-        """Angle of the joint in rad, as it is published."""
+        """Angle of the joint in rad, as published."""
         return float_of_fixed(self.position)
 
     @cython.ccall
     @cython.exceptval(check=False)
     def rate_rad_s(self) -> cython.double:
-        """Rate of the joint in rad/s, as it is published."""
+        """Rate of the joint in rad/s, as published."""
         return float_of_fixed(self.rate)
 
     @cython.ccall

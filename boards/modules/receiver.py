@@ -1,4 +1,4 @@
-"""Where a received frame goes: objects with one method, `deliver`, listed by identifier in the CAN link."""
+"""Receivers of frames: objects with one method, `deliver`, listed by identifier in the CAN link."""
 
 import cython
 
@@ -7,9 +7,9 @@ from ranger_sim.foundation.numbers import fixed_of_float, float_of_word, wrap_i3
 
 @cython.cclass
 class Receiver:
-    """Base of everything that takes the two words of a frame (0 ... 2^32-1 each). `frames`: how many came.
+    """Base of everything that takes the two words of a frame (0 ... 2^32-1 each). `frames`: number received.
 
-    `cycles`: what it takes more than the time frame's.
+    `cycles`: those in addition to the time frame's.
     """
 
     frames: cython.longlong
@@ -21,7 +21,7 @@ class Receiver:
 
     @cython.ccall
     def deliver(self, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A frame of this identifier was received. Satellites ignore the time word of commands."""
+        """Take a frame of this identifier. Satellites ignore the time word of commands."""
         self.frames += 1
 
 

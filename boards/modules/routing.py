@@ -75,7 +75,7 @@ class RoutingTable:
 
     @cython.ccall
     def learn(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
-        """Note where `identifier` comes from; a source that changed is accepted without a word."""
+        """Note the source of `identifier`; a changed source is accepted without a report."""
         before: cython.longlong = self.rows[identifier] >> SOURCE_SHIFT
         if before == channel:
             return
@@ -169,7 +169,7 @@ class Router:
         word0: cython.longlong,
         word1: cython.longlong,
     ) -> cython.bint:
-        """What a CAN receive interrupt does: one frame into the ring that the four buses share.
+        """The work of a CAN receive interrupt: one frame into the ring that the four buses share.
 
         63 frames fit; one more is lost, False, and CANn_RX_BUF_OF reported.
         """

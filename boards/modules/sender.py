@@ -1,4 +1,4 @@
-"""How a board's own variables leave it: words, stamped with the network time, into the ring of a link."""
+"""Sending of a board's own variables: words, stamped with the network time, into the ring of a link."""
 
 import cython
 
@@ -8,10 +8,10 @@ from ranger_sim.foundation.numbers import word_of_float, word_of_i32
 
 @cython.cclass
 class Sender:
-    """Base of what takes frames from a board's program: a CAN bus's end, the router's own ring.
+    """Base of the takers of frames from a board's program: a CAN bus's end, the router's own ring.
 
-    `time`: the network time that stamps them. `late_cycles`: cycles of a line of the schedule that come after its frame
-    is asked for, in a task of their own.
+    `time`: the network time that stamps them. `late_cycles`: cycles of a line of the schedule after the request of its
+    frame, in a separate task.
     """
 
     time: NetworkTime
@@ -30,7 +30,7 @@ class Sender:
 
     @cython.ccall
     def build(self, identifier: cython.longlong, value_word: cython.longlong, time_word: cython.longlong) -> None:
-        """A line of the schedule has made a frame; here it is sent at once."""
+        """Take a frame that a line of the schedule has made; here it is sent at once."""
         self.send_words(identifier, value_word, time_word)
 
     @cython.ccall

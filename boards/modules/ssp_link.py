@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-# (what is divided is never below 0; every index below is a row of a segment or a segment of a circle, wrapped where it
-# is moved)
+# (dividends are never below 0; every index below is a row of a segment or a segment of a circle, wrapped where it is
+# moved)
 """The serial link between the router and the main brain: both ends, as logic on segments.
 
 A segment is 31 half-words: up to six frames of five half-words, zeros, and a checksum. The router is the
@@ -11,9 +11,9 @@ robot.md N1.6.
 
 Frames are put straight into the segment that will carry them, and are taken straight out of the one that came in.
 
-Empty segments are one shared object per end and the others come round in a circle, so nobody may write to a
-segment that was handed over: a fault makes its own with `corrupted_copy`. A circle is long enough for all that its end
-can queue and for all that the other end can let wait.
+Empty segments are one shared object per end and the others come round in a circle, so a segment that was handed over
+must not be written to: a fault makes its own with `corrupted_copy`. A circle is long enough for all that its end can
+queue and for all that the other end can let wait.
 """
 
 from typing import Final
@@ -198,7 +198,7 @@ class MainBrainSspLink:
 
     @cython.cfunc
     def _miss(self) -> cython.bint:
-        """A segment finds no place: False."""
+        """Report a segment without a free place: False."""
         self.receive_full += 1
         self.report(self.code_receive_full)
         return False
@@ -260,7 +260,7 @@ class MainBrainSspLink:
                 self.report(self.code_checksum)
             for row in range(0, FRAME_ROW * frames, 3):  # FRAME_ROW: as a step it would make this Python's range
                 if segment.rows[row] & IDENTIFIER > self.last_id:
-                    frames = self._drop_strangers(i, frames)
+                    frames = self._drop_unknown_frames(i, frames)
                     break
             self.received_frames[i] = frames
             self.frames += frames
@@ -268,7 +268,7 @@ class MainBrainSspLink:
         return self.segments
 
     @cython.cfunc
-    def _drop_strangers(self, place: cython.longlong, frames: cython.longlong) -> cython.longlong:
+    def _drop_unknown_frames(self, place: cython.longlong, frames: cython.longlong) -> cython.longlong:
         """Keep the received segment at `place` without the frames that no variable has; returns how many are left."""
         segment: SspSegment = self.received[place]
         known: SspSegment = SspSegment()
@@ -420,7 +420,7 @@ class RouterSspLink:
     ) -> cython.bint:
         """Put a frame into the transmit ring; a full ring drops it whole (SSP_TX_BUF_OF), False.
 
-        `flags` as in foundation.events; `now` is the instant in ns at which the pushing begins.
+        `flags` as in foundation.events; `now` is the time in ns at which the pushing begins.
         """
         header: cython.longlong = (identifier & IDENTIFIER) | HEADER_ONES
         if self.half_words > MOST_BEFORE_A_FRAME:
@@ -438,7 +438,7 @@ class RouterSspLink:
 
     @cython.cfunc
     def _lose(self) -> cython.bint:
-        """A frame does not fit: False."""
+        """Report a frame that does not fit: False."""
         self.transmit_lost += 1
         self.report(self.code_transmit_full)
         return False
@@ -532,7 +532,7 @@ class RouterSspLink:
 
     @cython.cfunc
     def _miss_segment(self) -> None:
-        """The exchange brought no segment, or there is no place for it."""
+        """Report that the exchange brought no segment, or that no place is free for it."""
         if not self.exchange_done:
             self.low_rate += 1
             self.report(self.code_low_rate)
@@ -551,7 +551,7 @@ class RouterSspLink:
 
     @cython.cfunc
     def _drop_segment(self) -> None:
-        """The checksum of the segment that is read next is wrong."""
+        """Report a wrong checksum of the segment that is read next."""
         self.checksum_errors += 1
         self.report(self.code_checksum)
 
@@ -563,7 +563,7 @@ class RouterSspLink:
 
     @cython.ccall
     def take(self) -> cython.bint:
-        """Move the next received frame into rx_id, rx_flags, rx_word0, rx_word1; False if there is none.
+        """Move the next received frame into rx_id, rx_flags, rx_word0, rx_word1; False without one.
 
         A wrong checksum drops the segment (SSP_BAD_CHKSM). The data length of a frame becomes 8.
         """

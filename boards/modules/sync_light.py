@@ -85,7 +85,7 @@ class SyncLight:
 
     @cython.ccall
     def _show(self, on: cython.bint) -> None:
-        """Both lights on or off."""
+        """Switch both lights on or off."""
         self.lit = on
         self.gpio.write(self.pin, 0 if on else 1)
         self.leds.set_led(SYNC_LED, WHITE if on else DARK)

@@ -69,7 +69,7 @@ class AttachServer(StreamServer[_Client]):
     def _welcome(self, connection: socket.socket) -> _Client:
         return _Client(connection)
 
-    def _apology(self, reason: str) -> bytes:
+    def _last_bytes(self, reason: str) -> bytes:
         """A REFUSED."""
         words = {
             FOREIGN: f"{self.name!r} belongs to another user",
@@ -96,7 +96,7 @@ class AttachServer(StreamServer[_Client]):
     def _obey(self, client: _Client, kind: int, body: bytes) -> None:
         """One record of a client."""
         if kind == wire.HELLO:
-            self._greet(client, body)
+            self._handshake(client, body)
             return
         tap, taps = client.tap, client.taps
         if tap is None or taps is None:
@@ -115,19 +115,19 @@ class AttachServer(StreamServer[_Client]):
             elif answer == NOT_ON_BUS:
                 tap.events.append((DROPPED, taps.time, identifier, flags, lo, hi))
         elif kind == wire.CONTROL:
-            (wish,) = wire.unpacked(struct.Struct("<B"), body)
-            if wish == wire.ACTIVATE:
+            (request,) = wire.unpacked(struct.Struct("<B"), body)
+            if request == wire.ACTIVATE:
                 tap.activate(taps.time)
-            elif wish == wire.LISTEN:
+            elif request == wire.LISTEN:
                 tap.listen(taps.time)
-            elif wish == wire.FLUSH:
+            elif request == wire.FLUSH:
                 tap.flush(taps.time)
             else:
-                raise MalformedError(f"control {wish} is none of 1, 2, 3")
+                raise MalformedError(f"control {request} is none of 1, 2, 3")
         else:
             raise MalformedError(f"record type {kind} is not for a client to send")
 
-    def _greet(self, client: _Client, body: bytes) -> None:
+    def _handshake(self, client: _Client, body: bytes) -> None:
         """HELLO: the client becomes a node of its channel, or receives the list of channels."""
         if client.tap is not None:
             raise MalformedError("a second HELLO")
@@ -166,7 +166,7 @@ class AttachServer(StreamServer[_Client]):
             wire.record(wire.WELCOME, wire.WELCOME_BODY.pack(wire.VERSION, window, bitrate, self.epoch_ns) + names)
         )
 
-    def _tell(self, client: _Client) -> None:
+    def _report(self, client: _Client) -> None:
         """Send bus events as records. For a client that is far behind, frames are dropped and counted."""
         tap = client.tap
         if tap is None or not tap.events and not client.state:

@@ -48,7 +48,7 @@ class AttachedLink(Link):
         queue_limit: int = RECEIVE_QUEUE,
     ) -> None:
         super().__init__(f"{name}/{channel}", receive_own, queue_limit)
-        self.socket, welcome = greeted(name, channel, wire.OPTION_LISTEN if listen_only else 0)
+        self.socket, welcome = handshake(name, channel, wire.OPTION_LISTEN if listen_only else 0)
         _, self.window, self.bitrate, self.epoch_ns, self.channels, rest = welcome
         self.state = LISTENING if listen_only else ERROR_ACTIVE
         self.incoming = rest
@@ -69,7 +69,7 @@ class AttachedLink(Link):
         with self.changed:
             if self.outstanding >= self.window:
                 if timeout is None:
-                    self._wait_while_heard()
+                    self._wait_while_served()
                 else:
                     self._wait(lambda: self.outstanding < self.window, timeout)
                 if self.outstanding >= self.window:
@@ -81,7 +81,7 @@ class AttachedLink(Link):
             self.outstanding += 1
             self._write(wire.send_record(identifier, flags, lo, hi))
 
-    def _wait_while_heard(self) -> None:
+    def _wait_while_served(self) -> None:
         """Wait for a place, or until the controller is error passive and has sent nothing for UNHEARD_S."""
         while self.outstanding >= self.window and not (self.gone or self.closed):
             passive = self.state == ERROR_PASSIVE
@@ -140,10 +140,10 @@ class AttachedLink(Link):
         self._close_signal()
         self.socket.close()
 
-    def _control(self, wish: int) -> None:
+    def _control(self, request: int) -> None:
         with self.changed:
             self._check()
-            self._write(wire.record(wire.CONTROL, bytes([wish])))
+            self._write(wire.record(wire.CONTROL, bytes([request])))
 
     def _check(self) -> None:
         if self.closed:
@@ -226,7 +226,7 @@ class AttachedLink(Link):
 Welcome = tuple[int, int, int, int, list[str], bytearray]
 
 
-def greeted(
+def handshake(
     name: str, channel: str, options: int = 0, patience_s: float = HANDSHAKE_S
 ) -> tuple[socket.socket, Welcome]:
     """A connection to the robot `name` and its welcome: version, window, bit rate, epoch, channels, the rest.
@@ -275,6 +275,6 @@ def greeted(
 
 def channels_of(name: str, patience_s: float = HANDSHAKE_S) -> list[str]:
     """The channels of a running robot or host."""
-    connection, welcome = greeted(name, "", patience_s=patience_s)
+    connection, welcome = handshake(name, "", patience_s=patience_s)
     connection.close()
     return welcome[4]

@@ -47,7 +47,7 @@ class Tally:
 
     def __init__(self, own: int = -1) -> None:
         self.own = own
-        self.heard = 0
+        self.received = 0
         self.reordered = 0
         self.expected: dict[int, int] = {}
 
@@ -58,7 +58,7 @@ class Tally:
         number = int.from_bytes(message.data, "little")
         self.reordered += number < self.expected.get(message.arbitration_id, 0)
         self.expected[message.arbitration_id] = number + 1
-        self.heard += 1
+        self.received += 1
 
 
 def numbered(sender: int, number: int) -> can.Message:
@@ -91,9 +91,9 @@ def interface_frames(interface: str, frames: int, nodes: int = 3) -> dict:
         cpu_s = max(wallclock.process_cpu_s() - start, 1e-9)
         wall_s = wallclock.monotonic_s() - wall
         for bus, tally in zip(buses, tallies, strict=True):  # frames still in transit
-            while tally.heard < frames - frames // nodes and (message := bus.recv(0.05)) is not None:
+            while tally.received < frames - frames // nodes and (message := bus.recv(0.05)) is not None:
                 tally.take(message)
-    delivered = sum(tally.heard for tally in tallies)
+    delivered = sum(tally.received for tally in tallies)
     return {
         "frames": frames,
         "delivered": delivered,
@@ -122,7 +122,7 @@ def two_processes(interface: str, frames: int) -> dict:
             bus = opened(interface, name)
         stack.enter_context(bus)
         sender = stack.enter_context(_helper("send", interface, name, str(frames)))
-        while tally.heard < frames:
+        while tally.received < frames:
             message = bus.recv(SILENCE_S)
             if message is None:
                 if sender.process.poll() is None:
@@ -134,11 +134,11 @@ def two_processes(interface: str, frames: int) -> dict:
     wall_s = max(last - first, 1e-9)
     return {
         "frames": frames,
-        "delivered": tally.heard,
-        "lost": frames - tally.heard,
+        "delivered": tally.received,
+        "lost": frames - tally.received,
         "reordered": tally.reordered,
         "wall_s": wall_s,
-        "frames_per_s": tally.heard / wall_s,
+        "frames_per_s": tally.received / wall_s,
     }
 
 

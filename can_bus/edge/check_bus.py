@@ -59,8 +59,8 @@ def read_link(device: str, sys_folder: pathlib.Path = pathlib.Path("/sys/class/n
     except (OSError, subprocess.TimeoutExpired, ValueError):
         return read_sys(device, sys_folder)
     if done.returncode != 0:
-        said = " ".join(done.stderr.split())
-        raise NotReadError(NO_DEVICE if "does not exist" in said else said or f"ip left with {done.returncode}")
+        message = " ".join(done.stderr.split())
+        raise NotReadError(NO_DEVICE if "does not exist" in message else message or f"ip left with {done.returncode}")
     return parse_link(done.stdout, device)
 
 
@@ -100,7 +100,7 @@ def read_sys(device: str, folder: pathlib.Path) -> dict[str, Any]:
     }
 
 
-def listen(arguments: Mapping[str, Any], seconds: float) -> Traffic:
+def observe(arguments: Mapping[str, Any], seconds: float) -> Traffic:
     """Open a python-can bus and receive for that long; NotReadError when it cannot be opened."""
     try:
         bus = can.Bus(**arguments)

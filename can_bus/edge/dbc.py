@@ -24,8 +24,8 @@ def load(path: pathlib.Path) -> Database:
     except OSError as error:
         raise BusError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # a broken file makes cantools raise many types
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise BusError(f"{path}: not a DBC file that cantools can read: {said}") from None
+        cause = " ".join(f"{type(error).__name__}: {error}".split())
+        raise BusError(f"{path}: not a DBC file that cantools can read: {cause}") from None
     if not isinstance(database, cantools.database.can.Database):
         raise BusError(f"{path}: holds no CAN messages")
     return database

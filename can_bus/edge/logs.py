@@ -47,8 +47,8 @@ class RecordedFrames:
         except UserError:
             raise
         except Exception as error:  # readers of formats raise many types
-            said = error.strerror if isinstance(error, OSError) and error.strerror else error
-            text = f"{self.source}: the recording cannot be read ({said or type(error).__name__})"
+            cause = error.strerror if isinstance(error, OSError) and error.strerror else error
+            text = f"{self.source}: the recording cannot be read ({cause or type(error).__name__})"
             raise DataError(text) from None
 
     def lose(self, reason: str, count: int, where: str) -> None:
@@ -58,7 +58,7 @@ class RecordedFrames:
 
 
 def read_log(path: str | pathlib.Path) -> RecordedFrames:
-    """(channel, time_ns, identifier, flags, lo, hi) of every frame in a recording, as it is iterated.
+    """(channel, time_ns, identifier, flags, lo, hi) of every frame in a recording, while iterating over it.
 
     Times are as in the file, or since its first frame where the format defines them so.
     """

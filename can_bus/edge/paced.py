@@ -122,12 +122,12 @@ class PacedBus:
         until = self.time if self.held() else self.now()
         bit_ns = 1_000_000_000 // self.bitrate
         for _ in range(BURST):
-            hears = taps.poll(self.time)
+            poll_time = taps.poll(self.time)
             # at full speed an idle bus waits for its clients, whatever noise may hit it meanwhile
-            due = hears if self.speed == 0.0 and is_quiet(bus) else min(bus.next_time, hears)
+            due = poll_time if self.speed == 0.0 and is_quiet(bus) else min(bus.next_time, poll_time)
             waits = bus.operating < 2 and due <= until and alone_and_passive(bus)
             if waits:
-                due = hears  # earlier events are still reported
+                due = poll_time  # earlier events are still reported
             if due > until:
                 break
             # one bit more: events within it belong to the same frame, and no frame starts that soon after another
@@ -143,9 +143,9 @@ class PacedBus:
             hold_off(bus, bus.bit_of(self.time) + 1)
         if self.speed != 0.0:
             bus.advance(self.time)
-            hears = taps.poll(self.time)
+            poll_time = taps.poll(self.time)
         rests = alone or (self.speed == 0.0 and is_quiet(bus))
-        return hears if rests else min(bus.next_time, hears)
+        return poll_time if rests else min(bus.next_time, poll_time)
 
     def held(self) -> bool:
         """True when time waits: at full speed the bus waits for its slowest reader; by the clock it does not."""

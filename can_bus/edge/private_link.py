@@ -38,7 +38,7 @@ class PrivateBus:
                 events = link.tap.events
                 if events:
                     link.tap.events = []
-                    link.hear(events)
+                    link.take_events(events)
             if due > self.paced.time:  # otherwise there was more work than one call does
                 break
         if due < self.due:
@@ -73,7 +73,7 @@ class PrivateLink(Link):
             bus.links.append(self)
             bus.pass_time()
 
-    def hear(self, events: list[Event]) -> None:
+    def take_events(self, events: list[Event]) -> None:
         """Take the events of the bus; the lock is held."""
         epoch = self.bus.paced.epoch_ns
         for event in events:

@@ -139,7 +139,7 @@ class SlcanServer(StreamServer[Connection]):
         self.totals["frames_in"] += 1
         self._answer((b"Z" if flags & FLAG_EXTENDED else b"z") + OK)
 
-    def _tell(self, client: Connection) -> None:
+    def _report(self, client: Connection) -> None:
         """Send frames of the bus as lines."""
         if client.tap is not None and client.tap.events:
             events, client.tap.events = client.tap.events, []

@@ -80,7 +80,7 @@ class SocketcandServer(StreamServer[_Client]):
     def _welcome(self, connection: socket.socket) -> _Client:
         return _Client(connection)
 
-    def _apology(self, reason: str) -> bytes:
+    def _last_bytes(self, reason: str) -> bytes:
         return f"< error this client {REASONS[reason]} >".encode()
 
     def _take(self, client: _Client) -> bool:
@@ -151,7 +151,7 @@ class SocketcandServer(StreamServer[_Client]):
         else:  # the protocol has no message for a full queue
             self.totals["refused"] += 1
 
-    def _tell(self, client: _Client) -> None:
+    def _report(self, client: _Client) -> None:
         """Send frames of the bus as text."""
         if client.tap is None or not client.tap.events and not client.kept:
             return

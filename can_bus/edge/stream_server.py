@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.taps import Tap, Taps, taps_of
-from ranger_sim.foundation.peers import ARRIVALS_PER_S, REASONS, Door, Peer, Stream
+from ranger_sim.foundation.peers import ARRIVALS_PER_S, REASONS, Peer, PeerServer, Stream
 
 HELD_ABOVE = 1 << 16  # bytes waiting for a client above which a bus at full speed waits for it
 NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: an external frame then waits 1 ms at most
@@ -30,7 +30,7 @@ class Connection(Peer):
 Client = TypeVar("Client", bound=Connection)
 
 
-class StreamServer(Door[Client]):
+class StreamServer(PeerServer[Client]):
     """Serves `buses`, {channel: Bus or Taps}, to the peers of an endpoint of this `kind`."""
 
     def __init__(
@@ -47,7 +47,7 @@ class StreamServer(Door[Client]):
                 self.own.append(self.channels[channel])
         self.totals = dict.fromkeys(COUNTERS, 0)
 
-    def _tell(self, client: Client) -> None:
+    def _report(self, client: Client) -> None:
         """Write the events of the bus into `client.outgoing`."""
         raise NotImplementedError
 
@@ -59,7 +59,7 @@ class StreamServer(Door[Client]):
 
     def poll(self, now_ns: int) -> int:
         """Read frames from clients, write frames of the buses; returns the latest time for the next poll, ns."""
-        self.look(now_ns)
+        self.receive(now_ns)
         for taps in self.own:
             taps.poll(now_ns)
         self.deliver()
@@ -69,7 +69,7 @@ class StreamServer(Door[Client]):
     def deliver(self) -> None:
         """Write frames of the buses."""
         for client in self.peers:
-            self._tell(client)
+            self._report(client)
         self.write()
         for client in self.peers:
             if client.tap is not None:
@@ -79,7 +79,7 @@ class StreamServer(Door[Client]):
         """Wall-clock seconds after which a poll has work even if nothing else happens."""
         if self.left_over:
             return 0.0
-        return 1.0 / ARRIVALS_PER_S if self.knocking else math.inf
+        return 1.0 / ARRIVALS_PER_S if self.connections_wait else math.inf
 
     def counters(self) -> dict[str, int]:
         """Whole numbers by name: clients now, clients seen, frames in, out and dropped, malformed, refused.
@@ -92,7 +92,7 @@ class StreamServer(Door[Client]):
     def close(self) -> None:
         """End every connection, after processing the results of the last poll."""
         for client in self.peers:
-            self._tell(client)
+            self._report(client)
         super().close()
 
     def send_away(self, peer: Client, reason: str, apology: bytes = b"") -> None:

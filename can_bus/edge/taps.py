@@ -203,12 +203,12 @@ class Tap:
         self.counters, self.off = counters, off
         if frame is not None:
             self.events.append((RECEIVED, time, *frame))
-        self.tell_state(time)
+        self.report_state(time)
         if off:
             while self.waiting:
                 self._drop(time, self.waiting.popleft())
 
-    def tell_state(self, time: int) -> None:
+    def report_state(self, time: int) -> None:
         """Add the present state to the events."""
         self.events.append((STATE, time, self.state, *self.counters, 0))
 
@@ -218,7 +218,7 @@ class Tap:
         """Take part again: from listening only at once, from bus-off after its 128 recessive sequences."""
         if self.silent:
             self._unmute()
-            self.tell_state(now)
+            self.report_state(now)
         elif self.off:
             self.bus.set_mode(self.node, OPERATING, now)
 
@@ -229,7 +229,7 @@ class Tap:
         self.flush(now)
         self.silent = True
         self.bus.set_silent(self.node, True)
-        self.tell_state(now)
+        self.report_state(now)
 
     def _unmute(self) -> None:
         self.silent = False

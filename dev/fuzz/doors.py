@@ -26,7 +26,7 @@ from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.can_bus.edge.taps import TAP_LIMIT, Taps
 from ranger_sim.foundation.events import STAGE_BUS, EventQueue
-from ranger_sim.foundation.peers import Door
+from ranger_sim.foundation.peers import PeerServer
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.processes.control import ControlServer, address
 from ranger_sim.ranger.requests import Request, admitted
@@ -154,7 +154,7 @@ class Fuzz:
         self.terminal = SlcanServer("can1", self.taps)
         self.tcp = SocketcandServer(buses, 0)
         self.control = ControlServer(name, admitted, self.obey)
-        self.doors: tuple[Door[Any], ...] = (self.attach, self.terminal, self.tcp, self.control)
+        self.doors: tuple[PeerServer[Any], ...] = (self.attach, self.terminal, self.tcp, self.control)
         for door in self.doors:
             door.clock = lambda: self.now_ns * 1e-9
         ways = {
@@ -302,7 +302,7 @@ class Fuzz:
                     program.hear()
                     program.heard.clear()
 
-    def check(self, door: Door[Any], worked: int) -> None:
+    def check(self, door: PeerServer[Any], worked: int) -> None:
         """Raise Finding when an endpoint has done or holds more than the table allows."""
         limits = door.limits
         answer = 4 * 1024  # the longest single answer of any endpoint is below that
@@ -321,7 +321,7 @@ class Fuzz:
                 raise Finding(f"{door.kind}: {what} (case {self.cases})")
 
     @staticmethod
-    def most(door: Door[Any], buffer: str) -> int:
+    def most(door: PeerServer[Any], buffer: str) -> int:
         return max((len(getattr(peer, buffer)) for peer in door.peers), default=0)
 
     def talk(self) -> None:

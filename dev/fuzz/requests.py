@@ -48,7 +48,7 @@ class Body(PlantRun):
         self.orders, self.orders_ns = 0, -1
         self.answers: list[dict[str, Any]] = []
 
-    def tell(self, **content: Any) -> None:
+    def report(self, **content: Any) -> None:
         """The answer that the user gets."""
         self.answers.append(content)
 

@@ -19,7 +19,7 @@ from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.xcp.udp import LOOK_NS, MAX_CTO, MAX_DTO, WAITING, XcpUdpServer
+from ranger_sim.harness.xcp.udp import MAX_CTO, MAX_DTO, POLL_NS, WAITING, XcpUdpServer
 from ranger_sim.ranger.robot import Ranger
 
 HEADER = struct.Struct("<HH")
@@ -117,7 +117,7 @@ class Fuzz:
 
     def look(self) -> list[bytes]:
         """Advance a little time and poll; returns every packet sent back."""
-        self.now_ns += LOOK_NS
+        self.now_ns += POLL_NS
         before = self.server.totals["commands"]
         self.server.sample(self.now_ns)
         self.server.poll(self.now_ns)

@@ -51,7 +51,7 @@ SYSTEM: Final = 0x1F
 IRQ_LINE: Final = 1
 FIQ_LINE: Final = 2
 STATE: Final = 53  # numbers of Core.state_into
-LOOK_CYCLES: Final = 60_000  # between two polls of a debugger's endpoint; chosen by us: 1 ms of the robot's processors
+POLL_CYCLES: Final = 60_000  # between two polls of a debugger's endpoint; chosen by us: 1 ms of the robot's processors
 
 # C variables when compiled: Cython makes a Python object of every literal above 31 bits.
 _MASK: cython.longlong = 4294967295
@@ -67,7 +67,7 @@ MAM_TIMING = 4  # clocks of a flash access at 60 MHz: what all of the robot's bo
 
 
 class ProcessorError(FirmwareError):
-    """The program did what the processor does not define."""
+    """The program did something that the processor does not define."""
 
 
 class BusFault(ProcessorError):  # noqa: N818  (what processors call it)
@@ -80,7 +80,7 @@ class BusFault(ProcessorError):  # noqa: N818  (what processors call it)
 
 
 def memory(what, size):
-    """`size` bytes of zeros as an array of words; UserError when that is no whole number of words, 4 or more."""
+    """`size` bytes of zeros as an array of words; UserError unless that is a whole number of words, 4 or more."""
     if not isinstance(size, int) or size < 4 or size % 4:
         raise FirmwareError(f"{what} of {size!r} bytes: must be a whole number of words of 4 bytes, at least one")
     return array.array("q", [0]) * (size // 4)
@@ -95,7 +95,7 @@ def put(words, place, content) -> None:
 
 @cython.cclass
 class Device:
-    """What a program reaches beyond flash and RAM. A class of this kind is called without Python's way of calling."""
+    """The part of the address space beyond flash and RAM. Compiled, its calls are calls of C."""
 
     @cython.ccall
     def read(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
@@ -163,7 +163,7 @@ class Core:
     passing: cython.longlong
     return_pc: cython.longlong
     return_mode: cython.longlong
-    next_look: cython.longlong
+    next_poll: cython.longlong
     fault_address: cython.longlong
     r: cython.longlong[::1]
     high: cython.longlong[::1]
@@ -207,7 +207,7 @@ class Core:
         self.hit = None
         self.stepping = 0
         self.passing = self.return_pc = self.return_mode = -1
-        self.next_look = 0
+        self.next_poll = 0
         self.r = array.array("q", [0]) * 16
         self.high = array.array("q", [0]) * 10  # r8 ... r12 of the other modes, then of FIQ
         self.banked = array.array("q", [0]) * 12  # r13, r14 of: user, FIQ, IRQ, supervisor, abort, undefined
@@ -238,7 +238,7 @@ class Core:
         self.stopped = 1
 
     def set_mam(self, mode, timing) -> None:
-        """Mode 0 ... 2 and clocks per access 1 ... 7 of the flash accelerator; what it held is forgotten."""
+        """Mode 0 ... 2 and clocks per access 1 ... 7 of the flash accelerator; its contents are discarded."""
         if mode not in (0, 1, 2) or not 1 <= timing <= 7:
             raise FirmwareError(f"{self.name}: MAM mode {mode} of {timing} clocks: modes are 0 ... 2, clocks 1 ... 7")
         self.mam_mode = mode
@@ -290,13 +290,13 @@ class Core:
         return self.saved[bank] if bank else self.cpsr()
 
     def set_spsr(self, value) -> None:
-        """Write it; nothing happens in a mode that has none."""
+        """Write the saved status register; a mode that has none ignores it."""
         if self.bank(self.control & 0x1F):
             self.saved[self.bank(self.control & 0x1F)] = value & _STATUS
 
     @cython.ccall
     def set_cpsr(self, value: cython.longlong) -> cython.int:
-        """Write all of it; registers change with the mode. ProcessorError for an invalid mode."""
+        """Write the whole status register; registers change with the mode. ProcessorError for an invalid mode."""
         self.switch_mode(value & 0x1F)
         self.n = value >> 31 & 1
         self.z = value >> 30 & 1
@@ -435,7 +435,7 @@ class Core:
     def load_elsewhere(self, address: cython.longlong, size: cython.longlong) -> cython.longlong:
         """A datum of a device, or of memory that is watched."""
         if self.watches:
-            self.look_for_watch(address, size, 1)
+            self.check_watchpoints(address, size, 1)
             if self.is_memory(address):
                 self.open_memory()
                 self.cycles -= 1
@@ -475,7 +475,7 @@ class Core:
     @cython.cfunc
     def store_elsewhere(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         if self.watches:
-            self.look_for_watch(address, size, 2)
+            self.check_watchpoints(address, size, 2)
             if 0 <= address - self.ram_base < self.ram_size:
                 self.open_memory()
                 self.cycles -= 1
@@ -523,7 +523,7 @@ class Core:
     @cython.cfunc
     @cython.exceptval(check=False)
     def jump(self, address: cython.longlong) -> cython.int:
-        """Go on there, in the present state: the pipeline fills anew."""
+        """Branch to an address, in the present state: the pipeline fills anew."""
         self.following = address & (_MASK - 1 if self.control & 0x20 else _MASK - 3)
         self.cycles += 2
         if self.mam_mode == 1:
@@ -668,8 +668,8 @@ class Core:
         """As `run`."""
         try:
             while self.cycles < until and not self.stopped:
-                if self.cycles >= self.next_look:
-                    self.next_look = self.cycles + LOOK_CYCLES
+                if self.cycles >= self.next_poll:
+                    self.next_poll = self.cycles + POLL_CYCLES
                     self.debugger.poll()
                 if self.armed:
                     self.debugged()
@@ -687,7 +687,7 @@ class Core:
     def debugged(self) -> cython.int:
         """An instruction, an interrupt's entry, or a halt.
 
-        A step passes over interrupts that occur meanwhile: it ends when one of its own instructions is done.
+        A step passes over interrupts that occur during it: it ends when one of the program's own instructions is done.
         """
         if self.return_pc == self.pc and self.return_mode == self.control & 0x1F:
             self.return_pc = -1
@@ -737,7 +737,7 @@ class Core:
         return 0
 
     @cython.cfunc
-    def look_for_watch(self, address: cython.longlong, size: cython.longlong, kind: cython.longlong) -> cython.int:
+    def check_watchpoints(self, address: cython.longlong, size: cython.longlong, kind: cython.longlong) -> cython.int:
         """`hit` is the first watchpoint that this access meets: (address, its kinds)."""
         if self.hit is None:
             for start, end, kinds in self.watches:

@@ -20,7 +20,7 @@ def framed(payload: bytes) -> bytes:
 
 
 def escaped(data: bytes) -> bytes:
-    """Binary data as they stand in a payload."""
+    """Binary data as escaped in a payload."""
     out = bytearray()
     for byte in data:
         if byte in SPECIAL:
@@ -31,7 +31,7 @@ def escaped(data: bytes) -> bytes:
 
 
 def unescaped(data: bytes) -> bytes:
-    """What was escaped."""
+    """The data before escaping."""
     out = bytearray()
     parts = iter(data)
     for byte in parts:

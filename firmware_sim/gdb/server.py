@@ -1,8 +1,8 @@
 """The debugger's endpoint: a TCP port per board, one debugger at a time, under the rule of foundation/peers.py.
 
 A debugger that connects halts the board before its next instruction. While it holds a board, the process that runs the
-robot waits here, and virtual time stands still for all boards. When the debugger leaves, its points are removed and the
-run goes on.
+robot waits here, and virtual time stops for all boards. When the debugger leaves, its points are removed and the run
+goes on.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from ranger_sim.foundation.peers import (
     MALFORMED,
     MS,
     REASONS,
-    Door,
     Peer,
+    PeerServer,
     SocketStream,
     listening_address,
 )
@@ -45,14 +45,14 @@ def never() -> bool:
     return False
 
 
-def unseen(_stands: bool) -> None:
-    """Default `stands`: ignores that the process waits for a debugger."""
+def unseen(_waits: bool) -> None:
+    """Default `on_wait`: ignores that the process waits for a debugger."""
 
 
-class GdbServer(Door[_Client]):
+class GdbServer(PeerServer[_Client]):
     """A debugger's endpoint for `board`, on `host`:`port` (0: a free port; see `port`).
 
-    `ends` is asked while the board is held: True releases it. `stands` is called when the process begins and stops
+    `ends` is asked while the board is held: True releases it. `on_wait` is called when the process begins and stops
     waiting for a debugger. UserError when the port is not available, or would be open to the network without
     `allow_network`.
     """
@@ -64,7 +64,7 @@ class GdbServer(Door[_Client]):
         host: str = "127.0.0.1",
         allow_network: bool = False,
         ends: Callable[[], bool] = never,
-        stands: Callable[[bool], None] = unseen,
+        on_wait: Callable[[bool], None] = unseen,
     ) -> None:
         what = f"gdb for {board.name} on {host}:{port}"
         address = listening_address(host, what, allow_network)
@@ -80,13 +80,13 @@ class GdbServer(Door[_Client]):
         super().__init__("gdb", listener)
         self.host, self.port = listener.getsockname()
         self.ends = ends
-        self.stands = stands
+        self.on_wait = on_wait
         self.client: _Client | None = None
         self.held = False
         self.seen = 0  # debuggers so far
         self.halts = 0
-        self.looks = 0  # polls while the board ran
-        self.doors: list[GdbServer] = [self]
+        self.polls = 0  # polls while the board ran
+        self.servers: list[GdbServer] = [self]
         self.leads_to(board)
 
     # ---- for the caller that runs the board
@@ -110,18 +110,18 @@ class GdbServer(Door[_Client]):
         self.skips_idle = bool(getattr(board, "skips_idle", False))
         board.core.debugger = self
 
-    def together(self, doors: list[GdbServer]) -> None:
-        """Poll all `doors` of this process, including this one, while one board is held."""
-        self.doors = doors
+    def together(self, servers: list[GdbServer]) -> None:
+        """Poll all `servers` of this process, including this one, while one board is held."""
+        self.servers = servers
 
     def wait_for_debugger(self) -> None:
         """Wait until a debugger has connected to each endpoint and released its board, or until `ends` returns True."""
-        for door in self.doors:
-            door.begin()
-        with self._standing():
-            while not all(door.seen for door in self.doors) and not self.ends():
+        for server in self.servers:
+            server.begin()
+        with self._held_for_debugger():
+            while not all(server.seen for server in self.servers) and not self.ends():
                 self._wait()
-        self._stand()
+        self._wait_while_held()
 
     def close(self) -> None:
         """Release the board for good."""
@@ -132,19 +132,19 @@ class GdbServer(Door[_Client]):
 
     def poll(self) -> None:
         """Check for a debugger that connects or wants to halt the board. Once per millisecond of the board
-        (Core.LOOK_CYCLES)."""
-        self.looks += 1
-        self._attend(self.looks * MS)
-        self._stand()
+        (Core.POLL_CYCLES)."""
+        self.polls += 1
+        self._attend(self.polls * MS)
+        self._wait_while_held()
 
     def halted(self, error: UserError | None) -> None:
         """Halt at a point or after a step, or (`error`) because the program did something illegal."""
         if self.client is None:
             return
         if error is not None:
-            self._say(f"{error}\n")
+            self._print(f"{error}\n")
         self._halt(SIGNAL_TRAP if error is None else SIGNAL_BAD_ACCESS)
-        self._stand()
+        self._wait_while_held()
 
     def _halt(self, signal: int) -> None:
         """Give control of the board to the debugger."""
@@ -154,45 +154,45 @@ class GdbServer(Door[_Client]):
         if self.client is not None:
             self._reply(self.client, reply)
 
-    def _stand(self) -> None:
+    def _wait_while_held(self) -> None:
         """Wait until no board of this process is held."""
-        if not any(door.held for door in self.doors):
+        if not any(server.held for server in self.servers):
             return
-        with self._standing():
-            while any(door.held for door in self.doors):
+        with self._held_for_debugger():
+            while any(server.held for server in self.servers):
                 if self.ends():
-                    for door in self.doors:
-                        door._let_go()
+                    for server in self.servers:
+                        server._let_go()
                     return
                 self._wait()
 
     @contextmanager
-    def _standing(self) -> Iterator[None]:
+    def _held_for_debugger(self) -> Iterator[None]:
         """Context in which the process waits for a debugger."""
-        self.stands(True)
+        self.on_wait(True)
         try:
             yield
         finally:
-            self.stands(False)
+            self.on_wait(False)
 
     # ---- polling the endpoint
 
     def _attend(self, now_ns: int = 0) -> None:
         """Carry out received requests, as far as buffers allow, and send answers; 0: the board is halted."""
-        self.look(now_ns)
+        self.receive(now_ns)
         self.write()
 
     def _wait(self) -> None:
         """Wait until an endpoint has work, at most WAIT_S, and do it."""
         to_read, to_write = [], []
-        for door in self.doors:
-            door.write()
-            to_read += door.filenos()
-            to_write += door.filenos_to_write()
-        if not any(door.left_over for door in self.doors):
+        for server in self.servers:
+            server.write()
+            to_read += server.filenos()
+            to_write += server.filenos_to_write()
+        if not any(server.left_over for server in self.servers):
             descriptors.wait(to_read, to_write, WAIT_S)
-        for door in self.doors:
-            door._attend()
+        for server in self.servers:
+            server._attend()
 
     def _welcome(self, connection: socket.socket) -> _Client:
         return _Client(connection)
@@ -209,7 +209,7 @@ class GdbServer(Door[_Client]):
     def _takes_part(self, peer: _Client) -> bool:
         return True
 
-    def _apology(self, reason: str) -> bytes:
+    def _last_bytes(self, reason: str) -> bytes:
         return packets.framed(b"E.this debugger " + REASONS[reason].encode())
 
     def _closed(self, peer: _Client) -> None:
@@ -273,7 +273,7 @@ class GdbServer(Door[_Client]):
             return
         reply = self.stub.answer(payload)
         if self.stub.console:
-            self._say(self.stub.console)
+            self._print(self.stub.console)
             self.stub.console = ""
         if reply is not None:
             self._reply(peer, reply)
@@ -290,7 +290,7 @@ class GdbServer(Door[_Client]):
         peer.latest = packets.framed(payload)
         peer.answer(peer.latest)
 
-    def _say(self, text: str) -> None:
+    def _print(self, text: str) -> None:
         """Print lines on the debugger's console; the protocol allows this before a stop reply and before the answer of
         `monitor`."""
         if self.client is not None:

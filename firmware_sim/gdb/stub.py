@@ -1,7 +1,7 @@
 """The requests of a debugger and their answers; no sockets, no waiting.
 
 Source: Debugging with GDB (gdb 13), appendix E (Packets, Stop Reply Packets, General Query Packets, Memory Map Format).
-What a request asks that is not here is answered by an empty packet, as the protocol wants it.
+A request that is not implemented here is answered by an empty packet, as the protocol requires.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ class BadRequestError(Exception):
 
 
 def number(text: bytes) -> int:
-    """A hexadecimal number. BadRequestError: it is none."""
+    """A hexadecimal number. BadRequestError: the text is not one."""
     if not text or not all(byte in b"0123456789abcdefABCDEF" for byte in text) or len(text) > 16:
         raise BadRequestError
     return int(text, 16)
 
 
 def numbers(text: bytes, count: int) -> list[int]:
-    """So many, with commas between."""
+    """A fixed number of hexadecimal numbers, with commas between."""
     parts = text.split(b",")
     if len(parts) != count:
         raise BadRequestError
@@ -60,8 +60,8 @@ def crc(data: bytes) -> int:
 
 
 class Stub:
-    """Carries requests out on `target`. After `answer`: `resumes` says that the processor goes on, `leaves` that the
-    debugger goes away."""
+    """Executes requests on `target`. After `answer`, `resumes` means that the processor goes on, `leaves` that the
+    debugger disconnects."""
 
     def __init__(self, target: Target) -> None:
         self.target = target
@@ -293,10 +293,10 @@ class Stub:
         return answer.encode().hex().encode()
 
     def _monitored(self, words: list[str]) -> str | None:
-        """What a command of `monitor` answers; None for an unknown one."""
+        """The answer of a command of `monitor`; None for an unknown one."""
         target = self.target
         if words == ["time"]:
-            return target.told_time() + "\n"
+            return target.time_text() + "\n"
         if words in (["reset"], ["reset", "halt"], ["reset", "init"]):
             target.core.reset()
             return f"{target.board.name}: reset, halted at {target.core.pc:#010x}\n{STALE}"

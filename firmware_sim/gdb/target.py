@@ -223,7 +223,7 @@ class Target:
     # ---- halting
 
     def set_point(self, kind: str, address: int, length: int) -> None:
-        """A breakpoint ("0" software, "1" hardware: the same here, memory stays as it is) or a watchpoint
+        """A breakpoint ("0" software, "1" hardware: the same here, memory is not changed) or a watchpoint
         ("2" on writes, "3" on reads, "4" on both)."""
         if kind in self.points:
             self.points[kind].add(address)
@@ -257,7 +257,7 @@ class Target:
             watches += [(address, address + length, kinds) for address, length in sorted(self.watches[kind])]
         self.core.set_points(self.points["0"] | self.points["1"], watches)
 
-    def told_time(self) -> str:
+    def time_text(self) -> str:
         """The board's time, in a line."""
         core = self.core
         time_of = getattr(self.board, "time_of", None)

@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
 # (the place of a block is worked out from the address's bits, below the size of the table)
-"""Where the processor's loads and stores go that are neither flash nor RAM: the blocks, by address.
+"""The targets of the processor's loads and stores that are neither flash nor RAM: the blocks, by address.
 
 An access acts at the time at which its instruction begins: later events in the chip come after it.
 """
@@ -56,7 +56,7 @@ class AddressedBoard(Microcontroller):
 class AddressMap(Device):
     """Blocks of the peripheral bus (0xE...), the fast GPIO and the VIC.
 
-    `touched` counts accesses that may do something or give another value another time, `looks` the others.
+    `touched` counts accesses that may do something or give another value another time, `reads` the others.
     """
 
     board: AddressedBoard
@@ -66,7 +66,7 @@ class AddressMap(Device):
     fast_gpio: Block
     vic: Block
     touched: cython.longlong
-    looks: cython.longlong
+    reads: cython.longlong
 
     def __init__(self, board: AddressedBoard, core: Core, image) -> None:
         self.board = board
@@ -76,7 +76,7 @@ class AddressMap(Device):
         self.fast_gpio = None
         self.vic = None
         self.touched = 0
-        self.looks = 0
+        self.reads = 0
 
     def add(self, block) -> None:
         """Put a block at its address."""
@@ -118,7 +118,7 @@ class AddressMap(Device):
         except NotModelledError as error:
             self.fail(address, size, False, 0, str(error))
         if block.steady:
-            self.looks += 1
+            self.reads += 1
         else:
             self.touched += 1
             self.board.work()
@@ -165,7 +165,7 @@ class AddressMap(Device):
         return 0
 
     def fail(self, address, size, writing, value, why) -> None:
-        """End the run: the access, where the program is, and why it cannot be."""
+        """End the run with an error: the access, the program's place, and the reason."""
         block = self.find(address)
         name = ""
         if block is not None:

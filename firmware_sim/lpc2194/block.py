@@ -1,4 +1,4 @@
-"""What all blocks of registers share, and the clocks that they run on."""
+"""The base of all blocks of registers, and the clocks that they run on."""
 
 import cython
 
@@ -6,7 +6,7 @@ from ranger_sim.firmware_sim.peripheral import Peripheral
 
 
 class NotModelledError(Exception):
-    """The program asks a register for what no device here does; the text says what."""
+    """The program asks a register for something that no device here does; the text names it."""
 
 
 @cython.final
@@ -33,9 +33,9 @@ class Clocks:
 class Block(Peripheral):
     """Registers from `base` on, the front of one device of firmware_sim/peripherals.
 
-    `read` and `write` take the offset of a register, a multiple of 4; what they do not know ends in `unknown`. `steady`
-    is set by a read that does nothing and gives the same until a write or an event of the chip: a loop that does
-    nothing else can be skipped. `mask`: the inputs of the VIC that it drives, `requests` their levels.
+    `read` and `write` take the offset of a register, a multiple of 4; unknown offsets go to `unknown`. `steady` is set
+    by a read that does nothing and gives the same until a write or an event of the chip: a loop that does nothing else
+    can be skipped. `mask`: the inputs of the VIC that it drives, `requests` their levels.
     """
 
     clocks: Clocks
@@ -83,13 +83,13 @@ class Block(Peripheral):
 
     @cython.ccall
     def clocked(self) -> object:
-        """The peripherals' clock is another one from now on."""
+        """The peripherals' clock has changed."""
 
     @cython.cfunc
     def unknown(self, offset: cython.longlong, writing: cython.bint) -> cython.longlong:
-        """An access that `read` and `write` do not know: to no register, or one that the chip has the other way only.
+        """Handle an access that `read` and `write` do not know: to no register, or in the wrong direction.
 
-        What can only be written reads 0; a write to what can only be read does nothing.
+        A write-only register reads 0; a write to a read-only one does nothing.
         """
         if offset not in self.REGISTERS:
             raise NotModelledError("no register is modelled there")
@@ -97,5 +97,5 @@ class Block(Peripheral):
 
     @cython.ccall
     def not_modelled(self, what) -> object:
-        """The register is known, what is asked of it is not."""
+        """End the run: the register is known, the request to it is not modelled."""
         raise NotModelledError(f"{what} is not modelled")

@@ -83,7 +83,7 @@ class ImageBoard(AddressedBoard):
     skips_idle: cython.bint
     asleep: cython.bint
     idle: cython.bint
-    pass_looks: cython.bint
+    pass_reads: cython.bint
     base_cycles: cython.longlong
     base_ns: cython.longlong
     running_to: cython.longlong
@@ -115,7 +115,7 @@ class ImageBoard(AddressedBoard):
         hardware = hardware if hardware is not None else BoardHardware()
         Microcontroller.__init__(self, name, hardware.hz, crystal)
         self.image = image
-        self.now = self.instant = phase_ns
+        self.now = self.input_time = phase_ns
         self.clocks = Clocks(self.crystal.nominal_hz)
         self.core = Core(name=name)
         self._build(hardware)
@@ -137,7 +137,7 @@ class ImageBoard(AddressedBoard):
         self.idle = False
         self.pass_cycles = 0
         self.pass_instructions = 0
-        self.pass_looks = False
+        self.pass_reads = False
         self.idle_cycles = 0
         self.idle_instructions = 0
         self.kept_registers = array.array("q", [0]) * STATE
@@ -316,7 +316,7 @@ class ImageBoard(AddressedBoard):
             own = NEVER
             stop = first if first < self.horizon else self.horizon
             if self.idle and core.debugger is not None:  # a debugger must also find a program that waits for ever
-                own = self.time_of(core.next_look)
+                own = self.time_of(core.next_poll)
                 if own < stop:
                     self._catch_up(own)
             if not self.idle and not self.asleep:
@@ -361,7 +361,7 @@ class ImageBoard(AddressedBoard):
     @cython.cfunc
     @cython.exceptval(check=False)
     def _may_wait(self) -> cython.bint:
-        """It is worth asking whether the program waits: where it waited before always, elsewhere now and then."""
+        """Whether to check if the program waits: always where it waited before, elsewhere now and then."""
         if self.waits[self._flash_place(self.core.pc)]:
             return True
         self.doubts += 1
@@ -376,7 +376,7 @@ class ImageBoard(AddressedBoard):
         cycles: cython.longlong = core.cycles
         instructions: cython.longlong = core.instructions
         touched: cython.longlong = self.map.touched
-        looks: cython.longlong = self.map.looks
+        reads: cython.longlong = self.map.reads
         left: cython.longlong = LONGEST_PASS
         self._keep()
         core.stopped = 0
@@ -389,7 +389,7 @@ class ImageBoard(AddressedBoard):
                 self.idle = True
                 self.pass_cycles = core.cycles - cycles
                 self.pass_instructions = core.instructions - instructions
-                self.pass_looks = self.map.looks != looks
+                self.pass_reads = self.map.reads != reads
                 # not beyond `target`: the pass under way sees what arrives then
                 if not self.waits[self._flash_place(pc)] and core.cycles + self.pass_cycles <= target:
                     self._learn(self.pass_instructions)
@@ -427,7 +427,7 @@ class ImageBoard(AddressedBoard):
     @cython.cfunc
     @cython.exceptval(check=False)
     def _is_as_kept(self) -> cython.bint:
-        """Registers and RAM are as they were kept."""
+        """True when registers and RAM are as they were kept."""
         core: Core = self.core
         ram: cython.longlong[::1] = core.ram
         part: cython.longlong
@@ -488,9 +488,9 @@ class ImageBoard(AddressedBoard):
         line: EdgeLine
         block: Block
         level: cython.longlong
-        if self.idle and self.pass_looks:
+        if self.idle and self.pass_reads:
             self._catch_up(time)  # the loop reads devices: they are as they were until now
-        self.instant = self.now = time
+        self.input_time = self.now = time
         if self.edge_time == time:
             line = self.first_line if self.first_line.next_time == time else self.second_line
             level = line.levels >> 1
@@ -537,7 +537,7 @@ class ImageBoard(AddressedBoard):
 
     # --- what the caller that passes time asks ---------------------------------------------------------------
 
-    def speaks_from(self) -> cython.longlong:
+    def earliest_transmit_ns(self) -> cython.longlong:
         """Earliest time (ns) at which the board can send on a bus, unless input arrives."""
         return self.next_time
 
@@ -596,7 +596,7 @@ class ImageBoard(AddressedBoard):
         return ProcessorCounters(core.instructions, core.cycles, self.idle_instructions, self.idle_cycles)
 
     def can_counters(self) -> list:
-        """Of each controller that the program has taken out of reset mode."""
+        """Counters of each controller that the program has taken out of reset mode."""
         return [
             CanCounters(
                 block.number,

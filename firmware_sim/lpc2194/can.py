@@ -87,7 +87,7 @@ class CanFilterBlock(Block):
         if 0 < offset < 0x18:
             return self.table[offset >> 2]
         if offset == 0x18 or offset == 0x1C:
-            return 0  # a table that is not looked at has no errors
+            return 0  # a table that is not used has no errors
         return self.unknown(offset, False)
 
     def write(self, offset: cython.longlong, value: cython.longlong) -> cython.int:
@@ -148,7 +148,7 @@ class CanBlock(Block):
         bypass: cython.longlong
         buffer: cython.longlong
         if offset == 0x1C or offset == 0x08:
-            # the ends of transmissions are known beforehand: the word stands when none is to come
+            # the ends of transmissions are known beforehand: the word is final when no end is to come
             self.steady = can.ends.times[1] >= NEVER and can.ends.times[2] >= NEVER and can.ends.times[3] >= NEVER
             return can.SR() if offset == 0x1C else can.GSR()
         if offset == 0x0C:
@@ -205,7 +205,7 @@ class CanBlock(Block):
             can.write_MOD(value)
         elif offset == 0x10:
             can.write_IER(value & 0x7FF)
-            self.tell_ends()
+            self.report_ends()
         elif offset == 0x14:
             can.BTR = value & 0xFFFFFF
         elif offset == 0x18:
@@ -223,8 +223,8 @@ class CanBlock(Block):
         return 0
 
     @cython.ccall
-    def tell_ends(self) -> object:
-        """Ends of transmissions are events when the program wants an interrupt of them."""
+    def report_ends(self) -> object:
+        """Make ends of transmissions events when the program enables their interrupt."""
         can: CanController = self.can
         wanted: cython.longlong = can.IER & TX_BITS and 1
         if can.tx_source.bit != wanted:

@@ -59,8 +59,8 @@ class ConverterBlock(Block):
         self.burst_read = [0] * 8  # by channel, the number of the conversion that was read last, from 1
 
     @cython.cfunc
-    def look(self) -> cython.void:
-        """A conversion may have ended."""
+    def take_result(self) -> cython.void:
+        """Take the result of a conversion that has ended."""
         adc: AdcInternal = self.adc
         if not self.seen and not adc.busy:
             self.seen = True
@@ -68,7 +68,7 @@ class ConverterBlock(Block):
             self.done |= 1 << adc.channel
 
     def requests(self) -> cython.longlong:
-        self.look()
+        self.take_result()
         if self.control & CR_BURST:
             return 0
         if self.inten & GLOBAL_INTERRUPT:
@@ -80,7 +80,7 @@ class ConverterBlock(Block):
 
     @cython.ccall
     def _set_clock(self) -> object:
-        """By ADCR's divider and the peripherals' clock."""
+        """Set the conversion's clock from ADCR's divider and the peripherals' clock."""
         adc: AdcInternal = self.adc
         adc.clkdiv = (self.control >> 8 & 0xFF) + 1
         adc.hz = self.clocks.pclk

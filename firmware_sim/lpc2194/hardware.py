@@ -1,4 +1,4 @@
-"""What hangs on the pins of a board that runs an image: given by who builds the board, not by its program."""
+"""The devices at the pins of a board that runs an image: given by the builder of the board, not by its program."""
 
 import dataclasses
 
@@ -7,7 +7,7 @@ from ranger_sim.firmware_sim.native.hardware import Hardware
 
 @dataclasses.dataclass(frozen=True)
 class BoardHardware(Hardware):
-    """As for firmware in C, and what such a program is not asked about.
+    """As for firmware in C, with the values that such a program does not supply.
 
     pulled_up: pins that read 1 while undriven. slot_timer: 0 or 1, the timer whose match begins a slot.
     segment_interval_ns: not 0 where the SSP is the master of a link of segments (then there is no external converter):

@@ -32,7 +32,7 @@ HEX_FIXED = {HEX_END: 0, HEX_SEGMENT: 2, HEX_SEGMENT_START: 4, HEX_LINEAR: 2, HE
 
 @dataclasses.dataclass(frozen=True)
 class Symbol:
-    """A name of the program: address, size in bytes (0: not told)."""
+    """A name of the program: address, size in bytes (0: unknown)."""
 
     address: int
     size: int
@@ -41,7 +41,7 @@ class Symbol:
 
 @dataclasses.dataclass(frozen=True)
 class Image:
-    """A program as it stands in memory before reset. `segments`: (address, bytes), sorted, none over another.
+    """A program as it is in memory before reset. `segments`: (address, bytes), sorted, none over another.
 
     `symbols`, sorted by address, are empty where the file has none (HEX).
     """
@@ -70,7 +70,7 @@ class Image:
 
 
 def read(path: str | os.PathLike) -> Image:
-    """The image in a file. UserError, one line, for what is none that this chip could run."""
+    """The image in a file. UserError, one line, for a file that is not an image for this chip."""
     path = pathlib.Path(path)
     try:
         content = path.read_bytes()
@@ -96,7 +96,7 @@ def read(path: str | os.PathLike) -> Image:
 
 
 def _other_kind(path: pathlib.Path, content: bytes) -> str:
-    """What a file is that is neither ELF nor HEX, and what makes it one of them."""
+    """Description of a file that is neither ELF nor HEX, and how to convert it."""
     target = path.with_suffix(".hex").name
     if re.match(rb"\s*S[0-9][0-9A-Fa-f]{2}", content):
         return f"Motorola S-records, not ELF or Intel HEX: arm-none-eabi-objcopy -I srec -O ihex {path.name} {target}"
@@ -168,7 +168,7 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
 
 
 def _newer_architecture(elf: Any) -> str:
-    """What the build attributes of an ELFFile ask for beyond ARMv4T; empty when that is enough, or nothing is said."""
+    """The requirements of an ELFFile's build attributes beyond ARMv4T; empty for none, or without attributes."""
     from elftools.elf.sections import ARMAttributesSection  # only here: a walk without images does without
 
     found: dict[str, Any] = {}
@@ -185,7 +185,7 @@ def _newer_architecture(elf: Any) -> str:
     if name == "ARMv7":
         name += PROFILES.get(chr(profile), "")
     processor = found.get("TAG_CPU_NAME", "")
-    # gas gives the architecture's name again where the processor is not said: "7-M" of ARMv7-M
+    # gas repeats the architecture's name where no processor is given: "7-M" of ARMv7-M
     return f"{name} ({processor})" if processor and not name.endswith(processor) else name
 
 
@@ -207,7 +207,7 @@ def _symbols(elf: Any) -> tuple[Symbol, ...]:
 
 
 def _from_hex(path: pathlib.Path, content: bytes) -> Image:
-    """Intel HEX: data records, with the upper half of their addresses in records of their own."""
+    """Intel HEX: data records, with the upper half of their addresses in separate records."""
     pieces: list[tuple[int, bytes]] = []
     upper = 0
     ended = False

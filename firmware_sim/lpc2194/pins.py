@@ -3,7 +3,7 @@
 """Pins: fast and old GPIO registers, PINSEL, and where an edge at a pin goes, to a timer's capture or an EINT.
 
 LPC2194 user manual, GPIO and pin connect block. Both sets of GPIO registers reach the same pins, whatever SCS says.
-Functions that a pin can have beside GPIO are looked at for edges alone: a UART's or the PWM's pin needs no PINSEL here.
+Of a pin's functions other than GPIO only those for edges are checked: a UART's or the PWM's pin needs no PINSEL here.
 """
 
 from typing import TYPE_CHECKING, Final
@@ -66,7 +66,7 @@ class PinSelectBlock(Block):
 
     @cython.ccall
     def connect(self) -> object:
-        """PINSEL was written: which pins lead where."""
+        """Route the pins after a write of PINSEL."""
         for pin in range(32):
             function = self.words[pin >> 4] >> 2 * (pin & 15) & 3
             timer, channel = CAPTURES.get((pin, function), (0, -1))
@@ -74,7 +74,7 @@ class PinSelectBlock(Block):
             self.interrupt[pin] = EXTERNAL_INTERRUPTS.get((pin, function), -1)
 
     def on_pin(self, pin: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """An edge at a pin, whose level has been taken in."""
+        """Handle an edge at a pin, whose level has been taken in."""
         to: cython.longlong = self.capture[pin]
         timer: ProgrammedTimer
         if to >= 0:
@@ -122,7 +122,7 @@ class Ports(Gpio):
 
     @cython.cfunc
     def drive(self, port: cython.longlong, bits: cython.longlong) -> cython.int:
-        """Those of `bits` that are outputs show their latches."""
+        """Drive the outputs among `bits` with their latches."""
         bit: cython.longlong = 0
         bits &= self.direction[port]
         while bits:
@@ -134,7 +134,7 @@ class Ports(Gpio):
 
     @cython.cfunc
     def put(self, port: cython.longlong, bits: cython.longlong, levels: cython.longlong) -> cython.int:
-        """Latches of `bits` get these levels."""
+        """Set the latches of `bits` to these levels."""
         self.latch[port] = self.latch[port] & ~bits | levels & bits
         return self.drive(port, bits)
 

@@ -54,17 +54,17 @@ class PwmBlock(Block):
 
     def clocked(self) -> None:
         self.begun = False
-        self._look()
+        self._start_or_stop()
 
     @cython.ccall
-    def _look(self) -> object:
-        """Periods begin now, or stop, as the registers are."""
+    def _start_or_stop(self) -> object:
+        """Begin or stop the periods, as the registers require."""
         pwm: Pwm = self.pwm
         runs: cython.bint = self.TCR & 0xB == TCR_COUNTS | TCR_PWM and self.MCR & MCR_RESET_MR0 and pwm.MR0 > 0
-        was: cython.bint = self.begun
+        counted: cython.bint = self.begun
         self.begun = runs
         self._drive()
-        if was or not runs:
+        if counted or not runs:
             return
         pwm.hz = self.clocks.pclk
         pwm.phase_ns = self.chip.now
@@ -75,9 +75,9 @@ class PwmBlock(Block):
 
     @cython.ccall
     def _drive(self) -> object:
-        """The pins of channels that PWMPCR enables show pulses while periods pass."""
+        """Drive pulses at the pins of the channels that PWMPCR enables, while periods pass."""
         self.pwm.driven = self.PCR >> 8 & 0x7E if self.begun else 0
-        self.pwm.tell()
+        self.pwm.notify_follower()
 
     @cython.cfunc
     @cython.exceptval(check=False)
@@ -134,7 +134,7 @@ class PwmBlock(Block):
         elif number == 0:
             pwm.MR0 = value
             if not self.begun:
-                self._look()
+                self._start_or_stop()
         elif number == 1:
             pwm.MR1 = value
         elif number == 3:
@@ -148,15 +148,15 @@ class PwmBlock(Block):
                 if value & 1 and pwm.MR0 <= 0:
                     self.not_modelled("PWM with a period of 0 counts (PWMMR0)")
                 pwm.latch(value & 0x7F)
-                pwm.LER = 0  # the values stand from the next period on, which no program waits for
+                pwm.LER = 0  # the values hold from the next period on, which no program waits for
         elif offset == 0x04:
             self.TCR = value & 0xB
-            self._look()
+            self._start_or_stop()
         elif offset == 0x14:
             if value & ~MCR_RESET_MR0:
                 self.not_modelled("PWM interrupts, and matches that stop it (PWMMCR)")
             self.MCR = value
-            self._look()
+            self._start_or_stop()
         elif offset == 0x4C:
             if value & 0x7E:
                 self.not_modelled("PWM with double edges (PWMPCR)")

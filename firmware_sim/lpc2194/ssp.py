@@ -92,7 +92,7 @@ class SegmentLink(SspDevice):
     earliest: cython.longlong
     words: list
     coming: list
-    came: list
+    words_in: list
     going: SspSegment
     alarm: "Alarm"
 
@@ -105,22 +105,22 @@ class SegmentLink(SspDevice):
         self.sent = 0  # words of the present segment
         self.words = [0] * 31
         self.coming = [0] * 30 + [1]  # an empty segment: zeros, and its checksum
-        self.came = None  # half-words of the last received segment, until the program starts to read them
+        self.words_in = None  # half-words of the last received segment, until the program starts to read them
         chip.claim(SSP_SEGMENT, 0, self)
 
     def on_message(self, queue) -> InterruptSource | None:
         """Receive the other end's segment. It is copied at once, because the other end may fill it anew."""
-        self.came = queue.ref.words
+        self.words_in = queue.ref.words
         return None
 
     def begin(self, time: cython.longlong) -> cython.int:
         if self.sent == 0:
-            self.coming = self.came if self.came is not None else [0] * 30 + [1]
-            self.came = None
+            self.coming = self.words_in if self.words_in is not None else [0] * 30 + [1]
+            self.words_in = None
         return 0
 
     def exchange(self, word: cython.longlong, time: cython.longlong) -> cython.longlong:
-        came: cython.longlong = self.coming[self.sent]
+        word_in: cython.longlong = self.coming[self.sent]
         self.words[self.sent] = word & 0xFFFF
         self.sent += 1
         if self.sent == SEGMENT_WORDS:
@@ -133,7 +133,7 @@ class SegmentLink(SspDevice):
                 self.alarm.set(self.earliest)
             else:
                 self._start(time)
-        return came
+        return word_in
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """Start the segment that waits."""
@@ -167,9 +167,9 @@ class SspBlock(Block):
     IMSC: cython.longlong
     flags: cython.longlong
     going: cython.longlong[8]
-    came: cython.longlong[8]
+    words_in: cython.longlong[8]
     going_count: cython.longlong
-    came_count: cython.longlong
+    words_in_count: cython.longlong
     word: cython.longlong
     word_ns: cython.longlong
     bit_ns: cython.longlong
@@ -201,8 +201,8 @@ class SspBlock(Block):
         self.flags = 0  # ROR and RT
         self.going = [0] * 8
         self.going_count = 0
-        self.came = [0] * 8
-        self.came_count = 0
+        self.words_in = [0] * 8
+        self.words_in_count = 0
         self.busy = False
         self.word = 0
         self.word_ns = 0
@@ -216,7 +216,7 @@ class SspBlock(Block):
     def raw(self) -> cython.longlong:
         """SSPRIS."""
         value: cython.longlong = self.flags
-        if self.came_count >= DEPTH // 2:
+        if self.words_in_count >= DEPTH // 2:
             value |= RX
         if self.going_count <= DEPTH // 2:
             value |= TX
@@ -253,20 +253,20 @@ class SspBlock(Block):
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
         """End a word, or signal that received words were not read in time."""
-        came: cython.longlong
+        word_in: cython.longlong
         if alarm == SILENCE_ALARM:
-            if self.came_count > 0:
+            if self.words_in_count > 0:
                 self.flags |= RT
             return None
         self.words += 1
-        came = cython.cast(SspDevice, self.device).exchange(self.word, time)
+        word_in = cython.cast(SspDevice, self.device).exchange(self.word, time)
         if self.CR1 & CR1_LOOPBACK:
-            came = self.word
-        if self.came_count == DEPTH:
+            word_in = self.word
+        if self.words_in_count == DEPTH:
             self.flags |= ROR
         else:
-            self.came[self.came_count] = came
-            self.came_count += 1
+            self.words_in[self.words_in_count] = word_in
+            self.words_in_count += 1
         self.silence_alarm.set(time + SILENT_BITS * self.bit_ns)
         self.busy = False
         if self.going_count > 0:
@@ -277,12 +277,12 @@ class SspBlock(Block):
         value: cython.longlong
         i: cython.longlong
         if offset == 0x08:
-            value = self.came[0]
-            if self.came_count > 0:
-                self.came_count -= 1
-                for i in range(self.came_count):
-                    self.came[i] = self.came[i + 1]
-                if self.came_count:
+            value = self.words_in[0]
+            if self.words_in_count > 0:
+                self.words_in_count -= 1
+                for i in range(self.words_in_count):
+                    self.words_in[i] = self.words_in[i + 1]
+                if self.words_in_count:
                     self.silence_alarm.set(self.chip.now + SILENT_BITS * self.bit_ns)
                 else:
                     self.silence_alarm.set(NEVER)
@@ -295,9 +295,9 @@ class SspBlock(Block):
                 value |= SR_TFE
             if self.going_count < DEPTH:
                 value |= SR_TNF
-            if self.came_count > 0:
+            if self.words_in_count > 0:
                 value |= SR_RNE
-            if self.came_count == DEPTH:
+            if self.words_in_count == DEPTH:
                 value |= SR_RFF
             return value
         if offset == 0x00:

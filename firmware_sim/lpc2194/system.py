@@ -25,7 +25,7 @@ MAM_SLOWEST = 7
 @cython.final
 @cython.cclass
 class SystemBlock(Block):
-    """`EXTINT`: flags of the four external interrupts. `converter`: whose BUSY hangs on one of them, or None."""
+    """`EXTINT`: flags of the four external interrupts. `converter`: the one whose BUSY drives one of them, or None."""
 
     converter: Ads7871
     EXTINT: cython.longlong
@@ -76,7 +76,7 @@ class SystemBlock(Block):
     # --- external interrupts ------------------------------------------------------------------------------
 
     def on_pin(self, number: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """The pin of external interrupt `number` has this level now."""
+        """Take the present level of the pin of external interrupt `number`."""
         flag: cython.longlong = 1
         flag <<= number
         rising: cython.longlong = self.EXTPOLAR >> number & 1

@@ -63,12 +63,12 @@ class ProgrammedTimer(TimerCapture):
         self.planned = NEVER
         self.matches = 0  # that asked for an interrupt
         self.match_time = 0  # the latest of them
-        self.stand(0)
+        self.hold_at(0)
 
     # --- what the program does ----------------------------------------------------------------------------
 
     @cython.ccall
-    def stand(self, count) -> object:
+    def hold_at(self, count) -> object:
         """Hold the count at `count` from now on."""
         self.held = count
         self.counts_per_ns = 0.0
@@ -101,7 +101,7 @@ class ProgrammedTimer(TimerCapture):
         """Count from `count` on, the present count, with the registers as they are."""
         now = self.chip.now
         if not self.running():
-            self.stand(0 if self.TCR & TCR_RESET else count)
+            self.hold_at(0 if self.TCR & TCR_RESET else count)
             return
         pclk = self.clocks.pclk
         crystal = self.chip.crystal
@@ -111,7 +111,7 @@ class ProgrammedTimer(TimerCapture):
         self.passed = count
         resets = [self.match[n] for n in range(4) if self.MCR >> MCR_BITS * n & MCR_RESET]
         ahead = [match for match in resets if match >= count]
-        # behind all of them it first goes round through all 32 bits
+        # a count above all of them first wraps through all 32 bits
         self.MR0 = min(ahead) if ahead else FULL_COUNT - 1
         self._lay_out(self.wrap_time)
 
@@ -127,8 +127,8 @@ class ProgrammedTimer(TimerCapture):
         self.next_wrap_time = train.next()
         self._plan()
 
-    def look(self) -> None:
-        """Registers have changed: go on with the count as it is."""
+    def continue_count(self) -> None:
+        """Continue from the present count after a change of the registers."""
         self.go_on_from(self.count())
 
     def retune(self, now, before) -> None:
@@ -251,7 +251,7 @@ class ProgrammedTimer(TimerCapture):
     def _stop_at(self, count) -> object:
         """A match stops the timer: TCR's enable bit falls, the count stops."""
         self.TCR &= ~TCR_ENABLE
-        self.stand(max(count, 0))
+        self.hold_at(max(count, 0))
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
         """An edge at a capture pin; the flag comes only where the program wants the interrupt."""
@@ -305,7 +305,7 @@ class TimerBlock(Block):
         return self.mask if self.timer.IR else 0
 
     def clocked(self) -> None:
-        self.timer.look()
+        self.timer.continue_count()
 
     def read(self, offset: cython.longlong) -> cython.longlong:
         timer: ProgrammedTimer = self.timer
@@ -348,17 +348,17 @@ class TimerBlock(Block):
             if timer.running():
                 timer.go_on_from(value)
             else:
-                timer.stand(value)
+                timer.hold_at(value)
         elif offset == 0x0C:
             count = timer.count()
             timer.PR = value
             timer.go_on_from(count)
         elif offset == 0x14:
             timer.MCR = value & 0xFFF
-            timer.look()
+            timer.continue_count()
         elif 0x18 <= offset <= 0x24:
             timer.match[(offset - 0x18) >> 2] = value
-            timer.look()
+            timer.continue_count()
         elif offset == 0x3C:
             if value & 0xFF0:
                 self.not_modelled("a match output at a pin (EMR)")

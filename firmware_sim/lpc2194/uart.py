@@ -75,7 +75,7 @@ class UartBlock(Block):
         self.uart.set_divisor(self.divisor or 1, self.FDR & 15, self.FDR >> 4 & 15 or 1)
 
     @cython.cfunc
-    def look(self) -> cython.void:
+    def take_alarms(self) -> cython.void:
         """Take over what the UART's alarms have set."""
         if self.uart.IIR == IIR_TRANSMIT:
             self.uart.IIR = IIR_NONE
@@ -86,7 +86,7 @@ class UartBlock(Block):
     def identity(self) -> cython.longlong:
         """UnIIR's low four bits: the first reason for an interrupt."""
         uart: Uart = self.uart
-        self.look()
+        self.take_alarms()
         if self.IER & IER_STATUS and uart.errors:
             return IIR_STATUS
         if self.IER & IER_RECEIVE:

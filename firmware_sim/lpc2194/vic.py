@@ -87,7 +87,7 @@ class VicBlock(Block):
     @cython.cfunc
     @cython.exceptval(check=False)
     def settle(self) -> cython.longlong:
-        """What the processor sees, by the levels as they are now."""
+        """Set the processor's inputs from the present levels."""
         active: cython.longlong = (self.raw | self.soft) & self.enabled
         irq: cython.longlong = active & ~self.selected
         self.lines = FIQ_LINE if active & self.selected else 0

@@ -127,7 +127,7 @@ def _compile(
     manifest: Manifest,
 ) -> tuple[str, ...]:
     """Compile and link in the folder `making`; returns the warnings. The runtime itself is not instrumented."""
-    said: list[str] = []
+    output: list[str] = []
     objects = [str(making / "runtime.o")]
     counting = ["-DFW_COVERAGE"] if "--coverage" in watching else []
     code, text = run_compiler([program, *OPTIONS, *counting, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
@@ -139,17 +139,17 @@ def _compile(
         code, text = run_compiler([program, *options, "-c", str(source), "-o", str(place)])
         objects.append(str(place))
         failed |= code != 0
-        said += text
+        output += text
     if not failed:
         wrapped = [f"-Wl,--wrap={name}" for name in ENDING]
         code, text = run_compiler(
             [program, *watching, *objects, *LINKING, *wrapped, "-lm", "-o", str(making / "library.so")]
         )
         failed = code != 0
-        said += text
+        output += text
     if failed:
-        raise FirmwareError(*errors_in(manifest, said))
-    return tuple(line for line in map(message_of, said) if line and " warning: " in line)
+        raise FirmwareError(*errors_in(manifest, output))
+    return tuple(line for line in map(message_of, output) if line and " warning: " in line)
 
 
 def run_compiler(command: list[str]) -> tuple[int, list[str]]:
@@ -168,14 +168,14 @@ def message_of(line: str) -> str | None:
     return f"{found['file']}:{found['line']}: {found['kind']}: {found['text']}" if found else None
 
 
-def errors_in(manifest: Manifest, said: list[str]) -> list[str]:
+def errors_in(manifest: Manifest, output: list[str]) -> list[str]:
     """The errors: the compiler's, or the linker's missing names, or, where neither format matches, the whole output."""
-    errors = [line for line in map(message_of, said) if line and "error: " in line]
-    for line in said:
+    errors = [line for line in map(message_of, output) if line and "error: " in line]
+    for line in output:
         found = UNDEFINED.search(line)
         if found:
             errors.append(f"{found['place']}: error: {found['name']} is used, but no source defines it")
-    errors = list(dict.fromkeys(errors)) or said[:20] or ["the compiler failed without a message"]
+    errors = list(dict.fromkeys(errors)) or output[:20] or ["the compiler failed without a message"]
     return [f"{manifest.folder}: {manifest.name} does not compile:", *errors]
 
 

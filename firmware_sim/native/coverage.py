@@ -88,36 +88,36 @@ def read(library: pathlib.Path, folder: pathlib.Path, counts: pathlib.Path) -> l
                 shutil.copyfile(note, each / note.name)
                 if data is not None:
                     shutil.copyfile(data, each / data.name)
-                for found in _told(each, note.stem):
+                for found in _counts_text(each, note.stem):
                     if found.path.is_relative_to(folder.resolve()):
                         files.setdefault(found.path, FileCounts(found.path)).add(found)
     return [files[path] for path in sorted(files)]
 
 
-def _told(place: pathlib.Path, stem: str) -> list[FileCounts]:
+def _counts_text(place: pathlib.Path, stem: str) -> list[FileCounts]:
     """gcov's output for one object's notes and counts in the folder `place`."""
     command = [gcov(), "--json-format", "--stdout", "--branch-probabilities", f"{stem}.gcno"]
     done = subprocess.run(command, cwd=place, capture_output=True, check=False, timeout=LONGEST_S)
     found = []
     try:
         for line in done.stdout.splitlines():
-            said = json.loads(line)
-            base = pathlib.Path(said["current_working_directory"])
-            found += [_file(base / each["file"], each) for each in said["files"]]
+            report = json.loads(line)
+            base = pathlib.Path(report["current_working_directory"])
+            found += [_file(base / each["file"], each) for each in report["files"]]
     except (ValueError, KeyError, TypeError):
         why = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason is given"]
         raise FirmwareError(f"{command[0]}: {stem}: its answer does not read as JSON of gcov: {why[0]}") from None
     return found
 
 
-def _file(path: pathlib.Path, said: dict[str, Any]) -> FileCounts:
+def _file(path: pathlib.Path, report: dict[str, Any]) -> FileCounts:
     counts = FileCounts(path.resolve())
-    for each in said["lines"]:
+    for each in report["lines"]:
         line = each["line_number"]
         counts.lines[line] = counts.lines.get(line, 0) + each["count"]
         if each["branches"]:
             counts.branches[line] = counts.branches.get(line, []) + [branch["count"] for branch in each["branches"]]
-    for each in said["functions"]:
+    for each in report["functions"]:
         counts.functions[each["name"]] = (each["start_line"], each["execution_count"])
     return counts
 

@@ -30,8 +30,8 @@ ENTRIES = 16
 
 
 class Notebook:
-    """Memory for records of a process that runs programs in C, for the process that forked it: `told` gives the cause
-    of its end."""
+    """Memory for records of a process that runs programs in C, for the process that forked it: `describe` returns
+    the cause of its end."""
 
     def __init__(self) -> None:
         self.words = memoryview(mmap.mmap(-1, 8 * ENTRIES * ENTRY_WORDS)).cast("q")
@@ -47,7 +47,7 @@ class Notebook:
         entry[RECORD + 1 : RECORD + 1 + len(padded)] = padded
         return entry[:RECORD]
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """`MCH: SIGSEGV ... in control() at hip.c:42`; empty when no program has ended its process."""
         for number in range(ENTRIES):
             entry = self.words[number * ENTRY_WORDS :][:ENTRY_WORDS]
@@ -57,7 +57,7 @@ class Notebook:
                     paths = pathlib.Path(library), pathlib.Path(sources)
                 except (ValueError, TypeError, RecursionError):
                     return f"a board with a program in C: {UNREADABLE}"
-                return printable(f"{board}: {told(*paths, entry[:RECORD].tolist())}")
+                return printable(f"{board}: {describe(*paths, entry[:RECORD].tolist())}")
         return ""
 
 
@@ -74,7 +74,7 @@ def record_of(board: str, library: pathlib.Path, sources: pathlib.Path) -> tuple
     return words, f"ranger-sim: {board}: its program has ended this process, where: addr2line -f -e {library}"
 
 
-def told(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) -> str:
+def describe(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]) -> str:
     """`SIGSEGV (Segmentation fault) in control() at hip.c:42, called from slot() at hip.c:17`; "" for no record.
 
     library: the file with its debug information; sources: the folder to which file names are relative.
@@ -126,12 +126,12 @@ def lines_of(library: pathlib.Path, sources: pathlib.Path, places: Sequence[int]
         )
     except (subprocess.TimeoutExpired, OSError, ValueError):  # the last: no path of a file
         return offsets
-    said = done.stdout.splitlines()
-    if len(said) != 2 * len(places):
+    output = done.stdout.splitlines()
+    if len(output) != 2 * len(places):
         return offsets
     return [
         offset if function == UNKNOWN else f"{function}() at {_shown(place, sources)}"
-        for offset, function, place in zip(offsets, said[::2], said[1::2], strict=True)
+        for offset, function, place in zip(offsets, output[::2], output[1::2], strict=True)
     ]
 
 

@@ -1,4 +1,4 @@
-"""What is in the chip of a board and hangs on it: given by who builds the board, not by its program."""
+"""The devices in a board's chip and at its pins: given by the builder of the board, not by its program."""
 
 import dataclasses
 from collections.abc import Callable
@@ -43,8 +43,8 @@ class SpiDevice:
 class Hardware:
     """Core clock (Hz), converters (None: no converter), and the device on each SPI.
 
-    panel: makes, of the chip, what a person sees of the board, as boards/modules/front_panel.py: it has `words`, `move`
-    and, as `ssp`, what hangs on the SSP. None: there is nothing to be seen, and no SspDevice.
+    panel: makes, from the chip, what a person sees of the board, as boards/modules/front_panel.py: it has `words`,
+    `move` and, as `ssp`, the device on the SSP. None: nothing to see, and no SspDevice.
     """
 
     hz: int = 60_000_000

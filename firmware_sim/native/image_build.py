@@ -110,7 +110,7 @@ def _compile(
     gcc: str, options: Sequence[str], sources: Sequence[pathlib.Path], making: pathlib.Path, manifest: Manifest
 ) -> tuple[str, ...]:
     """Compile and link in the folder `making`; returns the warnings."""
-    said: list[str] = []
+    output: list[str] = []
     objects: list[str] = []
     own = [CHIP / name for name in ("startup.S", "firmware.c", "scheduler.c", "support.c")]
     failed = False
@@ -124,21 +124,21 @@ def _compile(
             raise FirmwareError(f"{source} does not compile with {gcc}:", *text[:20])
         objects.append(str(place))
         failed |= code != 0
-        said += text
+        output += text
     if not failed:
         image = making / "image.elf"
         script = ["-T", str(CHIP / "lpc2194.ld")]
         code, text = run_compiler([gcc, *OPTIONS, *LINKING, *script, *objects, "-lgcc", "-o", str(image)])
         failed = code != 0
-        said += text
+        output += text
     if failed:
-        raise FirmwareError(*(_too_large(manifest, said) or errors_in(manifest, said)))
-    return tuple(line for line in map(message_of, said) if line and " warning: " in line)
+        raise FirmwareError(*(_too_large(manifest, output) or errors_in(manifest, output)))
+    return tuple(line for line in map(message_of, output) if line and " warning: " in line)
 
 
-def _too_large(manifest: Manifest, said: Sequence[str]) -> list[str]:
+def _too_large(manifest: Manifest, output: Sequence[str]) -> list[str]:
     """The linker's message about a program that does not fit, in a line."""
-    for line in said:
+    for line in output:
         found = TOO_LARGE.search(line)
         if found:
             size = FLASH_BYTES if found["region"] == "flash" else RAM_BYTES

@@ -74,7 +74,7 @@ class Library:
     """One loaded copy of the firmware in the file `path`, which messages call `shown`.
 
     `schedule`: whether it offers a schedule, else it has a main loop. UserError for a file that is not such a library.
-    What the program itself does is not looked at: none of its functions is called.
+    The program itself is not checked: none of its functions is called.
     """
 
     def __init__(self, path: pathlib.Path, shown: pathlib.Path | None = None) -> None:
@@ -116,7 +116,7 @@ class Library:
                 self.code.fw_write_counts()
 
     def _end_counts(self) -> None:
-        """Who has wanted counts has got them; without this libgcov writes some at the end of the process."""
+        """Drop the counts, which were written if wanted; otherwise libgcov writes some at the end of the process."""
         with (
             tempfile.TemporaryDirectory(prefix="ranger-sim-counts-") as nobodys,
             _setting({coverage.PREFIX: nobodys}),
@@ -124,7 +124,7 @@ class Library:
             self.code.fw_end_counts()
 
     def table_version(self) -> int | None:
-        """Of the master table that it was compiled with; None where it does not say."""
+        """Hash of the master table that it was compiled with; None where it has none."""
         return self.code.firmware_table_version() if self.has("firmware_table_version") else None
 
     def leave_record_in(self, words: Any, message: str = "") -> None:
@@ -158,7 +158,7 @@ class Library:
 
 @contextlib.contextmanager
 def _setting(variables: dict[str, str]) -> Iterator[None]:
-    """Inside, this process has these variables of the environment."""
+    """Context in which this process has these environment variables."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -172,7 +172,7 @@ def _setting(variables: dict[str, str]) -> Iterator[None]:
 
 
 def _loaded_copy(path: pathlib.Path) -> Any:
-    """A copy of the file, loaded. What is loaded twice from one file would be one library."""
+    """A copy of the file, loaded: a file loaded twice would be one library."""
     handle, copy = tempfile.mkstemp(prefix=f"{path.stem}-", suffix=".so")
     os.close(handle)
     try:

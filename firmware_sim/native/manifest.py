@@ -1,4 +1,4 @@
-"""`firmware.toml`: what a folder of firmware in C is made of, and what hangs on its chip.
+"""`firmware.toml`: the parts of a folder of firmware in C, and the devices at its chip.
 
 [firmware]
 name = "hip"                 # of the library

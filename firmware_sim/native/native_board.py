@@ -40,8 +40,8 @@ LER_OF_MATCH = 1  # PWMLER: bit n is match register n
 CMR_AT, CMR_CDO, CMR_STB1 = 0x2, 0x8, 0x20  # CxCMR
 USUAL_LATENCY = -1
 WORD = 0xFFFF_FFFF
-LONGEST_TURN_NS = 10_000_000  # of a program that nobody stops earlier; chosen by us: some slots
-MAIN_ENDED, NO_STACK = -1, -2  # what a turn of a main loop returns beside cycles
+LONGEST_TURN_NS = 10_000_000  # of a program that is not stopped earlier; chosen by us: some slots
+MAIN_ENDED, NO_STACK = -1, -2  # further results of a turn of a main loop, next to cycles
 
 
 class NotStartedError(Exception):
@@ -60,7 +60,7 @@ class Started(dict):
 
 
 class StartUp(Peripheral):
-    """The steps of the start-up, each at its instant."""
+    """The steps of the start-up, each at its time."""
 
     def __init__(self, chip: Any, steps: list[tuple[int, Any]]) -> None:
         Peripheral.__init__(self, chip)
@@ -73,7 +73,7 @@ class StartUp(Peripheral):
 
 
 class PlainPin(Peripheral):
-    """A pin with an encoder that the program captures nowhere: its level can be read, that is all."""
+    """A pin with an encoder that the program does not capture: its level can be read, no more."""
 
     def on_pin(self, channel: int, level: int, time: int) -> int:
         return 0
@@ -100,7 +100,7 @@ class Calls:
         self.cans = Started("CAN controller")
 
     def new(self, started: Started, number: int) -> None:
-        """Device `number` is about to be started."""
+        """Check that device `number` can be started."""
         if number in started:
             raise FirmwareError(f"{started.what} {number} is started twice")
 
@@ -403,7 +403,7 @@ class Calls:
 class NativeBoard(Microcontroller):
     """A chip with the devices of `hardware` that runs the firmware in the library `path` from `phase_ns` (ns) on.
 
-    What the program does wrong towards the devices, and the chip would not survive, ends the run with a UserError
+    A misuse of a device that the chip would not survive ends the run with a UserError
     that names the call. `devices` has what the program has started. record: as for `leave_record_in`, from the start.
     """
 
@@ -444,11 +444,11 @@ class NativeBoard(Microcontroller):
             self._take_schedule()
         else:
             self.background = self._turn
-            self.instant = self.code_time = phase_ns
+            self.input_time = self.code_time = phase_ns
             self.next_time = phase_ns
 
     def _callback(self, number: int, name: str) -> Any:
-        """What a call of the program leads to."""
+        """Execute a call of the program."""
         method = getattr(self.devices, name, None)
         if method is None:
             raise FirmwareError(f"{self.library.path}: it calls fw_{name}, which is not known here: build it again")
@@ -516,11 +516,11 @@ class NativeBoard(Microcontroller):
         """From now on a signal that ends this process leaves in `words` where the program was (library.py)."""
         self.library.leave_record_in(words, message)
 
-    def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
+    def connect_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
         """As the chip's; the program need not capture the pin."""
         if self.pin_owners[pin] is None:
             self.claim_pin(pin, 0, PlainPin(self))
-        Microcontroller.listen_to_edges(self, buffer, pin, partner_pin)
+        Microcontroller.connect_edges(self, buffer, pin, partner_pin)
 
     # --- the schedule -------------------------------------------------------------------------------------
 
@@ -584,7 +584,7 @@ class NativeBoard(Microcontroller):
     # --- the main loop ------------------------------------------------------------------------------------
 
     def _turn(self) -> int:
-        """One turn of a main loop of its own: until it lets time pass. Returns the instant at which it goes on."""
+        """Run one turn of the program's main loop, until it lets time pass. Returns the time at which it goes on."""
         cycles = self.library.code.fw_turn()
         if cycles == NO_STACK:
             self.failure = FirmwareError(f"{self.name}: no memory for the stack of the main loop")

@@ -1,4 +1,4 @@
-"""Running a program with the compiler's sanitizers: what their runtime needs of a process, and what it found.
+"""Running a program with the compiler's sanitizers: the needs of their runtime, and their findings.
 
 The runtime of the address sanitizer must be in a process before anything else, so a run with it is a separate process,
 started with LD_PRELOAD. Findings go to files, and the run goes on.
@@ -38,7 +38,7 @@ def is_ready() -> bool:
 
 
 def environment(logs: pathlib.Path) -> dict[str, str]:
-    """Of a process that can run a program with sanitizers; findings go to files in the folder `logs`."""
+    """Environment of a process that can run a program with sanitizers; findings go to files in the folder `logs`."""
     program = compiler()
     asked = subprocess.run([program, "-print-file-name=libasan.so"], capture_output=True, check=False, text=True)
     runtime = pathlib.Path(asked.stdout.strip())
@@ -52,7 +52,7 @@ def environment(logs: pathlib.Path) -> dict[str, str]:
 def lead_findings() -> None:
     """After a library was loaded: what its undefined-behaviour sanitizer finds goes to the same place.
 
-    With the address sanitizer, that runtime reads no options of its own.
+    With the address sanitizer, that runtime does not read its own options.
     """
     place = os.environ.get(PLACE)
     if place is None:
@@ -77,7 +77,7 @@ class Finding:
     text: str
     count: int = 1
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """`hip.c:42: signed integer overflow: ... in control()`."""
         place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
         return f"{place}{self.text}{f' in {self.function}()' if self.function else ''}"
@@ -133,11 +133,13 @@ def _address(text: str, what: str, programs: list[Program]) -> Finding:
     for frame in FRAME.finditer(text):
         for program in programs:
             if program.library.stem == frame["name"] and program.library.is_file():
-                (told,) = lines_of(program.library, program.folder, [int(frame["offset"], 16)])
-                function, at, place = told.partition("() at ")
+                (line_text,) = lines_of(program.library, program.folder, [int(frame["offset"], 16)])
+                function, at, place = line_text.partition("() at ")
                 file, _, line = place.rpartition(":")
                 return (
-                    Finding(file, int(line), function, what) if at and line.isdecimal() else Finding(told, 0, "", what)
+                    Finding(file, int(line), function, what)
+                    if at and line.isdecimal()
+                    else Finding(line_text, 0, "", what)
                 )
     return Finding("", 0, "", f"{what}, outside of the program's code")
 

@@ -52,15 +52,15 @@ def tried(
         os.close(reading)
         _be_the_trial(lambda reached: _load_and_start(library, start, made, record, reached), writing)
     os.close(writing)
-    said = _all_of(reading)
+    output = _all_of(reading)
     os.close(reading)
-    code = _end_of(process, is_over=said in THROUGH)
-    if said in THROUGH:
+    code = _end_of(process, is_over=output in THROUGH)
+    if output in THROUGH:
         return
-    reached, _, mistake = said.partition(REFUSED)
+    reached, _, mistake = output.partition(REFUSED)
     if mistake:
         raise FirmwareError(*mistake.decode(errors="replace").split("\n"))
-    how = crash.told(library, sources, record.tolist()) or (
+    how = crash.describe(library, sources, record.tolist()) or (
         f"no answer for {PATIENCE_S:g} s"
         if code is None
         else f"its process was killed by signal {-code}"
@@ -88,14 +88,14 @@ def _load_and_start(
 
 def _all_of(pipe: int) -> bytes:
     """Bytes from a pipe until the program is done, the pipe ends, or PATIENCE_S are over."""
-    said = b""
+    output = b""
     until_s = wallclock.monotonic_s() + PATIENCE_S
-    while said not in THROUGH and descriptors.wait([pipe], [], until_s - wallclock.monotonic_s())[0]:
+    while output not in THROUGH and descriptors.wait([pipe], [], until_s - wallclock.monotonic_s())[0]:
         part = os.read(pipe, LONGEST_TEXT)
         if not part:
             break
-        said += part
-    return said
+        output += part
+    return output
 
 
 def _end_of(process: int, is_over: bool) -> int | None:

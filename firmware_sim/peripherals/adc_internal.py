@@ -33,7 +33,7 @@ CR_START: Final = 0x1000000  # now
 # ADGDR
 GDR_RESULT_SHIFT: Final = 6
 GDR_CHN_SHIFT: Final = 24
-GDR_DONE_ABOVE_CHN: Final = 0x80  # bit 31, counted from where the channel stands
+GDR_DONE_ABOVE_CHN: Final = 0x80  # bit 31, counted from the channel's lowest bit
 
 
 @cython.final

@@ -4,9 +4,9 @@
 CxRDB, and CxTFI1-3, CxTID1-3, CxTDA1-3, CxTDB1-3 as TFI[1] ... TDB[3]).
 
 Three transmit buffers: a request goes out as CAN_REQUEST. Its end comes as CAN_TX_DONE, or the bus writes it into
-`ends` beforehand, and the controller takes it in when a register that depends on it is looked at; then it is a message
-only where somebody waits for it, an interrupt or who asked for it (`tell_end`). Transmit and abort in one command is
-single shot. Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data overrun and lost.
+`ends` beforehand, and the controller takes it in when a register that depends on it is read; then it is a message only
+where an interrupt or a caller of `report_end` waits for it. Transmit and abort in one command is single shot.
+Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data overrun and lost.
 Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors, each if CxIER allows it.
 Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
 """
@@ -51,14 +51,14 @@ CMR_STB1: Final = 0x20  # select transmit buffer
 CMR_STB2: Final = 0x40
 CMR_STB3: Final = 0x80
 
-# CxICR and CxIER: the bits of the controller itself; those that the bus tells, ICR_*, are in can_bus/node.py.
+# CxICR and CxIER: the bits of the controller itself; those from the bus, ICR_*, are in can_bus/node.py.
 ICR_RI: Final = 0x1  # a frame waits
 ICR_TI1: Final = 0x2  # transmit buffer 1 has ended
 ICR_DOI: Final = 0x8  # data overrun
 ICR_ALI: Final = 0x40  # arbitration lost
 ICR_TI2: Final = 0x200
 ICR_TI3: Final = 0x400
-# ends of transmissions as bits 1 ... 3; those of buffers 2 and 3 stand higher up in CxICR
+# ends of transmissions as bits 1 ... 3; those of buffers 2 and 3 are higher up in CxICR
 ENDED_1: Final = 0x2
 ENDED_2_3: Final = 0xC
 TI2_SHIFT: Final = 7
@@ -186,7 +186,7 @@ class CanController(Peripheral):
         self.IER = IER
         self.end_interrupts = buffers_of(IER)  # by buffer, bits 1 ... 3
         self.ended = 0  # the same way: ends that CxICR shows until it is read
-        self.noted = 0  # what else it shows until then
+        self.noted = 0  # the other bits that it shows until it is read
         self.BTR = btr
         self.RFS = 0
         self.RID = 0
@@ -248,8 +248,8 @@ class CanController(Peripheral):
         return self.free_at(buffer, self.chip.now)
 
     @cython.ccall
-    def tell_end(self, buffer: cython.longlong) -> None:
-        """The next end of a transmission from a buffer shall come as a message."""
+    def report_end(self, buffer: cython.longlong) -> None:
+        """Make the next end of a transmission from a buffer arrive as a message."""
         end: cython.longlong = self.ends.times[buffer]
         status: cython.longlong = self.ends.statuses[buffer]
         self.ends.times[buffer] = NEVER + 1  # BY_MESSAGE
@@ -259,30 +259,30 @@ class CanController(Peripheral):
                 self.chip.stop_time = end
 
     @cython.ccall
-    def tell_first_end(self) -> None:
-        """Buffers 1 and 2 are not free: the end that frees one of them first shall come as a message."""
+    def report_first_end(self) -> None:
+        """Make the end that first frees buffer 1 or 2 arrive as a message; neither is free now."""
         if self.ends.times[1] < NEVER:
-            self.tell_end(1)
+            self.report_end(1)
         elif self.ends.times[2] < NEVER:
-            self.tell_end(2)
+            self.report_end(2)
         else:  # neither has started
-            self.tell_end(1)
-            self.tell_end(2)
+            self.report_end(1)
+            self.report_end(2)
 
     @cython.ccall
     def write_IER(self, value: cython.longlong) -> None:
         """Write the interrupt enable register; it counts for what is under way as well."""
         buffer: cython.longlong
-        self._look()
+        self._take_ends()
         self.IER = value
         self.end_interrupts = buffers_of(value)
         for buffer in range(1, 4):
             if self.end_interrupts >> buffer & 1 and self.tx_source.bit != 0:
-                self.tell_end(buffer)
+                self.report_end(buffer)
 
     @cython.cfunc
-    def _look(self) -> cython.void:
-        """Take in every end that has come."""
+    def _take_ends(self) -> cython.void:
+        """Take in every end up to now."""
         buffer: cython.longlong
         for buffer in range(1, 4):
             self.free_at(buffer, self.chip.now)
@@ -329,7 +329,7 @@ class CanController(Peripheral):
         lo: cython.longlong,
         hi: cython.longlong,
     ) -> cython.bint:
-        """`transmit` by a program that looks at the buffer's status first: False when that says no, or in reset."""
+        """`transmit` by a program that reads the buffer's status first: False when it is not free, or in reset."""
         if not 1 <= buffer <= 3:
             raise IndexError(f"{self.chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
         if self.ends.times[buffer] <= self.chip.now:
@@ -344,7 +344,7 @@ class CanController(Peripheral):
         self.requests += 1
         self.chip.outbox.request(self.chip.now, self.number, buffer, identifier, flags, lo, hi)
         if self.end_interrupts >> buffer & 1 and self.tx_source.bit != 0:
-            self.tell_end(buffer)
+            self.report_end(buffer)
         return True
 
     @cython.ccall
@@ -379,7 +379,7 @@ class CanController(Peripheral):
     # --- receive ----------------------------------------------------------------------------------------
 
     def on_message(self, queue) -> InterruptSource | None:
-        """What the bus tells: a frame received, the end of a transmission, a change of the error state."""
+        """Take a message of the bus: a frame received, the end of a transmission, a change of the error state."""
         buffer: cython.longlong
         if queue.kind == CAN_RX:
             if self.MOD & MOD_RESET:
@@ -428,7 +428,7 @@ class CanController(Peripheral):
 
     @cython.cfunc
     def _bus_off(self) -> cython.void:
-        """Too many transmit errors: reset mode, nothing is sent or received until software restarts it."""
+        """Enter reset mode after too many transmit errors: nothing is sent or received until software restarts it."""
         buffer: cython.longlong
         self.bus_off = True
         self.MOD |= MOD_RESET
@@ -467,7 +467,7 @@ class CanController(Peripheral):
     def read_ICR(self) -> cython.longlong:
         """Interrupt and capture register; the read clears all but the receive bit."""
         value: cython.longlong
-        self._look()
+        self._take_ends()
         value = self.ICR
         self.ended = 0
         self.noted = 0
@@ -485,7 +485,7 @@ class CanController(Peripheral):
         buffer: cython.longlong
         word: cython.longlong = 0
         common: cython.longlong = 0
-        self._look()
+        self._take_ends()
         if self.rx_count > 0:
             common |= SR_RBS
         if self.overrun:

@@ -26,9 +26,9 @@ ONE_LINE_LENGTH = 80
 @cython.final
 @cython.cclass
 class CharacterDisplay(Peripheral):
-    """`data`: the pins of DB0 ... DB7; RS, R/W and E are one pin each. What is written stands in `memory`.
+    """`data`: the pins of DB0 ... DB7; RS, R/W and E are one pin each. `memory` has the characters written.
 
-    `on_enable` is to be called with each change of E (`Chip.followers` of whoever made this).
+    The owner calls `on_enable` with each change of E (its `Chip.followers`).
     """
 
     data_pins: cython.longlong[8]
@@ -74,7 +74,7 @@ class CharacterDisplay(Peripheral):
 
     @cython.ccall
     def on_enable(self, level: cython.longlong) -> cython.bint:
-        """E is `level` from now on; True when a byte has been taken with that."""
+        """Take a new level of E; True when a byte has been taken with it."""
         byte: cython.longlong = 0
         i: cython.longlong
         if self.enabled == (level != 0):
@@ -98,7 +98,7 @@ class CharacterDisplay(Peripheral):
 
     @cython.cfunc
     def _read_out(self) -> cython.int:
-        """E has changed in a read: the display drives the data pins; at the read's end the address moves on."""
+        """Take a change of E in a read: the display drives the data pins; at the read's end the address moves on."""
         i: cython.longlong
         is_data: cython.bint = self.chip.pins[self.rs] != 0
         byte: cython.longlong = self.memory[self.address] if is_data and not self.in_shapes else 0
@@ -137,7 +137,7 @@ class CharacterDisplay(Peripheral):
 
     @cython.cfunc
     def _instruct(self, byte: cython.longlong) -> cython.int:
-        """The highest bit that is set says which instruction it is."""
+        """Execute the instruction that the highest set bit selects."""
         i: cython.longlong
         step: cython.longlong
         if byte & SET_ADDRESS:
@@ -155,7 +155,7 @@ class CharacterDisplay(Peripheral):
             if byte & 0x08:
                 self.shift -= step  # to the right: the glass begins a place earlier
             else:
-                self.address = self._beside(self.address, step)
+                self.address = self._next_address(self.address, step)
         elif byte & DISPLAY_CONTROL:
             self.on = (byte & 0x04) != 0
         elif byte & ENTRY_MODE:
@@ -177,12 +177,12 @@ class CharacterDisplay(Peripheral):
         if self.in_shapes:
             self.address = (self.address + self.increment) & 0x3F
         else:
-            self.address = self._beside(self.address, self.increment)
+            self.address = self._next_address(self.address, self.increment)
         return 0
 
     @cython.cfunc
     @cython.exceptval(check=False)
-    def _beside(self, address: cython.longlong, step: cython.longlong) -> cython.longlong:
+    def _next_address(self, address: cython.longlong, step: cython.longlong) -> cython.longlong:
         """The next address: behind the end of a line comes the other one."""
         place: cython.longlong
         if not self.two_lines:

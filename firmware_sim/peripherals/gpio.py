@@ -2,9 +2,9 @@
 # (pins are those of the boards' tables, 0 ... 63)
 """General-purpose pins: P0.0 ... P0.31 are pins 0 ... 31, P1.0 ... P1.31 are pins 32 ... 63.
 
-Inputs follow PIN_EDGE messages (the chip keeps their levels); a change of an output sends PIN_OUTPUT. What else is on
-the board and hangs on a pin sees both (`Chip.followers`).
-A pin's level at a stamp is that of its last message: a partner pin without messages of its own is as old as
+Inputs follow PIN_EDGE messages (the chip keeps their levels); a change of an output sends PIN_OUTPUT. Other devices of
+the board at a pin see both (`Chip.followers`).
+A pin's level at a stamp is that of its last message: a partner pin without its own messages is as old as
 the last edge that reported it.
 """
 

@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False
 # (devices are those of the chain, ports 0 ... 9, registers masked to 32)
-"""LED drivers MAX6966 in a chain on the SSP: shift registers, and what a rising edge of their select pin makes of them.
+"""LED drivers MAX6966 in a chain on the SSP: shift registers, which a rising edge of their select pin executes.
 
 MAX6966/MAX6967 data sheet. 16 bits for each device: bit 15 reads, bits 14-8 are the register's address, 7-0 the data.
 The first word that is sent ends in the device that is farthest from the processor. Registers 0x00-0x09 are the ports;
@@ -33,7 +33,7 @@ ALL_GROUPS_BELOW = 0x10  # 0x0E and 0x0F, inputs, are read only
 class LedDrivers(SspDevice):
     """`count` drivers; number 0 is nearest to the processor. `writes`: how many registers have been written.
 
-    `on_select` is to be called with each change of the select pin (`Chip.followers` of whoever made this).
+    The owner calls `on_select` with each change of the select pin (its `Chip.followers`).
     """
 
     select_pin: cython.longlong
@@ -69,7 +69,7 @@ class LedDrivers(SspDevice):
 
     @cython.ccall
     def on_select(self, level: cython.longlong) -> cython.bint:
-        """The select pin is `level` from now on; True when the drivers have taken what was shifted in."""
+        """Take a new level of the select pin; True when the drivers have taken the bits shifted in."""
         device: cython.longlong
         rises: cython.bint = level != 0 and self.selected
         self.selected = level == 0
@@ -80,7 +80,7 @@ class LedDrivers(SspDevice):
 
     @cython.cfunc
     def _take(self, device: cython.longlong, word: cython.longlong) -> cython.int:
-        """One driver does what its 16 bits say."""
+        """Let one driver execute its 16 bits."""
         address: cython.longlong = word >> 8 & 0x7F
         first: cython.longlong = REGISTERS * device
         place: cython.longlong

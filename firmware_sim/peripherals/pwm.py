@@ -1,9 +1,9 @@
 # cython: cdivision=True
-# (what is divided is never below 0)
+# (dividends are never below 0)
 """The PWM unit (PWMMR0 ... PWMMR6, PWMLER): match values take effect at the start of a PWM period.
 
 At 60 MHz and MR0 = 600 a period is 10 us (100 kHz); channel n is high for MRn of MR0 counts. Every latch that
-touches MR0, MR2 or MR6 (the two leads of an H-bridge) is told outside as PWM_UPDATE, stamped with the start
+touches MR0, MR2 or MR6 (the two leads of an H-bridge) is sent outside as PWM_UPDATE, stamped with the start
 of the period that first has the new values: at most one period after `now`.
 """
 
@@ -128,10 +128,10 @@ class Pwm(Peripheral):
             )
         if mask & LER_MR0:
             self._count_periods()
-        self.tell()
+        self.notify_follower()
 
     @cython.ccall
-    def tell(self) -> None:
+    def notify_follower(self) -> None:
         """Pass the latched values to the follower of the unit's pins on the board (`Chip.pwm_follower`).
 
         ROBOT PARITY: at once, where the pins have it from the next period on; and not what `write` does to a bridge.

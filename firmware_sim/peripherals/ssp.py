@@ -1,7 +1,7 @@
-"""The synchronous serial port: words to what hangs on its wires, or a link of whole segments between two chips.
+"""The synchronous serial port: words to the device on its wires, or a link of whole segments between two chips.
 
-As a master of words (`SspMaster`) it exchanges each with an `SspDevice` at once: the time that it takes is a cost of
-the program's.
+As a master of words (`SspMaster`) it exchanges each with an `SspDevice` at once: the time that this takes is part of
+the program's cost.
 
 A segment is 31 half-words; at 16 bits and 3 Mbit/s it lasts 165.3 us. The master starts an exchange
 (SSP_START at `now`), the slave has loaded what it will send (SSP_LOAD), which goes out in every exchange until
@@ -37,7 +37,7 @@ def segment_time_ns(words: cython.longlong, word_bits: cython.longlong, bit_rate
 
 @cython.cclass
 class SspDevice(Peripheral):
-    """What hangs on the SSP: nothing. It reads as zeros. `bits`: of a word, as the master sends it."""
+    """A device on the SSP; this base is an empty wire, which reads as zeros. `bits`: of a word of the master."""
 
     bits: cython.longlong
 
@@ -83,8 +83,8 @@ class SspMaster(Peripheral):
 class SspSegment:
     """31 half-words, the last of which is the checksum of the others; `used`: how many are filled in.
 
-    They are kept as those who fill them in have them: `rows` of a half-word and two words of 32 bits, six times. Of the
-    checksum only `checksum_error` is kept: how much it is above what the others sum up to, 0 unless somebody spoilt it.
+    They are kept as the senders have them: `rows` of a half-word and two words of 32 bits, six times. Of the checksum
+    only `checksum_error` is kept: how much it is above the sum of the others, 0 unless a fault changed it.
     """
 
     used: cython.longlong
@@ -136,7 +136,7 @@ class SspSegment:
 class SspPort(Peripheral):
     """One end of the link. A received segment waits in `received`; one not taken is overwritten and counted."""
 
-    fresh: cython.bint
+    untaken: cython.bint
     number: cython.longlong
     source: InterruptSource
     received: SspSegment
@@ -153,7 +153,7 @@ class SspPort(Peripheral):
         self.overwritten = 0
         self.received = None
         self.received_time = 0
-        self.fresh = False
+        self.untaken = False
         self.source = chip.vic.source(SSP_SEGMENT, number)
         chip.claim(SSP_SEGMENT, number, self)
 
@@ -171,19 +171,19 @@ class SspPort(Peripheral):
         self.chip.outbox.push(self.chip.now, 0, SSP_LOAD, self.number, 0, 0, 0, 0, 0, segment)
 
     def on_message(self, queue) -> InterruptSource | None:
-        """The other side's segment is in."""
-        if self.fresh:
+        """Take the other side's segment."""
+        if self.untaken:
             self.overwritten += 1
         self.received = cython.cast(SspSegment, queue.ref)  # the only thing such a message brings
         self.received_time = queue.time
-        self.fresh = True
+        self.untaken = True
         self.exchanges += 1
         return self.source
 
     @cython.ccall
     def take(self) -> SspSegment:
         """The segment that came in last, or None when it has been taken already."""
-        if not self.fresh:
+        if not self.untaken:
             return None
-        self.fresh = False
+        self.untaken = False
         return self.received

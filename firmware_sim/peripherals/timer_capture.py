@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 IR_MR0: Final = 0x1  # TxIR: the match that restarts the timer
 IR_CR0: Final = 0x10  # capture 0; those of channels 1 ... 3 follow
-# TxCCR, per channel CCR_BITS apart
+# TxCCR, at intervals of CCR_BITS per channel
 CCR_RISING: Final = 0x1
 CCR_FALLING: Final = 0x2
 CCR_INTERRUPT: Final = 0x4
@@ -88,7 +88,7 @@ class TimerCapture(Peripheral):
             self.alarm.set(self.next_wrap_time)
 
     def retune(self, now, before) -> None:
-        """The count goes on where it is."""
+        """Continue from the present count."""
         crystal = self.chip.crystal
         self.counts_per_ns = crystal.cycles_per_ns(self.hz)
         if now >= self.next_wrap_time:
@@ -132,7 +132,7 @@ class TimerCapture(Peripheral):
 
     @property
     def wraps(self):
-        """How often the timer has started again, as far as it has been looked at."""
+        """How often the timer has started again, as far as wraps have been taken in."""
         return self.ticks.number - 1
 
     @cython.ccall
@@ -167,7 +167,7 @@ class TimerCapture(Peripheral):
 
     @cython.ccall
     def count_at(self, time: cython.longlong) -> cython.longlong:
-        """The count (0 ... MR0) at an instant not before the present wrap."""
+        """The count (0 ... MR0) at a time not before the present wrap."""
         count: cython.longlong
         if time >= self.next_wrap_time:
             self._wrap_to(time)
@@ -178,7 +178,7 @@ class TimerCapture(Peripheral):
 
     @cython.cfunc
     def _wrap_to(self, time: cython.longlong) -> cython.longlong:
-        """Bring the wrap that precedes `time` up to date, however far away; returns its instant."""
+        """Bring the wrap that precedes `time` up to date, however far away; returns its time."""
         self.wrap_time = self.next_wrap_time
         self.next_wrap_time = self.ticks.next()
         if time >= self.next_wrap_time:
@@ -187,7 +187,7 @@ class TimerCapture(Peripheral):
 
     @cython.cfunc
     def _skip_to(self, time: cython.longlong) -> cython.longlong:
-        """The same over wraps that nobody has looked at."""
+        """The same over wraps that were not taken in yet."""
         self.ticks.go_to(self.chip.crystal.local_ns(time - self.phase_ns) // self.period_ns)
         while self.ticks.time <= time:
             self.wrap_time = self.ticks.time
@@ -195,7 +195,7 @@ class TimerCapture(Peripheral):
         return self.wrap_time
 
     def on_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """An edge at a capture pin; 1 when it asks for the interrupt."""
+        """Handle an edge at a capture pin; 1 when it requests the interrupt."""
         asked: cython.longlong = self.CCR >> CCR_BITS * channel
         flag: cython.longlong = IR_CR0
         count: cython.longlong
@@ -215,12 +215,12 @@ class TimerCapture(Peripheral):
 
     @cython.cfunc
     def _late_pin(self, channel: cython.longlong, level: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """An edge after a wrap that has not been looked at."""
+        """Handle an edge after a wrap that was not taken in yet."""
         self._wrap_to(time)
         return self.on_pin(channel, level, time)
 
     def on_alarm(self, alarm: cython.longlong, time: cython.longlong) -> InterruptSource | None:
-        """The timer matched MR0 and restarted (an edge at this very instant may have told already)."""
+        """Take in a match of MR0 with its restart (an edge at this very time may have done so already)."""
         if time >= self.next_wrap_time:
             self._wrap_to(time)
         self.alarm.set(self.next_wrap_time)

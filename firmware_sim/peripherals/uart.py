@@ -5,7 +5,7 @@
 Receive: UART_BYTE messages stamped with the end of the byte fill a FIFO of 16. One message may bring up to
 eight bytes: c their number, d the first four, e the rest, low byte first, stamped with the end of the last.
 The interrupt (UART_BYTE, number) comes when the trigger level (1, 4, 8 or 14) is reached, and when bytes have
-waited below it for the time of four characters since the last one came or was read (IIR 0xC, LPC2194 user manual:
+waited below it for the time of four characters since the last one arrived or was read (IIR 0xC, LPC2194 user manual:
 3.5 to 4.5). Handlers are expected to empty the FIFO.
 Transmit: a byte written to THR leaves as UART_OUTPUT, stamped with the end of its stop bit; FIFO of 16. When
 the FIFO has become empty, (UART_TRANSMIT, number) is raised.
@@ -121,10 +121,10 @@ class Uart(Peripheral):
         return self.fifo_count
 
     def on_message(self, queue) -> InterruptSource | None:
-        """A byte came in, or up to eight that followed each other without a gap, stamped with the last's end.
+        """Take a byte, or up to eight that followed each other without a gap, stamped with the last's end.
 
         A group is taken at once: with the trigger at or above its size the interrupt comes at the same
-        instant as byte by byte.
+        time as byte by byte.
         """
         place: cython.longlong
         first: cython.longlong = self.fifo_count
@@ -162,7 +162,7 @@ class Uart(Peripheral):
     @cython.ccall
     @cython.exceptval(check=False)
     def RBR(self) -> cython.longlong:
-        """Take the oldest received byte; 0 when there is none (see LSR bit 0)."""
+        """Take the oldest received byte; 0 without one (see LSR bit 0)."""
         byte: cython.longlong
         if self.fifo_count == 0:
             return 0
@@ -172,7 +172,7 @@ class Uart(Peripheral):
 
     @cython.ccall
     def were_read(self, count: cython.longlong) -> cython.void:
-        """The oldest `count` bytes that wait were read from `fifo` itself, as by reads of RBR."""
+        """Remove the oldest `count` waiting bytes, which were read from `fifo` itself, as by reads of RBR."""
         i: cython.longlong
         if count > 0:
             self.fifo_count -= count

@@ -62,25 +62,25 @@ class Campaign:
             return sum(1 for _ in combinations(plan.axes))
         return len(self.cells()) * (plan.search.first + plan.search.rounds * plan.search.each)
 
-    def run(self, pool: Any, tell: Callable[[int, str], None]) -> None:
-        """Run what is missing. It calls `tell(done, what)` after every result; `pool`: of pools.py."""
+    def run(self, pool: Any, report: Callable[[int, str], None]) -> None:
+        """Run what is missing. It calls `report(done, what)` after every result; `pool`: of pools.py."""
         plan = self.plan
         self.cases, self.stopped_at = [], None
         if plan.search:
             for cases in self.searching(plan.search):
                 self.cases += cases
-                self.do(cases, pool, tell)
+                self.do(cases, pool, report)
             return
         cases = plan.cases()
         stopping = plan.sample.stopping if plan.sample else None
         if stopping is None:
             self.cases = cases
-            self.do(cases, pool, tell)
+            self.do(cases, pool, report)
             return
         for look in range(1, stopping.looks + 1):
             more = cases[len(self.cases) : stopping.look_after(look)]
             self.cases += more
-            self.do(more, pool, tell)
+            self.do(more, pool, report)
             if self.settled(stopping, look):
                 break
 
@@ -113,13 +113,13 @@ class Campaign:
         self.cases = [case for case in cases if self.result(case) is not None]
         self.stopped_at = None if len(self.cases) < len(cases) else self.stopped_at
 
-    def do(self, cases: list[Case], pool: Any, tell: Callable[[int, str], None]) -> None:
+    def do(self, cases: list[Case], pool: Any, report: Callable[[int, str], None]) -> None:
         """Run those of `cases` whose results are missing."""
         keys = {self.key(case): case for case in cases if self.result(case) is None}
         groups: dict[str, list[tuple[str, Case]]] = {}
         for key, case in keys.items():
             groups.setdefault(case.golden().text(), []).append((key, case))
-        healthy = self.healthy([members[0][1].golden() for members in groups.values()], pool, tell)
+        healthy = self.healthy([members[0][1].golden() for members in groups.values()], pool, report)
         requests = []
         for key in keys:
             self.store.forget(key)  # one that timed out
@@ -142,7 +142,7 @@ class Campaign:
                 )
         for result in pool.run(requests):
             self.store.add(result)
-            tell(self.done, result["outcome"])
+            report(self.done, result["outcome"])
 
     @property
     def done(self) -> int:
@@ -155,7 +155,7 @@ class Campaign:
         whole = {**golden.as_dict(), "walk": walk, "version": self.version, "watch": self.plan.watch_key()}
         return "healthy-" + hashlib.blake2b(json.dumps(whole, sort_keys=True).encode(), digest_size=8).hexdigest()
 
-    def healthy(self, goldens: list[Settings], pool: Any, tell: Callable[[int, str], None]) -> dict[str, Result]:
+    def healthy(self, goldens: list[Settings], pool: Any, report: Callable[[int, str], None]) -> dict[str, Result]:
         """What healthy walks raise, for each of these settings; walked when it is missing."""
         wanted = {self.healthy_key(golden): golden for golden in goldens}
         requests = [
@@ -170,7 +170,7 @@ class Campaign:
         ]
         for result in pool.run(requests):
             self.store.add(result)
-            tell(self.done, "healthy walks")
+            report(self.done, "healthy walks")
         return {key: self.store.results[key] for key in wanted}
 
     def healthy_of(self, case: Case) -> dict[str, Any] | None:

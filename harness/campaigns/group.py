@@ -250,12 +250,12 @@ def sweep_run(case: dict[str, Any], golden: Golden, healthy: Healthy | None, wat
 
 def slots_of(robot: Machine) -> Result:
     """{board: {margin, overruns}} since power-up; margin: the share of its slot that the longest one left."""
-    told = {}
+    figures = {}
     for board, counted in robot.counters().items():
         slots = counted.slots
         slot_cycles = slots.slot_ns * counted.hz * 1e-9
-        told[board] = {"margin": rounded(1.0 - slots.max_cycles / slot_cycles), "overruns": slots.overruns}
-    return told
+        figures[board] = {"margin": rounded(1.0 - slots.max_cycles / slot_cycles), "overruns": slots.overruns}
+    return figures
 
 
 def judged(

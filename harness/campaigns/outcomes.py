@@ -90,8 +90,8 @@ def classify(proof: Proof, gait: Gait, golden: Gait, overload: str, band: Band) 
         return "no effect", ""
     outside = beyond(gait, golden, band)
     if proof.detected is not None:
-        told = f"{proof.detected.code} from {proof.detected.board}"
-        return ("degraded gait", f"{outside}; {told}") if outside else ("detected and safe", told)
+        detection = f"{proof.detected.code} from {proof.detected.board}"
+        return ("degraded gait", f"{outside}; {detection}") if outside else ("detected and safe", detection)
     return ("undetected wrong", outside) if outside else ("masked", "")
 
 

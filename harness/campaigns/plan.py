@@ -72,8 +72,8 @@ class Range:
 
     def text(self) -> str:
         """Text for people."""
-        told = f"{self.low:g} to {self.high:g}"
-        return told + (f" by {self.step:g}" if self.step is not None else ", by factors" if self.log else "")
+        range_text = f"{self.low:g} to {self.high:g}"
+        return range_text + (f" by {self.step:g}" if self.step is not None else ", by factors" if self.log else "")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -94,7 +94,7 @@ class LocalPool:
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
-        self.told = f"{jobs} process{'es' if jobs > 1 else ''} of this machine"
+        self.description = f"{jobs} process{'es' if jobs > 1 else ''} of this machine"
         self.latest: dict[int, subprocess.Popen[str]] = {}  # by thread: each has one process at a time
         self.lock = threading.Lock()
         self.closed = False
@@ -178,7 +178,7 @@ class DaskPool:
             self.client = self._client_of(address, tls or {})
         workers = len(self.client.scheduler_info(n_workers=-1)["workers"])
         self.jobs = max(1, workers)
-        self.told = f"{workers} Dask worker{'s' if workers != 1 else ''}" + (f" at {address}" if address else "")
+        self.description = f"{workers} Dask worker{'s' if workers != 1 else ''}" + (f" at {address}" if address else "")
 
     def _client_of(self, address: str, tls: dict[str, str]) -> Any:
         """The client of a scheduler that runs already."""

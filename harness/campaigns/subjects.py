@@ -168,7 +168,7 @@ class OwnMachine:
         if worst and parts[worst] > 1.0:
             unit = self.shown.plant.sample_names[worst]
             beyond = f"{worst} off by {off[worst]:.4g} {unit}".rstrip()
-        told = f"{proof.detected.code} from {proof.detected.board}" if proof.detected is not None else ""
+        detection = f"{proof.detected.code} from {proof.detected.board}" if proof.detected is not None else ""
         if not proof.acted:
             outcome, why = "invalid", "the fault never acted"
         elif golden.fell_ns >= 0 and not (is_sweep and proof.fell_ns is not None):
@@ -178,10 +178,10 @@ class OwnMachine:
         elif proof.first_firmware is None:
             outcome, why = "no effect", ""
         elif beyond:
-            outcome = "degraded gait" if told else "undetected wrong"
-            why = "; ".join(part for part in (beyond, told) if part)
+            outcome = "degraded gait" if detection else "undetected wrong"
+            why = "; ".join(part for part in (beyond, detection) if part)
         else:
-            outcome, why = ("detected and safe", told) if told else ("masked", "")
+            outcome, why = ("detected and safe", detection) if detection else ("masked", "")
         return {
             "outcome": outcome,
             "why": why,

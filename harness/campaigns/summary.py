@@ -147,7 +147,7 @@ def tolerance(plan: Plan, wanted: Tolerance, felt: Sequence[Row]) -> dict[str, A
     """A time compared with its tolerance: of a sample the tolerance limit, of a census the share itself."""
     times = sorted(first_ms(result, wanted.what) for _, result in felt)
     within = sum(each <= wanted.limit_ms for each in times)
-    told: dict[str, Any] = {
+    requirement: dict[str, Any] = {
         "what": wanted.what,
         "limit_ms": wanted.limit_ms,
         "share": wanted.share,
@@ -157,11 +157,11 @@ def tolerance(plan: Plan, wanted: Tolerance, felt: Sequence[Row]) -> dict[str, A
     }
     if plan.sample is None:
         met = bool(times) and within >= wanted.share * len(times)
-        return {**told, "verdict": "met" if met else "not met", "by": "census"}
+        return {**requirement, "verdict": "met" if met else "not met", "by": "census"}
     place = tolerance_place(len(times), wanted.share, wanted.confidence)
     if place is None:
         needed = values_needed(wanted.share, wanted.confidence)
-        return {**told, "verdict": f"open: {needed} runs are needed", "by": f"{100 * wanted.confidence:g} %"}
+        return {**requirement, "verdict": f"open: {needed} runs are needed", "by": f"{100 * wanted.confidence:g} %"}
     limit = times[place - 1]
     if limit <= wanted.limit_ms:
         verdict = "met"
@@ -169,7 +169,7 @@ def tolerance(plan: Plan, wanted: Tolerance, felt: Sequence[Row]) -> dict[str, A
         verdict = "not met"
     else:
         verdict = "open: this many runs show neither it nor its contrary"
-    return {**told, "verdict": verdict, "by": f"{100 * wanted.confidence:g} %", "upper_ms": finite(limit)}
+    return {**requirement, "verdict": verdict, "by": f"{100 * wanted.confidence:g} %", "upper_ms": finite(limit)}
 
 
 def finite(value: float) -> float | None:
@@ -328,7 +328,7 @@ def flat(plan: Plan, row: Row) -> dict[str, Any]:
     fault = result.get("fault") or {}
     first = result["detected"][0] if result.get("detected") else {}
     parts = typed_text.parse(case.fault) if case.fault else None
-    told = {
+    requirement = {
         "key": result["key"],
         "place": parts.place if parts else "",
         "mode": parts.mode if parts else "",
@@ -353,7 +353,7 @@ def flat(plan: Plan, row: Row) -> dict[str, Any]:
         "digest": (result.get("digest") or "")[:16],
         "replay": replay(plan, row),
     }
-    return told
+    return requirement
 
 
 def name_of(difference: dict[str, Any] | None) -> str:

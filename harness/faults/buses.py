@@ -115,7 +115,7 @@ class BabblingNode(IntruderFault):
     def begin(self, now_ns: int) -> None:
         IntruderFault.begin(self, now_ns)
         if self.external is None:
-            self.tamper.speak(now_ns)
+            self.tamper.start_from(now_ns)
 
 
 @mode

@@ -29,7 +29,7 @@ class ConverterFault(Fault):
 
     def connect(self) -> None:
         board = self.robot.loop.board(self.place.details["board"])
-        if board.apart:
+        if board.out_of_process:
             raise FaultError(f"fault {self.text()}: {board.name} runs in a separate process; its converter is there")
         emulated(self.robot, board.name, f"fault {self.text()}")
         self.board: Any = board

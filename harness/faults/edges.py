@@ -6,9 +6,9 @@ edge, going down its equal, and the board counts by that alone. So whatever a fa
 such as a sensor could have sent.
 
 Two families. Faults of the value (offset, drift, noise ...) let the wire follow a wrong count: extra edges come
-SPACING_NS apart, and after the end the wire returns, so that the board's count is right again. Faults of the line
-(stuck, lost edges, swapped channels ...) act on the edges themselves: after the end the levels are the sensor's again,
-and the board keeps the miscount.
+at intervals of SPACING_NS, and after the end the wire returns, so that the board's count is right again. Faults of the
+line (stuck, lost edges, swapped channels ...) act on the edges themselves: after the end the levels are the sensor's
+again, and the board keeps the miscount.
 
 The values of parameters count in the joint's sense: an offset above 0 shows a joint that is farther ahead, on every
 board.

@@ -67,7 +67,7 @@ class Evidence:
     """
 
     def __init__(self, robot: Any) -> None:
-        if any(board.apart for board in robot.loop.boards):
+        if any(board.out_of_process for board in robot.loop.boards):
             raise FaultError(
                 "proof of a fault: every board must run in this process (backend sim; firmware in C: --in-process, "
                 "or Ranger(in_process=True))"

@@ -82,7 +82,7 @@ def rate_of(values: Any, at: int = 0) -> float:
     return float_of_word(a << 24 | b << 16 | c << 8 | d)
 
 
-def tell_rate(values: Any, at: int, rate_rad_s: float) -> None:
+def write_rate(values: Any, at: int, rate_rad_s: float) -> None:
     """Write another rate about x into the packet from `at` on, and the matching sum."""
     word = word_of_float(rate_rad_s)
     high, low = at + PACKET_BYTES - 2, at + PACKET_BYTES - 1
@@ -104,10 +104,10 @@ class SignalInPacket(PacketFault, SignalFault):
 
     def keep_packet(self, values: Any, at: int, time_ns: int) -> bool:
         true = rate_of(values, at)
-        tell_rate(values, at, self.signal.shown(true, time_ns))
-        told = rate_of(values, at)
-        if told != true:
-            self.note(time_ns, told - true)
+        write_rate(values, at, self.signal.shown(true, time_ns))
+        rate_shown = rate_of(values, at)
+        if rate_shown != true:
+            self.note(time_ns, rate_shown - true)
         return True
 
 

@@ -78,9 +78,9 @@ class OutsideDuplicate(OutsideIntruder):
         OutsideIntruder.__init__(self, external, identifier, noted)
         self.mask = mask
         self.sent: collections.deque[tuple[int, int]] = collections.deque(maxlen=MOST_BEHIND)  # not received back yet
-        external.sinks.append(self.heard)
+        external.sinks.append(self.receive)
 
-    def heard(self, time_ns: int, identifier: int, flags: int, low: int, high: int) -> None:
+    def receive(self, time_ns: int, identifier: int, flags: int, low: int, high: int) -> None:
         """Handle a frame on the bus; its own are received as well."""
         if identifier != self.identifier or flags & FLAG_ERROR:
             return
@@ -92,5 +92,5 @@ class OutsideDuplicate(OutsideIntruder):
             self.sent.append(other)
 
     def leave(self) -> None:
-        self.external.sinks.remove(self.heard)
+        self.external.sinks.remove(self.receive)
         OutsideIntruder.leave(self)

@@ -109,10 +109,10 @@ class Proof:
 
     def summary(self) -> dict[str, Any]:
         """As `walk --proof` stores it: names, and ms after the activation; None for what did not happen."""
-        first, told, reacted = self.first_firmware, self.detected, self.reaction
+        first, detection, reacted = self.first_firmware, self.detected, self.reaction
         return {
             "first_difference": first and {"where": first.where, "name": first.name, "after_ms": self.after_ms(first)},
-            "detected": told and {"code": told.code, "board": told.board, "rate": told.rate},
+            "detected": detection and {"code": detection.code, "board": detection.board, "rate": detection.rate},
             "detection_ms": self.detection_ms,
             "reaction": reacted
             and {"machine": reacted.machine, "state": reacted.state, "instead_of": reacted.instead_of},

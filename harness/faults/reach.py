@@ -34,7 +34,7 @@ def reaching_into(robot: Any, name: str, now_ns: int) -> Iterator[Any]:
     yield board
     board = loop.boards[place]  # it may have been replaced
     board.next_time = min(board.next_time, now_ns)
-    loop.due[place] = loop.came[place] = now_ns
+    loop.due[place] = loop.arrival[place] = now_ns
     loop.wires[place].silent_until = 0
 
 

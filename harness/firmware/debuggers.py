@@ -24,14 +24,14 @@ def placed(text: str) -> Place:
     return Place(board, host or "127.0.0.1", int(port))
 
 
-def open_doors(
+def open_servers(
     boards: Mapping[str, Any], wanted: Iterable[str], allow_network: bool = False, ends: Callable[[], bool] = never
 ) -> list[GdbServer]:
     """A debugger endpoint for each of `wanted` ("MCH=3333"), whose boards have their own processor.
 
     UserError for a board that has none or is named twice, and for a port that is not available.
     """
-    doors: list[GdbServer] = []
+    servers: list[GdbServer] = []
     try:
         for text in wanted:
             place = placed(text)
@@ -40,18 +40,18 @@ def open_doors(
             board = boards[place.board]
             if getattr(board, "core", None) is None:
                 raise FirmwareError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")
-            if any(door.board is board for door in doors):
+            if any(server.board is board for server in servers):
                 raise FirmwareError(f"gdb {text}: {place.board} has a port already")
-            doors.append(GdbServer(board, place.port, place.host, allow_network, ends))
+            servers.append(GdbServer(board, place.port, place.host, allow_network, ends))
     except BaseException:
-        close_doors(doors)
+        close_servers(servers)
         raise
-    for door in doors:
-        door.together(doors)
-    return doors
+    for server in servers:
+        server.together(servers)
+    return servers
 
 
-def close_doors(doors: Iterable[GdbServer]) -> None:
+def close_servers(servers: Iterable[GdbServer]) -> None:
     """Close the endpoints and disconnect debuggers."""
-    for door in doors:
-        door.close()
+    for server in servers:
+        server.close()

@@ -28,13 +28,13 @@ def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> 
 def first_outputs(board: Any) -> list[Message]:
     """The outputs of a board since it was made, from its first outbox."""
     out = board.outbox
-    said = []
+    sent = []
     while out.take():
-        said.append((out.time, out.order, out.kind, out.a, out.b, out.c, out.d, out.e, out.f, out.ref))
-    return said
+        sent.append((out.time, out.order, out.kind, out.a, out.b, out.c, out.d, out.e, out.f, out.ref))
+    return sent
 
 
-def pass_on(said: list[Message], outbox: Any, not_before_ns: int) -> None:
+def pass_on(sent: list[Message], outbox: Any, not_before_ns: int) -> None:
     """Put messages into another outbox, none with a stamp before `not_before_ns`."""
-    for message in said:
+    for message in sent:
         outbox.push(max(message[0], not_before_ns), *message[1:])

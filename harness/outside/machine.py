@@ -34,7 +34,7 @@ class Elsewhere(Board):
         self.next_time = NEVER
         return NEVER
 
-    def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
+    def connect_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
         """Discard edges at its pins."""
 
     def counters(self) -> Any:

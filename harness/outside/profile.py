@@ -7,7 +7,7 @@
     interface = "socketcan"            of python-can; left out: the bus is emulated inside
     channel = "can0"
     bit_rate = 1_000_000               bit/s
-    schedule = "1mbit"                 schedules/1mbit.toml beside this file or shipped; "full": as the firmware sends
+    schedule = "1mbit"                 schedules/1mbit.toml next to this file or shipped; "full": as the firmware sends
     options = { receive_own_messages = false }   further arguments of python-can's Bus
 
 A profile passes whole or not at all; all mistakes are reported together: file, key, value and the rule broken.

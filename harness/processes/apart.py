@@ -31,7 +31,7 @@ from ranger_sim.harness.step_watch import StepWatch
 RESET = 1  # mode of a bus node
 
 
-class Apart:
+class RemoteBoards:
     """The boards `names` of the wired, never run `robot`, each in its process.
 
     `deaths`: for each that has ended by itself, in order: {"board", "time_s", "how" its process ended, "why"}, the
@@ -65,8 +65,8 @@ class Apart:
         }
         for name, remote in self.remotes.items():
             loop.replace(remote)
-            robot.boards[name].apart = True  # it does not run here
-        loop.watchers.append(Undertaker(self))
+            robot.boards[name].remote = True  # it does not run here
+        loop.watchers.append(ProcessReaper(self))
 
     def _board(self, name: str, stage: tuple[Any, Any]) -> Callable[[], int]:
         def body() -> int:
@@ -84,7 +84,7 @@ class Apart:
         finally:
             os.sched_setaffinity(0, allowed)
 
-    def bury(self) -> None:
+    def reap(self) -> None:
         """Take lost boards off their buses; their pins stay, so that the watchdogs of bridges expire."""
         for name, remote in self.remotes.items():
             if remote.gone and name in self.children and not self.ended:
@@ -104,7 +104,7 @@ class Apart:
         if name in self.robot.firmware and block.words[places.CRASH]:
             firmware = self.robot.firmware[name]
             record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS].tolist()
-            return crash.told(firmware.library, firmware.folder, record)
+            return crash.describe(firmware.library, firmware.folder, record)
         return ""
 
     def asking(self, names: tuple[str, ...]) -> StepWatch:
@@ -117,7 +117,7 @@ class Apart:
             if name in self.remotes and not self.ended:
                 self.remotes[name].catch_up(self.robot.loop.time)
                 self.remotes[name].fetch_counters()
-        self.bury()
+        self.reap()
 
     def dismiss(self) -> None:
         """Let all processes finish writing and end by themselves; wait for that."""
@@ -125,7 +125,7 @@ class Apart:
             if name in self.children and not remote.gone:
                 remote.catch_up(self.robot.loop.time)
                 remote.fetch_counters()
-        self.bury()
+        self.reap()
         for name, process in list(self.children.items()):
             self.remotes[name].dismiss()
             descriptors.wait([self.watches[name]], [], DEADLINE_S)
@@ -151,27 +151,27 @@ class Apart:
             block.close()
 
 
-class Undertaker(StepWatch):
+class ProcessReaper(StepWatch):
     """Checks before each step for boards that are gone, so that they leave their buses by virtual time."""
 
-    def __init__(self, apart: Apart) -> None:
+    def __init__(self, remote: RemoteBoards) -> None:
         StepWatch.__init__(self)
-        self.apart = apart
+        self.remote = remote
 
     def before_step(self, now_ns: int) -> None:
-        self.apart.bury()
+        self.remote.reap()
 
 
 class Asking(StepWatch):
     """Fetches these boards' counters before each step."""
 
-    def __init__(self, apart: Apart, names: tuple[str, ...]) -> None:
+    def __init__(self, remote: RemoteBoards, names: tuple[str, ...]) -> None:
         StepWatch.__init__(self)
-        self.apart = apart
+        self.remote = remote
         self.names = names
 
     def before_step(self, now_ns: int) -> None:
-        self.apart.fetch_counters(self.names)
+        self.remote.fetch_counters(self.names)
 
 
 def processor_for_this_worker() -> int:

@@ -8,7 +8,7 @@ from typing import Any
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import told
+from ranger_sim.foundation.peers import reasons_text
 from ranger_sim.harness.firmware.fresh_board import first_outputs, fresh_board, pass_on
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
@@ -32,15 +32,15 @@ class Hold:
         self.pace = stage[0]
         self.since_ns = 0
 
-    def stands(self, stands: bool) -> None:
+    def on_wait(self, waits: bool) -> None:
         """Note that the board begins or ends to wait for a debugger."""
         now_ns = wallclock.monotonic_ns()
-        if stands:
+        if waits:
             self.since_ns = now_ns
         else:
             self.pace[places.PACE_WALL_NS] += now_ns - max(self.since_ns, self.pace[places.PACE_BEGUN_NS])
             self.pace[places.PACE_BEGUN_NS] = now_ns
-        self.words[places.HELD] = int(stands)
+        self.words[places.HELD] = int(waits)
 
     def ends(self) -> bool:
         """Whether the run is to end."""
@@ -48,19 +48,19 @@ class Hold:
 
 
 def serve(
-    robot: Any, name: str, block: Block, stage: tuple, settings: Settings, fresh: bool, door: GdbServer | None = None
+    robot: Any, name: str, block: Block, stage: tuple, settings: Settings, fresh: bool, server: GdbServer | None = None
 ) -> int:
     """Run board `name` of the wired, never run `robot` until ordered to stop; returns the exit code.
 
     fresh: not the board that was built with the robot but a new one, powered up when the plant's process orders it.
-    door: the endpoint for a debugger of this board; the board that was built waits for one.
+    server: the endpoint for a debugger of this board; the board that was built waits for one.
     """
     kernel.begin_process(f"ranger-{name}", settings)
     place = list(robot.boards).index(name)
     board = robot.boards[name]
     if robot.printed is not None and name in robot.firmware:
         robot.printed.lead(name)
-    said = []
+    sent = []
     crash_record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS]
     if fresh:
         bell = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
@@ -71,14 +71,14 @@ def serve(
             pass
         record = crash_record if name in robot.firmware else None
         board = fresh_board(robot, name, block.words[places.POWER_UP], record)
-        said = first_outputs(board)
+        sent = first_outputs(board)
     if name in robot.firmware:
         board.leave_record_in(crash_record)
         if board.counts is not None:
             os.environ[coverage.PREFIX] = str(board.counts)  # for a crash, which writes them as well
     if block.table_words:
         board.move_memory(block.table())
-    in_slots = name in robot.wiring.hear_in_slots
+    in_slots = name in robot.wiring.receive_in_slots
     wires = [
         (number, wire.word) for number, wire in enumerate(robot.loop.word_wires) if wire.board is robot.boards[name]
     ]
@@ -87,19 +87,19 @@ def serve(
     audience = Audience(words, doubles, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
     try:
         endpoint = Endpoint(board, block, stage, audience, place, in_slots)  # gives the board another outbox
-        pass_on(said, board.outbox, 0)
-        if door is not None:
+        pass_on(sent, board.outbox, 0)
+        if server is not None:
             hold = Hold(block, stage)
-            door.ends, door.stands = hold.ends, hold.stands
-            door.leads_to(board)
+            server.ends, server.on_wait = hold.ends, hold.on_wait
+            server.leads_to(board)
             if fresh:
-                door.begin()
+                server.begin()
             else:
-                door.wait_for_debugger()
+                server.wait_for_debugger()
         endpoint.serve()
-        if door is not None:
-            door.close()
-            if away := told(door.sent_away):
+        if server is not None:
+            server.close()
+            if away := reasons_text(server.sent_away):
                 print(f"gdb for {name}: {away}", file=sys.stderr, flush=True)
     except BaseException as error:  # noqa: BLE001  (the supervisor reports any error of a board's program)
         where = traceback.extract_tb(error.__traceback__)[-1:]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import LIMITS, REASONS, Door, Peer, SocketStream, connected
+from ranger_sim.foundation.peers import LIMITS, REASONS, Peer, PeerServer, SocketStream, connected
 from ranger_sim.foundation.user_error import RequestError, UserError
 
 ANSWER_S = 10.0  # a client waits so long
@@ -26,7 +26,7 @@ class Client(Peer):
         self.number = number
 
 
-class ControlServer(Door[Client]):
+class ControlServer(PeerServer[Client]):
     """The supervisor's endpoint: `obey(number of the client, request)` receives every admitted request.
 
     `admitted(line)` returns the request of a line, or raises UserError.
@@ -59,7 +59,7 @@ class ControlServer(Door[Client]):
         """A client that waits for an answer keeps its place."""
         return peer.waits
 
-    def _apology(self, reason: str) -> bytes:
+    def _last_bytes(self, reason: str) -> bytes:
         return line_of({"error": f"this client {REASONS[reason]}"})
 
     def _take(self, peer: Client) -> bool:
@@ -84,7 +84,7 @@ class ControlServer(Door[Client]):
 
     def poll(self) -> None:
         """Read what has arrived, as far as the limits allow; send waiting answers."""
-        self.look(0)
+        self.receive(0)
         self.write()
 
     def answer(self, number: int, content: dict) -> None:

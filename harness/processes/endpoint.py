@@ -155,11 +155,13 @@ class Endpoint:
             if command == COMMAND_ADVANCE:
                 self._advance()
             elif command == COMMAND_COUNTERS:
-                self.tell(NOTE_COUNTERS, json.dumps(as_dict(self.board.counters()), separators=(",", ":")).encode())
+                self.send_note(
+                    NOTE_COUNTERS, json.dumps(as_dict(self.board.counters()), separators=(",", ":")).encode()
+                )
                 if self.runs_c:
                     self.board.write_counts()
             elif command == COMMAND_ACTIVITY:
-                self.tell(NOTE_ACTIVITY, self.activity.next())
+                self.send_note(NOTE_ACTIVITY, self.activity.next())
             self.block[RESULT] = RESULT_MORE if self._put_out() else RESULT_DONE
             self._show()
             self.answer.ring()
@@ -304,7 +306,7 @@ class Endpoint:
                 self.board.store.set_word(a, b, self.board.time.ms)
         self.to_board.notes.clear()
 
-    def tell(self, what, data) -> None:
+    def send_note(self, what, data) -> None:
         """Queue bytes for the other side, in parts."""
         parts = [data[i : i + NOTE_BYTES] for i in range(0, len(data), NOTE_BYTES)] or [b""]
         for number, part in enumerate(parts):

@@ -15,7 +15,7 @@ from ranger_sim.foundation import descriptors
 from ranger_sim.harness.processes import kernel, places
 
 DEADLINE_S = 10.0  # a turn takes some microseconds; the rest is for a busy machine
-LOOKS = 10  # checks in a deadline, each after a wait: a suspended machine costs one of them
+CHECKS = 10  # checks in a deadline, each after a wait: a suspended machine costs one of them
 TRACED = "t"  # state of a process that a debugger holds
 STOPPED = ("T", TRACED)
 
@@ -32,7 +32,7 @@ class Watched:
     """The last state of a board's process: its turn, for how many checks, and its processor time then."""
 
     turn: tuple[int, int] = (-1, -1)
-    looks: int = 0
+    checks: int = 0
     used_s: float = 0.0
     was_asked: bool = False
 
@@ -61,17 +61,17 @@ class Guard:
     def watch(self) -> int:
         """Watch until all have ended; returns the exit code of the watching process."""
         while self.watches:
-            ready, _ = descriptors.wait(list(self.watches), [], (self.deadline_s or DEADLINE_S) / LOOKS)
+            ready, _ = descriptors.wait(list(self.watches), [], (self.deadline_s or DEADLINE_S) / CHECKS)
             for descriptor in ready:
                 block = self.blocks[self.watches.pop(descriptor)]
                 block.words[places.FATE] = places.GONE
                 os.eventfd_write(block.answer_descriptor, 1)
             if not ready and self.deadline_s and kernel.state_of(os.getppid()) not in STOPPED:
                 for name in self.watches.values():
-                    self.look(name)
+                    self.check(name)
         return 0
 
-    def look(self, name: str) -> None:
+    def check(self, name: str) -> None:
         """End the process of a board that has given no sign of life for the deadline."""
         seen, block, process = self.seen[name], self.blocks[name], self.numbers[name]
         turn = (block.words[places.ASKED], block.words[places.ANSWERED])
@@ -82,15 +82,15 @@ class Guard:
         used_s = kernel.processor_time_s(process) - seen.used_s
         if state == TRACED or (state == "R" and used_s < self.deadline_s / 2):
             return  # a debugger has it, or the machine is busy with other processes
-        seen.looks += 1
-        if seen.looks < LOOKS:
+        seen.checks += 1
+        if seen.checks < CHECKS:
             return
         if not seen.was_asked:
             block.leave_fault(self.cause(turn, state))
         if seen.was_asked or name not in self.in_c or turn[0] == turn[1]:
             os.kill(process, signal.SIGKILL)
         else:
-            seen.was_asked, seen.looks = True, LOOKS - 1  # killed at the next check
+            seen.was_asked, seen.checks = True, CHECKS - 1  # killed at the next check
             os.kill(process, crash.ASKED)
             os.kill(process, signal.SIGCONT)
 

@@ -54,7 +54,7 @@ class HardwareInTheLoop:
         order = STAGE_BUS * 256 + 16 * len(robot.boards)  # after every board
         for bus in robot.buses:
             if bus.name in external and profile.external():
-                external[bus.name].sinks.append(self._hear(bus.name))
+                external[bus.name].sinks.append(self._sink(bus.name))
             if not profile.absent():
                 continue
             inbox: EventQueue = EventQueue()
@@ -66,11 +66,11 @@ class HardwareInTheLoop:
                 self.nodes[bus.name] = RestNode(inbox, self._onto(bus, node))
         robot.attach(self)
 
-    def _hear(self, name: str) -> Callable[[int, int, int, int, int], Any]:
-        def hear(time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
+    def _sink(self, name: str) -> Callable[[int, int, int, int, int], Any]:
+        def receive(time_ns: int, identifier: int, flags: int, lo: int, hi: int) -> None:
             self.watch.frame(time_ns, name, identifier, flags, lo, hi)
 
-        return hear
+        return receive
 
     @staticmethod
     def _through(peer: Any) -> Callable[[int, int, int, int, int, int], Any]:

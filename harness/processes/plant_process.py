@@ -24,7 +24,7 @@ MOST_FAULTS = 255  # of one run, by request; chosen by us: each that waits is ch
 KEY_HOLD_NS = 200_000_000  # a firm press
 MISUSE = 2  # exit code when something outside cannot be opened
 RESET, OPERATING = 1, 0  # modes of a bus node
-MOST_TOLD = 10  # superseded faults in one status; chosen by us: a status stays short
+MOST_REPORTED = 10  # superseded faults in one status; chosen by us: a status stays short
 POWER_UP_NS = 1_000_000  # from the start of a restarted process to its board's power
 
 
@@ -47,7 +47,7 @@ class PlantRun:
         self.gave_way: dict[int, str] = {}  # by the fault's number
         robot.deaths = self.deaths
         if robot.printed is not None:
-            robot.printed.show = lambda line: self.tell(printed=line)  # the supervisor owns the terminal
+            robot.printed.show = lambda line: self.report(printed=line)  # the supervisor owns the terminal
         self.next_status_s = 0.0
         self.orders = 0  # that changed the robot at `orders_ns` of its time
         self.orders_ns = -1
@@ -81,10 +81,10 @@ class PlantRun:
             if self.paused or ahead_s > LONGEST_WAIT_S or self.stopping:
                 continue
             done = robot.run(stop, slice_s)
-            self.look_at_faults()
+            self.check_faults()
             if done:
                 return
-            self.bury()
+            self.reap()
 
     def wait(self, seconds: float) -> None:
         """Sleep (not at all when not above 0), and serve the supervisor and external connections meanwhile."""
@@ -98,28 +98,30 @@ class PlantRun:
             for each in ends:
                 read += each.filenos()
                 write += each.filenos_to_write() if hasattr(each, "filenos_to_write") else []
-            left_over = any(getattr(each, "left_over", False) or getattr(each, "knocking", False) for each in ends)
+            left_over = any(
+                getattr(each, "left_over", False) or getattr(each, "connections_wait", False) for each in ends
+            )
             ready, writable = descriptors.wait(read, write, min(end - now, NAP_S) if left_over else end - now)
             if read[0] in ready:
-                self.hear()
+                self.receive_orders()
                 return
             now = wallclock.monotonic_s()
             if writable or ready or left_over:
                 self.robot.poll_now()
                 # what a connection cannot accept at this virtual time stays there: no busy loop on it
                 if descriptors.wait(read[:1], [], min(NAP_S, end - now))[0]:
-                    self.hear()
+                    self.receive_orders()
                     return
                 now = wallclock.monotonic_s()
             if now >= self.next_status_s:
                 self.next_status_s = now + STATUS_S
-                self.tell(status=self.status())
+                self.report(status=self.status())
             if now >= end:
                 return
 
     # --- the supervisor -----------------------------------------------------------------------------------
 
-    def tell(self, **content: Any) -> None:
+    def report(self, **content: Any) -> None:
         """Send a dictionary; while the supervisor is busy a status may be lost, but nothing more."""
         data = json.dumps(content).encode()
         try:
@@ -129,7 +131,7 @@ class PlantRun:
         except OSError:  # the supervisor has ended, and the kernel is about to end this process
             self.stopping = True
 
-    def hear(self) -> None:
+    def receive_orders(self) -> None:
         """Read everything the supervisor has sent."""
         while True:
             try:
@@ -179,7 +181,7 @@ class PlantRun:
         except UserError as mistake:
             answer = {"answer": order.get("number"), "error": str(mistake)}
         if order.get("number") is not None:
-            self.tell(**answer)
+            self.report(**answer)
 
     def set_parameter(self, name: str, word: int) -> None:
         """Write a parameter into the main brain's table now; the supervisor's endpoint has checked it."""
@@ -200,13 +202,13 @@ class PlantRun:
             raise UserError(f"clear: there is no fault {which}; {len(faults)} were armed, counted from 0")
         faults[which].stop()
 
-    def look_at_faults(self) -> None:
+    def check_faults(self) -> None:
         """Report a requested fault that another has superseded since the last poll: it never begins."""
         for number, fault in enumerate(self.robot.faults):
             if fault.gave_way_ns >= 0 and number not in self.gave_way:
                 at_s = (fault.gave_way_ns - self.robot.start_ns) * 1e-9
                 self.gave_way[number] = f"fault {number}, {fault.text()}, gave way at {at_s:.3f} s: {fault.gave_way_to}"
-                self.tell(said=self.gave_way[number])
+                self.report(said=self.gave_way[number])
 
     def status(self) -> dict:
         """What the live view shows."""
@@ -220,7 +222,7 @@ class PlantRun:
             "speed_m_per_s": robot.mean_speed_m_per_s(),
             "behind_s": max(0.0, -self.pace.ahead_s(robot.loop.time)),
             "paused": self.paused,
-            "gave_way": list(self.gave_way.values())[-MOST_TOLD:],
+            "gave_way": list(self.gave_way.values())[-MOST_REPORTED:],
             "buses": self.loads(),
             "ends": [end.counters() for end in robot.polled],
             "sent_away": sent_away(robot.polled),
@@ -247,14 +249,14 @@ class PlantRun:
         wires = self.robot.loop.wires[self.robot.loop.place(name)]
         return [(bus, wires.nodes[controller]) for controller, bus in enumerate(wires.buses) if bus is not None]
 
-    def bury(self) -> None:
+    def reap(self) -> None:
         """Take lost boards off their buses; their pins keep their levels, so their watchdog lines stay constant."""
         for name, remote in self.remotes.items():
             if remote.gone and name not in self.mourned:
                 self.mourned.add(name)
                 self.deaths.append({"board": name, "time_s": self.robot.time_s, "why": self.blocks[name].fault()})
                 self.unplug(name)
-                self.tell(gone=name, time_s=self.robot.time_s)
+                self.report(gone=name, time_s=self.robot.time_s)
 
     def unplug(self, name: str) -> None:
         """Take the controllers of a board off the emulated buses."""
@@ -265,7 +267,7 @@ class PlantRun:
         """Reset the channel of a board whose old process has ended, for a new one."""
         remote = self.remotes[name]
         remote.leave()
-        self.bury()
+        self.reap()
         remote.reset_channel()
 
     def revive(self, name: str) -> None:
@@ -326,16 +328,16 @@ def serve(
     try:
         begin(robot)
     except UserError as mistake:
-        run.tell(failed=str(mistake))
+        run.report(failed=str(mistake))
         return MISUSE
     started = wallclock.monotonic_s()
     run.run(stop)
     run.wall_s = wallclock.monotonic_s() - started
     interrupted = run.stopping and not run.lost
-    run.tell(collecting=True)
+    run.report(collecting=True)
     run.collect()
     kernel.be_ordinary()
-    run.tell(over=True, status=run.status())
+    run.report(over=True, status=run.status())
     link.setblocking(True)
     while True:  # the supervisor owns the terminal until it releases it
         data = link.recv(65536)

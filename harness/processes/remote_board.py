@@ -94,7 +94,7 @@ class RemoteBoard(Board):
     def __init__(self, built, shared, stage, place, follows_steps) -> None:
         Board.__init__(self, built.name)
         shared.check(place)
-        self.apart = True
+        self.out_of_process = True
         self.inbox = built.inbox
         self.next_time = built.next_time
         if shared.table_words:
@@ -123,11 +123,11 @@ class RemoteBoard(Board):
         self.turns = 0
         self.reached = 0
 
-    def listen_to_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
-        """Send edges of `buffer` to `pin` of the board with the level of `partner_pin`; `edges_came` reports them."""
+    def connect_edges(self, buffer: EdgeBuffer, pin: cython.longlong, partner_pin: cython.longlong) -> None:
+        """Send edges of `buffer` to `pin` of the board with the level of `partner_pin`; `note_edges` reports them."""
         self.lines.append(EdgeLine(buffer, pin, partner_pin))
 
-    def edges_came(self) -> cython.longlong:
+    def note_edges(self) -> cython.longlong:
         """Turn new edges into messages: the board cannot see the sensors' buffers."""
         line: EdgeLine
         for line in self.lines:
@@ -220,9 +220,9 @@ class RemoteBoard(Board):
 
     def fetch_counters(self) -> None:
         """Ask the board for its counters; `counters` returns them from then on."""
-        told = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
+        counters = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
         if not self.gone:
-            self.counted = from_dict(type(self.uncounted), json.loads(told))
+            self.counted = from_dict(type(self.uncounted), json.loads(counters))
 
     def notes_of(self, command, what) -> bytes:
         """Run one turn with `command`; returns the bytes of the board's notes of the kind `what`."""

@@ -31,9 +31,9 @@ from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
 from ranger_sim.harness.stop_rule import StopRule
 
 PLANT = "plant"
-LOOK_S = 0.2  # between two polls of boards and updates of the screen
+POLL_S = 0.2  # between two polls of boards and updates of the screen
 ASK_S = 0.005  # between two polls of requests, however many there are: it limits a client that never stops
-MOST_LOOK_S = 5 * LOOK_S  # how much of a process's stop one poll counts: a suspended machine or terminal counts once
+MOST_POLL_S = 5 * POLL_S  # how much of a process's stop one poll counts: a suspended machine or terminal counts once
 HANG_S = 1.0  # a board that keeps its turn this long is checked, and named well within 2 s
 RESTART_LIMIT = 5  # per board with --restart on-failure, so that a broken board does not keep us busy
 
@@ -85,10 +85,12 @@ class Supervisor:
         finish: Callable[[Any, Any, bool], int],
         view: View,
         begin: Callable[[Any], None] = lambda _robot: None,
-        doors: Sequence[GdbServer] = (),
+        servers: Sequence[GdbServer] = (),
     ) -> None:
         self.robot = robot
-        self.doors = {door.board.name: door for door in doors}  # of debuggers; each is its board's process's
+        self.debug_servers = {
+            server.board.name: server for server in servers
+        }  # of debuggers; each is its board's process's
         self.held: set[str] = set()  # boards that a debugger has, as far as reported
         self.begin = begin
         self.settings = settings if settings.boards else dataclasses.replace(settings, boards=tuple(robot.boards))
@@ -96,8 +98,8 @@ class Supervisor:
         self.finish = finish
         self.view = view
         self.control = ControlServer(settings.name, robot.admitted, self.obey)
-        self.next_ask_s = self.next_look_s = 0.0
-        self.looked_s = 0.0
+        self.next_ask_s = self.next_check_s = 0.0
+        self.polled_s = 0.0
         self.sent_away: dict[str, dict[str, int]] = {}  # clients by endpoint and reason, as far as reported
         self.stage = new_stage()
         self.blocks = {
@@ -158,9 +160,9 @@ class Supervisor:
         def body() -> int:
             self.plant_link.close()
             self.robot.logbook.close()
-            door = self.doors.pop(name, None)
-            self.close_doors()
-            return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh, door)
+            server = self.debug_servers.pop(name, None)
+            self.close_servers()
+            return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh, server)
 
         block.words[places.FATE] = 0
         block.words[places.FAULT_TEXT] = 0
@@ -168,17 +170,17 @@ class Supervisor:
         block.words[places.HELD] = 0
         self.fork(name, body)
 
-    def close_doors(self) -> None:
+    def close_servers(self) -> None:
         """Close the endpoints in a process that does not use them."""
-        for door in self.doors.values():
-            door.close()
-        self.doors.clear()
+        for server in self.debug_servers.values():
+            server.close()
+        self.debug_servers.clear()
 
     def start_plant(self) -> None:
         """The plant's process."""
 
         def body() -> int:
-            self.close_doors()
+            self.close_servers()
             return plant_process.serve(
                 self.robot,
                 self.blocks,
@@ -224,7 +226,7 @@ class Supervisor:
             each.close()
         for block in self.blocks.values():
             block.close()
-        self.close_doors()
+        self.close_servers()
 
     @contextlib.contextmanager
     def signals_noted(self) -> Iterator[None]:
@@ -270,7 +272,7 @@ class Supervisor:
     def turn(self) -> None:
         """Wait for an event, or a fifth of a second, and handle it."""
         read, write = [self.wakeup_read.fileno(), self.link.fileno()], []
-        patience_s = LOOK_S
+        patience_s = POLL_S
         if (wait_s := self.next_ask_s - wallclock.monotonic_s()) > 0.0:
             patience_s = wait_s
         else:
@@ -281,7 +283,7 @@ class Supervisor:
                 while self.wakeup_read.recv(4096):
                     pass
         signals, self.signals = self.signals, []
-        self.hear_plant()  # before the ends of children: the plant's process may have ordered them
+        self.receive_from_plant()  # before the ends of children: the plant's process may have ordered them
         if signal.SIGCHLD in signals:
             self.reap()
         if any(number != signal.SIGCHLD for number in signals):
@@ -290,9 +292,9 @@ class Supervisor:
         if now_s >= self.next_ask_s:
             self.next_ask_s = now_s + ASK_S
             self.control.poll()
-        if signals or now_s >= self.next_look_s:
-            self.next_look_s = now_s + LOOK_S
-            self.look()
+        if signals or now_s >= self.next_check_s:
+            self.next_check_s = now_s + POLL_S
+            self.check()
 
     def interrupt(self) -> None:
         """Ctrl-C: once to stop and finish the files, twice to abort."""
@@ -319,7 +321,7 @@ class Supervisor:
             return False
         return True
 
-    def hear_plant(self) -> None:
+    def receive_from_plant(self) -> None:
         """What the plant's process has sent."""
         while True:
             try:
@@ -344,7 +346,7 @@ class Supervisor:
             if "collecting" in news:  # from here on boards end because they are ordered to
                 self.ending = True
             if "over" in news:
-                self.look()
+                self.check()
                 self.view.close()
                 self.order({"do": "finish"}, listening=True)
 
@@ -370,7 +372,7 @@ class Supervisor:
                 return
             if process == 0:
                 return
-            self.hear_plant()  # it may have ordered this child to end since the last read
+            self.receive_from_plant()  # it may have ordered this child to end since the last read
             child = next((each for each in self.children.values() if each.process == process), None)
             if child is None:
                 continue
@@ -415,7 +417,7 @@ class Supervisor:
         if name in self.robot.firmware and block.words[places.CRASH]:
             record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS].tolist()
             firmware = self.robot.firmware[name]
-            block.leave_fault(crash.told(firmware.library, firmware.folder, record))
+            block.leave_fault(crash.describe(firmware.library, firmware.folder, record))
         return block.fault()
 
     def make_room(self, child: Child) -> None:
@@ -432,10 +434,10 @@ class Supervisor:
         self.view.say(f"{PLANT} (process {child.process}) {how}: the run is lost, no files are finished")
         self.exit_code = 1
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Find processes that keep their turn, or are stopped, too long, and show the state."""
         now = wallclock.monotonic_s()
-        passed_s, self.looked_s = min(now - self.looked_s, MOST_LOOK_S), now
+        passed_s, self.polled_s = min(now - self.polled_s, MOST_POLL_S), now
         for child in self.children.values():
             self.look_at_stopped(child, passed_s)
         for name, block in self.blocks.items():
@@ -462,14 +464,14 @@ class Supervisor:
                 f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s, "
                 f"{used_s:.1f} s of them computing; it is killed"
             )
-            tells_where = name in self.robot.firmware and not child.was_asked
-            os.kill(child.process, crash.ASKED if tells_where else signal.SIGKILL)
+            reports_place = name in self.robot.firmware and not child.was_asked
+            os.kill(child.process, crash.ASKED if reports_place else signal.SIGKILL)
             child.was_asked = True
             child.turn_since_s = now
         plant = self.children.get(PLANT)
         if not self.ending and plant is not None and plant.state == RUNNING:
-            self.look_at_plant(plant, now)
-        self.say_who_was_sent_away()
+            self.check_plant(plant, now)
+        self.report_disconnected()
         if not self.ending:
             self.view.show(self.state())
 
@@ -506,16 +508,18 @@ class Supervisor:
             self.view.say(f"{name} is held by its debugger, or waits for it: all wait")
         return True
 
-    def say_who_was_sent_away(self) -> None:
+    def report_disconnected(self) -> None:
         """Print a line when an endpoint first sends clients away for a reason; the total is reported at the end."""
-        doors = {**self.status.get("sent_away", {}), "control": dict(self.control.sent_away)}
-        for door, counts in doors.items():
-            said = self.sent_away.setdefault(door, {})
-            for reason in counts.keys() - said.keys():
-                self.view.say(f"{door}: a client {REASONS[reason]}, and was sent away; others of this kind are counted")
-            said.update(counts)
+        endpoints = {**self.status.get("sent_away", {}), "control": dict(self.control.sent_away)}
+        for endpoint, counts in endpoints.items():
+            reported = self.sent_away.setdefault(endpoint, {})
+            for reason in counts.keys() - reported.keys():
+                self.view.say(
+                    f"{endpoint}: a client {REASONS[reason]}, and was sent away; others of this kind are counted"
+                )
+            reported.update(counts)
 
-    def look_at_plant(self, plant: Child, now: float) -> None:
+    def check_plant(self, plant: Child, now: float) -> None:
         """Report the plant's process when it makes no progress although no board delays it."""
         progress = self.stage[0][places.HEARTBEAT_NS]
         waits = any(

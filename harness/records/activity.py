@@ -11,6 +11,6 @@ def activity_of(robot: Any, name: str) -> Any:
     board = robot.loop.board(name)
     if not hasattr(board, "activity"):
         return None
-    if board.apart:
+    if board.out_of_process:
         board.catch_up(robot.loop.time)
     return board.activity()

@@ -357,7 +357,7 @@ def why_ended(item: pytest.Item, child: Child) -> str:
         text = f"{item.nodeid}: the process of the test was killed by signal {-code} ({name})"
     else:
         text = f"{item.nodeid}: the process of the test ended with code {code} before the test did"
-    where = child.notebook.told()
+    where = child.notebook.describe()
     return f"{text}\n{where}" if where else text
 
 

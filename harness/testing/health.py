@@ -66,7 +66,7 @@ class Seen:
     off: tuple[str, ...]  # boards with a controller that is bus-off now
 
 
-def look(robot: Any) -> Seen:
+def observe(robot: Any) -> Seen:
     """Take the counts."""
     boards = robot.counters()
     lost, errors = {}, {}
@@ -95,7 +95,7 @@ class Health:
     def __init__(self, robot: Any, from_power_up: bool = False) -> None:
         self.robot = robot
         whole = from_power_up or robot.loop.time <= robot.start_ns
-        self.before: Seen | None = None if whole else look(robot)
+        self.before: Seen | None = None if whole else observe(robot)
         self.had_fallen = bool(robot.ended) and not whole
         self.judged_faults = 0 if whole else len(robot.faults)  # injected before monitoring began
 
@@ -103,7 +103,7 @@ class Health:
         """A line for each unexpected event, and for each expected one that did not occur."""
         wanted = expected if expected is not None else Expected()
         wanted.check(self.robot.names, self.robot.boards)
-        now, before = look(self.robot), self.before
+        now, before = observe(self.robot), self.before
         off = wanted.bus_off is not False
         lost = since(now.lost, before.lost if before is not None else {})
         broken = since(now.bus_errors, before.bus_errors if before is not None else {})
@@ -213,14 +213,14 @@ def amount(what: str, wanted: Amount, found: Mapping[str, int], may_be: bool = F
     may_be: it follows from another event that the test expects.
     """
     there = {name: count for name, count in found.items() if count}
-    told = ", ".join(f"{name} {count}" for name, count in there.items())
+    listed = ", ".join(f"{name} {count}" for name, count in there.items())
     if wanted is False:
-        return [f"{what}: {told}"] if there and not may_be else []
+        return [f"{what}: {listed}"] if there and not may_be else []
     if wanted is True:
         return [] if there else [f"expected and not seen: {what}"]
     if isinstance(wanted, str):
         others = {name: count for name, count in there.items() if name != wanted}
         lines = [] if wanted in there else [f"expected and not seen: {what} of {wanted}"]
-        return lines + ([f"{what}: {told}, expected only of {wanted}"] if others else [])
+        return lines + ([f"{what}: {listed}, expected only of {wanted}"] if others else [])
     total = sum(there.values())
-    return [] if total == wanted else [f"{what}: {told or 'none'}, expected are {wanted}"]
+    return [] if total == wanted else [f"{what}: {listed or 'none'}, expected are {wanted}"]

@@ -33,7 +33,7 @@ class Order(Protocol):
     def fresh(self) -> Any:
         """The machine at power-up."""
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """Its settings, in a line of a report."""
 
     def arguments(self) -> list[str]:
@@ -58,7 +58,7 @@ class MachineOrder:
     def fresh(self) -> Any:
         return self.make(**{"seed": self.seed, **dict(self.wanted)})
 
-    def told(self) -> str:
+    def describe(self) -> str:
         return ", ".join([f"seed {self.seed}", *(f"{name} {value}" for name, value in self.wanted)])
 
     def arguments(self) -> list[str]:

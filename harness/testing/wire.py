@@ -124,15 +124,15 @@ class Wire:
         __tracebackhide__ = True
         causes = [each for each in self._elsewhere(cause) if cause_if is None or cause_if(each)]
         effects = [each for each in self._elsewhere(effect) if effect_if is None or effect_if(each)]
-        instants = [each.time_ns for each in effects]
+        times = [each.time_ns for each in effects]
         pairs = []
         for each in causes:
-            place = bisect.bisect_right(instants, each.time_ns)
+            place = bisect.bisect_right(times, each.time_ns)
             if place < len(effects):
                 pairs.append((each, effects[place]))
         if not pairs:
-            told = f"{len(causes)} frames of {cause}, {len(effects)} of {effect}"
-            self._fail(f"{cause} to {effect} on {self.bus}: no effect after any cause ({told})", causes[-1:])
+            counts = f"{len(causes)} frames of {cause}, {len(effects)} of {effect}"
+            self._fail(f"{cause} to {effect} on {self.bus}: no effect after any cause ({counts})", causes[-1:])
         return Intervals(f"{cause} to {effect} on {self.bus}", pairs)
 
     def assert_latency(self, cause: str | int, effect: str | int, at_most: Duration, **conditions: Any) -> Intervals:

@@ -224,7 +224,7 @@ class SlotView:
 
     def between(self, begin: Instant, end: Instant) -> Self:
         """Only slots that begin from `begin` on and before `end` (since the robot's power-up)."""
-        first, last = _instant_ns(begin), _instant_ns(end)
+        first, last = _time_ns(begin), _time_ns(end)
         if last <= first:
             raise UserError(f"slots of {self.board}: nothing is between {begin} and {end}")
         called = f"between {duration_text(first)} and {duration_text(last)}"
@@ -385,8 +385,8 @@ class SlotView:
             late = places[slots.overran[places]]
             worst = Slot(self.recording, int(late[np.argmax(slots.end[late] - slots.start[late])]))
             dropped = ", ".join(f"{name} {n} times" if n > 1 else name for name, n in self.dropped.items())
-            told = f"{count} of {len(places)} overran; dropped: {dropped or 'nothing'}; the worst:"
-            self._fail(told, worst, self.legend.slot_ns)
+            text = f"{count} of {len(places)} overran; dropped: {dropped or 'nothing'}; the worst:"
+            self._fail(text, worst, self.legend.slot_ns)
 
     def assert_within(self, at_most: Limit) -> None:
         """Assert that every slot ended within `at_most` of its tick, interrupts included."""
@@ -398,8 +398,8 @@ class SlotView:
         over = int(((slots.cycles[places] > at_most) if isinstance(at_most, int) else (taken > limit_ns)).sum())
         if over:
             worst = self.worst()
-            told = f"{over} of {len(places)} took longer than {_limit_text(at_most)}; the worst:"
-            self._fail(told, worst, limit_ns)
+            text = f"{over} of {len(places)} took longer than {_limit_text(at_most)}; the worst:"
+            self._fail(text, worst, limit_ns)
 
     def assert_function(self, name: str, at_most: Limit) -> None:
         """Assert that no execution of function `name` cost more than `at_most`, interrupts not included."""
@@ -422,10 +422,10 @@ class SlotView:
         limit_ns = duration_ns(at_most, "limit")
         latency_ns, slot = self._worst_run(name, lambda rows: rows[:, COLUMN_LATENCY], INTERRUPT_RAN)
         if latency_ns > limit_ns:
-            told = (
+            text = (
                 f"{name} waited {duration_text(latency_ns)} for its service, at most {given_text(at_most)} are allowed:"
             )
-            self._fail(told, slot)
+            self._fail(text, slot)
 
     def _compare(self, what: str, cycles: int, at_most: Limit, slot: Slot) -> None:
         __tracebackhide__ = True
@@ -439,9 +439,9 @@ class SlotView:
             raise UserError(f"limit {limit!r}: a whole number of cycles, or a time such as '450 us', is needed")
         return nanoseconds(limit, "limit") if isinstance(limit, str) else round(limit / self.legend.cycles_per_ns)
 
-    def _fail(self, told: str, slot: Slot, limit_ns: int | None = None) -> None:
+    def _fail(self, text: str, slot: Slot, limit_ns: int | None = None) -> None:
         __tracebackhide__ = True
-        raise AssertionError(f"{self}: {told}\n\n{slot.picture(limit_ns)}")
+        raise AssertionError(f"{self}: {text}\n\n{slot.picture(limit_ns)}")
 
 
 def _by_name(rows: np.ndarray, names: list[str], limits: list[int]) -> dict[str, Statistics]:
@@ -471,7 +471,7 @@ def _statistics(name: str, rows: np.ndarray, limit: int) -> Statistics:
     )
 
 
-def _instant_ns(instant: Instant) -> int:
+def _time_ns(instant: Instant) -> int:
     return duration_ns(instant, "instant")
 
 

@@ -256,7 +256,7 @@ class BoardWires(Outbox):
     ) -> None:
         """Forward a frame to its bus."""
         if time < self.silent_until:
-            self._spoke_early(time)
+            self._check_early_transmit(time)
         if self.buses[controller] is None:
             self._to_bus_outside(CAN_REQUEST, time, controller, buffer, identifier, flags, lo, hi)
         else:
@@ -266,7 +266,7 @@ class BoardWires(Outbox):
             if time + self.window_ns < self.board.horizon:
                 self.board.stop_at(time + self.window_ns)
 
-    def _spoke_early(self, time) -> None:
+    def _check_early_transmit(self, time) -> None:
         raise UserError(
             f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `speakers` none could be before"
             f" {self.silent_until} ns: name the task that sends there; for a handler that sends, leave `speakers` out"

@@ -57,7 +57,7 @@ class BridgeWire(NamedTuple):
 class Wiring:
     """All wires of a machine. names: {board: {pin, input or register: its number}}; P0.n is pin n, P1.n pin 32 + n.
 
-    hear_in_slots: boards on which frames, edges and bytes wait for a task: none of their handlers or main loops
+    receive_in_slots: boards on which frames, edges and bytes wait for a task: none of their handlers or main loops
     answers them at once; they are then left alone until they have something to send.
     """
 
@@ -66,7 +66,7 @@ class Wiring:
     analog: Sequence[AnalogInput] = ()
     words: Sequence[EncoderWord] = ()
     bridges: Sequence[BridgeWire] = ()
-    hear_in_slots: Sequence[str] = ()
+    receive_in_slots: Sequence[str] = ()
     names: Mapping[str, Mapping[str, int]] = dataclasses.field(default_factory=dict)
 
     def number(self, board: str, name: str) -> int:

@@ -54,7 +54,7 @@ NAME = "XCP"
 # the rest is for commands and answers, for other masters of the bus, and for repeated frames.
 MOST_LOAD = Fraction(4, 5)
 WAITING = 1024  # packets; chosen by us: 46 ms of a bus at 3 Mbit/s, far more than a disturbance within the bound
-LOOK_NS = 1_000_000_000  # no external program waits for it; it is polled for its counters only
+POLL_NS = 1_000_000_000  # no external program waits for it; it is polled for its counters only
 
 # Commands of the transport layer.
 TRANSPORT_LAYER_CMD = 0xF2
@@ -70,7 +70,7 @@ class _Station(Board):
     def __init__(self) -> None:
         Board.__init__(self, NAME)
         self.next_time = NEVER
-        self.heard: deque[bytes] = deque()
+        self.received: deque[bytes] = deque()
         self.waiting: deque[bytes] = deque()
         self.sending = False
         self.counts: Counter[str] = Counter()
@@ -82,7 +82,7 @@ class _Station(Board):
         while inbox.head_time < self.horizon:
             inbox.take()
             if inbox.kind == CAN_RX:
-                self._hear(inbox.b, inbox.c, inbox.d, inbox.e)
+                self._on_frame(inbox.b, inbox.c, inbox.d, inbox.e)
             elif inbox.kind == CAN_TX_DONE:
                 self.sending = False
                 self.counts["packets_out" if inbox.c == TX_SENT else "packets_lost"] += 1
@@ -94,10 +94,10 @@ class _Station(Board):
                 self.outbox.push(inbox.time, ORDER_INTERRUPTS, CAN_MODE, CONTROLLER, 0)
         return NEVER
 
-    def _hear(self, identifier: int, flags: int, low: int, high: int) -> None:
+    def _on_frame(self, identifier: int, flags: int, low: int, high: int) -> None:
         if identifier == XCP_MASTER_ID and not flags & (FLAG_EXTENDED | FLAG_REMOTE) and flags & LENGTH_CODE:
             data = (high << 32 | low).to_bytes(MAX_DLC, "little")
-            self.heard.append(data[: min(flags & LENGTH_CODE, MAX_DLC)])
+            self.received.append(data[: min(flags & LENGTH_CODE, MAX_DLC)])
 
     def put(self, packet: bytes) -> None:
         """Queue a packet; it is dropped when the queue is full."""
@@ -164,9 +164,9 @@ class XcpCanProbe(StepWatch):
     def before_step(self, now_ns: int) -> object:
         """Execute received commands, measure, and send."""
         station = self.station
-        while station.heard:
+        while station.received:
             self.commands += 1
-            answer = self.answer(station.heard.popleft(), now_ns)
+            answer = self.answer(station.received.popleft(), now_ns)
             if answer:
                 station.put(answer)
         if self.slave.running:
@@ -196,7 +196,7 @@ class XcpCanProbe(StepWatch):
 
     def poll(self, now_ns: int) -> int:
         """Do nothing: everything happens in virtual time, and nothing outside is polled."""
-        return now_ns + LOOK_NS
+        return now_ns + POLL_NS
 
     def filenos(self) -> list[int]:
         """None: its master is on the bus."""

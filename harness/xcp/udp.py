@@ -37,11 +37,11 @@ from ranger_sim.harness.xcp.table_memory import TableMemory
 
 MAX_CTO, MAX_DTO = 248, 1400  # bytes: a datagram fits into one frame of Ethernet
 RULE = LIMITS["xcp-udp"]
-DATAGRAMS_A_LOOK = RULE.read_bytes // RULE.longest
+DATAGRAMS_PER_POLL = RULE.read_bytes // RULE.longest
 WAITING = 4096  # packets of measurements kept for the next poll; chosen by us: 2 s of one list at 0.5 ms
-STRANGERS_A_LOOK = 2  # datagrams; chosen by us: polling those that get no answer takes 10 us
+UNKNOWN_PER_POLL = 2  # datagrams; chosen by us: polling those that get no answer takes 10 us
 QUESTIONS = 8  # to the kernel, at once; chosen by us: masters that a person starts and stops
-LOOK_NS = 500_000  # virtual time between two polls: the fastest event
+POLL_NS = 500_000  # virtual time between two polls: the fastest event
 CONNECT, DISCONNECT = 0xFF, b"\xfe"  # codes of commands
 HEADER = struct.Struct("<HH")
 
@@ -88,7 +88,7 @@ class XcpUdpServer:
         self.totals = {"commands": 0, "packets_out": 0, "packets_dropped": 0}
         self.left_over = False  # datagrams may wait for the next poll
         self.rest, self.speaker = b"", ("", 0)  # of a datagram whose commands wait for the next poll, and its sender
-        self.room = RULE.burst
+        self.allowance = RULE.burst
         self.clock = wallclock.monotonic_s
         self.questions, self.asked_s = float(QUESTIONS), self.clock()  # to the kernel: how many, as of when
         self.sampling = _Sampling(self)
@@ -108,16 +108,16 @@ class XcpUdpServer:
         """Handle commands that have arrived and send waiting measurements; returns the next poll's time, ns."""
         while self.waiting:
             self._send(self.waiting.popleft())
-        self.room, self.left_over = RULE.burst, False
+        self.allowance, self.left_over = RULE.burst, False
         self._carry_out(now_ns)
         if self.private is not None:
-            self._read(self.private, DATAGRAMS_A_LOOK, now_ns)
-        self._read(self.socket, STRANGERS_A_LOOK, now_ns)
-        return now_ns + LOOK_NS
+            self._read(self.private, DATAGRAMS_PER_POLL, now_ns)
+        self._read(self.socket, UNKNOWN_PER_POLL, now_ns)
+        return now_ns + POLL_NS
 
     def _read(self, source: socket.socket, strangers: int, now_ns: int) -> None:
         """Read a socket's datagrams: as many as a poll may take, and `strangers` that are not the master's."""
-        for _ in range(DATAGRAMS_A_LOOK):
+        for _ in range(DATAGRAMS_PER_POLL):
             if self.rest or strangers <= 0:
                 self.left_over = True
                 return
@@ -192,7 +192,7 @@ class XcpUdpServer:
 
     def _carry_out(self, now_ns: int) -> None:
         """Carry out the packets of a datagram in order, as far as this poll's limit of commands allows."""
-        while self.rest and self.room > 0:
+        while self.rest and self.allowance > 0:
             data = self.rest
             length = HEADER.unpack_from(data)[0] if len(data) >= HEADER.size else 0
             packet, self.rest = data[HEADER.size : HEADER.size + length], data[HEADER.size + length :]
@@ -200,7 +200,7 @@ class XcpUdpServer:
                 self.sent_away[MALFORMED] += 1
                 self.rest = b""
                 return
-            self.room -= 1
+            self.allowance -= 1
             self.totals["commands"] += 1
             answer = self.slave.command(packet, now_ns)
             if not answer:

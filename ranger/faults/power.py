@@ -148,7 +148,7 @@ class PowerlessBoard(Board):
         self.log = before.scheduler.log  # of its activity, which the board continues when it returns
         self.buffers: list[Any] = []
 
-    def listen_to_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
+    def connect_edges(self, buffer: Any, pin: int, partner_pin: int) -> None:
         """Ignore edges at its pins."""
         self.buffers.append(buffer)
 
@@ -242,7 +242,7 @@ class Restart(Fault):
         off = loop.boards[place]
         off.advance(now_ns)
         board = fresh_board(robot, name, now_ns)
-        said = first_outputs(board)
+        sent = first_outputs(board)
         board.inbox = off.inbox  # buses, link and operator write there
         board.keep_activity(off.log)
         robot.boards[name] = board
@@ -251,8 +251,8 @@ class Restart(Fault):
             bus.nodes[node].unplug()
             bus.set_mode(node, OPERATING, now_ns)
         loop.replace(board)
-        pass_on(said, loop.wires[place], now_ns)
-        loop.due[place] = loop.came[place] = now_ns
+        pass_on(sent, loop.wires[place], now_ns)
+        loop.due[place] = loop.arrival[place] = now_ns
         loop.wires[place].silent_until = 0
         wake_buses(robot, now_ns)
 

@@ -295,7 +295,7 @@ class StuckInterrupt(ProcessorFault):
             self.service = self.source.service
             self.source.serve_by(self._serve)
             self.asking = True
-            board.now = board.instant = now_ns
+            board.now = board.input_time = now_ns
             board.request(self.source)
 
     def _serve(self, queue: Any) -> Any:

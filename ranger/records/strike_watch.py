@@ -41,7 +41,7 @@ class StrikeWatch(StepEnd):
         self.sum_ms = 0.0
         self.squares_ms2 = 0.0
 
-    def look(self) -> object:
+    def observe(self) -> object:
         """Check, once per step of the plant, whether the main brain has flipped the swing leg."""
         board: Board = self.board
         leg: cython.longlong = board.watched()

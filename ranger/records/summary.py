@@ -159,12 +159,12 @@ def firmware(robot: Any, board: str) -> dict:
     """The end of a board's program in C, the findings in it, and its coverage."""
     made = robot.firmware[board]
     death = next((each for each in robot.deaths if each["board"] == board), None)
-    if not robot.loop.board(board).apart:
+    if not robot.loop.board(board).out_of_process:
         robot.loop.board(board).write_counts()
     return {
         "name": made.manifest.name,
         "folder": str(made.folder),
-        "own_process": bool(robot.loop.board(board).apart),
+        "own_process": bool(robot.loop.board(board).out_of_process),
         "lost_s": death["time_s"] if death is not None else None,
         "why": cause_of(death) if death is not None else None,
         "findings": [dataclasses.asdict(each) for each in found_in(robot, board)],

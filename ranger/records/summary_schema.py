@@ -13,7 +13,7 @@ COUNT, WHOLE, REAL, FLAG, TEXT, TEXTS, OBJECT = "count", "integer", "number", "b
 
 @dataclasses.dataclass(frozen=True)
 class Figure:
-    """One figure. `place`: keys with dots between them; `{bus}` stands for each name of its kind, `[]` for each entry.
+    """One figure. `place`: keys with dots between them; `{bus}` means each name of its kind, `[]` each entry.
 
     `unit`: "" for words, flags and counts, "1" for ratios. `null`: when it is null, empty when it never is.
     """
@@ -263,13 +263,13 @@ def branch() -> dict[str, Any]:
 
 def leaf(figure: Figure) -> dict[str, Any]:
     """The schema of one figure."""
-    told: dict[str, Any] = dict(JSON_TYPES[figure.kind])
-    told["description"] = figure.meaning + (f"; null: {figure.null}" if figure.null else "")
+    schema: dict[str, Any] = dict(JSON_TYPES[figure.kind])
+    schema["description"] = figure.meaning + (f"; null: {figure.null}" if figure.null else "")
     if figure.null:
-        told["type"] = [told["type"], "null"]
+        schema["type"] = [schema["type"], "null"]
     if figure.unit:
-        told["unit"] = figure.unit
-    return told
+        schema["unit"] = figure.unit
+    return schema
 
 
 def below(at: dict[str, Any], key: str) -> dict[str, Any]:

@@ -86,7 +86,7 @@ class Node:
         self.free = list(BUFFERS)
         self.due: list[tuple[int, int, int, int, int, int]] = []  # time, count, identifier, flags, words
         self.offered = 0
-        self.heard: list[Frame] = []
+        self.all_received: list[Frame] = []
 
     def send(
         self,
@@ -135,7 +135,9 @@ class Node:
             if queue.kind == CAN_TX_DONE:
                 self.free.append(queue.b)
             elif queue.kind == CAN_RX:
-                self.heard.append(frame_type(RANGER)(queue.time, self.bus.name, queue.b, queue.c, queue.d, queue.e))
+                self.all_received.append(
+                    frame_type(RANGER)(queue.time, self.bus.name, queue.b, queue.c, queue.d, queue.e)
+                )
         while self.due and self.free and self.due[0][0] <= now_ns:
             _, _, *frame = heapq.heappop(self.due)
             self.bus.request(self.number, self.free.pop(0), now_ns, *frame)
@@ -143,13 +145,13 @@ class Node:
     def received(self, what: str | int | None = None) -> list[Frame]:
         """What others sent: every frame, or those of one variable, since the start or the last `forget`."""
         if what is None:
-            return list(self.heard)
+            return list(self.all_received)
         wanted = RANGER.identifier(what)
-        return [frame for frame in self.heard if frame.identifier == wanted]
+        return [frame for frame in self.all_received if frame.identifier == wanted]
 
     def forget(self) -> None:
         """Forget what was received."""
-        self.heard.clear()
+        self.all_received.clear()
 
     def wait_for(self, what: str | int, within: Duration = "100 ms") -> Frame:
         """Pass time until the next frame of a variable arrives; AssertionError if none does `within` this time."""
@@ -300,7 +302,7 @@ class Encoder:
         self.bench = bench
         self.buffer = EdgeBuffer()
         self.level = 0
-        bench.chip.listen_to_edges(self.buffer, pin_a, pin_b)
+        bench.chip.connect_edges(self.buffer, pin_a, pin_b)
 
     def turn(self, edges: int, period: Duration, forward: bool = True) -> None:
         """Send `edges` edges from now on, one per `period`; pass the time afterwards, then call it again."""
@@ -311,7 +313,7 @@ class Encoder:
             time_ns += period_ns
             self.level ^= 1
             self.buffer.push(time_ns, self.level, self.level ^ 1 if forward else self.level)
-        self.bench.chip.edges_came()
+        self.bench.chip.note_edges()
 
 
 class Outputs(Outbox):
@@ -368,7 +370,7 @@ class BoardAlone(Bench):
             self.chip: Any = self._board_in_c(self.firmware, crystal)
         else:
             self.chip = BOARD_CLASSES[name](crystal, quirks or Quirks(), 0)
-        said = first_outputs(self.chip)
+        sent = first_outputs(self.chip)
         self.chip.outbox = Outputs(self)
         self.buses_of: dict[int, tuple[Bus, int]] = {}
         self.node_on: dict[str, Node] = {}
@@ -384,7 +386,7 @@ class BoardAlone(Bench):
         self.uart_log: dict[int, list[tuple[float, int]]] = collections.defaultdict(list)
         self.encoders: dict[str, Encoder] = {}
         self.link: Link | None = link_of(self)
-        pass_on(said, self.chip.outbox, 0)
+        pass_on(sent, self.chip.outbox, 0)
         if network_time and name != "CSR":
             self.call_at(SYNC_NS, self._send_time, SYNC_NS)
 

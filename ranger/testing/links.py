@@ -29,11 +29,11 @@ class Bench(Protocol):
 
 
 class Link:
-    """The test's end of the link. `heard`: frames of the board, stamped when they were complete here."""
+    """The test's end of the link. `all_received`: frames of the board, stamped when they were complete here."""
 
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
-        self.heard: list[Frame] = []
+        self.all_received: list[Frame] = []
         self.errors: list[int] = []  # codes that this end would report
 
     def send(self, what: str | int, value: float, stamp_ms: int | None = None) -> None:
@@ -45,11 +45,11 @@ class Link:
     def received(self, what: str | int | None = None) -> list[Frame]:
         """What the board sent: every frame, or those of one variable."""
         wanted = None if what is None else RANGER.identifier(what)
-        return [frame for frame in self.heard if wanted is None or frame.identifier == wanted]
+        return [frame for frame in self.all_received if wanted is None or frame.identifier == wanted]
 
     def note(self, time_ns: int, identifier: int, lo: int, hi: int) -> None:
         """Take a frame of the board."""
-        self.heard.append(frame_type(RANGER)(time_ns, "link", identifier, DATA_8, lo, hi))
+        self.all_received.append(frame_type(RANGER)(time_ns, "link", identifier, DATA_8, lo, hi))
 
     def send_words(self, identifier: int, lo: int, hi: int) -> None:
         """Send a frame unchanged."""

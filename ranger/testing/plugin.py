@@ -95,7 +95,7 @@ class WarmedUp:
 WARMED_UP = pytest.StashKey[WarmedUp]()
 COUNTING = pytest.StashKey[str]()
 ALONE = pytest.StashKey[Any]()
-TOLD = pytest.StashKey[dict[Any, int]]()
+REPORTED = pytest.StashKey[dict[Any, int]]()
 ROBOTS = pytest.StashKey[list[Watched]]()
 BRANCH = pytest.StashKey[bool]()
 FORKED: pytest.StashKey[ForkedTest] = pytest.StashKey()  # of a test that runs in its own process, in the parent
@@ -367,7 +367,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     unhealthy = []
     for watched in robots_of(item):
         unhealthy += watched.health.faults(expected_of(item))
-    unhealthy += [f"firmware: {each.told()}" for each in new_findings(item)]
+    unhealthy += [f"firmware: {each.describe()}" for each in new_findings(item)]
     if unhealthy:
         pytest.fail(
             "\n".join(
@@ -393,8 +393,8 @@ def new_findings(item: pytest.Item) -> list[Any]:
     }
     processes = [os.getpid()]
     for watched in robots_of(item):
-        apart = getattr(watched.robot, "processes", None)
-        processes += apart.numbers if apart is not None else ()
+        remote = getattr(watched.robot, "processes", None)
+        processes += remote.numbers if remote is not None else ()
     for node in item.listchain():
         alone = node.stash.get(ALONE, None)
         if alone is not None and alone.firmware is not None:
@@ -406,12 +406,12 @@ def new_findings(item: pytest.Item) -> list[Any]:
     logs = sanitizers.place_of_findings()
     if logs is None:
         return []
-    told = item.config.stash.setdefault(TOLD, {})
+    reported = item.config.stash.setdefault(REPORTED, {})
     new = []
     for each in sanitizers.findings(logs, [one.program for one in firmware.values()], processes):
-        if each.count > told.get(each.told(), 0):
+        if each.count > reported.get(each.describe(), 0):
             new.append(each)
-        told[each.told()] = each.count
+        reported[each.describe()] = each.count
     return new
 
 
@@ -515,7 +515,7 @@ def description(item: pytest.Item, watched: Watched) -> str:
     command = ["pytest", item.nodeid, *order.arguments()]
     where = robot.whereabouts().replace(", in ", ", ")
     lines = [
-        f"{order.told()}; {robot.time_s:.6f} s since power-up{where}",
+        f"{order.describe()}; {robot.time_s:.6f} s since power-up{where}",
         f"once more: {shlex.join(command)}",
         *(f"also: {line}" for line in ([] if robot.lost else watched.health.faults(expected_of(item)))),
         "last errors that boards sent, beyond what is normal:",

@@ -67,7 +67,7 @@ class Order:
         """Whether a robot that is warmed up can be branched by forking."""
         return bool(self.warmed_up) and not self.firmware and self.backend == SIM and self.log != "full"
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """Its settings, in a line of a report."""
         scenario = self.scenario
         return f"seed {scenario.seed}, controller {scenario.controller}, body {scenario.body}, backend {self.backend}"
@@ -112,8 +112,10 @@ def counted(counts: pathlib.Path) -> list[FileCounts]:
     """The lines of firmware that ran in all the tests that had `counts` as their folder."""
     found = []
     for about in sorted(counts.glob(f"*/{ABOUT}")):
-        told = json.loads(about.read_text(encoding="utf-8"))
-        found.append(coverage.read(pathlib.Path(told["library"]), pathlib.Path(told["folder"]), about.parent))
+        about_build = json.loads(about.read_text(encoding="utf-8"))
+        found.append(
+            coverage.read(pathlib.Path(about_build["library"]), pathlib.Path(about_build["folder"]), about.parent)
+        )
     return coverage.merged(found)
 
 

@@ -157,12 +157,12 @@ def test_the_lag_quirk_holds_every_frame_until_the_next_one_comes():
         wires = build(router_one_frame_lag=lag)
         for n, identifier in enumerate((14, 21, 15, 37)):
             wires.frame((n + 1) * 5 * MS, 1, identifier, 7, n)
-        heard = []
+        arrived = []
         for n in range(4):
             wires.run((n + 1) * 5 * MS + 2 * MS)
-            heard.append([i for i, _, _ in wires.heard if i in (14, 21, 15, 37)])
+            arrived.append([i for i, _, _ in wires.heard if i in (14, 21, 15, 37)])
             wires.heard.clear()
-        got[lag] = heard
+        got[lag] = arrived
     assert got[False] == [[14], [21], [15], [37]]
     assert got[True] == [[], [14], [21], [15]]
 

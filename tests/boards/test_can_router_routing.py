@@ -164,7 +164,7 @@ def test_the_own_ring_holds_seven():
     assert [router.send(160, i, 0) for i in range(8)] == [True] * 7 + [False]
 
 
-def test_a_remote_frame_subscribes_its_bus_and_is_passed_on_to_nobody():
+def test_a_remote_frame_subscribes_its_bus_and_is_not_forwarded():
     router, _ = build()
     router.route(1, 14, 8, 1, 1, 0)  # the router knows that 14 comes from CAN1
     router.route(2, 14, FLAG_REMOTE, 0, 0, 0)

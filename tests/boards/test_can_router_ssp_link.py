@@ -154,7 +154,7 @@ def test_the_seventeenth_segment_unread_is_dropped_with_an_error(router, brain, 
     assert [f[1] for f in frames_of(brain)] == list(range(16))
 
 
-def test_nobody_writes_to_segments_that_wait_at_the_main_brain(router, brain):
+def test_segments_that_wait_at_the_main_brain_are_not_written_to(router, brain):
     for i in range(96):
         router.push(30, 8, i, i, 0)
         if i % 6 == 5:
@@ -169,7 +169,7 @@ def test_nobody_writes_to_segments_that_wait_at_the_main_brain(router, brain):
     assert frames_of(brain) == [(30, i, i) for i in range(96)]
 
 
-def test_nobody_writes_to_segments_that_wait_at_the_router(brain, router):
+def test_segments_that_wait_at_the_router_are_not_written_to(brain, router):
     for i in range(7):
         brain.send(5, i, 0)
         brain.flush()

@@ -83,14 +83,14 @@ def test_both_pushes_begin_by_the_lean_of_the_outer_leg_alone(bench):
 
 
 @pytest.mark.parametrize(("counts", "stands"), [(1_699.0, False), (1_701.0, True)])
-def test_feet_stand_above_the_contact_sum(bench, counts, stands):
+def test_feet_are_on_the_floor_above_the_contact_sum(bench, counts, stands):
     go(bench, "outer_push")
     bench.machines_only(EST_CONTACT_INNER=counts)
     assert bench.states()[1] == ("outer_swing" if stands else "outer_push")
 
 
 @pytest.mark.parametrize("state", ["inner_swing", "outer_push", "outer_swing", "inner_push"])
-def test_flight_is_told_after_200_ticks_without_contact_and_ends_on_the_outer_feet(bench, state):
+def test_flight_is_detected_after_200_ticks_without_contact_and_ends_on_the_outer_feet(bench, state):
     go(bench, state)
     leans = {"E_LO_ANGLE": 0.0}
     for _ in range(200):

@@ -320,7 +320,7 @@ def test_the_display_gets_the_next_error_when_the_link_took_the_last():
     assert parts_of_error_word(store.get_word(table.ERROR_LCD)) == (105, 4, 2)
 
 
-def test_by_quirk_the_computers_error_is_marked_new_while_there_is_none():
+def test_by_quirk_the_computers_error_is_marked_new_although_it_is_absent():
     store, errors = distribution(inverted=True)
     store.mark_read(table.ERROR_LABVIEW, LABVIEW)
     errors.distribute()

@@ -192,7 +192,7 @@ def test_the_medium_list_is_searched_for_a_new_variable_until_its_end_and_anew_i
         store.set_float(table.LV_CH_0 + place, number + MEDIUM)
     link.build_lists()
     link.slow_id, link.phase, link.fast_place = 400, 0, 0
-    told = []
+    reported = []
     for new in ({22}, {20, 21, 22}, {20, 21}, set()):
         for number in (20, 21, 22):
             store.set_word(number, 1, 1)
@@ -205,9 +205,9 @@ def test_the_medium_list_is_searched_for_a_new_variable_until_its_end_and_anew_i
             steps += 1
             if link.phase == 0:
                 break
-        told.append((steps, link.points - before))
+        reported.append((steps, link.points - before))
     # looks at 20, 21, 22, slow, restart; at 20, slow, restart; at 21, ...; at 22 in vain, slow, restart
-    assert told == [(5, 2), (3, 2), (3, 2), (3, 1)]
+    assert reported == [(5, 2), (3, 2), (3, 2), (3, 1)]
 
 
 def test_both_flags_put_a_variable_on_both_lists_and_strange_values_on_none(desk):
@@ -379,7 +379,7 @@ def test_the_link_holds_the_limits_of_the_master_file_in_single_precision():
     assert len(expected) > 150 and all_variables.WRITABLE == expected
 
 
-def test_the_firmware_of_2016_writes_whatever_it_is_told():
+def test_the_firmware_of_2016_writes_any_value_it_receives():
     desk = Desk(Quirks(parameter_writes_checked=False))
     desk.send(packet(table.MCFO_SHUTDOWN, 7) + packet(ID_OF_LAST + 1, 1))
     desk.run_ms(44)
@@ -393,7 +393,7 @@ def test_the_firmware_of_2016_finds_its_receive_transfer_off_once():
     assert desk.errors() == {"MB_SER_DMA_OFF": 1}
 
 
-def test_more_bytes_than_the_ring_takes_are_lost_and_told(desk):
+def test_more_bytes_than_the_ring_takes_are_lost_and_reported(desk):
     desk.run_ms(5)  # behind the swap of the first pass
     desk.send(b"\xff" * 600)
     desk.run_ms(22)

@@ -208,7 +208,7 @@ def test_the_means_begin_5_mrad_ahead_for_the_inner_feet_and_at_once_for_the_out
     assert bench.get("E_HEEL_STAGE") == int(begins)
 
 
-def test_contact_before_the_foot_flips_down_is_no_strike():
+def test_contact_before_the_foot_flips_down_is_not_a_strike():
     bench = walking()
     bench.tick(MCH_ANGLE=0.1, MCFI_MID_ANKLE_ANGLE=0.3)
     for _ in range(10):
@@ -310,7 +310,7 @@ def test_the_feet_that_the_estimator_knows_can_be_chosen(feet, inner, outer):
         assert estimator.sweet_spot_m == pytest.approx(radius - ankle)
 
 
-def test_the_estimator_knows_the_feet_of_the_default_body_unless_told_otherwise():
+def test_the_estimator_has_the_feet_of_the_default_body_unless_set_otherwise():
     floor = Bench().estimator.floor
     assert (floor.inner_radius_m, floor.inner_ankle_m, floor.outer_radius_m, floor.outer_ankle_m) == (
         0.2,
@@ -350,7 +350,7 @@ def test_energy_is_the_trapezoid_of_each_boards_power():
     assert bench.get("EST_TOTAL_BATT_POWER") == 20.0
 
 
-def test_a_leg_beyond_45_degrees_is_a_fall_told_once_and_stops_the_motors():
+def test_a_leg_beyond_45_degrees_is_reported_once_as_a_fall_and_stops_the_motors():
     bench = walking()
     swing_inner_and_strike(bench)
     bench.estimator.outer_angle = 0.8

@@ -61,7 +61,7 @@ def test_a_stamp_n_ms_later_runs_the_filter_n_times_with_the_old_value_held():
     assert stamped.output == each_ms.output
 
 
-def test_a_datum_with_the_same_stamp_waits_for_the_next_one_and_is_held_until_then():
+def test_a_datum_with_the_same_stamp_is_held_until_the_next_one_arrives():
     stamped, each_ms = ButterworthFilter(10.0, 1000.0), ButterworthFilter(10.0, 1000.0)
     stamped.push_stamped(0.0, 7)
     each_ms.push(0.0)

@@ -240,7 +240,7 @@ def test_the_correction_follows_mode_and_speed(bench, mode, v):
 
 def test_the_hip_waits_for_the_leg_machine_at_mid_stance(bench):
     inner_stance_premid(bench)
-    bench.modes.leg.machine.put("stop")
+    bench.modes.leg.machine.set_state("stop")
     bench.machines_only(E_LI_ANGLE=0.01)
     assert bench.states()[2] == "HO_premid"
 
@@ -267,13 +267,13 @@ def test_the_emergency_hold_of_the_outer_legs(bench, angle, v, rate, held):
 
 
 def test_the_emergency_hold_of_the_inner_legs_is_the_mirror(bench):
-    bench.modes.hip.machine.put("HI_premid")
+    bench.modes.hip.machine.set_state("HI_premid")
     bench.machines_only(MCH_ANGLE=0.25, E_AM_L_ABSRATE=0.5, E_MCH_ANG_RATE=-0.1)
     assert bench.states()[2] == "HI_ehold"
     assert bench.command("MCH") == close((30.0 * 0.35, 30.0, 4.0))
 
 
-def test_mid_stance_comes_before_the_emergency_hold_once_the_leg_machine_has_told_it(bench):
+def test_mid_stance_comes_before_the_emergency_hold_once_the_leg_machine_has_reported_it(bench):
     inner_stance_premid(bench)
     bench.machines_only(E_T_AFTER_HS=340, E_LI_ANGLE=0.001, MCH_ANGLE=-0.15, E_MCH_ANG_RATE=-0.1)
     assert bench.states()[1:3] == ("LI_aftermid", "HO_premid")  # one slot behind
@@ -455,7 +455,7 @@ def test_a_foot_flips_down_when_its_leg_is_ahead_and_stands_after_its_strike(ben
 
 
 def test_the_outer_foot_is_the_mirror_of_the_inner_one(bench):
-    bench.modes.outer_foot.machine.put("stance")
+    bench.modes.outer_foot.machine.set_state("stance")
     bench.set(E_SWING_LEG=1, E_ANKLE_HEIGHT=0.011, E_FI_ABSANG=1.8, E_FO_ABSANG=2.0, MCFO_MOTOR_POSITION=1.9)
     bench.machines_only(MCH_ANGLE=0.04, E_AM_L_ABSRATE=0.7)
     assert bench.states()[4] == "stance"

@@ -77,11 +77,11 @@ def test_standby_stops_the_steering_of_the_walk_that_it_ends():
 
 def put_machines(bench, leg, hip, inner, outer, steering):
     modes = bench.modes
-    modes.leg.machine.put(leg)
-    modes.hip.machine.put(hip)
-    modes.inner_foot.machine.put(inner)
-    modes.outer_foot.machine.put(outer)
-    modes.steering.machine.put(steering)
+    modes.leg.machine.set_state(leg)
+    modes.hip.machine.set_state(hip)
+    modes.inner_foot.machine.set_state(inner)
+    modes.outer_foot.machine.set_state(outer)
+    modes.steering.machine.set_state(steering)
 
 
 def test_leaving_walk_puts_every_machine_back_to_its_start():
@@ -223,7 +223,7 @@ def test_a_light_warns_of_pushes_that_began_too_early():
     assert bench.get("UI_SET_LED_3") == 0
 
 
-def test_the_colour_of_light_1_tells_the_mode():
+def test_the_colour_of_light_1_shows_the_mode():
     bench = Bench()
     bench.tick()
     colours = [bench.get("UI_SET_LED_1")]

@@ -135,7 +135,7 @@ def test_a_machine_can_nest_three_deep(script):
     assert [line for line in script.took() if line.endswith("main")] == ["top main", "middle main", "low main"]
 
 
-def test_a_state_is_told_by_number_at_the_beginning_of_the_next_tick(script):
+def test_a_state_is_reported_by_number_at_the_beginning_of_the_next_tick(script):
     machine = StateMachine(
         "told",
         (script.state(3, "a"), script.state(8, "b")),
@@ -150,7 +150,7 @@ def test_a_state_is_told_by_number_at_the_beginning_of_the_next_tick(script):
     machine.step()
     machine.step()
     assert script.took() == [8, "b main", "b main"]
-    machine.put("a")
+    machine.set_state("a")
     assert script.took() == [3]
 
 
@@ -174,4 +174,4 @@ def test_a_number_used_twice_is_refused(script):
 
 def test_putting_a_machine_into_an_unknown_state_is_refused(script):
     with pytest.raises(ValueError, match="no state 'z'"):
-        two_states(script).put("z")
+        two_states(script).set_state("z")

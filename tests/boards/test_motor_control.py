@@ -115,7 +115,7 @@ def test_only_the_outer_feet_motor_is_mounted_the_other_way_round():
     assert {name: Bench(name).board.output.sign for name in BOARDS} == {"MCH": 1, "MCFO": -1, "MCFI": 1, "MCSI": 1}
 
 
-def test_the_target_is_clipped_and_told():
+def test_the_target_is_clipped_and_reported():
     motor = limits()
     assert motor.limit_target(5 * ONE, 0) == 4 * ONE
     assert motor.limit_target(-9 * ONE, 0) == -4 * ONE
@@ -582,7 +582,7 @@ def loop_at_rest():
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_the_integral_is_clipped_beyond_its_limit_to_either_side_and_tells_of_it(loop_at_rest, sign):
+def test_the_integral_is_clipped_beyond_its_limit_to_either_side_and_reported(loop_at_rest, sign):
     control, saturated = loop_at_rest
     control.integral = sign * (control.integral_limit - 1)
     control.update(sign, 0)

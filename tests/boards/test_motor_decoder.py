@@ -280,7 +280,7 @@ def test_a_pulse_that_ends_before_its_interrupt_is_served_is_a_glitch():
     assert bench.board.joint.count == 1
 
 
-def test_an_edge_at_the_very_instant_of_a_wrap_is_timed_right():
+def test_an_edge_at_the_very_time_of_a_wrap_is_timed_right():
     bench = Bench("MCH").run(ms=1)
     bench.edge(1, 0, "01", after_ns=400_000)
     bench.edge(0, 1, "01", after_ns=500_000)  # the timer wraps every 0.5 ms from power-up on

@@ -27,7 +27,7 @@ def test_an_error_word_is_a_16_bit_code_a_6_bit_board_and_a_10_bit_count():
     assert error_word(1, 1, 5000) >> 22 == 5000 - 4 * 1024
 
 
-def test_an_error_waits_with_its_count_and_the_time_it_first_came():
+def test_an_error_waits_with_its_count_and_the_time_of_its_first_occurrence():
     errors = error_module()
     errors.time.ms = 77
     errors.report(109)
@@ -145,7 +145,7 @@ def test_a_board_sends_a_waiting_error_in_its_occasional_list():
 
 
 @pytest.mark.parametrize("samples", [10, 11])
-def test_contact_changes_after_so_many_equal_samples(samples):
+def test_contact_changes_after_a_number_of_equal_samples(samples):
     foot = FootContact(2000, 1000, samples)
     for _ in range(samples - 1):
         foot.read(2001)

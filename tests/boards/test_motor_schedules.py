@@ -398,15 +398,15 @@ def test_a_board_answers_the_same_whatever_the_size_of_its_steps(name):
             for i in range(10):
                 bench.edge(i & 1, 1 - (i & 1), "01", after_ns=ms * 1_000_000 + i * 90_000 + 5)
             bench.board.inbox.push(ms * 1_000_000 + 7, 512, CAN_RX, bench.controller, 0, 8, ms, ms)
-        told = []
+        reported = []
         queue = bench.board.outbox
         while bench.now < 20_000_000:
             bench.now += step_ns
             bench.board.advance(bench.now)
             while queue.take():
-                told.append((queue.time, queue.kind, queue.a, queue.b, queue.c, queue.d, queue.e, queue.f))
+                reported.append((queue.time, queue.kind, queue.a, queue.b, queue.c, queue.d, queue.e, queue.f))
         # a bridge update is stamped with the coming PWM period, so it may be fetched before its turn
-        return hashlib.sha256(repr(sorted(told)).encode()).hexdigest()
+        return hashlib.sha256(repr(sorted(reported)).encode()).hexdigest()
 
     assert digest(25_000) == digest(125_000) == digest(1_000_000)
 
@@ -443,8 +443,8 @@ class Link:
 def test_frames_go_to_the_receiver_of_their_identifier():
     link = Link()
     current, sleep = FloatReceiver(), IntReceiver()
-    link.can.listen(18, current)
-    link.can.listen(17, sleep)
+    link.can.subscribe(18, current)
+    link.can.subscribe(17, sleep)
     link.push(CAN_RX, 1, 18, 8, 0xBFC00000, 5)
     link.push(CAN_RX, 1, 17, 8, 0xFFFFFFFF, 5)
     assert link.can.receive_all() == 2
@@ -456,7 +456,7 @@ def test_frames_go_to_the_receiver_of_their_identifier():
 def test_frames_that_are_not_8_bytes_or_remote_or_extended_are_dropped(flags):
     link = Link()
     current = FloatReceiver()
-    link.can.listen(18, current)
+    link.can.subscribe(18, current)
     link.push(CAN_RX, 1, 18, flags, 0xBFC00000, 5)
     link.can.receive_all()
     assert current.frames == 0 and link.can.ignored == 1
@@ -469,13 +469,23 @@ def test_an_identifier_outside_the_list_is_dropped():
     assert link.can.ignored == 1
 
 
+def test_the_old_name_of_subscribe_warns_at_the_caller():
+    link, current = Link(), FloatReceiver()
+    with pytest.warns(DeprecationWarning, match=r"^CanLink.listen is now subscribe; the old name ends") as warned:
+        link.can.listen(18, current)
+    assert warned[0].filename == __file__
+    link.push(CAN_RX, 1, 18, 8, 0xBFC00000, 5)
+    link.can.receive_all()
+    assert current.value == -1.5
+
+
 def test_two_receivers_for_one_identifier_are_a_mistake():
     link = Link()
-    link.can.listen(18, Ignored())
+    link.can.subscribe(18, Ignored())
     with pytest.raises(UserError, match="identifier 18 has two receivers"):
-        link.can.listen(18, Ignored())
+        link.can.subscribe(18, Ignored())
     with pytest.raises(UserError, match="identifier 2048 is not"):
-        link.can.listen(2048, Ignored())
+        link.can.subscribe(2048, Ignored())
 
 
 @pytest.mark.parametrize("report", [True, False])
@@ -564,7 +574,7 @@ def test_after_bus_off_the_controller_is_started_again_at_once():
     assert link.errors.totals[codes.CAN1_ERR_WARN] == 1
 
 
-def test_a_data_overrun_is_told_once_and_never_cleared():
+def test_a_data_overrun_is_reported_once_and_never_cleared():
     link = Link()
     for _ in range(2):  # nobody takes the frames: two fill the controller's buffers, each further one is lost
         link.chip.vic.detach(link.controller.rx_source)

@@ -60,7 +60,7 @@ def lines(value=1.5, keys=lambda: -3, errors=None):
     ]
 
 
-def test_lines_stand_in_the_rows_that_the_master_table_names():
+def test_lines_are_in_the_rows_that_the_master_table_names():
     schedule = Schedule(slot_us=500, **laid_out(TABLE, Heard(), lines()))
     rows = [[task.name for task in row] for row in schedule.rows]
     assert rows == [["ANGLE"], ["KEYS", "ANGLE"], ["occasional"]]
@@ -72,34 +72,34 @@ def test_lines_stand_in_the_rows_that_the_master_table_names():
 
 
 def test_a_value_goes_out_as_the_tables_type_stamped_with_the_network_time():
-    heard = Heard()
-    heard.time.ms = 77
+    received = Heard()
+    received.time.ms = 77
     values = [0.25, 0.5]
-    rows = laid_out(TABLE, heard, lines(value=lambda: values.pop(0)))["rows"]
+    rows = laid_out(TABLE, received, lines(value=lambda: values.pop(0)))["rows"]
     for task in (*rows[0], *rows[1]):
         task.function()
-    assert heard.frames == [(7, word_of_float(0.25), 77), (8, 2**32 - 3, 77), (7, word_of_float(0.5), 77)]
+    assert received.frames == [(7, word_of_float(0.25), 77), (8, 2**32 - 3, 77), (7, word_of_float(0.5), 77)]
 
 
 def test_a_number_that_never_changes_is_sent_as_it_is():
-    heard = Heard()
-    laid_out(TABLE, heard, lines(value=1.5))["rows"][0][0].function()
-    assert heard.frames == [(7, word_of_float(1.5), 0)]
+    received = Heard()
+    laid_out(TABLE, received, lines(value=1.5))["rows"][0][0].function()
+    assert received.frames == [(7, word_of_float(1.5), 0)]
 
 
 def test_an_error_goes_out_only_while_one_waits_with_the_stamp_of_its_first_time():
-    heard = Heard()
+    received = Heard()
     errors = ErrorModule(5, NetworkTime())
-    send = laid_out(TABLE, heard, lines(errors=errors))["occasional"][0].function
+    send = laid_out(TABLE, received, lines(errors=errors))["occasional"][0].function
     send()
-    assert heard.frames == []
+    assert received.frames == []
     errors.time.ms = 12
     errors.report(34)
     errors.update()
-    heard.time.ms = 99
+    received.time.ms = 99
     send()
     send()
-    assert heard.frames == [(9, 34 | 5 << 16 | 1 << 22, 12)]
+    assert received.frames == [(9, 34 | 5 << 16 | 1 << 22, 12)]
 
 
 @pytest.mark.parametrize(
@@ -171,6 +171,6 @@ def test_adding_a_variable_takes_a_line_a_name_in_a_row_and_a_send_and_nothing_e
     hip = house / "boards/hip.py"
     line = re.search(r'^ *Send\("MCH_ANGLE".*\n', hip.read_text(encoding="utf-8"), re.MULTILINE).group(0)
     edit(hip, line, line + " " * 16 + 'Send("MCH_SPIKES", lambda: board.encoder.value, 260, 400),\n')
-    heard = run(house, "-c", HEAR_A_NEW_VARIABLE)
+    received = run(house, "-c", HEAR_A_NEW_VARIABLE)
     # the first slot begins after 0.5 ms, and its first row comes round in every fourth
-    assert heard.stdout == "1 4690.0\n", heard.stderr
+    assert received.stdout == "1 4690.0\n", received.stderr

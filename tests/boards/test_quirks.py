@@ -32,13 +32,13 @@ def test_defaults_and_values_of_2016_in_the_table_are_those_of_the_dataclass():
         assert row[5].strip("`") == str(each.metadata["firmware"]), each.name
 
 
-def test_every_line_tells_what_the_appendix_says_and_what_the_firmware_does():
+def test_every_line_has_what_the_appendix_says_and_what_the_firmware_does():
     for row in rows():
         assert len(row) == 6
         assert all(len(cell) > 0 for cell in row)
 
 
-def test_lines_without_a_switch_tell_why():
+def test_lines_without_a_switch_give_the_reason():
     text = TABLE.read_text().split("## Without a switch")[1].split("## Our own departures")[0]
     lines = [line for line in text.splitlines() if line.startswith("|")][2:]
     assert len(lines) >= 10
@@ -47,7 +47,7 @@ def test_lines_without_a_switch_tell_why():
         assert len(cells) == 4 and all(cells), line
 
 
-def test_our_own_departures_are_told_with_the_reason():
+def test_our_own_departures_are_listed_with_the_reason():
     text = TABLE.read_text().split("## Our own departures")[1]
     lines = [line for line in text.splitlines() if line.startswith("|")][2:]
     assert len(lines) >= 7
@@ -64,7 +64,7 @@ def test_every_switch_sets_the_value_of_2016():
     assert firmware.proportional_current_control is False
 
 
-def test_a_value_that_is_not_allowed_is_told_in_one_line():
+def test_a_value_that_is_not_allowed_is_reported_in_one_line():
     with pytest.raises(UserError, match=r"quirk imu_packets: 'all' is not allowed .*'rates'"):
         Quirks(imu_packets="all")
     with pytest.raises(UserError, match="contact_equal_samples: 0 is not allowed"):
@@ -73,7 +73,7 @@ def test_a_value_that_is_not_allowed_is_told_in_one_line():
         Quirks(speed_limiter=1)
 
 
-def test_an_unknown_switch_is_told_in_one_line():
+def test_an_unknown_switch_is_reported_in_one_line():
     with pytest.raises(UserError, match="no such switch"):
         Quirks.named(speed_limitter=False)
     assert Quirks.named(speed_limiter=False).speed_limiter is False

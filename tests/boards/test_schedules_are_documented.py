@@ -59,7 +59,7 @@ def test_slots_and_rows_are_those_of_the_page(boards, name):
 
 
 @pytest.mark.parametrize("name", BOARDS)
-def test_interrupts_cost_and_stand_in_the_order_that_the_page_says(boards, name):
+def test_interrupts_have_the_costs_and_the_order_of_the_page(boards, name):
     *_, interrupts = documented(name)
     assert interrupts == [
         [

@@ -91,7 +91,7 @@ def test_interrupts_have_the_slots_of_the_firmware():
     }  # fmt: skip
 
 
-def test_frames_carry_the_network_time_last_heard():
+def test_frames_carry_the_network_time_last_received():
     wires = build().run(10 * MS)
     wires.frame(10 * MS + 100, 2, table.TIMESTAMP, 4711, 4711)
     wires.run(15 * MS)
@@ -99,7 +99,7 @@ def test_frames_carry_the_network_time_last_heard():
     assert wires.sent[-1][5] == 4711
 
 
-def test_it_says_that_it_lives_and_how_long_its_slots_take():
+def test_it_reports_that_it_lives_and_how_long_its_slots_take():
     wires = build().run(200 * MS)
     assert {float_of_word(w0) for _, w0, _ in wires.of(table.UI_STATUS)} == {1.0}
     longest = float_of_word(wires.of(table.UI_MAX_EXECUTION_TIME)[-1][1])
@@ -255,12 +255,12 @@ def test_a_song_command_plays_the_tune_once():
 
 
 def test_an_error_of_another_board_beeps_and_with_the_quirk_it_does_not():
-    heard = {}
+    received = {}
     for beeps in (True, False):
         wires = build(buzzer_beeps=beeps).run(5 * MS)
         command(wires, table.ERROR_LCD, errors.AE_SPIKE | 3 << 16 | 1 << 22)
-        heard[beeps] = wires.board.panel.hertz
-    assert heard == {True: 1319, False: 0}
+        received[beeps] = wires.board.panel.hertz
+    assert received == {True: 1319, False: 0}
 
 
 def test_its_own_errors_beep_too_and_go_out_with_board_and_time():

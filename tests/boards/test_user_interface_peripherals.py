@@ -154,14 +154,14 @@ def buzzer(chip):
 
 
 def play(buzzer, milliseconds):
-    heard = []
+    received = []
     for _ in range(milliseconds):
         buzzer.update()
-        heard.append(buzzer.hertz)
-    return heard
+        received.append(buzzer.hertz)
+    return received
 
 
-def test_a_tone_is_half_a_period_of_the_timer_and_heard(panel, buzzer):
+def test_a_tone_is_half_a_period_of_the_timer_and_audible(panel, buzzer):
     buzzer.tone(1000)
     assert (buzzer.pwm.latched_MR0, buzzer.pwm.latched_MR5) == (60000, 30000)
     assert panel.hertz == 1000
@@ -197,8 +197,8 @@ def test_an_error_beeps_once_for_sixty_milliseconds(buzzer):
 def test_different_errors_sound_different_and_wait_for_each_other(buzzer):
     for code in (4, 5, 6, 7):
         buzzer.error_sound(code)
-    heard = play(buzzer, 600)
-    pitches = [p for p, before in zip(heard, [0] + heard, strict=False) if p and not before]
+    received = play(buzzer, 600)
+    pitches = [p for p, before in zip(received, [0] + received, strict=False) if p and not before]
     assert pitches == [1047, 1319, 1568, 2093]
 
 
@@ -211,7 +211,7 @@ def test_error_zero_is_silent_and_no_more_than_eight_beeps_wait(buzzer):
     assert buzzer.beeps_made == 8
 
 
-def test_as_the_firmware_of_2016_neither_errors_nor_a_frequency_alone_are_heard(chip):
+def test_as_the_firmware_of_2016_neither_errors_nor_a_frequency_alone_are_audible(chip):
     buzzer = Buzzer(Pwm(chip, period=PERIOD_AT_START), False, True)
     buzzer.error_sound(62)
     BuzzerFrequency(buzzer).deliver(440, 0)

@@ -121,7 +121,7 @@ def test_the_description_names_every_record():
 # --- one client ---------------------------------------------------------------------------------------------
 
 
-def test_a_welcome_tells_window_bit_rate_epoch_and_channels():
+def test_a_welcome_has_window_bit_rate_epoch_and_channels():
     owner = Owner(epoch_ns=77)
     _, body = owner.attached()
     assert wire.WELCOME_BODY.unpack_from(body) == (1, TRANSMIT_QUEUE, RATE, 77)
@@ -140,7 +140,7 @@ def test_a_frame_goes_to_the_boards_and_is_answered_with_its_time(owner):
     assert time_ns == inbox.time + 1_000_000_000 // RATE  # a sender is done one bit after its receivers
 
 
-def test_a_client_hears_the_boards_of_its_channel_only(owner):
+def test_a_client_receives_the_boards_of_its_channel_only(owner):
     one, _ = owner.attached("can1")
     two, _ = owner.attached("can2")
     owner.buses["can1"].request(0, 1, owner.time, 0x55, 8, 1, 2)
@@ -156,7 +156,7 @@ def test_how_often_a_board_tries_is_its_own_business(owner):
     assert [frame[1:] for frame in frames_of(said(client))] == [(0x55, 8, 1, 2)]
 
 
-def test_a_sender_that_nobody_acknowledges_hears_of_it_until_nothing_changes_any_more(owner):
+def test_a_sender_without_acknowledgement_receives_error_frames_until_nothing_changes_any_more(owner):
     client, _ = owner.attached()
     owner.buses["can1"].set_mode(0, RESET, owner.time)
     owner.run(2)
@@ -167,7 +167,7 @@ def test_a_sender_that_nobody_acknowledges_hears_of_it_until_nothing_changes_any
     assert len(errors) == 16 and all(frame[2] & FLAG_ERROR for frame in errors)
 
 
-def test_a_client_that_only_asks_gets_the_channels_and_is_no_node(owner):
+def test_a_client_that_only_asks_gets_the_channels_and_is_not_a_node(owner):
     client = owner.connect()
     client.send(hello(""))
     owner.run()
@@ -181,11 +181,11 @@ def test_what_a_client_had_queued_is_sent_after_it_left_and_its_place_is_used_ag
     client.sendall(b"".join(wire.send_record(number, 0, 0, 0) for number in range(20)))
     client.close()
     owner.run(200)
-    heard = []
+    received = []
     inbox = owner.inboxes["can1"]
     while inbox.take():
-        heard.append(inbox.b)
-    assert heard == list(range(20))
+        received.append(inbox.b)
+    assert received == list(range(20))
     for _ in range(5):
         again, _ = owner.attached()
         owner.run(5)
@@ -195,7 +195,7 @@ def test_what_a_client_had_queued_is_sent_after_it_left_and_its_place_is_used_ag
     assert owner.server.counters()["clients_seen"] == 6
 
 
-def test_a_board_sends_the_same_frames_at_the_same_times_whether_somebody_listens_or_not():
+def test_a_board_sends_the_same_frames_at_the_same_times_with_and_without_a_listener():
     logs = []
     for listeners in (0, 2):
         owner = Owner()
@@ -211,7 +211,7 @@ def test_a_board_sends_the_same_frames_at_the_same_times_whether_somebody_listen
     assert len(logs[0]) == 50 and logs[0] == logs[1]
 
 
-def test_a_slow_client_loses_frames_is_told_and_holds_up_nobody(owner):
+def test_a_slow_client_loses_frames_gets_a_report_and_delays_no_other_client(owner):
     slow, _ = owner.attached()
     tap = owner.server.peers[0].tap
     per_frame = len(wire.frame_record(wire.FRAME, 0, 0, 0, 0, 0))
@@ -221,16 +221,16 @@ def test_a_slow_client_loses_frames_is_told_and_holds_up_nobody(owner):
         owner.run()
     lost = owner.server.counters()["frames_dropped"]
     assert lost > 0
-    heard, rest = [], bytearray()
+    received, rest = [], bytearray()
     while more := said(slow, rest):
-        heard += more
+        received += more
         owner.run()
     owner.buses["can1"].request(0, 1, owner.time, 0x78, 0, 0, 0)
     owner.run(10)
-    heard += said(slow, rest)
-    assert len(frames_of(heard)) + lost == 4 * len(flood) + 1
-    assert [wire.OVERFLOW_BODY.unpack(body)[1] for kind, body in heard if kind == wire.OVERFLOW][-1] == lost
-    assert frames_of(heard)[-1][1] == 0x78
+    received += said(slow, rest)
+    assert len(frames_of(received)) + lost == 4 * len(flood) + 1
+    assert [wire.OVERFLOW_BODY.unpack(body)[1] for kind, body in received if kind == wire.OVERFLOW][-1] == lost
+    assert frames_of(received)[-1][1] == 0x78
 
 
 # --- refusals -----------------------------------------------------------------------------------------------
@@ -257,7 +257,7 @@ def test_a_slow_client_loses_frames_is_told_and_holds_up_nobody(owner):
         (hello("can1") + wire.send_record(1, 0, 0, 0) * (TRANSMIT_QUEUE + 1), b"more than the window of 64"),
     ],
 )
-def test_a_client_that_breaks_the_rules_is_told_why_and_closed(owner, data, words):
+def test_a_client_that_breaks_the_rules_gets_the_reason_and_is_closed(owner, data, words):
     client = owner.connect()
     client.sendall(data)
     owner.run(3)
@@ -268,7 +268,7 @@ def test_a_client_that_breaks_the_rules_is_told_why_and_closed(owner, data, word
     assert owner.server.counters()["clients"] == 0 and not owner.server.peers
 
 
-def test_a_name_can_be_had_once_and_again_when_it_is_free():
+def test_a_name_can_be_taken_once_and_again_when_it_is_free():
     owner = Owner()
     with pytest.raises(UserError, match=f"name '{owner.name}' is taken"):
         AttachServer(owner.name, {})
@@ -277,12 +277,12 @@ def test_a_name_can_be_had_once_and_again_when_it_is_free():
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "a b", "x" * 65, "ä"])
-def test_an_impossible_name_is_told(name):
+def test_an_impossible_name_is_reported(name):
     with pytest.raises(UserError, match="is not 1 ... 64 letters"):
         AttachServer(name, {})
 
 
-def test_elsewhere_than_on_linux_the_reason_is_told(monkeypatch):
+def test_on_other_systems_than_linux_the_reason_is_reported(monkeypatch):
     monkeypatch.setattr(wire.sys, "platform", "darwin")
     with pytest.raises(UserError, match="exist on Linux only, this is darwin"):
         AttachServer("x", {})
@@ -304,7 +304,7 @@ def test_a_client_on_a_bus_keeps_its_place_and_one_more_is_refused(owner):
     owner.attached()
 
 
-def test_who_has_not_said_hello_makes_room_for_one_more(owner):
+def test_a_client_that_has_not_sent_hello_gives_up_its_place_to_another(owner):
     silent = [owner.connect() for _ in range(LIMITS["attach"].peers)]
     owner.run(400)
     owner.attached()
@@ -319,16 +319,16 @@ def test_nothing_is_left_in_the_kernels_list_when_it_ends():
     assert name not in wire.names_running()
 
 
-def test_who_listens_under_the_address_but_is_no_robot_is_told():
+def test_a_listener_at_the_address_that_is_not_a_robot_is_reported():
     name = fresh_name()
     impostor = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     impostor.bind(wire.SOCKET_PREFIX + name)
     impostor.listen()
     with pytest.raises(UserError, match="is running but has not answered for 0.01 s"):
-        attached_link.greeted(name, "can1", patience_s=0.01)
+        attached_link.handshake(name, "can1", patience_s=0.01)
     impostor.close()
     with pytest.raises(FileNotFoundError):
-        attached_link.greeted(name, "can1")
+        attached_link.handshake(name, "can1")
 
 
 def test_a_frame_directly_behind_the_welcome_is_not_forgotten():
@@ -396,7 +396,7 @@ def test_a_host_reads_of_its_clients_before_it_passes_time_and_not_behind(monkey
 
     host.serve(Server())
     tap = bus.taps.add("client")
-    tap.tell_state(0)
+    tap.report_state(0)
     steps.clear()
     host.turn(0.5)
     assert steps == ["advance", "poll", "advance", "deliver"]
@@ -422,10 +422,10 @@ RECORDS = st.one_of(
 
 
 @given(st.lists(st.tuples(RECORDS, st.booleans(), st.booleans()), max_size=30), st.booleans())
-def test_whatever_clients_send_the_server_and_the_other_nodes_live_on(pieces, greeted):
+def test_whatever_clients_send_the_server_and_the_other_nodes_live_on(pieces, handshake):
     owner = Owner()
     good, _ = owner.attached()
-    bad = owner.attached()[0] if greeted else owner.connect()
+    bad = owner.attached()[0] if handshake else owner.connect()
     for piece, leaves, waits in pieces:
         try:
             bad.sendall(piece)
@@ -441,11 +441,11 @@ def test_whatever_clients_send_the_server_and_the_other_nodes_live_on(pieces, gr
     good.send(wire.send_record(0, 1, 0x5A, 0))
     owner.run(1000)
     assert [frame[1:4] for frame in frames_of(said(good), wire.SENT)] == [(0, 1, 0x5A)]
-    heard = []
+    received = []
     inbox = owner.inboxes["can1"]
     while inbox.take():
-        heard.append((inbox.b, inbox.d))
-    assert (0, 0x5A) in heard
+        received.append((inbox.b, inbox.d))
+    assert (0, 0x5A) in received
     owner.close()
 
 

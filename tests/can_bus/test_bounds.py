@@ -119,7 +119,7 @@ def test_time_in_a_queue_is_jitter_for_those_above_it():
     )
 
 
-def test_a_queue_that_stands_still_is_later_by_that():
+def test_a_queue_that_pauses_is_later_by_that():
     one = message("A", 1, 10 * MS, queue="node")
     paused = dataclasses.replace(one, pause_ns=500_000)
     assert response_times([paused], 1_000_000)[0].response_ns == 635_000

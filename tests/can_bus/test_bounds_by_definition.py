@@ -48,7 +48,7 @@ def equations(streams, m, bit_rate):
     return ceil(max(R) * bit_ns), R.index(max(R)), Q, ceil(B * bit_ns), ceil(t * bit_ns)
 
 
-def told(bound):
+def reported(bound):
     return bound.response_ns, bound.instance, bound.instances, bound.blocking_ns, bound.busy_ns
 
 
@@ -66,11 +66,11 @@ streams_of_a_bus = st.lists(
 
 @settings(max_examples=examples(100))
 @given(streams_of_a_bus, st.sampled_from([1_000_000, 500_000, 3_000_000]))
-def test_bounds_of_frames_with_buffers_of_their_own_are_those_of_the_equations(drawn, bit_rate):
+def test_bounds_of_frames_with_their_own_buffers_are_those_of_the_equations(drawn, bit_rate):
     streams = [Message(f"m{n}", key, bits, T, T, J) for n, (key, bits, T, J) in enumerate(drawn)]
     assume(sum(one.bits * 10**9 / bit_rate / one.period_ns for one in streams) < 0.97)
     for m, bound in enumerate(response_times(streams, bit_rate)):
-        assert told(bound) == equations(streams, m, bit_rate)
+        assert reported(bound) == equations(streams, m, bit_rate)
 
 
 class Listed:

@@ -27,7 +27,7 @@ def test_a_corrupted_frame_is_repeated_and_received_once():
     assert [status for *_, status in wired.of(0, "done")] == [TX_SENT]
 
 
-def test_the_repetition_is_logged_at_its_last_bit_and_lost_once_where_nobody_listens():
+def test_the_repetition_is_logged_at_its_last_bit_and_lost_once_without_a_receiver():
     wired = Wired(2)
     wired.bus.nodes[1].listening = False
     wired.bus.inject_errors(1)
@@ -88,7 +88,7 @@ def test_the_length_of_an_error_frame_depends_on_what_receivers_have_seen():
     assert taken_by_error(bits + 50) == 1 + 6 + 6 + 8 + 3
 
 
-def test_the_error_is_told_at_its_bit_and_logged_at_its_end():
+def test_the_error_is_reported_at_its_bit_and_logged_at_its_end():
     wired = Wired(2)
     bits = frame_bits(0x10, 8, 0, 0)
     wired.bus.inject_errors(1, bits - 10)
@@ -103,7 +103,7 @@ def test_the_error_is_told_at_its_bit_and_logged_at_its_end():
     assert frame[2] == 8
 
 
-def test_an_error_at_an_instant_hits_what_is_on_the_bus_then():
+def test_an_error_at_a_time_hits_what_is_on_the_bus_then():
     wired = Wired(2)
     wired.bus.inject_error_at(20_000)
     wired.bus.inject_error_at(500_000)  # nothing runs then: a dominant bit is a start of frame to everybody
@@ -167,10 +167,10 @@ def test_alone_on_the_bus_a_sender_becomes_passive_but_never_goes_bus_off():
     node = wired.bus.nodes[0]
     assert (node.transmit_errors, node.passive, node.mode) == (128, True, OPERATING)
     assert wired.bus.counters.frames == 0 and wired.bus.counters.errors > 1000 and wired.bus.buffers.waiting_count == 1
-    told = wired.of(0, "status")
-    assert [status[2] for status in told[:16]] == [8 * n for n in range(1, 17)]
-    assert told[11][1] & EI and told[15][1] & EPI  # 96, 128
-    assert told[0][1] >> 16 & 31 == FIELD_ACK_SLOT
+    reported = wired.of(0, "status")
+    assert [status[2] for status in reported[:16]] == [8 * n for n in range(1, 17)]
+    assert reported[11][1] & EI and reported[15][1] & EPI  # 96, 128
+    assert reported[0][1] >> 16 & 31 == FIELD_ACK_SLOT
 
 
 def test_a_node_that_joins_ends_the_endless_repetition():
@@ -203,11 +203,11 @@ def test_32_errors_in_a_row_make_a_sender_bus_off_and_its_frames_lost():
     assert wired.bus.counters.errors == 32  # 32 * 8 = 256
     assert wired.bus.nodes[0].mode == BUS_OFF
     messages = wired.messages(0)
-    told = [message[1:] for message in messages if message[0] == "status"]
+    reported = [message[1:] for message in messages if message[0] == "status"]
     done = [message[1:] for message in messages if message[0] == "done"]
-    assert [status[4] for status in told] == [0] * 31 + [1]
-    assert told[11][1] & EI and told[15][1] & EPI and told[31][1] & EI
-    assert told[31][2] == 127  # the register of the LPC2194 once it is off
+    assert [status[4] for status in reported] == [0] * 31 + [1]
+    assert reported[11][1] & EI and reported[15][1] & EPI and reported[31][1] & EI
+    assert reported[31][2] == 127  # the register of the LPC2194 once it is off
     assert sorted(done) == [(done[0][0], 1, TX_ABORTED), (done[0][0], 2, TX_ABORTED)]
     assert wired.bus.counters.lost == wired.bus.counters.flushed == wired.bus.nodes[0].flushed == 2
     # the receiver counted each error once and is well below its limits
@@ -395,7 +395,7 @@ def test_what_is_taken_out_of_a_disturbed_bus_is_not_sent_any_more():
     bus.advance(edge(70))  # in the error frame of the first
     assert bus.disturbed and bus.counters.errors == 1
     assert sorted(bus.take_out(0, edge(70))) == [(1, 0x100, 8, 1, 2), (2, 0x200, 8, 3, 4)]
-    bus.look_again()
+    bus.recompute_next()
     bus.advance(edge(2000))
     assert [(identifier, node) for _, identifier, flags, _, _, node in wired.log() if not flags & FLAG_ERROR] == [
         (0x300, 1)

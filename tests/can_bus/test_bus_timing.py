@@ -55,7 +55,7 @@ def test_three_megabit_does_not_drift_in_a_day():
 
 
 @given(st.sampled_from([10_000, 33_333, 125_000, 1_000_000, 3_000_000, 6_000_000]), st.integers(0, 2**52))
-def test_instants_and_bits_convert_as_whole_number_arithmetic_says(bitrate, number):
+def test_times_and_bits_convert_as_whole_number_arithmetic_says(bitrate, number):
     bus = Bus("can1", bitrate)
     assert bus.bit_of(number) == number * bitrate // SECOND
     bit = number % (2**40)
@@ -83,7 +83,7 @@ def test_a_frame_under_way_is_not_pre_empted():
     assert [frame[1] for frame in wired.of(2, "rx")] == [0x700, 0x001]
 
 
-def test_a_request_at_the_very_instant_of_a_start_comes_too_late():
+def test_a_request_at_the_very_time_of_a_start_comes_too_late():
     for late, order in ((0, [0x001, 0x700]), (1, [0x700, 0x001])):
         wired = Wired(3)
         wired.send(0, 0x700, time=1000)  # starts at 1334
@@ -294,7 +294,7 @@ def test_a_full_bus_has_load_one():
     assert wired.bus.load.largest() == 1.0
 
 
-def test_frames_nobody_listens_to_are_lost_but_acknowledged():
+def test_frames_without_a_receiver_are_lost_but_acknowledged():
     wired = Wired(2)
     wired.bus.nodes[1].listening = False
     wired.send(0, 7)

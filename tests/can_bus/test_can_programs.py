@@ -73,11 +73,11 @@ def test_the_player_replays_a_log_of_ours(node, tmp_path):
     with hosted("can1") as (name, _):
         bus = node(f"{name}/can1")
         with Program("-m", "can.player", *options(name), str(tmp_path / "walk.log")) as player:
-            heard = [bus.recv(60) for _ in frames]
+            received = [bus.recv(60) for _ in frames]
             assert player.ended()[0] == 0
-    assert [each.arbitration_id for each in heard] == [frame[1] for frame in frames]
-    assert bytes(heard[7].data) == (7).to_bytes(4, "little") + (49).to_bytes(4, "little")
-    assert heard[50].is_extended_id and bytes(heard[50].data).hex() == "efbeadde"
+    assert [each.arbitration_id for each in received] == [frame[1] for frame in frames]
+    assert bytes(received[7].data) == (7).to_bytes(4, "little") + (49).to_bytes(4, "little")
+    assert received[50].is_extended_id and bytes(received[50].data).hex() == "efbeadde"
 
 
 def test_the_bridge_joins_two_buses(node):

@@ -47,8 +47,13 @@ def met(frame, *inverted):
         while inbox.take():
             if inbox.kind == CAN_STATUS and inbox.b & ICR_BUS_ERROR:
                 field = inbox.b >> ICR_FIELD_SHIFT & ICR_FIELD_MASK
-                told = (inbox.time // BIT_NS - 1, field, inbox.b >> ICR_KIND_SHIFT & 3, bool(inbox.b & ICR_RECEIVING))
-                found[number].append(told)
+                reported = (
+                    inbox.time // BIT_NS - 1,
+                    field,
+                    inbox.b >> ICR_KIND_SHIFT & 3,
+                    bool(inbox.b & ICR_RECEIVING),
+                )
+                found[number].append(reported)
     return found
 
 
@@ -110,12 +115,12 @@ def test_an_overload_flag_that_does_not_show_is_an_error_in_it(first):
             assert found[node][0][:3] == (behind + 6 + n, DELIMITER, KIND_FORM)
 
 
-def test_an_undisturbed_frame_and_an_overload_frame_are_no_errors():
+def test_an_undisturbed_frame_and_an_overload_frame_are_not_errors():
     behind = START + len(fields_of(STANDARD))
     assert met(STANDARD) == met(STANDARD, behind) == {0: [], 1: [], 2: []}
 
 
-def test_a_captured_error_has_one_of_six_names_or_is_no_new_one():
+def test_a_captured_error_has_one_of_six_names_or_is_not_new():
     """By field and kind of UM10114: 0 bit, 1 form, 2 stuff, 3 other; whatever else is in the interrupt word."""
     for rest in (0, ICR_RECEIVING, ICR_BUS_ERROR | 0x4, 0xFF000000 | ICR_RECEIVING | 0xFFFF):
 

@@ -74,7 +74,7 @@ def test_up_is_read_from_the_flags_and_not_from_operstate():
     assert failures(check(virtual(operstate="UNKNOWN"), "vcan0")) == {}
 
 
-def test_a_wrong_bit_rate_is_told_with_both_and_mended_with_the_interface_down():
+def test_a_wrong_bit_rate_is_reported_with_both_rates_and_mended_with_the_interface_down():
     (found,) = failures(check(controller(bittiming={"bitrate": 500_000}))).values()
     assert found.what == "bit rate" and "500000" in found.text and "1000000" in found.text
     assert found.mend == ("ip link set can0 down && ip link set can0 type can bitrate 1000000 && ip link set can0 up")
@@ -108,14 +108,14 @@ def test_error_states_and_counters_are_failures(state, counters, what, mend):
     assert mend in {finding.mend for finding in found.values()}
 
 
-def test_what_happened_since_the_start_is_told():
+def test_errors_since_the_start_are_reported():
     link = controller()
     link["linkinfo"]["info_xstats"].update(bus_off=2, bus_error=17)
     errors = next(finding for finding in check(link) if finding.what == "errors")
     assert errors.ok and "bus error 17, bus off 2" in errors.text
 
 
-def test_a_short_queue_is_no_failure_but_told():
+def test_a_short_queue_is_reported_but_not_a_failure():
     (found,) = [finding for finding in check(controller(txqlen=10)) if finding.what == "queue"]
     assert found.ok is None and found.mend == "ip link set can0 txqueuelen 1000"
 
@@ -132,12 +132,12 @@ def test_an_interface_that_is_not_there_is_named(device, mend):
     assert not found.ok and device in found.text and found.mend == mend
 
 
-def test_what_is_no_can_interface_is_refused():
+def test_an_interface_that_is_not_can_is_refused():
     (found,) = check({"ifname": "eth0", "flags": ["UP"], "link_type": "ether"}, "eth0")
     assert not found.ok and "'ether'" in found.text
 
 
-def test_the_output_of_ip_is_read_and_its_refusal_told(monkeypatch):
+def test_the_output_of_ip_is_read_and_its_refusal_reported(monkeypatch):
     def answer(stdout="", stderr="", code=0):
         def run(call, **_):
             assert call[:5] == ["ip", "-details", "-statistics", "-json", "link"] and call[-1] == "can0"
@@ -158,7 +158,7 @@ def test_the_output_of_ip_is_read_and_its_refusal_told(monkeypatch):
         check_bus.read_link("can0")
 
 
-def test_without_ip_what_sys_tells_is_used(tmp_path, monkeypatch):
+def test_without_ip_the_values_of_sys_are_used(tmp_path, monkeypatch):
     def missing(*_, **__):
         raise FileNotFoundError("ip")
 
@@ -191,17 +191,17 @@ def test_any_json_of_ip_is_read_or_refused(content):
 KNOWN = {0: "TIMESTAMP", 14: "MCH_ANGLE", 18: "MCH_COMMAND_CURRENT"}
 
 
-def test_traffic_that_belongs_here_is_told_with_its_rate():
+def test_traffic_that_belongs_here_is_listed_with_its_rate():
     (found,) = check_traffic("can0", Traffic(2.0, 1000, 0, {0: 500, 14: 500}), KNOWN, {14: "MCH_ANGLE"})
     assert found.ok and "500/s" in found.text and "TIMESTAMP, MCH_ANGLE" in found.text
 
 
-def test_an_external_board_that_is_not_heard_is_a_failure():
+def test_an_external_board_that_sends_nothing_is_a_failure():
     (found,) = check_traffic("can0", Traffic(1.0, 1000, 0, {0: 1000}), KNOWN, {14: "MCH_ANGLE"})
     assert not found.ok and "MCH" in found.text and found.mend == "candump -e can0"
 
 
-def test_silence_is_no_failure_where_nobody_is_expected():
+def test_silence_is_not_a_failure_where_no_board_is_expected():
     assert check_traffic("can0", Traffic(1.0, 0, 0, {}), KNOWN, {}) == [
         Finding("traffic", None, "0 frames in 1 s (0/s)")
     ]
@@ -230,11 +230,11 @@ def test_listening_counts_what_a_python_can_bus_receives():
         patch = pytest.MonkeyPatch()
         with patch.context() as patched:
             patched.setattr(check_bus.can, "Bus", opened)
-            traffic = check_bus.listen(place, 0.05)
+            traffic = check_bus.observe(place, 0.05)
     assert (traffic.frames, traffic.error_frames, traffic.identifiers) == (1, 1, {14: 1})
 
 
-def test_an_interface_that_cannot_be_opened_is_told_in_one_line():
+def test_an_interface_that_cannot_be_opened_is_reported_in_one_line():
     with pytest.raises(NotReadError) as caught:
-        check_bus.listen({"interface": "no_such_interface", "channel": "x"}, 0.01)
+        check_bus.observe({"interface": "no_such_interface", "channel": "x"}, 0.01)
     assert "no_such_interface" in str(caught.value) and "\n" not in str(caught.value)

@@ -82,7 +82,7 @@ def test_no_pattern_of_equal_bytes_between_two_others_is_longer(identifier, coun
 # ---- lanes
 
 
-def test_messages_alone_have_three_buffers_of_a_node_and_a_queue_two_of_its_own():
+def test_messages_alone_have_three_buffers_of_a_node_and_a_queue_has_two_buffers():
     messages = [
         message(f"m{n}", n, MS, queue=queue) for n, queue in enumerate(["", "a", "", "b", "a", "", "", "b", ""])
     ]
@@ -220,7 +220,7 @@ def quick(monkeypatch):
 
 
 @pytest.mark.usefixtures("quick")
-def test_drawn_sets_are_as_many_different_ones_as_they_are_said_to_be():
+def test_drawn_sets_are_as_many_different_ones_as_reported():
     """100 sets, of which each kind has its share: limits hold in all, and both ends of a range are met."""
     counts, rates, loads, jitters, queues, trains, extended = [], set(), [], 0, 0, 0, 0
     for number in range(100):
@@ -383,7 +383,7 @@ def test_a_set_is_played_once_for_each_bound_and_once_at_random(monkeypatch):
     assert all(0 <= word < 1 << 32 for pair in drawn for word in pair)
 
 
-def test_of_a_set_with_queues_no_shares_are_told():
+def test_a_set_with_queues_has_no_shares():
     figures = Figures()
     senders = [sender("a", 1, MS, queue="q"), sender("b", 2, MS)]
     check_set(senders, RATE, RandomStream(1, "x"), figures)
@@ -408,7 +408,7 @@ def test_many_sets_are_those_of_their_numbers_and_their_load_is_the_mean():
     assert found["unbounded"] == 0 and random_sets(6, seed=4) == found != random_sets(6, seed=5)
 
 
-def test_where_there_is_no_bound_there_is_no_instance_that_answers_last():
+def test_without_a_bound_no_instance_answers_last():
     one = message("a", 1, 100_000, 8)  # 135 us of every 100
     [bound] = response_times([one], RATE)
     assert bound == Bound(one, None, 0, 0, 0, None)

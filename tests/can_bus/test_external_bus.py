@@ -149,7 +149,7 @@ def test_error_frames_and_can_fd_are_counted_and_not_delivered(bus):
     assert (bus.errors, bus.refused) == (1, 1) and messages_of(bus.inboxes[0]) == []
 
 
-def test_an_interface_that_breaks_is_told_and_does_not_raise(bus):
+def test_an_interface_that_breaks_is_reported_and_does_not_raise(bus):
     def broken(_timeout):
         raise can.CanOperationError("Network is down")
 
@@ -204,7 +204,7 @@ def test_an_interface_that_is_not_there_is_one_line():
         opener("can1", {"interface": "slcan", "channel": "/dev/no-such-port"})()
 
 
-def test_python_cans_own_options_stand_behind_the_place():
+def test_python_cans_own_options_follow_the_place():
     text = "can1=slcan:/dev/ttyACM0 --bitrate 1000000 --bus-kwargs app_name=ranger serial=7"
     assert place_of(text) == (
         "can1",
@@ -220,7 +220,7 @@ def test_python_cans_own_options_stand_behind_the_place():
         place_of("can1=slcan:x --bitrate fast")
 
 
-def test_a_board_may_have_a_place_of_its_own_on_the_bus(bus):
+def test_a_board_may_have_its_own_place_on_the_bus(bus):
     other = Wire()
     peer = bus.add_peer("can1, UI", EventQueue(), 1, 620, lambda: other)
     peer.from_board(CAN_REQUEST, 0, 1, 0x123, 8, 0, 0)
@@ -263,7 +263,7 @@ def test_only_the_first_peer_counts_for_the_load(bus):
     assert (bus.busy_ns, bus.heard) == (0, [])
 
 
-def test_an_interface_with_a_file_is_read_when_that_says_so(bus):
+def test_an_interface_with_a_file_is_read_when_its_file_is_readable(bus):
     """A pipe represents a socket: `recv` is asked only when something lies in it."""
     reading, writing = os.pipe()
     asked = []

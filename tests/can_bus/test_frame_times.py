@@ -28,7 +28,7 @@ def sender(node, buffer, flags):
     return (node + 1) << SENDER_SHIFT | buffer << TIMES_BUFFER_SHIFT | flags
 
 
-def test_a_frame_that_has_to_wait_tells_since_when():
+def test_a_frame_that_has_to_wait_shows_since_when():
     """1 Mbit/s, where a bit is 1000 ns, and the first frame is of 47 bits and its stuff bits: by hand."""
     wired = Wired(2, bitrate=1_000_000)
     rows = timed(wired)
@@ -45,21 +45,21 @@ def test_a_frame_that_has_to_wait_tells_since_when():
     ]
 
 
-def test_what_is_told_are_the_receivers_stamps_and_the_senders():
+def test_reports_have_the_receivers_stamps_and_the_senders():
     wired = Wired(3)
     rows = timed(wired)
     for number, flags in enumerate((8, 3, FLAG_EXTENDED | 8, FLAG_REMOTE | 8)):
         wired.send(number % 2, 0x100 + number, time=number * 200_000, flags=flags | FLAG_SINGLE_SHOT * (number == 1))
         wired.bus.advance(number * 200_000 + 100_000)
-    heard = [(time, identifier, flags) for time, identifier, flags, _, _ in wired.of(2, "rx")]
+    received = [(time, identifier, flags) for time, identifier, flags, _, _ in wired.of(2, "rx")]
     found = rows()
-    assert [(row[3], row[4] & 255) for row in found] == [(identifier, flags) for _, identifier, flags in heard]
+    assert [(row[3], row[4] & 255) for row in found] == [(identifier, flags) for _, identifier, flags in received]
     # receivers have a frame at the end of the bit before its last
-    assert [row[2] for row in found] == [edge(round(time * RATE / 1e9) + 1) for time, _, _ in heard]
+    assert [row[2] for row in found] == [edge(round(time * RATE / 1e9) + 1) for time, _, _ in received]
     assert [row[1] for row in found] == [0, 200_000, 400_000, 600_000]
 
 
-def test_an_error_frame_and_the_frame_that_comes_of_it_at_last_are_told():
+def test_an_error_frame_and_the_repeated_frame_are_reported():
     wired = Wired(3)
     rows = timed(wired)
     wired.bus.inject_errors(1)

@@ -77,7 +77,7 @@ def test_a_line_of_candump_is_the_frame_that_it_shows(tmp_path, line, frame):
         ("(1.0) can1 123", "no #"),
     ],
 )
-def test_what_is_wrong_with_a_line_is_told_with_its_number(tmp_path, line, words):
+def test_a_fault_in_a_line_is_reported_with_its_number(tmp_path, line, words):
     path = tmp_path / "bad.log"
     path.write_text(f"(0.0) can1 123#\n\n{line}\n", encoding="ascii")
     found = []
@@ -140,7 +140,7 @@ def test_a_writer_counts_lines_and_ends_with_a_whole_one_when_the_disk_is_full(t
     assert writer.frames == 5 and len(list(read_candump(path))) == 5 and writer.file.closed
 
 
-def test_what_is_not_ascii_is_no_log(tmp_path):
+def test_a_file_that_is_not_ascii_is_not_a_log(tmp_path):
     path = tmp_path / "odd.log"
     path.write_bytes(b"(1.0) can1 123#\xff\n")
     with pytest.raises(UserError, match=r"odd.log: the frame log cannot be read \(not plain ASCII\)"):
@@ -244,7 +244,7 @@ KINDS = {0: 0x01, 1: 0x02, 2: 0x04, 3: 0x00}  # CAN_ERR_PROT_BIT, _FORM, _STUFF,
 @pytest.mark.parametrize("kind", [0, 1, 2, 3])
 @pytest.mark.parametrize("receiving", [0, RECEIVING])
 @pytest.mark.parametrize("more", [0, WARNING, PASSIVE])
-def test_an_error_frame_says_where_what_and_who(field, kind, receiving, more):
+def test_an_error_frame_has_place_kind_and_sender(field, kind, receiving, more):
     interrupts = BUS_ERROR | receiving | field << 16 | kind << 22 | more
     frame = linux_errors.frame_of_status(interrupts, (8, 300), False, False)
     acknowledgement = kind == 3 and field == 25
@@ -264,7 +264,7 @@ def test_going_off_and_coming_back_take_the_place_of_what_a_controller_says(was_
     assert frame == (0x200 | classes, FLAG_ERROR | 8, status << 8, 10 << 16 | 20 << 24)
 
 
-def test_too_slow_a_reader_is_told_by_a_class_and_a_bit():
+def test_too_slow_a_reader_is_reported_by_a_class_and_a_bit():
     assert linux_errors.overflow() == (0x4, FLAG_ERROR | 8, 0x0100, 0)
 
 
@@ -383,11 +383,11 @@ def test_a_dbc_file_gives_identifiers_lengths_and_periods(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("told", "rate"), [("1", 1_000), ("9999", 9_999_000), ("10000", 10_000), ("1000000", 1_000_000)]
+    ("reported", "rate"), [("1", 1_000), ("9999", 9_999_000), ("10000", 10_000), ("1000000", 1_000_000)]
 )
-def test_below_10000_a_bit_rate_is_in_kbit_s(tmp_path, told, rate):
+def test_below_10000_a_bit_rate_is_in_kbit_s(tmp_path, reported, rate):
     path = tmp_path / "net.dbc"
-    path.write_text(DBC.replace("RATE", told))
+    path.write_text(DBC.replace("RATE", reported))
     assert dbc.read_messages(path, None)[1] == rate
 
 
@@ -459,7 +459,7 @@ def test_each_thing_that_can_be_wrong_with_a_controller_has_its_finding_and_what
     assert findings(link(**changes)) == {**WELL, **others}
 
 
-def test_a_link_that_says_little_is_told_as_far_as_it_goes():
+def test_a_link_with_few_details_is_reported_as_far_as_they_go():
     assert findings({"ifname": "can0", "link_type": "can"}) == {
         **WELL, "bit rate": (False, f"{RATE} && {UP}"), "up": (False, UP), "state": (None, ""),
     }  # fmt: skip
@@ -477,17 +477,17 @@ def test_a_link_that_says_little_is_told_as_far_as_it_goes():
         ("vcan1", None, True), ("vxcan1", None, True), ("can0", None, False),
     ],
 )  # fmt: skip
-def test_what_is_virtual_is_told_by_its_kind_or_by_its_name(device, kind, virtual):
+def test_a_virtual_interface_is_recognised_by_its_kind_or_by_its_name(device, kind, virtual):
     found = {"ifname": device, "link_type": "can", "flags": ["UP"], "txqlen": 10}
     if kind:
         found["linkinfo"] = {"info_kind": kind}
-    told = findings(found, device)
-    assert ("state" in told, "queue" in told) == (not virtual, not virtual)
+    reported = findings(found, device)
+    assert ("state" in reported, "queue" in reported) == (not virtual, not virtual)
     if virtual:
-        assert told == {"there": (True, ""), "bit rate": (None, ""), "up": (True, "")}
+        assert reported == {"there": (True, ""), "bit rate": (None, ""), "up": (True, "")}
 
 
-def test_an_interface_that_cannot_be_read_is_told_with_the_command_that_shows_it():
+def test_an_interface_that_cannot_be_read_is_reported_with_the_command_that_shows_it():
     def broken(_):
         raise NotReadError("not permitted")
 
@@ -496,7 +496,7 @@ def test_an_interface_that_cannot_be_read_is_told_with_the_command_that_shows_it
     assert finding.text == "cannot be read: not permitted"
 
 
-def test_what_happened_since_it_is_there_is_told_when_it_happened():
+def test_errors_since_the_interface_exists_are_reported_when_they_happened():
     found = link(berr_counter={"tx": 3, "rx": 4})
     found["linkinfo"]["info_xstats"] = {"bus_error": 0, "arbitration_lost": 7, "bus_off": 1}
     [text] = [each.text for each in check_link("can0", 1_000_000, lambda _: found) if each.what == "errors"]
@@ -518,7 +518,7 @@ def test_json_without_that_link_is_a_missing_interface(text):
 
 
 @pytest.mark.parametrize("failing", ["flags", "type", "tx_queue_len"])
-def test_without_ip_a_broken_folder_of_sys_is_told(tmp_path, monkeypatch, failing):
+def test_without_ip_a_broken_folder_of_sys_is_reported(tmp_path, monkeypatch, failing):
     def missing(*_, **__):
         raise FileNotFoundError("ip")
 
@@ -537,7 +537,7 @@ def test_without_ip_a_broken_folder_of_sys_is_told(tmp_path, monkeypatch, failin
         read_link("can0", tmp_path)
 
 
-def test_ip_that_leaves_without_a_word_is_told_by_its_code(monkeypatch):
+def test_ip_that_ends_without_output_is_reported_by_its_code(monkeypatch):
     monkeypatch.setattr(
         check_bus.subprocess, "run", lambda call, **_: check_bus.subprocess.CompletedProcess(call, 3, "", " \n")
     )
@@ -549,7 +549,7 @@ KNOWN = {n: f"B{n}_X" for n in range(8)}
 
 
 @pytest.mark.parametrize(
-    ("traffic", "expected", "told"),
+    ("traffic", "expected", "reported"),
     [
         (Traffic(2.0, 5, 0, {1: 5}), {}, {"traffic": (True, "5 frames in 2 s (2/s): B1_X")}),
         (Traffic(0.0, 0, 0, {}), {}, {"traffic": (None, "0 frames in 0 s (0/s)")}),
@@ -587,13 +587,13 @@ KNOWN = {n: f"B{n}_X" for n in range(8)}
         ),
     ],
 )
-def test_what_passed_is_told_with_its_rate_its_names_and_what_does_not_belong(traffic, expected, told):
+def test_traffic_is_listed_with_its_rate_its_names_and_what_does_not_belong(traffic, expected, reported):
     found = check_traffic("can0", traffic, KNOWN, expected)
-    assert {each.what: (each.ok, each.text) for each in found} == told
+    assert {each.what: (each.ok, each.text) for each in found} == reported
     assert [each.mend for each in found] == ["candump -e can0" if each.ok is False else "" for each in found]
 
 
-def test_listening_lasts_as_long_as_it_is_told_and_ends_with_the_bus_shut(monkeypatch):
+def test_listening_lasts_as_long_as_requested_and_ends_with_the_bus_shut(monkeypatch):
     now, shut = [100.0], []
 
     class Heard:
@@ -621,10 +621,10 @@ def test_listening_lasts_as_long_as_it_is_told_and_ends_with_the_bus_shut(monkey
 
     monkeypatch.setattr(check_bus.can, "Bus", Heard)
     monkeypatch.setattr(check_bus.wallclock, "monotonic_s", lambda: now[0])
-    assert check_bus.listen({"channel": "x"}, 2.0) == Traffic(2.0, 3, 1, {1: 2, 2: 1})
+    assert check_bus.observe({"channel": "x"}, 2.0) == Traffic(2.0, 3, 1, {1: 2, 2: 1})
     assert shut[0] == pytest.approx([2.0, 1.5, 1.0, 0.5, 0.1])
     with pytest.raises(NotReadError, match="^CanOperationError: two lines$"):
-        check_bus.listen({"channel": "x"}, 5.0)
+        check_bus.observe({"channel": "x"}, 5.0)
     assert len(shut) == 2
 
 

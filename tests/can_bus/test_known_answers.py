@@ -13,15 +13,15 @@ from ranger_sim.can_bus.edge.benchmark import Tally, numbered
 from ranger_sim.foundation.user_error import UserError
 
 
-def told(name="A", key=1, bits=100, period=10, **more):
+def reported(name="A", key=1, bits=100, period=10, **more):
     return Message(name, key, bits, period, period, **more)
 
 
 def train(clock_ppm=0, bit_rate=1, **more):
     """Releases at 0 and 3 of every 10 ns, of keys 1 and 5."""
     members = [
-        told(queue="q", offset_ns=0, jitter_ns=2, pause_ns=4, **more),
-        told("B", 5, 120, queue="q", offset_ns=13, jitter_ns=1, pause_ns=6),
+        reported(queue="q", offset_ns=0, jitter_ns=2, pause_ns=4, **more),
+        reported("B", 5, 120, queue="q", offset_ns=13, jitter_ns=1, pause_ns=6),
     ]
     return bounds._Train(members, 5, bit_rate, clock_ppm)
 
@@ -36,7 +36,7 @@ def test_a_train_has_its_longest_frame_jitter_and_pause_over_one_cycle():
 @pytest.mark.parametrize(
     "window, releases", [(-1, 0), (0, 0), (1, 1), (3, 1), (4, 2), (10, 2), (11, 3), (13, 3), (14, 4), (20, 4), (24, 6)]
 )
-def test_a_window_holds_so_many_releases_at_0_and_3_of_every_10(window, releases):
+def test_a_window_holds_the_releases_at_0_and_3_of_every_10(window, releases):
     assert train().most(None, window) == releases
     assert train().most(5, window) == releases
 
@@ -64,19 +64,21 @@ def test_a_clock_that_is_fast_releases_more_and_a_slow_one_brings_releases_neare
 
 
 def test_periods_without_a_short_common_multiple_are_refused():
-    members = [told(period=997, queue="q", offset_ns=0), told("B", 2, period=1009, queue="q", offset_ns=0)]
+    members = [reported(period=997, queue="q", offset_ns=0), reported("B", 2, period=1009, queue="q", offset_ns=0)]
     with pytest.raises(ValueError, match="queue q: periods have no common multiple of at most 2000 frames"):
         bounds._Train(members, 2, 1, 0)
-    bounds._Train([told(period=1999, queue="q", offset_ns=0), told("B", 2, period=1, queue="q", offset_ns=0)], 2, 1, 0)
+    bounds._Train(
+        [reported(period=1999, queue="q", offset_ns=0), reported("B", 2, period=1, queue="q", offset_ns=0)], 2, 1, 0
+    )
 
 
 @pytest.mark.parametrize(
     "field, least", [("bits", 1), ("period_ns", 1), ("deadline_ns", 1), ("jitter_ns", 0), ("pause_ns", 0)]
 )
 def test_each_number_of_a_message_has_its_least_value(field, least):
-    assert getattr(dataclasses.replace(told(), **{field: least}), field) == least
+    assert getattr(dataclasses.replace(reported(), **{field: least}), field) == least
     with pytest.raises(ValueError, match="message A: bits"):
-        dataclasses.replace(told(), **{field: least - 1})
+        dataclasses.replace(reported(), **{field: least - 1})
 
 
 def test_a_message_s_deadline_is_its_period_unless_given():
@@ -87,19 +89,21 @@ def test_a_message_s_deadline_is_its_period_unless_given():
 
 
 def test_a_message_counts_with_the_lowest_priority_of_its_queue():
-    alone, turns = told(key=3), told(key=3, last_key=8)
-    members = [told("A", 3, queue="q"), told("B", 7, queue="q", last_key=9), told("C", 20, queue="other")]
+    alone, turns = reported(key=3), reported(key=3, last_key=8)
+    members = [reported("A", 3, queue="q"), reported("B", 7, queue="q", last_key=9), reported("C", 20, queue="other")]
     assert (level_of(alone, []), level_of(turns, [])) == (3, 8)
     assert [level_of(one, members) for one in members] == [9, 9, 20]
 
 
 def test_utilisation_is_exact():
-    assert utilisation([told(bits=100, period=1_000_000), told(bits=50, period=2_000_000)], 1_000_000) == Fraction(1, 8)
+    assert utilisation(
+        [reported(bits=100, period=1_000_000), reported(bits=50, period=2_000_000)], 1_000_000
+    ) == Fraction(1, 8)
     assert utilisation([], 1_000_000) == 0
 
 
 def test_a_busy_bus_that_is_exactly_full_has_an_end_only_without_blocking():
-    full = [told("A", 1, 50, 100_000), told("B", 2, 50, 100_000)]
+    full = [reported("A", 1, 50, 100_000), reported("B", 2, 50, 100_000)]
     assert [one.response_ns for one in bounds.response_times(full, 1_000_000)] == [100_000, 100_000]
     late = [dataclasses.replace(full[0], jitter_ns=1), full[1]]
     assert bounds.response_times(late, 1_000_000)[1].response_ns is None
@@ -110,7 +114,7 @@ def test_a_busy_bus_that_is_exactly_full_has_an_end_only_without_blocking():
 
 def test_a_frame_s_own_jitter_lengthens_its_busy_period():
     # 60 us of every 100 us, queued up to 50 us late: the second instance may come 50 us after the first
-    (bound,) = bounds.response_times([told("A", 1, 60, 100_000, jitter_ns=50_000)], 1_000_000)
+    (bound,) = bounds.response_times([reported("A", 1, 60, 100_000, jitter_ns=50_000)], 1_000_000)
     assert (bound.busy_ns, bound.instances) == (120_000, 2)
     assert (bound.response_ns, bound.instance) == (110_000, 0)
 
@@ -139,14 +143,14 @@ def test_senders_have_sixteen_identifiers_each_with_running_numbers():
     assert not first.is_extended_id and len(first.data) == 8
 
 
-def test_a_tally_counts_what_others_sent_and_what_came_out_of_its_order():
+def test_a_tally_counts_frames_of_others_and_those_out_of_order():
     tally = Tally(own=1)
     for sender, number in ((0, 0), (1, 0), (0, 1), (0, 32), (0, 16), (0, 48), (2, 16)):
         tally.take(numbered(sender, number))
-    assert (tally.heard, tally.reordered) == (6, 1)
+    assert (tally.received, tally.reordered) == (6, 1)
     assert tally.expected == {0: 4, 1: 1, 128: 2}
     everybody = Tally()
     everybody.take(numbered(1, 0))
     everybody.take(can.Message(arbitration_id=0, data=b"\x00", is_extended_id=False))
     everybody.take(can.Message(arbitration_id=0, data=b"\x00", is_extended_id=False))
-    assert (everybody.heard, everybody.reordered) == (3, 1)
+    assert (everybody.received, everybody.reordered) == (3, 1)

@@ -12,7 +12,7 @@ import pytest
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attached_link, benchmark, links, paced, python_can
-from ranger_sim.can_bus.edge.attached_link import AttachedLink, channels_of, greeted
+from ranger_sim.can_bus.edge.attached_link import AttachedLink, channels_of, handshake
 from ranger_sim.can_bus.edge.links import Link, LinkError, QueueFullError
 from ranger_sim.can_bus.edge.paced import PacedBus, alone_and_passive, hold_off, is_quiet
 from ranger_sim.can_bus.edge.private_link import PrivateBus, PrivateLink
@@ -53,7 +53,7 @@ def test_events_are_kept_or_counted_by_their_kind(own):
     assert link._take() is None
 
 
-def test_a_reader_that_is_too_slow_loses_what_comes_last_and_is_told_before_the_next():
+def test_a_reader_that_is_too_slow_loses_the_latest_frames_and_gets_a_report_before_the_next():
     link = Link("here", False, 2)
     for number in range(5):
         link._arrive(frame(RECEIVED, number))
@@ -94,13 +94,13 @@ def test_a_descriptor_is_readable_while_something_is_there():
         os.fstat(signal)
 
 
-def test_elsewhere_there_is_no_such_descriptor(monkeypatch):
+def test_other_systems_have_no_such_descriptor(monkeypatch):
     monkeypatch.setattr(links.sys, "platform", "darwin")
     with pytest.raises(NotImplementedError):
         Link("here", False, 9)._make_signal()
 
 
-def test_a_full_queue_is_told_with_the_counters_of_a_controller_that_is_not_well():
+def test_a_full_queue_is_reported_with_the_counters_of_a_controller_that_is_not_well():
     link = Link("here", False, 9)
     assert str(link._full()) == "here: the transmit queue stayed full"
     link.state, link.counters = ERROR_PASSIVE, (128, 0)
@@ -137,7 +137,7 @@ class Answering:
 def greet(monkeypatch, other, **options):
     asked = []
     monkeypatch.setattr(attached_link, "connected", lambda *what: asked.append(what) or other)
-    found = greeted("name", "can2", **options)
+    found = handshake("name", "can2", **options)
     assert asked[0][0] == "\0ranger-sim/name" and asked[0][2] == options.get("patience_s", 60.0)
     return found
 
@@ -163,14 +163,14 @@ def test_a_welcome_may_come_in_pieces_with_more_behind_it(monkeypatch, cut):
         ([OSError(104, "Connection reset by peer")], "attaching to 'name': Connection reset by peer"),
     ],
 )
-def test_who_does_not_greet_is_told_and_left(monkeypatch, pieces, words):
+def test_a_server_without_a_handshake_is_reported_and_left(monkeypatch, pieces, words):
     other = Answering(*pieces)
     with pytest.raises(UserError, match=f"^{words}"):
         greet(monkeypatch, other, patience_s=5.0)
     assert other.closed
 
 
-def test_who_is_not_there_is_a_missing_file_and_other_failures_are_the_users(monkeypatch):
+def test_an_absent_server_is_a_missing_file_and_other_failures_are_the_users(monkeypatch):
     def failing(error):
         def connected(*_):
             raise error
@@ -179,13 +179,13 @@ def test_who_is_not_there_is_a_missing_file_and_other_failures_are_the_users(mon
 
     failing(ConnectionRefusedError(111, "Connection refused"))
     with pytest.raises(FileNotFoundError, match="name"):
-        greeted("name", "can1")
+        handshake("name", "can1")
     failing(OSError(1, "Operation not permitted"))
     with pytest.raises(UserError, match="^attaching to 'name': Operation not permitted$"):
-        greeted("name", "can1")
+        handshake("name", "can1")
 
 
-def test_who_only_asks_for_channels_leaves(monkeypatch):
+def test_a_client_that_only_asks_for_channels_leaves(monkeypatch):
     other = Answering(WELCOME)
     monkeypatch.setattr(attached_link, "connected", lambda *_: other)
     assert channels_of("name") == ["can1", "can2"] and other.closed
@@ -202,15 +202,15 @@ class Attached:
         ours, self.end = socket.socketpair()
         self.greetings = []
 
-        def greeted(name, channel, asked):
+        def handshake(name, channel, asked):
             self.greetings.append((name, channel, asked))
             return ours, (1, 2, 500_000, 77, ["can1"], bytearray(rest))
 
-        monkeypatch.setattr(attached_link, "greeted", greeted)
+        monkeypatch.setattr(attached_link, "handshake", handshake)
         self.link = AttachedLink("name", "can1", **options)
         self.end.setblocking(False)
 
-    def heard(self):
+    def got(self):
         try:
             return self.end.recv(4096)
         except BlockingIOError:
@@ -240,7 +240,7 @@ def frame_record(kind, number, time=0):
     return record(kind, "qIHII", time, number, 0, 0, 0)
 
 
-def test_a_link_knows_what_the_welcome_said_and_what_came_behind_it(attached):
+def test_a_link_keeps_the_welcome_and_the_bytes_behind_it(attached):
     link, _, made = attached(frame_record(5, 7, time=3) + frame_record(5, 8)[:4], queue_limit=5)
     assert made.greetings == [("name", "can1", 0)]
     assert (link.label, link.window, link.bitrate, link.epoch_ns, link.channels) == (
@@ -260,17 +260,17 @@ def test_frames_go_out_up_to_the_window_and_on_as_they_are_answered(attached):
     link, end, made = attached()
     link.send(0x123, 2, 0xBBAA, 0, None)
     link.send(0x124, 0, 0, 0, 0.0)
-    assert made.heard() == record(4, "IHII", 0x123, 2, 0xBBAA, 0) + record(4, "IHII", 0x124, 0, 0, 0)
+    assert made.got() == record(4, "IHII", 0x123, 2, 0xBBAA, 0) + record(4, "IHII", 0x124, 0, 0, 0)
     assert link.outstanding == 2
     with pytest.raises(QueueFullError, match="^name/can1: the transmit queue stayed full"):
         link.send(0x125, 0, 0, 0, 0.0)
     end.send(frame_record(6, 0x123) + frame_record(7, 0x124))
     link.send(0x125, 0, 0, 0, 0.0)
     assert (link.outstanding, link.sent_frames, link.dropped_frames) == (1, 1, 1)
-    assert made.heard() == record(4, "IHII", 0x125, 0, 0, 0) and not link.arrived
+    assert made.got() == record(4, "IHII", 0x125, 0, 0, 0) and not link.arrived
 
 
-def test_where_nobody_acknowledges_a_sender_without_a_limit_is_told(attached, monkeypatch):
+def test_a_sender_without_acknowledgement_and_limit_gets_an_error(attached, monkeypatch):
     monkeypatch.setattr(attached_link, "UNHEARD_S", 0.0)
     link, end, _ = attached()
     link.send(1, 0, 0, 0, None)
@@ -284,13 +284,13 @@ def test_where_nobody_acknowledges_a_sender_without_a_limit_is_told(attached, mo
 
 
 @pytest.mark.parametrize(("state", "words"), [(OFF, "bus-off, nothing can be sent"), (LISTENING, "listening only")])
-def test_who_is_off_or_listens_sends_nothing_until_the_other_side_says_otherwise(attached, state, words):
+def test_a_client_that_is_off_or_listens_sends_nothing_until_the_other_side_allows_it(attached, state, words):
     link, end, made = attached()
     end.send(record(8, "qHHH", 5, state, 3, 4))
     assert link.present_state() == state and link.counters == (3, 4)
     with pytest.raises(LinkError, match=f"^name/can1: {words}"):
         link.send(1, 0, 0, 0, None)
-    assert made.heard() == b"" and link.outstanding == 0
+    assert made.got() == b"" and link.outstanding == 0
     end.send(record(8, "qHHH", 5, 0, 0, 0))
     link.send(1, 0, 0, 0, None)
     assert link.outstanding == 1 and link.state == 0
@@ -300,10 +300,10 @@ def test_what_a_program_wants_of_its_controller_is_one_byte(attached):
     link, _, made = attached()
     for wish, number in ((link.activate, 1), (link.listen, 2), (link.flush, 3)):
         wish()
-        assert made.heard() == bytes([2, 0, 0, 0, 9, number])
+        assert made.got() == bytes([2, 0, 0, 0, 9, number])
 
 
-def test_frames_arrive_in_their_order_and_a_missing_stretch_is_told_with_its_count(attached):
+def test_frames_arrive_in_their_order_and_a_missing_stretch_is_reported_with_its_count(attached):
     link, end, _ = attached()
     assert link.receive(0.0) is None
     end.send(frame_record(5, 1, time=7) + record(10, "qQ", 8, 44) + frame_record(5, 2))
@@ -326,7 +326,7 @@ def test_frames_arrive_in_their_order_and_a_missing_stretch_is_told_with_its_cou
         (struct.pack("<IB", 1, 66), "the other side does not speak the attach protocol: record type 66 with 0 bytes"),
     ],
 )
-def test_when_the_other_side_is_gone_what_came_before_is_still_heard(attached, said, words):
+def test_when_the_other_side_is_gone_earlier_frames_are_still_received(attached, said, words):
     link, end, _ = attached()
     end.send(frame_record(5, 1) + said)
     end.close()
@@ -341,7 +341,7 @@ def test_when_the_other_side_is_gone_what_came_before_is_still_heard(attached, s
     assert link.present_state() == 0
 
 
-def test_writing_to_who_has_gone_tells_why_if_it_was_said(attached):
+def test_writing_to_a_closed_link_gives_the_reason_if_it_was_sent(attached):
     link, end, _ = attached()
     end.send(struct.pack("<IB", 4, 3) + b"why")
     end.close()
@@ -353,7 +353,7 @@ def test_writing_to_who_has_gone_tells_why_if_it_was_said(attached):
         link.flush()
 
 
-def test_a_link_that_is_shut_says_so_and_is_shut_once(attached):
+def test_a_link_that_is_shut_reports_it_and_is_shut_once(attached):
     link, end, _ = attached()
     number = link.fileno()
     assert link.fileno() == number and not readable(number)
@@ -375,8 +375,8 @@ def test_a_link_that_is_shut_says_so_and_is_shut_once(attached):
 def test_figures_of_an_attached_bus_are_those_of_what_has_come_by_now(attached):
     link, end, _ = attached()
     end.send(frame_record(6, 1) + record(8, "qHHH", 5, 0, 3, 4))
-    told = python_can.RangerSimBus.statistics(SimpleNamespace(_link=link))
-    assert (told["sent"], told["transmit_errors"], told["receive_errors"]) == (1, 3, 4)
+    reported = python_can.RangerSimBus.statistics(SimpleNamespace(_link=link))
+    assert (reported["sent"], reported["transmit_errors"], reported["receive_errors"]) == (1, 3, 4)
 
 
 # ---- private links
@@ -397,7 +397,7 @@ def private(count=2, speed=0.0, depth=64, **options):
     return found
 
 
-def test_private_links_hear_each_other_with_stamps_since_the_epoch(clock):
+def test_private_links_receive_each_other_with_stamps_since_the_epoch(clock):
     one, two = private()
     assert (one.bitrate, one.state, one.label) == (1_000_000, 0, "link 0")
     one.send(0x123, 3, 0x030201, 0, None)
@@ -437,7 +437,7 @@ def test_threads_of_every_link_wake_when_the_next_event_comes_nearer_and_only_th
     assert woken == [0, 1, 2]
 
 
-def test_a_private_queue_that_stays_full_and_a_controller_that_is_off_are_told(clock):
+def test_a_private_queue_that_stays_full_and_a_controller_that_is_off_are_reported(clock):
     [one] = private(1, depth=3)
     for number in range(3):
         one.send(number, 0, 0, 0, 0.0)
@@ -509,7 +509,7 @@ def test_a_private_link_may_begin_by_listening_and_get_its_own_frames(clock):
         ({"passive": False}, False),
     ],
 )
-def test_a_passive_sender_that_nobody_hears_is_alone(changes, alone):
+def test_a_passive_sender_without_receivers_is_alone(changes, alone):
     bus = Bus("can1", 1_000_000)
     for number in range(3):
         bus.add_node(f"n{number}", EventQueue(8), 1, STAGE_BUS * 256 + number)
@@ -574,7 +574,7 @@ def test_a_paced_bus_is_made_of_its_options(clock):
         PacedBus("can1", bit_error_rate=0.2)
 
 
-def test_by_the_clock_time_passes_in_any_case_and_a_call_says_what_is_next(clock):
+def test_by_the_clock_time_passes_in_any_case_and_a_call_returns_the_next_time(clock):
     bus = PacedBus("can1", speed=2.0)
     sender, other = bus.add("a"), bus.add("b")
     clock[0] = MS
@@ -592,7 +592,7 @@ def test_by_the_clock_time_passes_in_any_case_and_a_call_says_what_is_next(clock
     assert bus.seconds_until(bus.now() - 1) == 0.0
 
 
-def test_a_call_passes_so_many_events_and_then_returns_with_more_to_do(clock, monkeypatch):
+def test_a_call_passes_a_bounded_number_of_events_and_returns_with_more_to_do(clock, monkeypatch):
     monkeypatch.setattr(paced, "BURST", 3)
     bus = PacedBus("can1", speed=0.0)
     sender, other = bus.add("a"), bus.add("b")
@@ -624,7 +624,7 @@ def test_a_call_passes_so_many_events_and_then_returns_with_more_to_do(clock, mo
         ),
     ],
 )
-def test_an_event_is_the_message_that_it_tells(event, fields):
+def test_an_event_becomes_its_message(event, fields):
     message = message_of_event(event, "here")
     assert fields == (
         message.timestamp, message.arbitration_id, message.is_extended_id, message.is_remote_frame,
@@ -668,7 +668,7 @@ def opened():
         each.shutdown()
 
 
-def test_a_bus_tells_what_it_is_and_what_became_of_its_frames(opened):
+def test_a_bus_reports_its_name_and_the_counts_of_its_frames(opened):
     one = opened(speed="max", bitrate="250000")
     two = opened(receive_own_messages="yes")
     assert (one.bitrate, two.bitrate) == (250_000, 250_000) and one.channel == two.channel
@@ -685,7 +685,7 @@ def test_a_bus_tells_what_it_is_and_what_became_of_its_frames(opened):
     assert (own.is_rx, one.recv(0).is_rx, own.channel) == (False, True, two.channel)
 
 
-def test_states_can_be_ordered_but_for_the_one_that_is_no_choice(opened):
+def test_states_can_be_ordered_except_for_the_one_that_cannot_be_chosen(opened):
     one = opened(speed="max")
     assert one.state == can.BusState.ACTIVE
     one.state = can.BusState.PASSIVE
@@ -721,7 +721,7 @@ def test_a_mistake_when_opening_is_pythons_cans_initialization_error(opened, opt
         opened(**options)
 
 
-def test_the_first_who_opens_a_private_bus_decides_on_it(opened):
+def test_the_first_to_open_a_private_bus_sets_its_options(opened):
     opened(speed="max", bitrate=500_000, bit_error_rate=0.01, seed=4)
     assert opened(speed="max", bitrate=500_000, bit_error_rate="0.01").bitrate == 500_000
     for options, words in (
@@ -806,7 +806,7 @@ def test_what_only_a_private_bus_has_is_refused_on_an_attached_one(monkeypatch, 
         attached_bus(monkeypatch, channel="r/can1", **options)
 
 
-def test_who_is_asked_for_by_name_must_run_and_who_is_not_need_not(monkeypatch):
+def test_a_robot_given_by_name_must_run_and_a_default_one_need_not(monkeypatch):
     with pytest.raises(
         can.CanInitializationError, match=r"no robot or bus host named 'r' is running \(running: none\)"
     ):
@@ -912,16 +912,16 @@ def test_frames_of_a_sender_take_its_sixteen_identifiers_in_turn():
         assert not message.is_extended_id
 
 
-def test_a_reader_counts_what_it_hears_of_others_and_what_is_out_of_order():
+def test_a_reader_counts_frames_of_others_and_those_out_of_order():
     tally = benchmark.Tally(own=1)
-    assert (tally.own, tally.heard, tally.reordered, tally.expected) == (1, 0, 0, {})
+    assert (tally.own, tally.received, tally.reordered, tally.expected) == (1, 0, 0, {})
     for sender, number in ((0, 0), (0, 16), (1, 0), (0, 0), (0, 32), (2, 0), (0, 48), (0, 1), (0, 32)):
         tally.take(benchmark.numbered(sender, number))
     # of identifier 0: 0, 1, then 0 again (late), 2, 3, and 2 again (late)
-    assert (tally.heard, tally.reordered) == (8, 2)
+    assert (tally.received, tally.reordered) == (8, 2)
     everybody = benchmark.Tally()
     everybody.take(benchmark.numbered(0, 0))
-    assert everybody.own == -1 and everybody.heard == 1
+    assert everybody.own == -1 and everybody.received == 1
 
 
 class Helper:
@@ -1020,7 +1020,7 @@ def test_a_process_of_the_measurement_is_waited_for_and_ended(monkeypatch):
     helper.process.stdin.close()
 
 
-def test_the_sender_of_the_measurement_sends_so_many(monkeypatch):
+def test_the_sender_of_the_measurement_sends_the_number_requested(monkeypatch):
     sent, opened_with = [], []
 
     class Sender:

@@ -9,7 +9,7 @@ CONTROLLER, COUNTERS, BUS_OFF, RESTARTED = 0x004, 0x200, 0x040, 0x100
 TX_WARNING, RX_WARNING, TX_PASSIVE, RX_PASSIVE, ACTIVE = 0x08, 0x04, 0x20, 0x10, 0x40
 
 
-def told(interrupts, counters, was_off=False, off=False):
+def reported(interrupts, counters, was_off=False, off=False):
     """(classes, controller's status, transmit errors, receive errors) of the frame."""
     classes, _, low, high = frame_of_status(interrupts, counters, was_off, off)
     return classes, low >> 8 & 0xFF, high >> 16 & 0xFF, high >> 24 & 0xFF
@@ -29,15 +29,15 @@ def told(interrupts, counters, was_off=False, off=False):
 )
 @pytest.mark.parametrize("interrupt", [ICR_ERROR_WARNING, ICR_ERROR_PASSIVE])
 def test_the_status_of_a_controller_follows_its_counters(counters, status, interrupt):
-    assert told(interrupt, counters) == (CONTROLLER | COUNTERS, status, *counters)
+    assert reported(interrupt, counters) == (CONTROLLER | COUNTERS, status, *counters)
 
 
-def test_bus_off_and_the_way_back_have_classes_of_their_own():
-    assert told(ICR_ERROR_PASSIVE, (300, 7), off=True) == (BUS_OFF | COUNTERS, 0, 255, 7)
-    assert told(ICR_ERROR_WARNING, (0, 0), was_off=True) == (RESTARTED | COUNTERS, 0, 0, 0)
+def test_bus_off_and_the_way_back_have_their_own_classes():
+    assert reported(ICR_ERROR_PASSIVE, (300, 7), off=True) == (BUS_OFF | COUNTERS, 0, 255, 7)
+    assert reported(ICR_ERROR_WARNING, (0, 0), was_off=True) == (RESTARTED | COUNTERS, 0, 0, 0)
 
 
-def test_counters_alone_are_no_news():
+def test_changed_counters_alone_are_not_reported():
     assert frame_of_status(0, (5, 5), False, False) is None
     assert frame_of_status(0, (300, 0), True, True) is None
     assert frame_of_status(ICR_BUS_ERROR, (5, 5), False, False) is not None

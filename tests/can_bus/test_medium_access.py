@@ -139,7 +139,7 @@ def test_what_a_register_shows_of_each_error():
 # ---- passive nodes ---------------------------------------------------------------------------------------
 
 
-def test_a_passive_sender_that_nobody_acknowledges_pays_only_for_a_dominant_bit_in_its_flag():
+def test_a_passive_sender_without_acknowledgement_pays_only_for_a_dominant_bit_in_its_flag():
     assert moves(outcome(counters=((130, 0),)), 0) == []
     disturbed = ACK_SLOT + 3
     assert moves(outcome(disturbed, counters=((130, 0),)), 0) == [(disturbed, 138, 0)]
@@ -161,7 +161,7 @@ def test_a_passive_flag_is_complete_after_six_equal_bits():
     assert second[0] == (again + (ACK_SLOT - START) + 1 + FLAG + DELIMITER) * 1000
 
 
-def test_a_passive_error_frame_on_a_recessive_bus_is_seen_by_nobody():
+def test_a_passive_error_frame_on_a_recessive_bus_is_not_seen():
     of = outcome(START, counters=((200, 0), (0, 0)))  # its start of frame reads recessive
     again = START + 1 + FLAG + DELIMITER + INTERMISSION + SUSPENSION
     assert moves(of, 0) == [(START, 208, 0), (again + LENGTH - 1, 207, 0)]
@@ -262,7 +262,7 @@ def test_a_false_start_on_an_idle_bus_is_a_stuff_error_after_six_recessive_bits(
 # ---- nodes that listen, and those that come late ---------------------------------------------------------
 
 
-def test_a_silent_node_hears_what_others_acknowledge_and_disturbs_nothing():
+def test_a_silent_node_receives_acknowledged_frames_and_disturbs_nothing():
     wired = Wired(3)
     wired.bus.set_silent(2, True)
     assert wired.bus.operating == 2

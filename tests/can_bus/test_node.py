@@ -21,7 +21,7 @@ def node_with(transmit_errors=0, receive_errors=0):
     return node
 
 
-def told(node):
+def reported(node):
     """The last CAN_STATUS: interrupts, transmit errors, receive errors, bus-off."""
     while node.inbox.take():
         pass
@@ -50,10 +50,10 @@ def test_the_error_state_is_that_of_the_higher_counter_and_only_transmit_errors_
     assert node.confine(5, ICR_BUS_ERROR) == off
     assert (node.warning, node.passive, node.mode) == (warning, passive, BUS_OFF if off else OPERATING)
     interrupts = ICR_BUS_ERROR | ICR_ERROR_WARNING * warning | ICR_ERROR_PASSIVE * passive
-    assert told(node) == (interrupts, 127 if off else transmit_errors, receive_errors, off)
+    assert reported(node) == (interrupts, 127 if off else transmit_errors, receive_errors, off)
     if not off:
         node.confine(6, 0)  # no interrupt for a state that it is in already
-        assert told(node)[0] == 0
+        assert reported(node)[0] == 0
 
 
 def test_reset_does_not_spare_a_node_that_was_thrown_off_its_recovery():

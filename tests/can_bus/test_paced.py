@@ -47,7 +47,7 @@ def test_a_frame_goes_out_when_its_time_has_come(clock):
     assert [event[2] for event in other.events if event[0] == RECEIVED] == [0x123]
 
 
-def test_at_full_speed_an_idle_bus_stands_still_and_a_frame_passes_at_once(clock):
+def test_at_full_speed_time_stops_on_an_idle_bus_and_a_frame_passes_at_once(clock):
     bus = PacedBus("can1", speed=0.0)
     sender, other = bus.add("a"), bus.add("b")
     assert bus.now() == NEVER - 1 and bus.seconds_until(10**15) == 0.0
@@ -62,7 +62,7 @@ def test_at_full_speed_an_idle_bus_stands_still_and_a_frame_passes_at_once(clock
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.0])
-def test_nobody_answers_a_lone_client_whose_frame_waits_without_work_until_somebody_comes(clock, speed):
+def test_the_frame_of_a_lone_client_waits_without_work_until_another_joins(clock, speed):
     bus = PacedBus("can1", speed=speed)
     lone = bus.add("a")
     lone.offer(0x123, 8, 1, 2)
@@ -125,7 +125,7 @@ def test_speeds_have_two_limits_and_a_word(text, speed):
 
 
 @pytest.mark.parametrize("text", ["0.0009", "1000.1", "fast", None, "nan", "-1"])
-def test_what_is_no_speed_is_refused(text):
+def test_a_text_that_is_not_a_speed_is_refused(text):
     with pytest.raises(UserError, match="is neither a number in 0.001 ... 1000 nor 'max'"):
         speed_of(text)
 

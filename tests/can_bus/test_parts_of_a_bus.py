@@ -140,7 +140,7 @@ def test_what_waits_is_a_list_with_an_entry_for_each_full_buffer(steps):
             assert list(buffers.rows[each + 4 : each + 8]) == frame
             data = b"".join(word.to_bytes(4, "little") for word in frame[2:])
             assert buffers.wire(each)[0] == oracle.stuffed(oracle.Frame(frame[0], data))[0] + [1] * 10
-    wired.bus.look_again()
+    wired.bus.recompute_next()
     assert wired.bus.next_bit == (1 if model else NEVER) and wired.bus.next_time == (edge(1) if model else NEVER)
 
 
@@ -246,12 +246,19 @@ def test_sequences_count_from_eleven_bits_before_the_bus_was_free(join_from, fre
     assert node.sequences_left == left
 
 
-def test_an_end_is_written_where_its_controller_looks_or_told_by_a_message():
+def test_an_end_is_written_to_the_buffer_of_its_controller_or_sent_as_a_message():
     node = fresh()
     node.end_unsent(2, 77, TX_LOST)
     assert node.inbox.take()
-    told = node.inbox
-    assert (told.time, told.order, told.kind, told.a, told.b, told.c) == (77, 900, CAN_TX_DONE, 2, 2, TX_LOST)
+    reported = node.inbox
+    assert (reported.time, reported.order, reported.kind, reported.a, reported.b, reported.c) == (
+        77,
+        900,
+        CAN_TX_DONE,
+        2,
+        2,
+        TX_LOST,
+    )
     ends = TransmitEnds()
     assert (list(ends.times), list(ends.statuses), ends.order) == ([NEVER] * 4, [0] * 4, 0)
     node.connect(ends)
@@ -265,7 +272,7 @@ def test_an_end_is_written_where_its_controller_looks_or_told_by_a_message():
     assert node.ends is not ends and list(node.ends.times) == [BY_MESSAGE] * 4 and node.ends.order == 900
 
 
-def test_ends_of_frames_are_written_for_a_controller_that_looks():
+def test_ends_of_frames_are_written_for_a_controller_that_polls():
     wired = Wired(2)
     ends = TransmitEnds()
     wired.bus.nodes[0].connect(ends)
@@ -324,15 +331,15 @@ def test_a_log_with_a_stream_keeps_nothing_itself():
     bus.note_outside(7, 2, 3, 4, 5)
     assert (bus.log.frames, bus.log.dropped) == ([(1, 2, 3, 4, 5, -1)], 1)
     bus.log.stream = FrameStream(3)
-    heard = []
-    bus.log.stream.sink = lambda _time, block: heard.extend(memoryview(block).cast("B").cast("q").tolist())
+    got = []
+    bus.log.stream.sink = lambda _time, block: got.extend(memoryview(block).cast("B").cast("q").tolist())
     bus.note_outside(8, 2, 3, 4, 5)
     bus.log.stream.flush()
-    assert heard == [8, 4 << 12 | 3 << 4 | 3, 5 << 29 | 2]  # as `foundation/row_stream.py` packs three numbers
+    assert got == [8, 4 << 12 | 3 << 4 | 3, 5 << 29 | 2]  # as `foundation/row_stream.py` packs three numbers
     assert bus.log.take() == [(1, 2, 3, 4, 5, -1)] and bus.log.take() == [] and bus.log.dropped == 1
 
 
-def test_frames_on_a_real_bus_that_stands_in_its_place_are_kept_like_its_own():
+def test_frames_on_a_real_bus_in_its_place_are_kept_like_its_own():
     wired = Wired(2, bitrate=1_000_000)
     rows = []
     wired.bus.note_outside(9 * MS, 0x7, 3, 1, 2)
@@ -403,8 +410,8 @@ def test_a_frame_is_hit_in_its_middle_or_behind_its_arbitration(frame, bit):
     words = comparison.words(frame["data"])
     wired.send(0, frame["identifier"], flags=flags, lo=words[0], hi=words[1])
     wired.bus.advance(SECOND)
-    told = wired.of(0, "status")[0]
-    assert told[0] == edge(1 + bit + 1) and wired.bus.disturbance.frames_left == 0
+    reported = wired.of(0, "status")[0]
+    assert reported[0] == edge(1 + bit + 1) and wired.bus.disturbance.frames_left == 0
     assert wired.bus.disturbance.planned_bits == [] and wired.bus.disturbance.next_bit == NEVER
 
 
@@ -481,7 +488,7 @@ def test_a_bus_that_is_asked_only_when_it_wants_to_be_does_the_same(kind):
 
 
 @pytest.mark.parametrize("rate", [125_000, 1_000_000, 3_000_000])
-def test_the_next_instant_is_the_start_of_the_next_frame_the_next_command_or_never(rate):
+def test_the_next_time_is_the_start_of_the_next_frame_the_next_command_or_never(rate):
     wired = Wired(2, bitrate=rate)
     bus = wired.bus
     assert (bus.next_time, bus.advance(1_000), bus.advanced) == (NEVER, NEVER, 1_000)
@@ -524,7 +531,7 @@ def test_requests_and_commands_from_the_past_act_from_what_is_decided_on():
     assert wired.bus.next_bit == 3_001 and wired.bus.counters.late_requests == 0
 
 
-def test_a_result_is_late_when_it_was_due_at_the_instant_that_found_it():
+def test_a_result_is_late_when_it_was_due_at_the_time_that_found_it():
     bits = length(1, bytes(8))
     for until, late in ((edge(bits) - 1, 0), (edge(bits), 1)):  # receivers have it behind bit 1 + bits - 2
         wired = Wired(2)
@@ -536,7 +543,7 @@ def test_a_result_is_late_when_it_was_due_at_the_instant_that_found_it():
 # ---- silence, wires, rates
 
 
-def test_who_is_silent_does_not_acknowledge_and_counts_again_when_it_speaks():
+def test_a_silent_node_does_not_acknowledge_and_counts_again_when_it_sends():
     wired = Wired(3)
     bus = wired.bus
     assert bus.operating == 3
@@ -690,7 +697,7 @@ AWAY, JOINS, IDLE, SUSPENDED = 0, 1, 2, 10
         ({"mode": JOINING, "join_from": 505}, 500, 500, (JOINS, 0)),
     ],
 )
-def test_where_a_machine_stands_on_an_idle_bus(changes, bit, free_bit, place):
+def test_the_state_of_a_machine_on_an_idle_bus(changes, bit, free_bit, place):
     machine = MediumAccess(fresh(**changes))
     machine.sending = machine.failed = True
     machine.row = machine.offered = 8

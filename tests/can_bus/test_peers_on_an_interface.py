@@ -91,7 +91,7 @@ class Outside:
     def ask(self, peer, time, buffer, identifier=0x155, flags=8, lo=0xAAAAAAAA, hi=0xAAAAAAAA):
         self.peers[peer].from_board(CAN_REQUEST, time, buffer, identifier, flags, lo, hi)
 
-    def told(self, peer):
+    def reported(self, peer):
         inbox, found = self.inboxes[peer], []
         while inbox.take():
             assert inbox.order == 600 + peer
@@ -136,11 +136,11 @@ def test_what_goes_out_holds_the_wire_for_its_bits_and_is_recorded_then(rate, id
     )
     assert (sent.dlc, bytes(sent.data)) == (flags & 15, frame["data"])
     end = 7_000 + length_ns(identifier, rate=rate, **frame)
-    assert outside.told(0) == [(end, CAN_TX_DONE, 1, 2, TX_SENT, 0, 0)]
+    assert outside.reported(0) == [(end, CAN_TX_DONE, 1, 2, TX_SENT, 0, 0)]
     assert outside.heard == [(end, identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi)]
     assert outside.bus.busy_ns == outside.bus.window_busy_ns == end - 7_000
     outside.counts(frames_out=1)
-    assert outside.told(1) == [] and outside.wires[1].sent == []
+    assert outside.reported(1) == [] and outside.wires[1].sent == []
 
 
 def test_a_controller_sends_one_frame_after_the_other_and_rests_in_between():
@@ -150,21 +150,21 @@ def test_a_controller_sends_one_frame_after_the_other_and_rests_in_between():
     outside.ask(0, 1_000 + 2 * PLAIN + 5, 3)  # 5 ns after both
     outside.ask(1, 2_000, 1)  # another controller's wire is its own
     ends = [1_000 + PLAIN, 1_000 + 2 * PLAIN, 1_000 + 3 * PLAIN + 5]
-    assert outside.told(0) == [(end, CAN_TX_DONE, 1, n + 1, TX_SENT, 0, 0) for n, end in enumerate(ends)]
-    assert outside.told(1) == [(2_000 + PLAIN, CAN_TX_DONE, 2, 1, TX_SENT, 0, 0)]
+    assert outside.reported(0) == [(end, CAN_TX_DONE, 1, n + 1, TX_SENT, 0, 0) for n, end in enumerate(ends)]
+    assert outside.reported(1) == [(2_000 + PLAIN, CAN_TX_DONE, 2, 1, TX_SENT, 0, 0)]
     assert outside.peers[0].free_ns == ends[-1]
     outside.counts(frames_out=4)
     assert [frame[0] for frame in outside.heard] == ends
 
 
-def test_of_a_full_interface_each_frame_is_tried_at_each_look_in_its_order_and_single_shots_once():
+def test_frames_for_a_full_interface_are_tried_at_each_poll_in_order_and_single_shots_once():
     outside = Outside()
     outside.wires[0].full = True
     outside.ask(0, 10, 1, flags=8 | FLAG_SINGLE_SHOT)
     outside.counts(not_taken=1, single_shot_skipped=1)
     outside.ask(0, 20, 2, identifier=2)
     outside.ask(0, 30, 3, identifier=3, flags=8 | FLAG_SINGLE_SHOT)  # behind one that waits: tries that one
-    assert outside.told(0) == [(10, CAN_TX_DONE, 1, 1, TX_LOST, 0, 0)]
+    assert outside.reported(0) == [(10, CAN_TX_DONE, 1, 1, TX_LOST, 0, 0)]
     outside.counts(not_taken=3, single_shot_skipped=1)
     assert outside.bus.last_error == "peer 0: no room"
     assert outside.bus.poll(1_000) == 126_000
@@ -172,7 +172,7 @@ def test_of_a_full_interface_each_frame_is_tried_at_each_look_in_its_order_and_s
     assert outside.heard == [] and outside.wires[0].sent == []
     outside.peers[0].from_board(CAN_ABORT, 2_000, 2, 0, 0, 0, 0)
     outside.bus.poll(3_000)  # now the single shot is the first
-    assert outside.told(0) == [
+    assert outside.reported(0) == [
         (2_000, CAN_TX_DONE, 1, 2, TX_ABORTED, 0, 0),
         (3_000, CAN_TX_DONE, 1, 3, TX_LOST, 0, 0),
     ]
@@ -187,7 +187,7 @@ def test_behind_a_lost_single_shot_the_next_frame_is_tried_at_once():
     outside.ask(0, 0, 2, identifier=2, flags=8 | FLAG_SINGLE_SHOT)
     outside.ask(0, 0, 3, identifier=3)
     outside.peers[0].from_board(CAN_ABORT, 0, 1, 0, 0, 0, 0)
-    outside.told(0)
+    outside.reported(0)
     before = outside.bus.not_taken
     outside.bus.poll(50)
     assert outside.bus.not_taken == before + 2
@@ -211,7 +211,7 @@ def test_a_controller_in_reset_drops_all_and_takes_nothing_until_it_operates_aga
     assert [frame[1] for frame in outside.heard] == [0x155]
     outside.peers[0].from_board(CAN_MODE, 9, OPERATING, 0, 0, 0, 0)
     outside.ask(0, 10, 1)
-    assert outside.told(0) == [
+    assert outside.reported(0) == [
         (6, CAN_TX_DONE, 1, 3, TX_ABORTED, 0, 0),
         (7, CAN_TX_DONE, 1, 1, TX_ABORTED, 0, 0),
         (7, CAN_TX_DONE, 1, 2, TX_ABORTED, 0, 0),
@@ -224,7 +224,7 @@ def test_a_controller_in_reset_drops_all_and_takes_nothing_until_it_operates_aga
 # ---- in
 
 
-def test_what_comes_in_has_its_flags_and_words_and_an_instant_of_its_own():
+def test_a_received_frame_has_its_flags_its_words_and_its_own_time():
     outside = Outside()
     frames = [
         (message(0x1F, b"\1\2\3"), (0x1F, 3, 0x030201, 0), {}),
@@ -250,13 +250,13 @@ def test_what_comes_in_has_its_flags_and_words_and_an_instant_of_its_own():
         if number:
             now += length_ns(frame[0], bytes(each.data), 1_000_000, **options)
         expected.append((now, CAN_RX, 2, *frame))
-    assert outside.told(1) == expected
+    assert outside.reported(1) == expected
     assert outside.peers[1].read_ns == now
     outside.counts()  # only what the first peer hears is a frame of this bus
     assert outside.heard == []
 
 
-def test_a_look_reads_two_hundred_frames_of_each_peer():
+def test_a_poll_reads_two_hundred_frames_of_each_peer():
     outside = Outside()
     for wire in outside.wires:
         wire.to_read = [message(n, b"") for n in range(250)]
@@ -265,7 +265,7 @@ def test_a_look_reads_two_hundred_frames_of_each_peer():
     outside.counts(frames_in=200, overflow=0)
     outside.bus.poll(2 * SECOND)
     outside.counts(frames_in=250)
-    assert len(outside.told(0)) == len(outside.told(1)) == 250
+    assert len(outside.reported(0)) == len(outside.reported(1)) == 250
 
 
 def test_frames_are_handed_on_20_ms_ahead_and_no_further():
@@ -274,7 +274,7 @@ def test_frames_are_handed_on_20_ms_ahead_and_no_further():
     now = 3 * SECOND
     outside.bus.poll(now)
     fits = AHEAD // PLAIN + 1  # the first one comes at once
-    assert [each[0] for each in outside.told(0)] == [now + n * PLAIN for n in range(fits)]
+    assert [each[0] for each in outside.reported(0)] == [now + n * PLAIN for n in range(fits)]
     outside.counts(frames_in=199, overflow=199 - fits)
     assert [frame[0] for frame in outside.heard] == [now + min(n * PLAIN, AHEAD) for n in range(fits)] + [
         now + AHEAD
@@ -282,7 +282,7 @@ def test_frames_are_handed_on_20_ms_ahead_and_no_further():
     # what came later than that is no more ahead of a later look
     outside.wires[0].to_read = [message()]
     outside.bus.poll(now + 1_000_000)
-    assert [each[0] for each in outside.told(0)] == [now + fits * PLAIN]
+    assert [each[0] for each in outside.reported(0)] == [now + fits * PLAIN]
 
 
 def test_a_frame_exactly_20_ms_ahead_is_handed_on():
@@ -290,11 +290,11 @@ def test_a_frame_exactly_20_ms_ahead_is_handed_on():
     outside.wires[0].to_read = [message(), message()]
     outside.peers[0].read_ns = SECOND + AHEAD - PLAIN
     outside.bus.poll(SECOND)
-    assert [each[0] for each in outside.told(0)] == [SECOND + AHEAD]
+    assert [each[0] for each in outside.reported(0)] == [SECOND + AHEAD]
     outside.counts(frames_in=2, overflow=1)
 
 
-def test_what_is_no_classic_frame_is_counted_and_what_follows_it_is_read():
+def test_a_frame_that_is_not_classic_is_counted_and_the_next_one_is_read():
     outside = Outside()
     outside.wires[0].to_read = [
         can.Message(is_error_frame=True),
@@ -304,7 +304,7 @@ def test_what_is_no_classic_frame_is_counted_and_what_follows_it_is_read():
     outside.wires[1].to_read = [can.Message(is_error_frame=True), message(1, bytes(12), is_fd=True)]
     outside.bus.poll(SECOND)
     outside.counts(frames_in=1, refused=2, error_frames=1)
-    assert [each[3] for each in outside.told(0)] == [2] and outside.told(1) == []
+    assert [each[3] for each in outside.reported(0)] == [2] and outside.reported(1) == []
 
 
 def test_an_interface_that_breaks_is_left_out_until_it_gives_again():
@@ -349,7 +349,7 @@ def test_a_bus_with_more_frames_than_fit_is_full_and_not_fuller():
     assert outside.bus.window_load == 1.0
 
 
-def test_leaving_goes_through_all_peers_whatever_one_of_them_says():
+def test_leaving_closes_all_peers_even_if_one_raises():
     outside = Outside(peers=3)
 
     def stubborn():
@@ -367,7 +367,7 @@ def test_draining_ends_when_nothing_comes_any_more():
     outside = Outside()
     outside.wires[0].to_read = [message(n, b"") for n in range(450)]
     outside.bus.drain(SECOND)
-    outside.counts(frames_in=450, overflow=450 - len(outside.told(0)))
+    outside.counts(frames_in=450, overflow=450 - len(outside.reported(0)))
     assert outside.wires[0].to_read == []
 
 
@@ -421,7 +421,7 @@ def test_what_the_kernel_has_dropped_is_what_was_sent_and_not_read():
         assert read > 0 and dropped == 64 - read > 0
 
 
-def test_an_interface_that_is_no_socket_or_does_not_tell_has_dropped_nothing():
+def test_an_interface_that_is_not_a_socket_or_has_no_counter_has_dropped_nothing():
     assert dropped_by_kernel(SimpleNamespace()) == dropped_by_kernel(SimpleNamespace(socket=7)) == 0
     with Recorded(socket.AF_INET, socket.SOCK_DGRAM) as end:
         assert dropped_by_kernel(SimpleNamespace(socket=end)) == 0
@@ -470,12 +470,12 @@ def test_a_place_is_an_interface_a_channel_and_options_as_far_as_given(text, fou
         ("can1=virtual:a b", "unrecognized arguments: b"),
     ],
 )
-def test_what_is_wrong_with_a_place_is_told(text, words):
+def test_a_fault_in_a_place_is_reported(text, words):
     with pytest.raises(UserError, match=f"^--bus {text}: .*{words}"):
         place_of(text)
 
 
-def test_without_any_interface_the_ways_to_name_one_are_told(monkeypatch):
+def test_without_any_interface_the_ways_to_name_one_are_listed(monkeypatch):
     monkeypatch.setattr(can.util, "CONFIG_FILES", [])
     monkeypatch.delenv("CAN_INTERFACE", raising=False)
     with pytest.raises(UserError, match=r"bus can9: .* as in can9=socketcan:vcan0, .* section \[can9\]"):

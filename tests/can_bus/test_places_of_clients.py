@@ -90,7 +90,7 @@ def test_frames_are_loaded_as_far_as_that_keeps_their_order(identifiers, buffers
     assert tap.queued == len(identifiers) and taps.queued
 
 
-def test_equal_fields_take_a_buffer_above_the_one_before_and_wait_where_there_is_none():
+def test_equal_fields_take_a_buffer_above_the_one_before_or_wait():
     taps, (tap, _) = placed(2)
     for identifier in (1, 5, 5):
         tap.offer(identifier, 0, 0, 0)
@@ -149,14 +149,16 @@ def test_whatever_is_offered_whenever_leaves_in_that_order(offers):
         tap.offer(identifier << (18 if flags & FLAG_EXTENDED else 0), flags, 0, 0)
         run(taps, taps.time + pause)
     run(taps, taps.time + 8 * MS)
-    told = [(identifier >> (18 if flags & FLAG_EXTENDED else 0), flags) for _, _, identifier, flags, _, _ in tap.events]
-    assert told == [frame for frame, _ in offers]
+    reported = [
+        (identifier >> (18 if flags & FLAG_EXTENDED else 0), flags) for _, _, identifier, flags, _, _ in tap.events
+    ]
+    assert reported == [frame for frame, _ in offers]
     assert [event[2:] for event in other.events] == [event[2:] for event in tap.events]
     assert {event[0] for event in tap.events} <= {SENT} and {event[0] for event in other.events} <= {RECEIVED}
     assert (tap.sent, tap.received, other.received, tap.queued) == (len(offers), 0, len(offers), 0)
 
 
-def test_a_place_has_room_for_its_depth_of_frames_on_their_way_and_waiting():
+def test_a_place_has_space_for_its_depth_of_frames_on_their_way_and_waiting():
     _, (tap,) = placed(1, depth=5)
     assert [tap.offer(n, 0, 0, 0) for n in range(6)] == [QUEUED] * 5 + [FULL]
     tap.poll(1_000)
@@ -181,7 +183,7 @@ def test_nothing_is_loaded_while_the_controller_is_off_the_bus():
     [(TX_SENT, SENT, 1, 0), (TX_ABORTED, DROPPED, 0, 1), (TX_LOST, DROPPED, 0, 1)],
 )
 @pytest.mark.parametrize("buffer", [1, 2, 3])
-def test_the_end_of_each_buffers_frame_is_told_with_that_frame(status, kind, sent, dropped, buffer):
+def test_the_end_of_each_buffers_frame_is_reported_with_that_frame(status, kind, sent, dropped, buffer):
     _, (tap,) = placed()
     given_frames = [(n, 2, 7 * n, n) for n in (1, 2, 3)]
     for frame in given_frames:
@@ -195,7 +197,7 @@ def test_the_end_of_each_buffers_frame_is_told_with_that_frame(status, kind, sen
     assert len(tap.events) == 1
 
 
-def test_a_frame_arrives_as_it_was_sent_at_the_instant_of_its_last_but_one_bit():
+def test_a_frame_arrives_as_it_was_sent_at_the_time_of_its_last_but_one_bit():
     taps, (sender, receiver) = placed(2)
     words = (0x1ABCDEF0, 5 | FLAG_EXTENDED, 0x04030201, 0x05)
     sender.offer(*words)
@@ -226,21 +228,21 @@ def error(event):
     return classes, struct.pack("<II", low, high)
 
 
-def test_a_lone_client_hears_of_each_missing_acknowledgement_until_it_is_passive():
+def test_a_lone_client_gets_a_report_of_each_missing_acknowledgement_until_it_is_passive():
     taps, (tap,) = placed()
     tap.offer(1, 0, 0, 0)
     run(taps, 6 * MS)
     assert tap.state == ERROR_PASSIVE and tap.counters == (128, 0) and tap.controller.retries > 20
-    told = [each for each in tap.events if each[0] == RECEIVED]
+    reported = [each for each in tap.events if each[0] == RECEIVED]
     states = [each[2:] for each in tap.events if each[0] == STATE]
     assert [kind for kind, *_ in tap.events] == [RECEIVED, STATE] * 16
     assert states == [(int(n == 16), 8 * n, 0, 0) for n in range(1, 17)]
-    for n, each in enumerate(told, 1):
+    for n, each in enumerate(reported, 1):
         classes, data = error(each)
         crossed = {12: 0x08, 16: 0x20}.get(n, 0)  # transmit warning at 96, passive at 128
         assert classes == ACK | BUSERROR | COUNTERS | (CONTROLLER if crossed else 0)
         assert data == bytes([0, crossed, 0, 25, 0, 0, 8 * n, 0])  # 25: the ACK slot
-    assert [a[1] for a in told] == [b[1] for b in tap.events if b[0] == STATE]
+    assert [a[1] for a in reported] == [b[1] for b in tap.events if b[0] == STATE]
 
 
 def test_bus_off_drops_what_waits_and_activating_brings_an_empty_controller_back():
@@ -258,8 +260,8 @@ def test_bus_off_drops_what_waits_and_activating_brings_an_empty_controller_back
     assert sorted(dropped) == [(n, 0, n, 0) for n in range(6)]
     [state] = [each for each in tap.events if each[0] == STATE]
     assert state[2:] == (OFF, 127, 0, 0)  # the counter of a controller that is off stands at 127
-    [told] = [each for each in tap.events if each[0] == RECEIVED]
-    assert error(told)[0] & OFF_CLASS
+    [reported] = [each for each in tap.events if each[0] == RECEIVED]
+    assert error(reported)[0] & OFF_CLASS
     assert tap.offer(1, 0, 0, 0) == NOT_ON_BUS
     tap.listen(taps.time)  # not now
     assert not tap.silent and tap.controller.mode == BUS_OFF
@@ -293,12 +295,12 @@ def test_the_state_is_off_before_listening_before_passive(counters, off, silent,
     _, (tap,) = placed()
     tap.counters, tap.off, tap.silent = counters, off, silent
     assert tap.state == state
-    tap.tell_state(9)
+    tap.report_state(9)
     assert tap.events == [(STATE, 9, state, *counters, 0)]
     assert (tap.offer(1, 0, 0, 0) == NOT_ON_BUS) == (off or silent)
 
 
-def test_a_status_is_told_once_and_only_when_something_in_it_is_new():
+def test_a_status_is_reported_once_and_only_when_something_in_it_is_new():
     _, (tap,) = placed()
     tap._status(1, 0, 3, 0, False)  # counters alone: a state, no error frame
     assert tap.events == [(STATE, 1, ERROR_ACTIVE, 3, 0, 0)]
@@ -318,7 +320,7 @@ def test_a_missing_stretch_is_an_error_frame_of_a_controller_that_overflowed():
 # ---- wishes
 
 
-def test_who_begins_to_listen_drops_what_waits_and_acknowledges_no_more():
+def test_a_client_that_begins_to_listen_drops_its_queue_and_acknowledges_no_more():
     taps, (tap, other) = placed(2)
     for n in range(5):
         tap.offer(n, 0, 0, 0)
@@ -338,11 +340,11 @@ def test_who_begins_to_listen_drops_what_waits_and_acknowledges_no_more():
     assert tap.events == [(STATE, taps.time, ERROR_ACTIVE, *tap.counters, 0)] and not tap.controller.silent
     assert taps.bus.operating == 2
     run(taps, 4 * MS)
-    heard = [each[2] for each in tap.events if each[0] == RECEIVED and not each[3] & FLAG_ERROR]
-    assert other.sent == 1 and heard == [9]
-    told = len(tap.events)
+    got = [each[2] for each in tap.events if each[0] == RECEIVED and not each[3] & FLAG_ERROR]
+    assert other.sent == 1 and got == [9]
+    reported = len(tap.events)
     tap.activate(taps.time)  # takes part already: nothing
-    assert len(tap.events) == told and tap.controller.mode == OPERATING
+    assert len(tap.events) == reported and tap.controller.mode == OPERATING
 
 
 def test_flushing_completes_what_is_under_way():
@@ -358,7 +360,7 @@ def test_flushing_completes_what_is_under_way():
     ]  # fmt: skip
 
 
-def test_who_leaves_is_off_the_bus_and_its_place_is_kept_for_the_next():
+def test_a_client_that_leaves_is_off_the_bus_and_its_place_is_kept_for_the_next():
     taps, (first, second, third) = placed(3)
     first.listen(1_000)
     taps.remove(first)
@@ -386,7 +388,7 @@ def test_a_place_whose_controller_is_not_off_yet_is_not_given_away():
     assert taps.spare == [first]
 
 
-def test_who_left_still_sends_but_hears_nothing_and_goes_when_all_is_sent_or_nobody_hears():
+def test_a_client_that_left_still_sends_without_receiving_until_all_is_sent_or_no_node_receives():
     taps, (leaver, other) = placed(2)
     for n in range(4):
         leaver.offer(n, 0, 0, 0)
@@ -425,7 +427,7 @@ def test_frames_wait_in_taps_while_any_client_has_one():
     assert not taps.queued and not first.queued
 
 
-def test_a_tap_is_the_last_of_an_instant_on_its_bus():
+def test_a_tap_comes_last_at_each_time_on_its_bus():
     """Boards' controllers have orders of STAGE_BUS * 256 and their number; a client comes behind all of them."""
     bus = Bus("can1", 1_000_000)
     bus.add_node("board", EventQueue(8), 1, STAGE_BUS * 256)

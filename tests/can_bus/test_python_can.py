@@ -112,7 +112,7 @@ def test_frames_of_one_sender_keep_their_order_whatever_their_identifiers(bus, c
     assert [(each.arbitration_id, each.data[0]) for each in drained(b)] == [(i, n) for n, i in enumerate(order)]
 
 
-def test_nobody_acknowledges_until_somebody_joins(bus, clock):
+def test_frames_are_not_acknowledged_until_another_node_joins(bus, clock):
     alone = bus()
     alone.send(message(0x55))
     clock.to(20_000_000)
@@ -127,14 +127,14 @@ def test_nobody_acknowledges_until_somebody_joins(bus, clock):
     assert alone.statistics()["sent"] == 1
 
 
-def test_disturbed_frames_are_repeated_and_told_as_error_frames(bus, clock):
+def test_disturbed_frames_are_repeated_and_reported_as_error_frames(bus, clock):
     a, b = bus(), bus()
     a.inject_errors(2)
     a.send(message(0x100, b"abc"))
     clock.to(10_000_000)
-    heard = drained(b)
-    assert [each.is_error_frame for each in heard] == [True, True, False]
-    assert heard[2].arbitration_id == 0x100
+    received = drained(b)
+    assert [each.is_error_frame for each in received] == [True, True, False]
+    assert received[2].arbitration_id == 0x100
     assert b.statistics()["receive_errors"] == 1 and a.statistics()["transmit_errors"] == 15  # 2 and 16, less one
 
 
@@ -218,7 +218,7 @@ def test_a_full_queue_blocks_until_the_timeout_and_then_raises(bus):
     assert [each.arbitration_id for each in drained(other)] == list(range(64))
 
 
-def test_without_a_timeout_sending_where_nobody_acknowledges_raises_once_the_queue_is_full(bus):
+def test_without_a_timeout_unacknowledged_sending_raises_once_the_queue_is_full(bus):
     alone = bus(speed="max")
     for number in range(64):
         alone.send(message(number))
@@ -230,7 +230,7 @@ def test_without_a_timeout_sending_where_nobody_acknowledges_raises_once_the_que
     assert [other.recv(60).arbitration_id for _ in range(300)] == list(range(300))
 
 
-def test_attached_sending_where_nobody_acknowledges_raises_as_well(monkeypatch):
+def test_attached_sending_without_acknowledgement_raises_as_well(monkeypatch):
     monkeypatch.setattr(attached_link, "UNHEARD_S", 0.05)
     with hosted("can1") as (name, _), can.Bus(interface="ranger_sim", channel=f"{name}/can1") as alone:
         with pytest.raises(can.CanOperationError, match="transmit queue stayed full .*ranger-sim bus --acknowledge"):
@@ -273,13 +273,13 @@ def test_what_cannot_be_on_a_classic_bus_is_refused(bus):
         ({"channel": "a name/can1", "private": False}, "name 'a name' is not"),
     ],
 )
-def test_a_mistake_in_an_option_is_told_in_one_line(bus, options, words):
-    with pytest.raises(can.CanInitializationError, match=words) as told:
+def test_a_mistake_in_an_option_is_reported_in_one_line(bus, options, words):
+    with pytest.raises(can.CanInitializationError, match=words) as reported:
         bus(**options)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(reported.value)
 
 
-def test_who_joins_a_private_bus_cannot_change_it(bus):
+def test_a_client_that_joins_a_private_bus_cannot_change_it(bus):
     bus(bitrate=250_000, speed="max")
     bus(bitrate="250000", speed="max")
     with pytest.raises(
@@ -290,7 +290,7 @@ def test_who_joins_a_private_bus_cannot_change_it(bus):
         bus(speed=1)
 
 
-def test_after_shutdown_everything_is_refused_and_nothing_is_said(bus, caplog):
+def test_after_shutdown_everything_is_refused_and_nothing_is_printed(bus, caplog):
     a, b = bus(), bus()
     a.shutdown()
     a.shutdown()
@@ -322,7 +322,7 @@ def test_flushing_drops_what_waits(bus, clock):
     assert a.statistics()["dropped"] >= 9
 
 
-def test_a_reader_that_is_too_slow_loses_frames_and_is_told(bus):
+def test_a_reader_that_is_too_slow_loses_frames_and_gets_a_report(bus):
     a, b = bus(speed="max"), bus(rx_queue_size=10)
     for number in range(25):
         a.send(message(number))
@@ -330,8 +330,10 @@ def test_a_reader_that_is_too_slow_loses_frames_and_is_told(bus):
     assert [each.arbitration_id for each in first] == list(range(10))
     assert b.recv(0) is None and b.statistics()["lost"] == 15
     a.send(message(0x77))
-    told, after = drained(b)
-    assert told.is_error_frame and told.arbitration_id == 0x004 and told.data[1] == 0x01  # CRTL: receive overflow
+    reported, after = drained(b)
+    assert (
+        reported.is_error_frame and reported.arbitration_id == 0x004 and reported.data[1] == 0x01
+    )  # CRTL: receive overflow
     assert after.arbitration_id == 0x77
 
 
@@ -348,7 +350,7 @@ def test_periodic_sending_by_python_cans_thread(bus, caplog):
     assert not [entry for entry in caplog.records if entry.levelno >= logging.WARNING]
 
 
-def test_a_periodic_message_after_the_shutdown_is_no_error_but_one_that_fails_before_is(bus, clock):
+def test_a_periodic_message_that_fails_is_an_error_before_the_shutdown_only(bus, clock):
     a, _ = bus(), bus()
     sender = python_can._WhileOpen(a)
     a.inject_errors(32)
@@ -573,7 +575,7 @@ def test_running_hosts_are_found(bus):
     assert not [each for each in can.detect_available_configs("ranger_sim") if name in each["channel"]]
 
 
-def test_when_the_other_side_goes_this_is_told(bus):
+def test_the_end_of_the_other_side_is_reported(bus):
     with hosted("can1") as (name, _):
         a, b = bus(f"{name}/can1", private=False), bus(f"{name}/can1", private=False)
         a.send(message(5))
@@ -590,12 +592,12 @@ def test_asyncio_waits_on_the_descriptor_of_an_attached_bus(bus):
         assert heard_by_asyncio(a, b, 200) == list(range(200))
 
 
-def test_an_attached_node_hears_of_errors_and_of_bus_off(bus):
+def test_an_attached_node_receives_errors_and_bus_off(bus):
     with hosted("can1") as (name, host):
         a, b = bus(f"{name}/can1", private=False), bus(f"{name}/can1", private=False)
         host.buses[0].bus.inject_errors(32)
         a.send(message(0x100))
-        while not (heard := a.recv(60)).is_error_frame or not heard.arbitration_id & 0x40:
+        while not (received := a.recv(60)).is_error_frame or not received.arbitration_id & 0x40:
             pass
         with pytest.raises(can.CanOperationError, match="bus-off"):
             a.send(message(0x101))
@@ -603,9 +605,9 @@ def test_an_attached_node_hears_of_errors_and_of_bus_off(bus):
         while not a.recv(60).arbitration_id & 0x100:  # CAN_ERR_RESTARTED
             pass
         a.send(message(0x102))
-        while (heard := b.recv(60)).is_error_frame:
+        while (received := b.recv(60)).is_error_frame:
             pass
-        assert heard.arbitration_id == 0x102
+        assert received.arbitration_id == 0x102
 
 
 def test_threads_may_send_and_receive_on_one_attached_bus(bus):
@@ -621,11 +623,11 @@ def test_threads_may_send_and_receive_on_one_attached_bus(bus):
         ]
         for thread in threads:
             thread.start()
-        heard = [[one.recv(60) for _ in range(2 * count)] for one in (a, b)]
+        received = [[one.recv(60) for _ in range(2 * count)] for one in (a, b)]
         for thread in threads:
             thread.join(60)
             assert not thread.is_alive(), "everything is heard, but sending it does not end"
-    for messages, senders in zip(heard, ((2, 3), (0, 1)), strict=True):
+    for messages, senders in zip(received, ((2, 3), (0, 1)), strict=True):
         for sender in senders:
             mine = [int.from_bytes(each.data) for each in messages if each.arbitration_id == sender]
             assert mine == list(range(count))
@@ -654,11 +656,11 @@ def test_every_standard_identifier_with_every_length_passes(bus):
     for length in range(9):
         for identifier in range(2048):
             a.send(message(identifier, (identifier * 0x0101_0101_0101_0101 & (1 << 64) - 1).to_bytes(8)[:length]))
-        heard = drained(b)
-        assert [(each.arbitration_id, each.dlc) for each in heard] == [(i, length) for i in range(2048)]
+        received = drained(b)
+        assert [(each.arbitration_id, each.dlc) for each in received] == [(i, length) for i in range(2048)]
         assert all(
             bytes(m.data) == (m.arbitration_id * 0x0101_0101_0101_0101 & (1 << 64) - 1).to_bytes(8)[:length]
-            for m in heard
+            for m in received
         )
     assert a.statistics()["sent"] == 9 * 2048 and a.state == can.BusState.ACTIVE == b.state
 

@@ -52,7 +52,7 @@ class Seen:
         nodes = self.nodes if number is None else [self.nodes[number]]
         return sum(event[1] == what for node in nodes for event in node.events)
 
-    def heard(self, bit):
+    def got(self, bit):
         """True when a node that listens had the frame, one bit before its sender was done at `bit`."""
         return any(
             event[:2] == (bit - 1, "received")
@@ -88,7 +88,7 @@ def test_counts_of_frames_are_those_of_what_was_seen_on_the_wire(scenarios):
         assert [node.sent for node in nodes] == [seen.count("sent", n) for n in range(len(nodes))]
         received = [seen.count("received", n) if n != DEAF else 0 for n in range(len(nodes))]
         assert [node.received for node in nodes] == received
-        unheard = sum(not seen.heard(bit) for bit in seen.sent)
+        unheard = sum(not seen.got(bit) for bit in seen.sent)
         assert counters.lost == unheard + counters.flushed
         assert [node.arbitrations_lost for node in nodes] == [
             seen.count("lost arbitration", n) for n in range(len(nodes))
@@ -125,7 +125,7 @@ def test_every_request_ends_once_and_is_counted_as_it_ended(scenarios):
         assert counters.flushed + counters.aborted <= gone <= counters.flushed + counters.aborted + counters.refused
 
 
-def test_the_log_has_each_frame_at_the_instant_at_which_receivers_had_it(scenarios):
+def test_the_log_has_each_frame_at_the_time_at_which_receivers_had_it(scenarios):
     for seen in scenarios:
         logged = [each for each in seen.bus.log.frames if not each[2] & FLAG_ERROR]
         expected = []

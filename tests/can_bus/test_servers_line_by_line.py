@@ -64,7 +64,7 @@ class Line:
 
     def tells(self, *events):
         self.program.tap.events += events
-        self.server._tell(self.program)
+        self.server._report(self.program)
         assert self.program.tap.events == []
         return self.taken()
 
@@ -100,7 +100,7 @@ def test_slcan_what_has_no_effect_on_an_emulated_bus_is_acknowledged(line, text)
         "r1239", "R000000010 ", "R0000000122", "T000000012g0",
     ],
 )  # fmt: skip
-def test_slcan_what_is_no_command_is_a_bell_and_counted(line, text):
+def test_slcan_an_unknown_command_is_a_bell_and_counted(line, text):
     line.say("O\r")
     assert line.say(text + "\r") == "\a"
     counted(line.server, clients=1, clients_seen=1, malformed=1)
@@ -163,7 +163,7 @@ def test_slcan_the_path_leads_to_the_adapter(line):
     assert line.server.filenos() == [line.program.stream.fileno()]
 
 
-def test_slcan_lines_may_come_in_pieces_and_empty_ones_are_no_command(line):
+def test_slcan_lines_may_come_in_pieces_and_empty_ones_are_ignored(line):
     assert line.say("V") == "" and line.say("\rN") == "V0101\r" and line.say("\r\r\r") == "NRSIM\r"
     assert line.say("\nV\n\r\n\r") == "V0101\r"
     counted(line.server)
@@ -203,7 +203,7 @@ def test_slcan_a_whole_command_has_32_characters_at_most(line, length, answer):
     ],
 )
 def test_slcan_what_happens_on_the_bus_is_a_line_if_it_is_a_frame(line, event, text):
-    line.server._tell(line.program)  # closed: nothing to tell
+    line.server._report(line.program)  # closed: nothing to tell
     line.say("O\r")
     assert line.tells(event) == text
     assert line.tells(event, event) == text + text
@@ -239,7 +239,7 @@ def test_slcan_the_epoch_moves_stamps():
     line.server.close()
 
 
-def test_slcan_frames_beyond_the_backlog_are_left_out_and_told_once(line):
+def test_slcan_frames_beyond_the_backlog_are_left_out_and_reported_once(line):
     line.say("O\r")
     event = (RECEIVED, 0, 0x1, 0, 0, 0)
     line.program.outgoing += bytes(LIMITS["slcan"].backlog - len("t0010\r"))
@@ -249,7 +249,7 @@ def test_slcan_frames_beyond_the_backlog_are_left_out_and_told_once(line):
 
 
 @pytest.mark.parametrize(
-    ("counters", "off", "silent", "told"),
+    ("counters", "off", "silent", "reported"),
     [
         ((0, 0), False, False, "F00"),
         ((127, 127), False, False, "F00"),
@@ -259,12 +259,12 @@ def test_slcan_frames_beyond_the_backlog_are_left_out_and_told_once(line):
         ((200, 0), False, True, "F00"),
     ],
 )
-def test_slcan_flags_tell_the_state_of_the_controller(line, counters, off, silent, told):
+def test_slcan_flags_show_the_state_of_the_controller(line, counters, off, silent, reported):
     line.say("O\r")
     tap = line.program.tap
     tap.counters, tap.off, tap.silent = counters, off, silent
     line.server.overrun = True
-    assert line.say("F\rF\r") == f"F{int(told[1:], 16) | 1:02X}\r{told}\r"
+    assert line.say("F\rF\r") == f"F{int(reported[1:], 16) | 1:02X}\r{reported}\r"
     tap.silent = False
 
 
@@ -328,7 +328,7 @@ class Daemon:
     def tells(self, client, *events):
         self.server.texts.clear()
         client.tap.events += events
-        self.server._tell(client)
+        self.server._report(client)
         return self.taken(client)
 
     def close(self):
@@ -369,16 +369,16 @@ def test_socketcand_a_send_is_queued_as_it_is_written(daemon, text, frame):
         "echo 1", "rawmode", "rawmode 1", "open", "open can1", "open can1 can1", "sent 1 0", "", "hello",
     ],
 )  # fmt: skip
-def test_socketcand_what_is_not_understood_is_told_and_counted(daemon, text):
+def test_socketcand_an_unknown_request_is_reported_and_counted(daemon, text):
     client = daemon.opened()
-    told = daemon.say(client, f"< {text} >< echo >")
-    assert told.startswith("< error ") and told.endswith(" >< echo >")
+    reported = daemon.say(client, f"< {text} >< echo >")
+    assert reported.startswith("< error ") and reported.endswith(" >< echo >")
     counted(daemon.server, clients=1, clients_seen=1, malformed=1)
     assert not client.tap.waiting
 
 
 @pytest.mark.parametrize("text", ["send 1 0", "rawmode"])
-def test_socketcand_nothing_is_sent_or_heard_before_a_bus_is_open(daemon, text):
+def test_socketcand_nothing_is_sent_or_received_before_a_bus_is_open(daemon, text):
     client = daemon.client()
     assert daemon.say(client, f"< {text} >").startswith("< error ")
     counted(daemon.server, malformed=1)
@@ -402,7 +402,7 @@ def test_socketcand_a_bus_that_is_not_there_ends_the_connection(daemon):
 
 
 @pytest.mark.parametrize("text", ["x", "GET /", "< < ", "< a < b >"])
-def test_socketcand_who_speaks_something_else_is_told_and_sent_away(daemon, text):
+def test_socketcand_a_client_of_another_protocol_gets_the_reason_and_is_sent_away(daemon, text):
     client = daemon.client()
     assert daemon.say(client, text) == "< error that is no message in angle brackets >"
     assert client.ending
@@ -483,7 +483,7 @@ def test_socketcand_frames_beyond_the_backlog_are_left_out(daemon):
     counted(daemon.server, clients=1, clients_seen=1, frames_out=1, frames_dropped=2)
 
 
-def test_socketcand_all_clients_of_a_look_hear_one_text_and_the_next_look_another(daemon):
+def test_socketcand_all_clients_of_a_poll_receive_one_text_and_the_next_poll_another(daemon):
     first, second = daemon.opened(), daemon.opened()
     event = (RECEIVED, 7_000, 1, 0, 0, 0)
     for _ in range(2):
@@ -522,9 +522,9 @@ def attached():
     other.close()
 
 
-def told(server, client, *events):
+def reported(server, client, *events):
     client.tap.events += events
-    server._tell(client)
+    server._report(client)
     found = bytes(client.outgoing)
     client.outgoing.clear()
     return found
@@ -539,16 +539,16 @@ def test_attach_each_event_is_the_record_that_the_description_says(attached):
     server, client = attached
     client.outstanding = 5
     words = (0x123, 8, 0x04030201, 0x08070605)
-    assert told(server, client, (RECEIVED, 7, *words)) == frame(5, 1_007, *words)
+    assert reported(server, client, (RECEIVED, 7, *words)) == frame(5, 1_007, *words)
     assert (server.totals["frames_out"], client.outstanding) == (1, 5)
-    assert told(server, client, (SENT, 8, *words)) == frame(6, 1_008, *words)
-    assert told(server, client, (DROPPED, 9, *words)) == frame(7, 1_009, *words)
+    assert reported(server, client, (SENT, 8, *words)) == frame(6, 1_008, *words)
+    assert reported(server, client, (DROPPED, 9, *words)) == frame(7, 1_009, *words)
     assert (server.totals["frames_out"], client.outstanding) == (1, 3)
-    assert told(server, client, (STATE, 10, 2, 70_000, 65_536, 0)) == struct.pack(
+    assert reported(server, client, (STATE, 10, 2, 70_000, 65_536, 0)) == struct.pack(
         "<IBqHHH", 15, 8, 1_010, 2, 65_535, 65_535
     )
-    assert told(server, client, (STATE, 10, 1, 65_534, 3, 0)) == struct.pack("<IBqHHH", 15, 8, 1_010, 1, 65_534, 3)
-    assert told(server, client) == b""
+    assert reported(server, client, (STATE, 10, 1, 65_534, 3, 0)) == struct.pack("<IBqHHH", 15, 8, 1_010, 1, 65_534, 3)
+    assert reported(server, client) == b""
 
 
 def test_attach_of_a_client_that_is_behind_frames_are_dropped_and_of_states_the_latest_is_kept(attached):
@@ -556,7 +556,7 @@ def test_attach_of_a_client_that_is_behind_frames_are_dropped_and_of_states_the_
     client.outgoing += bytes(LIMITS["attach"].backlog)
     client.outstanding = 1
     words = (0x1, 0, 0, 0)
-    shown = told(
+    shown = reported(
         server,
         client,
         (RECEIVED, 1, *words),
@@ -569,22 +569,22 @@ def test_attach_of_a_client_that_is_behind_frames_are_dropped_and_of_states_the_
     counted(server, clients=1, clients_seen=1, frames_dropped=2)
     state = struct.pack("<IBqHHH", 15, 8, 1_004, 2, 256, 7)
     overflow = struct.pack("<IBqQ", 17, 10, 1_006, 2)
-    assert told(server, client, (RECEIVED, 6, *words), (RECEIVED, 7, *words)) == state + overflow + frame(
+    assert reported(server, client, (RECEIVED, 6, *words), (RECEIVED, 7, *words)) == state + overflow + frame(
         5, 1_006, *words
     ) + frame(5, 1_007, *words)
     counted(server, clients=1, clients_seen=1, frames_dropped=2, frames_out=2)
 
 
-def test_attach_a_state_is_kept_for_as_long_as_there_is_no_room(attached):
+def test_attach_a_state_is_kept_while_the_buffer_is_full(attached):
     server, client = attached
     backlog = LIMITS["attach"].backlog
     client.outgoing += bytes(backlog)
-    assert len(told(server, client, (STATE, 2, 1, 128, 0, 0))) == backlog
+    assert len(reported(server, client, (STATE, 2, 1, 128, 0, 0))) == backlog
     client.outgoing += bytes(backlog)
-    assert len(told(server, client)) == backlog
+    assert len(reported(server, client)) == backlog
     client.outgoing += bytes(backlog - 1)
-    assert told(server, client)[backlog - 1 :] == struct.pack("<IBqHHH", 15, 8, 1_002, 1, 128, 0)
-    assert told(server, client) == b""
+    assert reported(server, client)[backlog - 1 :] == struct.pack("<IBqHHH", 15, 8, 1_002, 1, 128, 0)
+    assert reported(server, client) == b""
 
 
 def test_attach_a_client_may_have_a_window_of_frames_without_an_answer(attached):
@@ -609,7 +609,7 @@ def test_attach_what_a_client_sends_that_is_off_the_bus_is_answered_as_dropped(a
     assert server._take(client) and client.outstanding == 1
     assert client.tap.events == [(DROPPED, 0, 0x123, 2, 0xBBAA, 0)]
     counted(server, clients=1, clients_seen=1)
-    assert told(server, client) == frame(7, 1_000, 0x123, 2, 0xBBAA, 0) and client.outstanding == 0
+    assert reported(server, client) == frame(7, 1_000, 0x123, 2, 0xBBAA, 0) and client.outstanding == 0
 
 
 @pytest.mark.parametrize(("wish", "silent", "queued"), [(1, False, 1), (2, True, 0), (3, False, 0)])
@@ -642,7 +642,7 @@ def test_attach_a_client_may_begin_by_listening():
 # ---- what all have in common
 
 
-def test_a_server_wants_to_look_again_sooner_while_frames_of_clients_wait(daemon):
+def test_a_server_polls_sooner_while_frames_of_clients_wait(daemon):
     client = daemon.opened()
     assert daemon.server.poll(5 * MS) == 6 * MS
     client.tap.offer(1, 0, 0, 0)
@@ -669,7 +669,7 @@ def test_an_slcan_program_with_more_than_4_kb_waiting_holds_it():
     line.server.close()
 
 
-def test_clients_that_others_look_after_are_not_polled_by_a_server():
+def test_clients_that_others_poll_are_not_polled_by_a_server():
     """Given a bus it makes its clients' places itself and polls them; given the places, their owner does."""
     for owned in (True, False):
         bus = lone_bus()
@@ -685,7 +685,7 @@ def test_clients_that_others_look_after_are_not_polled_by_a_server():
 
 def test_a_server_is_patient_unless_requests_or_connections_wait(daemon):
     assert daemon.server.patience_s() == math.inf
-    daemon.server.knocking = True
+    daemon.server.connections_wait = True
     assert daemon.server.patience_s() == 1.0 / 250  # so many connections a second
     daemon.server.left_over = True
     assert daemon.server.patience_s() == 0.0
@@ -706,7 +706,7 @@ def test_what_a_client_queued_is_dropped_when_it_is_sent_away_and_sent_when_it_l
     counted(daemon.server, clients=1, clients_seen=3, frames_in=0, sent_away_malformed=1)
 
 
-def test_at_the_end_clients_hear_what_the_last_look_found(daemon):
+def test_at_the_end_clients_receive_what_the_last_poll_found(daemon):
     client = daemon.opened()
     client.tap.events.append((RECEIVED, 0, 0x1, 0, 0, 0))
     daemon.server.close()

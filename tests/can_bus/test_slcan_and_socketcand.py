@@ -44,7 +44,7 @@ class Owner:
             self.bus.advance(self.time)
             self.time += STEP_NS
 
-    def heard(self):
+    def received(self):
         found = []
         while self.inbox.take():
             if self.inbox.kind == 2:  # CAN_RX
@@ -97,13 +97,13 @@ def test_slcan_commands_have_the_answers_of_the_protocol(line):
 @pytest.mark.parametrize(
     ("length", "answer"), [(31, "Z\r"), (32, "Z\r"), (33, "\a"), (64, "\a"), (65, "\a"), (200, "\a")]
 )
-def test_slcan_a_command_has_32_bytes_at_most_and_the_next_one_is_heard(line, length, answer):
+def test_slcan_a_command_has_32_bytes_at_most_and_the_next_one_is_read(line, length, answer):
     """An extended frame has 26 and may carry a stamp behind it; a longer line is not a command, at any length."""
     _, say = line
     say("O\r")
     frame = "T0000012380102030405060708"
-    told = say(frame + "0" * (length - len(frame)) + "\r")
-    assert told == answer if length > 32 else told in (answer, "\a")
+    reported = say(frame + "0" * (length - len(frame)) + "\r")
+    assert reported == answer if length > 32 else reported in (answer, "\a")
     assert say("V\r") == "V0101\r"
 
 
@@ -128,7 +128,7 @@ def test_slcan_frames_are_lines(line):
     owner, say = line
     say("O\r")
     say("t1232AABB\rT1FFFFFFF8\rr7FF4\rR000008001\rT000008000\r")
-    assert owner.heard() == [
+    assert owner.received() == [
         (0x123, 2, 0xBBAA, 0),
         (0x7FF, 4 | FLAG_REMOTE, 0, 0),
         (0x800, 1 | FLAG_EXTENDED | FLAG_REMOTE, 0, 0),
@@ -145,7 +145,7 @@ def test_slcan_frames_are_lines(line):
     assert say() == "t0020007B\r"  # 60 123 ms, stamps wrap at a minute
 
 
-def test_slcan_listen_only_sends_nothing_and_hears_everything(line):
+def test_slcan_listen_only_sends_nothing_and_receives_everything(line):
     owner, say = line
     owner.bus.add_node("other", EventQueue(8), 1, STAGE_BUS * 256 + 1)
     assert say("L\r") == "\r"
@@ -154,7 +154,7 @@ def test_slcan_listen_only_sends_nothing_and_hears_everything(line):
     assert say() == "t0100\r"
 
 
-def test_slcan_a_program_that_does_not_read_loses_frames_and_is_told(line):
+def test_slcan_a_program_that_does_not_read_loses_frames_and_gets_a_report(line):
     owner, say = line
     say("O\r")
     tap = owner.server.program.tap
@@ -181,10 +181,10 @@ def test_slcan_whatever_comes_over_the_line_the_server_lives_on(pieces):
             pass
     os.write(end, b"\r\rC\rO\r")
     owner.run(300)
-    owner.heard()
+    owner.received()
     os.write(end, b"t0011AA\r")
     owner.run(10)
-    assert owner.heard() == [(1, 1, 0xAA, 0)]
+    assert owner.received() == [(1, 1, 0xAA, 0)]
     os.close(end)
     owner.server.close()
 
@@ -252,7 +252,7 @@ def test_socketcand_messages_have_the_answers_of_the_protocol(daemon):
     assert say("< rawmode >") == "< ok >"
     owner.clock[0] = 1.0
     assert say("< send 123 2 a 1b >< send 00000123 0 >") == ""
-    assert owner.heard() == [(0x123, 2, 0x1B0A, 0), (0x123, FLAG_EXTENDED, 0, 0)]
+    assert owner.received() == [(0x123, 2, 0x1B0A, 0), (0x123, FLAG_EXTENDED, 0, 0)]
     owner.board_sends(0x5, 3, 0x030201)
     owner.board_sends(0x1ABCDEF0, FLAG_EXTENDED)
     owner.board_sends(0x6, 3 | FLAG_REMOTE)
@@ -301,7 +301,7 @@ def test_socketcand_nothing_follows_the_answer_to_rawmode_at_once(daemon):
         ("< >", "an empty message"),
     ],
 )
-def test_socketcand_what_is_not_understood_is_told(daemon, text, words):
+def test_socketcand_an_unknown_request_is_reported(daemon, text, words):
     _, connect = daemon
     say = connect()
     said = say(text)
@@ -332,15 +332,15 @@ def test_socketcand_whatever_clients_send_the_server_and_the_others_live_on(piec
                 break
             owner.run(2)
         owner.run(300)
-        owner.heard()
+        owner.received()
         good.sendall(b"< send 001 1 aa >")
-        while not (heard := owner.heard()):
+        while not (received := owner.received()):
             owner.run(10)
-        assert heard == [(1, 1, 0xAA, 0)]
+        assert received == [(1, 1, 0xAA, 0)]
     owner.server.close()
 
 
-def test_a_port_that_cannot_be_had_is_told():
+def test_a_port_that_cannot_be_opened_is_reported():
     owner = Owner(lambda bus: SocketcandServer({"can1": bus}, 0))
     with pytest.raises(UserError, match=f"socketcand on 127.0.0.1:{owner.server.port}: Address already in use"):
         SocketcandServer({}, owner.server.port)

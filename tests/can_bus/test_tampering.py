@@ -59,9 +59,9 @@ def test_one_node_sees_the_error_first_and_the_others_because_of_its_flag(
 
 
 def test_a_missing_acknowledgement_costs_eight_and_the_repetition_starts_behind_the_error_frame():
-    told = []
+    reported = []
     tamper = once("ACK", 0, True)
-    tamper.noted = lambda time, difference: told.append(time)
+    tamper.noted = lambda time, difference: reported.append(time)
     wired = tampered(tamper)
     wired.send(0, 0x10, lo=7)
     wired.bus.advance(SECOND)
@@ -71,7 +71,7 @@ def test_a_missing_acknowledgement_costs_eight_and_the_repetition_starts_behind_
     again = slot + 1 + 7 + 8 + 3
     assert [time for time, *_ in wired.of(1, "rx")] == [edge(again + bits - 1)]
     assert [status[2] for status in wired.of(0, "status")] == [8, 7]
-    assert told == [edge(slot + 1)]
+    assert reported == [edge(slot + 1)]
 
 
 def test_a_stuff_error_of_the_sender_in_its_arbitration_field_costs_it_nothing():
@@ -189,12 +189,12 @@ def test_a_node_that_is_to_be_silenced_leaves_the_frames_of_others_alone():
     assert (wired.bus.counters.frames, wired.bus.counters.errors) == (1, 0)
 
 
-def test_a_babbling_node_at_identifier_0_leaves_nobody_else_a_frame():
+def test_a_babbling_node_at_identifier_0_leaves_no_other_node_a_frame():
     wired = Wired(3)
     intruder = tampering.Intruder(wired.bus, "intruder")
     babbling = tampering.Babbling(intruder, 0, 0)
     tampering.tampering_of(wired.bus).add(babbling)
-    babbling.speak(0)
+    babbling.start_from(0)
     wired.send(0, 0x10, time=1000)
     for until in range(0, MS, 25_000):  # however time is cut
         wired.bus.advance(until)
@@ -243,7 +243,7 @@ def test_a_node_at_another_bit_rate_sees_errors_only_and_recovers_when_it_is_rig
     assert wired.of(2, "rx")[-1][3] == 59
 
 
-def test_a_rate_that_synchronisation_makes_up_for_is_no_fault():
+def test_a_rate_that_synchronisation_makes_up_for_is_not_a_fault():
     with pytest.raises(UserError, match="synchronisation"):
         rewiring.set_rate_of(Wired(2).bus, 1, 2_970_000, 0)
     with pytest.raises(UserError, match="8 times"):

@@ -52,7 +52,7 @@ def test_a_client_whose_frames_do_not_go_out_leaves_when_its_time_is_over_and_no
     assert taps.taps == [other] and taps.leaving == 0 and taps.spare == [leaver]
 
 
-def test_a_client_that_is_alone_has_nobody_to_send_to_and_leaves_at_once():
+def test_a_client_that_is_alone_has_no_receiver_and_leaves_at_once():
     taps, (leaver,) = clients(1)
     leaver.offer(0x123, EIGHT_BYTES, 1, 2)
     taps.remove(leaver)
@@ -79,7 +79,7 @@ def pass_time(taps, until_ns, step_ns=50_000):
         taps.poll(now)
 
 
-def test_who_takes_the_place_of_another_is_a_new_client_under_its_own_name():
+def test_a_client_in_the_place_of_another_is_new_under_its_own_name():
     """Node, counters, queue, filters of state: nothing of the one before is left, and a bus has no more nodes."""
     taps, (leaver, other) = clients(2)
     leaver.offer(0x123, EIGHT_BYTES, 1, 2)

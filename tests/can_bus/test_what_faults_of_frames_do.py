@@ -155,7 +155,7 @@ def test_a_fault_picks_by_identifier_and_sender(options, taken):
     assert (tamper.begun, tamper.tampered, tamper.hit) == (len(taken), 0, False)
 
 
-def test_a_fault_takes_every_so_many_th_and_ends_with_its_count():
+def test_a_fault_takes_every_nth_frame_and_ends_with_its_count():
     tamper = Tamper(5)
     tamper.every, tamper.count = 3, 2
     found = []
@@ -182,17 +182,17 @@ def test_a_fault_takes_a_share_by_chance():
     assert tamper.takes(1, 0)  # without a throw
 
 
-def test_a_fault_tells_whoever_asked_and_nobody_else():
+def test_a_fault_reports_to_its_owner_alone():
     tamper = Tamper()
     tamper.note(5)
-    told = []
-    tamper.noted = lambda *what: told.append(what)
+    reported = []
+    tamper.noted = lambda *what: reported.append(what)
     tamper.note(6)
     tamper.note(7, 2.5)
-    assert told == [(6, 1.0), (7, 2.5)]
+    assert reported == [(6, 1.0), (7, 2.5)]
 
 
-def test_every_fault_of_a_bus_is_asked_whatever_the_others_say():
+def test_every_fault_of_a_bus_is_asked_whatever_the_others_answer():
     class Asked(Tamper):
         def __init__(self, says):
             Tamper.__init__(self)
@@ -239,7 +239,7 @@ def test_where_nothing_reaches_into_frames_a_place_for_it_is_made_and_acts_with_
 # ---- what single nodes have
 
 
-def test_a_lost_frame_is_acknowledged_and_neither_counted_nor_told_at_its_node():
+def test_a_lost_frame_is_acknowledged_and_neither_counted_nor_reported_at_its_node():
     wired, [noted] = with_faults(3, Loss(1, 0x10))
     wired.send(0, 0x10, lo=7)
     wired.send(1, 0x10, time=MS, lo=8)  # its own frames are no receptions
@@ -271,9 +271,9 @@ def test_a_corrupted_word_is_the_sent_one_with_the_bits_of_the_mask_inverted_at_
         wired.send(0, 0x10, time=n * MS, lo=0xF0 + n, hi=5)
         wired.bus.advance(n * MS + MS // 2)
     assert [each[3:] for each in wired.of(1, "rx")] == [(0xF0 + n, 5) for n in range(4)]
-    heard = wired.of(2, "rx")
-    assert [each[3:] for each in heard] == [(0xF0, 5), (0x800000F0, 5), (0xF2, 5), (0x800000F2, 5)]
-    assert noted == [(heard[1][0], 1.0), (heard[3][0], 1.0)] and fault.tampered == 2
+    got = wired.of(2, "rx")
+    assert [each[3:] for each in got] == [(0xF0, 5), (0x800000F0, 5), (0xF2, 5), (0x800000F2, 5)]
+    assert noted == [(got[1][0], 1.0), (got[3][0], 1.0)] and fault.tampered == 2
 
 
 def test_a_late_frame_is_whole_and_may_be_overtaken():
@@ -346,7 +346,7 @@ def test_on_a_bus_of_two_a_wrong_crc_is_the_missing_acknowledgement_that_the_sen
 # ---- silence
 
 
-def test_a_node_is_silenced_once_and_that_is_told_when_it_is_off():
+def test_a_node_is_silenced_once_and_that_is_reported_when_it_is_off():
     fault = Silence(0)
     wired, [noted] = with_faults(3, fault)
     wired.send(0, 0x10)
@@ -385,7 +385,7 @@ def intruded(count=2):
     return wired, Intruder(wired.bus, "intruder")
 
 
-def test_an_intruder_acknowledges_and_hears_nothing():
+def test_an_intruder_acknowledges_and_receives_nothing():
     wired, intruder = intruded(1)
     wired.send(0, 5)
     wired.bus.advance(SECOND)
@@ -401,7 +401,7 @@ def test_an_intruders_frame_starts_at_its_bit_and_a_full_buffer_takes_no_other()
     assert intruder.offer(2, 100, 0x123, 5, 0x04030201, 0x05)
     assert not intruder.offer(2, 50, 1, 0, 0, 0)
     assert intruder.offer(1, 900, 0x124, 0, 0, 0)
-    wired.bus.look_again()
+    wired.bus.recompute_next()
     assert wired.bus.next_bit == 100 and wired.bus.buffers.waiting_count == 2
     row = intruder.number << 5 | 2 << 3
     assert wired.bus.buffers.rows[row + 2] == edge(100)  # asked for
@@ -430,11 +430,11 @@ def test_an_intruder_that_is_suspended_or_joins_waits_and_one_that_is_off_gives_
 
 
 @pytest.mark.parametrize(("flags", "sent"), [(8, 8), (8 | FLAG_SINGLE_SHOT, 8), (3, 3)])
-def test_a_duplicate_begins_beside_its_frame_with_the_bits_of_the_mask_inverted(flags, sent):
+def test_a_duplicate_begins_next_to_its_frame_with_the_bits_of_the_mask_inverted(flags, sent):
     wired, intruder = intruded()
     duplicate = Duplicate(intruder, 0x10, 0xFF)
-    told = []
-    duplicate.noted = lambda *what: told.append(what)
+    reported = []
+    duplicate.noted = lambda *what: reported.append(what)
     tampering_of(wired.bus).add(duplicate)
     wired.send(0, 0x11)
     wired.bus.advance(MS)
@@ -444,7 +444,7 @@ def test_a_duplicate_begins_beside_its_frame_with_the_bits_of_the_mask_inverted(
     wired.bus.advance(edge(start))
     row = intruder.number << 5 | 1 << 3
     assert list(wired.bus.buffers.rows[row + 4 : row + 8]) == [0x10, sent, 0x0F0FF0, 0]
-    assert told == [(edge(start), 1.0)] and duplicate.tampered == 1
+    assert reported == [(edge(start), 1.0)] and duplicate.tampered == 1
     wired.bus.advance(SECOND)
     assert wired.bus.counters.errors > 0
     assert 0x0F0FF0 in [each[3] for each in wired.of(1, "rx")]
@@ -455,10 +455,10 @@ def test_a_duplicate_begins_beside_its_frame_with_the_bits_of_the_mask_inverted(
 def test_a_babbling_node_sends_as_often_as_it_can_or_by_its_period(period_us):
     wired, intruder = intruded()
     fault = Babbling(intruder, 0x0, period_us * 1000)
-    told = []
-    fault.noted = lambda *what: told.append(what)
+    reported = []
+    fault.noted = lambda *what: reported.append(what)
     tampering_of(wired.bus).add(fault)
-    fault.speak(20_000)
+    fault.start_from(20_000)
     until = 3 * MS
     for now in range(0, until, 10_000):
         wired.bus.advance(now)
@@ -468,9 +468,9 @@ def test_a_babbling_node_sends_as_often_as_it_can_or_by_its_period(period_us):
     # the first is behind its instant; by a period the others begin in the bits in which they are due
     due = first if period_us == 0 else first - 1
     starts = [first] + [due + n * step for n in range(1, (until * 3 // 1000 - due) // step + 1)]
-    heard = [each[0] for each in wired.of(0, "rx")]
+    got = [each[0] for each in wired.of(0, "rx")]
     found = [edge(start + bits - 1) for start in starts]
-    assert heard[: len(found) - 1] == found[:-1]
-    assert [time for time, _ in told][: len(starts) - 1] == [edge(start) for start in starts[:-1]]
-    assert abs(fault.tampered - len(starts)) <= 1 and {difference for _, difference in told} == {1.0}
+    assert got[: len(found) - 1] == found[:-1]
+    assert [time for time, _ in reported][: len(starts) - 1] == [edge(start) for start in starts[:-1]]
+    assert abs(fault.tampered - len(starts)) <= 1 and {difference for _, difference in reported} == {1.0}
     assert wired.bus.counters.errors == 0

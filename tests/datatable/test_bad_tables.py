@@ -93,7 +93,7 @@ VARIABLE_FAULTS = {
 
 
 @pytest.mark.parametrize("case", VARIABLE_FAULTS)
-def test_a_fault_in_the_variables_is_told_with_line_row_field_and_rule(tmp_path, case):
+def test_a_fault_in_the_variables_is_reported_with_line_row_field_and_rule(tmp_path, case):
     old, new, line, row, field, rule = VARIABLE_FAULTS[case]
     assert VARIABLES.count(old) == 1
     found = faults_of(write(tmp_path, variables=VARIABLES.replace(old, new)))
@@ -137,7 +137,7 @@ BOARD_FAULTS = {
 
 
 @pytest.mark.parametrize("case", BOARD_FAULTS)
-def test_a_fault_in_the_boards_is_told_with_line_row_field_and_rule(tmp_path, case):
+def test_a_fault_in_the_boards_is_reported_with_line_row_field_and_rule(tmp_path, case):
     old, new, line, row, field, rule = BOARD_FAULTS[case]
     assert BOARDS.count(old) == 1
     found = faults_of(write(tmp_path, boards=BOARDS.replace(old, new)))
@@ -165,7 +165,7 @@ ERROR_FAULTS = {
 
 
 @pytest.mark.parametrize("case", ERROR_FAULTS)
-def test_a_fault_in_the_errors_is_told_with_line_row_field_and_rule(tmp_path, case):
+def test_a_fault_in_the_errors_is_reported_with_line_row_field_and_rule(tmp_path, case):
     old, new, line, row, field, rule = ERROR_FAULTS[case]
     found = faults_of(write(tmp_path, errors=ERRORS.replace(old, new)))
     matching = [f for f in found if (f.file, f.line, f.row, f.field) == ("errors.csv", line, row, field)]
@@ -184,21 +184,21 @@ WHOLE_FILES = {
 
 @pytest.mark.parametrize("name", ["boards", "variables", "errors"])
 @pytest.mark.parametrize("case", WHOLE_FILES)
-def test_a_file_that_is_no_table_at_all_is_one_fault_of_that_file(tmp_path, name, case):
+def test_a_file_that_is_not_a_table_is_one_fault_of_that_file(tmp_path, name, case):
     content, rule = WHOLE_FILES[case]
     found = faults_of(write(tmp_path, **{name: content}))
     assert {fault.file.partition(".")[0] for fault in found} == {name}, "\n".join(map(str, found))
     assert rule is None or rule in found[0].rule
 
 
-def test_a_folder_that_does_not_exist_is_told(tmp_path):
+def test_a_folder_that_does_not_exist_is_reported(tmp_path):
     found = faults_of(tmp_path / "nowhere")
     assert {fault.file for fault in found} >= {"boards.toml", "variables.csv"}
     with pytest.raises(UserError, match="cannot be read"):
         hash_of_master_files(tmp_path / "nowhere")
 
 
-def test_a_header_without_rows_is_told(tmp_path):
+def test_a_header_without_rows_is_reported(tmp_path):
     boards = BOARDS.replace('every = ["TIME"]\n', "").replace('"TIME"', "").replace('["LEG_ANGLE"]', "[]")
     boards = boards.replace('"LEG_CURRENT", ', "").replace('[["KEYS_DOWN"]]', "[[]]")
     found = faults_of(write(tmp_path, boards=boards, variables=VARIABLES.splitlines()[0] + "\n"))

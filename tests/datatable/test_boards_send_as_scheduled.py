@@ -178,9 +178,9 @@ def test_the_main_brain_writes_row_by_row_what_boards_toml_says():
 def test_a_satellite_listens_only_to_what_the_table_gives_it(name):
     generated = importlib.import_module(f"ranger_sim.datatable.generated.{name.lower()}")
     board = power_up(SATELLITES[name])
-    heard = {number for number, receiver in enumerate(board.can.receivers) if receiver is not None}
-    assert heard and heard <= set(generated.RECEIVE)
-    unheard = {generated.NAMES[number] for number in set(generated.RECEIVE) - heard}
+    received = {number for number, receiver in enumerate(board.can.receivers) if receiver is not None}
+    assert received and received <= set(generated.RECEIVE)
+    unheard = {generated.NAMES[number] for number in set(generated.RECEIVE) - received}
     # robot.md N2.4: nobody takes the main brain's status, the spares and what is reserved
     reserved = {"MB_STATUS", "MCFO_HS_STATE", "MCFI_HS_STATE", "UI_AUDIO", "ERROR_LCD", "MCSO_LEFT_ANKLE_ANGLE"}
     assert {variable for variable in unheard if "_EMPTY_" not in variable} <= reserved

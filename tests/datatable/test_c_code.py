@@ -8,7 +8,7 @@ import pytest
 
 from ranger_sim.datatable.generate import GENERATED_FOLDER
 from ranger_sim.datatable.generate_c import C_TYPES
-from ranger_sim.datatable.generate_python import heard_by, known_to, sent_by
+from ranger_sim.datatable.generate_python import known_to, received_by, sent_by
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.datatable.routing import destination_masks
 
@@ -77,7 +77,7 @@ def test_a_boards_c_code_compiles_and_says_what_the_table_says(board, tmp_path):
         (word,) = struct.unpack("<I", struct.pack(layout, variable.initial))
         expected.append(["initial", str(variable.id), "4", str(word)])
     place = {variable.id: 4 * index for index, variable in enumerate(known)}
-    for which, variables in (("send", sent_by(TABLE, board)), ("receive", heard_by(TABLE, board))):
+    for which, variables in (("send", sent_by(TABLE, board)), ("receive", received_by(TABLE, board))):
         for v in variables:
             expected.append([which, str(v.id), str(list(C_TYPES).index(v.type)), str(place[v.id])])
     if board.role == "router":

@@ -87,7 +87,7 @@ def test_any_value_of_any_variable_is_packed_as_its_dbc_file_says(data):
 
 @settings(max_examples=examples(100))
 @given(st.integers(0, 65535), st.integers(0, 63), st.integers(0, 1023), times)
-def test_any_error_word_is_taken_apart_as_its_dbc_file_says(code, board, count, time_ms):
+def test_any_error_word_is_unpacked_as_its_dbc_file_says(code, board, count, time_ms):
     message = DATABASES["CAN1"].get_message_by_name("ERROR_MCH")
     decoded = message.decode(pack_frame("u32", error_word(code, board, count), time_ms), decode_choices=False)
     assert decoded == {"code": code, "board": board, "count": count, "time_ms": time_ms}

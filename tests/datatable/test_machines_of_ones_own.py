@@ -66,6 +66,6 @@ def test_c_dbc_and_catalogue_are_made_of_it_and_nothing_that_needs_a_main_brain(
         (BOARDS.replace("controller = 1\n", "controller = 1\nribbon = 1\n"), ROWS, "'ribbon': is not a key of a board"),
     ],
 )
-def test_what_does_not_belong_together_is_told(tmp_path, boards, rows, rule):
+def test_parts_that_do_not_belong_together_are_reported(tmp_path, boards, rows, rule):
     with pytest.raises(TableError, match=rule):
         table(tmp_path, boards, rows)

@@ -71,11 +71,11 @@ def test_each_board_publishes_as_many_of_the_robots_variables_as_on_the_robot(ta
     }
 
 
-def test_the_main_brain_hears_98_variables_of_the_satellites(table):
+def test_the_main_brain_receives_98_variables_of_the_satellites(table):
     # ids to board 1 from boards 3-8 (robot.md N2.2)
     numbers = {board.name: board.number for board in table.boards}
-    heard = [v for v in table.subscribed_by("MB") if v.id < 263 and 3 <= numbers[v.publisher] <= 8]
-    assert len(heard) == 98
+    received = [v for v in table.subscribed_by("MB") if v.id < 263 and 3 <= numbers[v.publisher] <= 8]
+    assert len(received) == 98
 
 
 def test_every_variable_is_described_and_ids_are_dense_to_the_last_of_the_robot(table):

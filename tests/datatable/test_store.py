@@ -69,7 +69,7 @@ def test_a_frame_is_stored_word_for_word_with_its_stamp(word, stamp):
 
 
 @pytest.mark.parametrize("write", ["set_float", "set_int", "set_u32"])
-def test_a_local_write_is_stamped_with_the_network_time_heard_last(write):
+def test_a_local_write_is_stamped_with_the_network_time_received_last(write):
     store = DataStore(3)
     store.set_word(0, 777, 777)
     getattr(store, write)(1, 5)
@@ -87,7 +87,7 @@ def test_the_age_is_right_across_the_wrap_of_the_ms_count(stamp, now, age):
 
 
 @given(words, st.integers(0, 2**32 - 1))
-def test_the_age_is_the_time_elapsed_wherever_the_count_stands(stamp, elapsed):
+def test_the_age_is_the_time_elapsed_at_any_count(stamp, elapsed):
     store = DataStore(2)
     store.set_word(1, 0, stamp)
     assert store.age_ms(1, (stamp + elapsed) % 2**32) == elapsed
@@ -128,10 +128,10 @@ def test_unread_ids_of_a_list_are_found_in_list_order():
 
 
 @pytest.mark.parametrize("number", [-1, 10, 2047, 2**40])
-def test_an_id_beyond_the_table_is_told_and_changes_nothing(number):
+def test_an_id_beyond_the_table_is_reported_and_changes_nothing(number):
     store = DataStore(10)
-    told = []
-    store.on_out_of_range = lambda: told.append(store.out_of_range_id)
+    reported = []
+    store.on_out_of_range = lambda: reported.append(store.out_of_range_id)
     before = bytes(store.words), bytes(store.stamps), bytes(store.unread)
     calls = [
         lambda: store.set_word(number, 1, 1),
@@ -149,7 +149,7 @@ def test_an_id_beyond_the_table_is_told_and_changes_nothing(number):
         lambda: store.is_unread(number, 0),
     ]
     assert [call() or 0 for call in calls] == [0] * len(calls)
-    assert told == [number] * len(calls)
+    assert reported == [number] * len(calls)
     assert store.out_of_range_count == len(calls)
     assert (bytes(store.words), bytes(store.stamps), bytes(store.unread)) == before
 

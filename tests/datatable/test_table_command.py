@@ -38,14 +38,18 @@ def test_check_fails_with_code_1_and_names_the_stale_files(master, tmp_path, cap
     (out / "leg.py").write_text("")
     capsys.readouterr()
     assert run("generate", "--master", master, "--out", out, "--check") == 1
-    told = capsys.readouterr()
-    assert told.out == "" and f"stale: {out / 'leg.py'}" in told.err and "ranger-sim table generate" in told.err
+    reported = capsys.readouterr()
+    assert (
+        reported.out == ""
+        and f"stale: {out / 'leg.py'}" in reported.err
+        and "ranger-sim table generate" in reported.err
+    )
     assert (out / "leg.py").read_text() == "", "--check writes nothing"
     assert run("generate", "--master", master, "--out", out, "--check", "--json") == 1
     assert json.loads(capsys.readouterr().out) == {"folder": str(out), "checked": True, "changed": ["leg.py"]}
 
 
-def test_generate_tells_how_much_it_wrote(master, tmp_path, capsys):
+def test_generate_prints_how_much_it_wrote(master, tmp_path, capsys):
     run("generate", "--master", master, "--out", tmp_path / "out")
     assert "files written to" in capsys.readouterr().out
     run("generate", "--master", master, "--out", tmp_path / "out")
@@ -72,7 +76,7 @@ def test_show_of_an_unknown_variable_is_one_clear_line(wanted):
     assert "\n" not in str(caught.value)
 
 
-def test_list_of_a_board_has_what_it_publishes_and_what_it_hears(capsys):
+def test_list_of_a_board_has_what_it_publishes_and_what_it_receives(capsys):
     assert run("list", "--board", "mch", "--json") == 0
     listed = json.loads(capsys.readouterr().out)
     assert all("MCH" in (row["publisher"], *row["subscribers"]) for row in listed)

@@ -71,7 +71,7 @@ def test_every_operator_makes_its_faults_and_no_others():
         ('x = "ä" + b - c\n', ("sign", '"ä" + b - c', "(c - ('ä' + b))")),
     ],
 )
-def test_a_fault_stands_where_its_place_is(source, fault):
+def test_a_mutant_is_at_its_place(source, fault):
     assert fault in made(source)
     for mutant in mutants(source, "x.py"):
         assert source[mutant.begin : mutant.end] == mutant.old
@@ -303,7 +303,7 @@ def test_what_is_built_anew_is_noticed_by_tests_that_pass_with_the_original(hous
     assert (copy.folder / "plant" / "valve.py").read_text(encoding="utf-8") == VALVE
 
 
-def test_rooms_have_mutants_and_no_key_twice():
+def test_packages_have_mutants_and_no_key_twice():
     for room in ("foundation", "datatable"):
         keys = [each.key for each in work.all_mutants(room)]
         assert len(keys) == len(set(keys)) > 300

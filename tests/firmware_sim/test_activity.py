@@ -95,7 +95,7 @@ def test_a_task_lasts_as_long_as_what_interrupts_it_and_costs_only_its_own():
     assert b.start == a.end
 
 
-def test_an_irq_lasts_as_long_as_the_fiq_in_it_and_who_waits_has_the_latency():
+def test_an_irq_lasts_as_long_as_the_fiq_in_it_and_the_waiting_one_has_the_latency():
     log = Log()
     log.start(every=(log.task("a", 6000),))
     irq = attach(log, EXTERNAL_INTERRUPT, 1, "irq", cost=600)

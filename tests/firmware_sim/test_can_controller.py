@@ -136,7 +136,7 @@ def test_remote_and_extended_frames_keep_their_flags():
     assert node.can.RFS == 2 << 16 | 1 << 30 | 1 << 31
 
 
-def test_a_received_frame_stands_in_the_registers_and_interrupts():
+def test_a_received_frame_is_in_the_registers_and_interrupts():
     node = Node()
     seen = []
 
@@ -203,7 +203,7 @@ def test_transmit_interrupts_come_only_when_enabled():
     assert served == [ICR_TI1 | ICR_TI2]
 
 
-def test_error_counters_and_warning_stand_in_the_global_status():
+def test_error_counters_and_warning_are_in_the_global_status():
     node = Node(IER=ICR_ERROR_WARNING | ICR_BUS_ERROR)
     served = []
     node.chip.vic.attach(CAN_STATUS, 1, lambda queue: served.append(node.can.read_ICR()), cost=50, slot=8)

@@ -173,7 +173,7 @@ def test_over_four_lines_a_byte_comes_in_two_halves(wired):
     assert wired.lines() == ("half    ", "whole   ")
 
 
-def test_what_stands_there_can_be_read_back_and_it_is_never_busy(started):
+def test_characters_can_be_read_back_and_the_display_is_never_busy(started):
     started.send(1, *b"read")
     started.send(0, 0x80 | 1)
     assert started.read(rs=0) == 1

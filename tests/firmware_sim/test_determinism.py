@@ -13,7 +13,7 @@ ROOT = pathlib.Path(__file__).parents[2]
 def digests(interpreted, hash_seed):
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
     environment["RANGER_SIM_INTERPRETED"] = "1" if interpreted else ""
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-m", "tests.firmware_sim.workload"],
         cwd=ROOT,
         env=environment,
@@ -22,7 +22,7 @@ def digests(interpreted, hash_seed):
         check=True,
         timeout=120,
     )
-    return told.stdout.split()
+    return reported.stdout.split()
 
 
 def test_the_workload_meets_every_case_that_it_should():

@@ -86,7 +86,7 @@ def run(cost, trains, frames, by_lines, **bench):
     buffers = [EdgeBuffer(1) for _ in PINS]
     if by_lines:
         for buffer, (pin, partner) in zip(buffers, PINS, strict=True):
-            bench.chip.listen_to_edges(buffer, pin, partner)
+            bench.chip.connect_edges(buffer, pin, partner)
     for time in frames:
         bench.chip.inbox.push(time, 512, CAN_RX, 1, time)
     for start in range(0, 2_000_000, STEP_NS):
@@ -98,7 +98,7 @@ def run(cost, trains, frames, by_lines, **bench):
                         buffer.push(time, a, b)
                     else:
                         bench.chip.inbox.push(time, PINS_ORDER, PIN_EDGE, pin, a, partner, b)
-        bench.chip.edges_came()
+        bench.chip.note_edges()
         for part in range(1, 5):
             bench.chip.advance(start + part * STEP_NS // 4)
         assert all(buffer.read == buffer.count for buffer in buffers)
@@ -140,7 +140,7 @@ def test_a_handler_longer_than_the_time_between_edges_loses_captures_and_a_short
     assert sum(run(500, (fast, slow), (), True)[1]) > 0
 
 
-def test_an_edge_comes_before_a_frame_of_the_same_instant_and_the_first_line_before_the_second():
+def test_an_edge_comes_before_a_frame_of_the_same_time_and_the_first_line_before_the_second():
     notes = run(10, ([(700_000, 1, 0)], [(700_000, 1, 1)]), (700_000,), True)[0]
     assert [note[0] for note in notes if note[1] in range(700_000, 712_000)] == [0, 1, "frame"]
 
@@ -148,27 +148,27 @@ def test_an_edge_comes_before_a_frame_of_the_same_instant_and_the_first_line_bef
 def test_a_chip_with_edges_waiting_is_due_and_one_without_is_not():
     bench = Bench(150)
     buffer = EdgeBuffer()
-    bench.chip.listen_to_edges(buffer, *PINS[0])
+    bench.chip.connect_edges(buffer, *PINS[0])
     bench.chip.advance(400_000)
-    assert bench.chip.edges_came() == NEVER
+    assert bench.chip.note_edges() == NEVER
     assert not bench.chip.due(450_000)
     buffer.push(440_000, 1, 0)
-    assert bench.chip.edges_came() == 440_000
+    assert bench.chip.note_edges() == 440_000
     assert bench.chip.due(450_000)
 
 
-def test_edges_for_a_pin_that_nobody_claimed_are_refused():
+def test_edges_for_a_pin_that_is_not_claimed_are_refused():
     with pytest.raises(UserError, match="TEST: no peripheral has claimed pin 5"):
-        Microcontroller("TEST").listen_to_edges(EdgeBuffer(), 5, 6)
+        Microcontroller("TEST").connect_edges(EdgeBuffer(), 5, 6)
 
 
 def test_a_third_encoder_on_one_chip_is_refused():
     bench = Bench(150)
     bench.timer.use_channel(2, 9)
     for pin in (22, 16):
-        bench.chip.listen_to_edges(EdgeBuffer(), pin, 27)
+        bench.chip.connect_edges(EdgeBuffer(), pin, 27)
     with pytest.raises(UserError, match="TEST: pin 9 would be the third with the edges of an encoder"):
-        bench.chip.listen_to_edges(EdgeBuffer(), 9, 27)
+        bench.chip.connect_edges(EdgeBuffer(), 9, 27)
 
 
 @pytest.mark.parametrize(("kind", "index"), [(32, 0), (-1, 0), (3, 16), (3, -1)])

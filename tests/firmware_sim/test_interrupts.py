@@ -60,7 +60,7 @@ def test_what_a_task_asks_for_is_served_when_it_asks_and_not_when_its_row_began(
     assert log.entries[2:] == [("asks", asked), ("irq", asked), ("after", asked + 2_000)]
 
 
-def test_requests_of_one_instant_are_served_by_priority():
+def test_requests_of_one_time_are_served_by_priority():
     log = Log()
     attach(log, CAN_RX, 1, 0, "slot 0")
     attach(log, UART_BYTE, 0, 3, "slot 3")
@@ -132,7 +132,7 @@ def test_a_message_that_no_peripheral_stores_waits_one_deep_and_a_newer_one_over
     assert source.merged == 1
 
 
-def test_messages_that_nobody_wants_are_counted():
+def test_messages_without_a_taker_are_counted():
     log = Log()
     log.chip.inbox.push(10, 0, CAN_RX, 2, 5)
     log.chip.inbox.push(10, 0, PIN_EDGE, 9, 1, -1)
@@ -178,7 +178,7 @@ def test_a_tick_behind_a_long_interrupt_starts_its_slot_late_but_the_count_runs_
     assert 5400 + 84 <= counts[0] <= 5400 + 85
 
 
-def test_the_slot_timer_can_stand_in_any_slot_and_on_the_fiq():
+def test_the_slot_timer_can_be_in_any_slot_and_on_the_fiq():
     for slot in (0, 15, FIQ):
         log = Log()
         log.start(every=(log.task("a", 60),), tick_slot=slot, tick_latency=0)
@@ -188,7 +188,7 @@ def test_the_slot_timer_can_stand_in_any_slot_and_on_the_fiq():
 
 
 @pytest.mark.parametrize(
-    "arguments, told",
+    "arguments, reported",
     [
         (dict(slot=16, handler=print, cost=1), "slot 16"),
         (dict(slot=0, handler=None, cost=1), "cannot be called"),
@@ -196,10 +196,10 @@ def test_the_slot_timer_can_stand_in_any_slot_and_on_the_fiq():
         (dict(slot=4, handler=print, cost=1), "is taken by taker"),
     ],
 )
-def test_a_faulty_attachment_is_refused(arguments, told):
+def test_a_faulty_attachment_is_refused(arguments, reported):
     vic = InterruptController()
     vic.attach(SOFTWARE, 1, print, cost=1, slot=4, name="taker")
-    with pytest.raises(UserError, match=told):
+    with pytest.raises(UserError, match=reported):
         vic.attach(SOFTWARE, 2, **arguments)
 
 

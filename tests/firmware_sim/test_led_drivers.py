@@ -120,7 +120,7 @@ def test_a_longer_chain_than_is_modelled_is_refused():
         LedDrivers(Microcontroller("chip"), SELECT, 3)
 
 
-def test_a_word_has_as_many_bits_as_the_port_was_told():
+def test_a_word_has_as_many_bits_as_the_port_was_set_to():
     class Echo(SspDevice):
         def exchange(self, word, time):
             return word

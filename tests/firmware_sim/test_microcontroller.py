@@ -40,7 +40,7 @@ class Bells(Peripheral):
             self.alarms[other].set(then)
 
 
-def test_alarms_ring_in_the_order_of_their_instants_and_then_of_their_making():
+def test_alarms_ring_in_the_order_of_their_times_and_then_of_their_making():
     dice = RandomStream(5, "alarms")
     for _ in range(200):
         chip = Microcontroller("chip", 60_000_000, Crystal())
@@ -76,7 +76,7 @@ class Matches(Peripheral):
         self.found = self.chip.match_time
 
 
-def test_at_one_instant_the_slot_timer_matches_after_the_alarms_however_late_they_were_made():
+def test_at_one_time_the_slot_timer_matches_after_the_alarms_however_late_they_were_made():
     chip = Microcontroller("chip", 60_000_000, Crystal())
     chip.start(Schedule(slot_us=500), 0)
     matches = Matches(chip)
@@ -87,7 +87,7 @@ def test_at_one_instant_the_slot_timer_matches_after_the_alarms_however_late_the
         Bells(chip, 16)
 
 
-def test_a_message_that_nobody_claims_waits_in_its_interrupt_source_or_is_counted():
+def test_an_unclaimed_message_waits_in_its_interrupt_source_or_is_counted():
     chip = Microcontroller("chip", 60_000_000, Crystal())
     seen = []
     chip.vic.attach(UART_BYTE, 1, lambda queue: seen.append((queue.kind, queue.a, queue.b)), cost=600)
@@ -100,7 +100,7 @@ def test_a_message_that_nobody_claims_waits_in_its_interrupt_source_or_is_counte
     assert chip.unclaimed == 2
 
 
-def test_interrupts_of_one_instant_are_served_after_all_that_comes_at_it():
+def test_interrupts_of_one_time_are_served_after_all_inputs_of_that_time():
     chip = Microcontroller("chip", 60_000_000, Crystal())
     served = []
     for number, slot in ((0, 7), (1, FIQ), (2, 3)):
@@ -110,7 +110,7 @@ def test_interrupts_of_one_instant_are_served_after_all_that_comes_at_it():
     assert served == [1, 2, 0]
 
 
-def test_an_edge_tells_the_level_of_its_partner_pin_which_may_be_pin_0():
+def test_an_edge_has_the_level_of_its_partner_pin_which_may_be_pin_0():
     log = Log()
     for partner, level in ((0, 1), (1, 1), (-1, 1)):  # -1: it has none
         log.chip.inbox.push(1_000, 0, PIN_EDGE, 9, 1, partner, level)

@@ -55,7 +55,7 @@ def served(chip, kind, index, slot=1):
 # --- analog pins -------------------------------------------------------------------------------------------
 
 
-def test_an_analog_pin_runs_straight_between_its_two_instants_and_holds_outside():
+def test_an_analog_pin_runs_straight_between_its_two_times_and_holds_outside():
     pins = AnalogPins()
     assert pins.volts(3, 77) == 0.0
     pins.set_pair(3, 1000, 1.0, 1400, 3.0)
@@ -65,7 +65,7 @@ def test_an_analog_pin_runs_straight_between_its_two_instants_and_holds_outside(
 # --- GPIO --------------------------------------------------------------------------------------------------
 
 
-def test_a_changed_output_is_told_once_with_its_instant():
+def test_a_changed_output_is_reported_once_with_its_time():
     chip = chip_at(5_000)
     gpio = Gpio(chip)
     gpio.write(p0(11), 1)
@@ -75,7 +75,7 @@ def test_a_changed_output_is_told_once_with_its_instant():
     assert sent(chip) == [(5_000, PIN_OUTPUT, 11, 1, 0), (6_000, PIN_OUTPUT, 11, 0, 0)]
 
 
-def test_the_first_write_is_told_even_when_the_level_is_the_same():
+def test_the_first_write_is_reported_even_when_the_level_is_the_same():
     chip = chip_at()
     Gpio(chip).write(p1(17), 0)
     assert sent(chip) == [(0, PIN_OUTPUT, 49, 0, 0)]
@@ -179,7 +179,7 @@ def test_the_match_interrupt_comes_at_every_wrap():
     assert times == [200_000, 400_000, 600_000, 800_000]
 
 
-def test_an_edge_at_the_instant_of_a_wrap_counts_zero_and_is_served_in_attaching_order():
+def test_an_edge_at_the_time_of_a_wrap_counts_zero_and_is_served_in_attaching_order():
     chip = chip_at()
     timer = TimerCapture(chip, match_interrupt=True)
     timer.use_channel(0, 22)
@@ -296,7 +296,7 @@ def test_the_eight_gains_are_those_of_the_data_sheet():
     assert [adc.convert(0.01, code) for code in range(8)] == [round(0.01 * gain / 2.5 * 8192) for gain in GAINS]
 
 
-def test_a_sequence_converts_one_channel_after_the_other_and_tells_when_it_is_done():
+def test_a_sequence_converts_one_channel_after_the_other_and_reports_its_end():
     chip = chip_at()
     adc = Ads7871(chip)
     adc.set_sequence((2, 1, 0), (1, 1, 1), (8, 0, 2))
@@ -446,7 +446,7 @@ def test_bytes_that_a_handler_leaves_ask_again_after_four_characters():
     assert uart.waiting() == 0
 
 
-def test_a_full_receive_fifo_loses_the_new_byte_and_says_so_once():
+def test_a_full_receive_fifo_loses_the_new_byte_and_reports_it_once():
     chip = chip_at()
     uart = Uart(chip, number=0)
     for byte in range(18):
@@ -541,12 +541,12 @@ def test_a_segment_that_is_loaded_already_goes_out_again_without_a_word():
     chip = chip_at()
     port = SspPort(chip)
     first, second = SspSegment(), SspSegment()
-    told = []
+    reported = []
     for segment in (first, first, second, second, first):
         port.load(segment)
         while chip.outbox.take():
-            told.append(chip.outbox.ref)
-    assert told == [first, second, first]
+            reported.append(chip.outbox.ref)
+    assert reported == [first, second, first]
 
 
 def test_a_segment_that_comes_in_interrupts_and_is_taken_once():
@@ -570,7 +570,7 @@ def test_a_segment_that_comes_in_interrupts_and_is_taken_once():
 
 
 @pytest.mark.parametrize(
-    "make, told",
+    "make, reported",
     [
         (lambda chip: TimerCapture(chip, period=0), "period 0"),
         (lambda chip: TimerCapture(chip, period=7), "not a whole number of ns"),
@@ -590,6 +590,6 @@ def test_a_segment_that_comes_in_interrupts_and_is_taken_once():
         (lambda chip: Microcontroller("X", hz=0), "hz 0"),
     ],
 )
-def test_an_impossible_peripheral_is_refused_with_its_value(make, told):
-    with pytest.raises(UserError, match=told):
+def test_an_impossible_peripheral_is_refused_with_its_value(make, reported):
+    with pytest.raises(UserError, match=reported):
         make(chip_at())

@@ -61,15 +61,15 @@ def test_an_overrun_lets_the_task_finish_drops_the_rest_and_starts_the_new_row_a
             (log.task("next row", 60),),
         ),
     )
-    told = []
-    log.chip.on_overrun = lambda: told.append(log.chip.now)
+    reported = []
+    log.chip.on_overrun = lambda: reported.append(log.chip.now)
     log.chip.advance(1_000_000)
     assert log.names() == ["long", "next row"]
     # 600 us of work, prolonged by the tick's own interrupt, begun after the first one
     assert log.times("next row") == [TICK_NS + 600_000 + TICK_NS]
     assert (scheduler.overruns, scheduler.dropped_tasks, scheduler.slot_count) == (1, 2, 2)
-    assert len(told) == 1
-    assert 500_000 <= told[0] < 501_000
+    assert len(reported) == 1
+    assert 500_000 <= reported[0] < 501_000
 
 
 def test_an_overrun_is_counted_once_and_the_rows_go_on_in_step():
@@ -94,7 +94,7 @@ def test_a_task_that_lasts_three_slots_overruns_twice_and_drops_whole_rows():
     assert (scheduler.overruns, scheduler.dropped_tasks) == (2, 2)
 
 
-def test_a_row_that_ends_at_the_very_instant_of_the_tick_has_overrun():
+def test_a_row_that_ends_at_the_very_time_of_the_tick_has_overrun():
     for cost, overruns in ((29_939, 0), (29_940, 1)):
         log = Log()
         # latency 25 and cost 35 of the tick are 1 us, 29,940 cycles 499 us
@@ -106,11 +106,11 @@ def test_a_row_that_ends_at_the_very_instant_of_the_tick_has_overrun():
 def test_without_a_completion_flag_tasks_are_dropped_in_silence():
     log = Log()
     scheduler = log.start(rows=((log.task("long", 36_000), log.task("dropped", 60)), ()), completion_flag=False)
-    told = []
-    log.chip.on_overrun = lambda: told.append(1)
+    reported = []
+    log.chip.on_overrun = lambda: reported.append(1)
     log.chip.advance(1_000_000)
     assert log.names() == ["long"]
-    assert told == []
+    assert reported == []
     assert scheduler.dropped_tasks == 1
 
 
@@ -163,27 +163,27 @@ def test_an_occasional_task_charges_its_own_cost_and_that_of_choosing():
     assert log.times("after")[0] - log.times("x")[0] in (5_333, 5_332)
 
 
-def test_a_limit_exceeded_is_counted_and_told_but_cost_alone_decides_the_time():
+def test_a_limit_exceeded_is_counted_and_reported_but_cost_alone_decides_the_time():
     log = Log()
-    told = []
-    log.chip.on_limit = told.append
+    reported = []
+    log.chip.on_limit = reported.append
     within = log.task("within", 600, limit=600)
     beyond = log.task("beyond", 601, limit=600)
     log.start(every=(within, beyond))
     log.chip.advance(900_000)
     assert (within.hits, beyond.hits) == (0, 2)
-    assert told == [beyond, beyond]
+    assert reported == [beyond, beyond]
 
 
 @pytest.mark.parametrize("cost, near, over", [(26_900, 0, 0), (26_920, 1, 0), (29_900, 1, 0), (29_930, 0, 1)])
 def test_a_slot_of_more_than_90_percent_is_near_its_limit_and_beyond_it_an_overrun(cost, near, over):
     log = Log()
-    told = []
-    log.chip.on_near_limit = lambda: told.append("near")
-    log.chip.on_overrun = lambda: told.append("over")
+    reported = []
+    log.chip.on_near_limit = lambda: reported.append("near")
+    log.chip.on_overrun = lambda: reported.append("over")
     scheduler = log.start(rows=((log.task("a", cost),), ()))
     log.chip.advance(900_000)
-    assert told == ["near"] * near + ["over"] * over
+    assert reported == ["near"] * near + ["over"] * over
     assert (scheduler.near_limits, scheduler.overruns) == (near, over)
 
 
@@ -217,7 +217,7 @@ def test_replacing_an_entry_runs_the_users_function_at_its_declared_cost():
     assert (task.cost, task.limit) == (600, 500)
 
 
-def test_a_tasks_counters_hold_for_calls_with_and_without_items_wherever_it_stands():
+def test_a_tasks_counters_hold_for_calls_with_and_without_items_at_any_place():
     log = Log()
     items = iter([None, 0, 3, None, 5, None])
     task = Task(lambda: next(items), cost=100, per_item=10)
@@ -351,7 +351,7 @@ def test_the_histogram_has_bins_of_five_percent():
 
 
 @pytest.mark.parametrize(
-    "table, told",
+    "table, reported",
     [
         (dict(rows=()), "at least one row"),
         (dict(slot_us=0), "does not divide"),
@@ -360,8 +360,8 @@ def test_the_histogram_has_bins_of_five_percent():
         (dict(occasional=(), occasional_row=4), "occasional_row 4"),
     ],
 )
-def test_a_faulty_table_is_refused(table, told):
-    with pytest.raises(UserError, match=told):
+def test_a_faulty_table_is_refused(table, reported):
+    with pytest.raises(UserError, match=reported):
         Schedule(**table)
 
 
@@ -384,36 +384,36 @@ def speaking(**table):
 
 def test_a_schedule_that_names_no_speakers_promises_silence_only_until_the_next_event():
     log = speaking()
-    assert log.chip.speaks_from() == log.chip.next_time == 0
+    assert log.chip.earliest_transmit_ns() == log.chip.next_time == 0
     log.chip.advance(505_000)
-    assert log.chip.speaks_from() == log.chip.next_time > 505_000
+    assert log.chip.earliest_transmit_ns() == log.chip.next_time > 505_000
 
 
 def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_them():
     """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 is empty."""
     chip = speaking(speakers=("b",)).chip
-    assert chip.speaks_from() == 10_000  # a before the first b of the slot that begins at 0
+    assert chip.earliest_transmit_ns() == 10_000  # a before the first b of the slot that begins at 0
     chip.advance(TICK_NS + 5_000)
-    assert chip.speaks_from() == TICK_NS + 10_000  # a runs
+    assert chip.earliest_transmit_ns() == TICK_NS + 10_000  # a runs
     chip.advance(TICK_NS + 15_000)
-    assert chip.speaks_from() == TICK_NS + 30_000  # b has begun, c follows, then d
+    assert chip.earliest_transmit_ns() == TICK_NS + 30_000  # b has begun, c follows, then d
     chip.advance(TICK_NS + 35_000)
-    assert chip.speaks_from() == 510_000  # d has begun, nothing more in this slot
+    assert chip.earliest_transmit_ns() == 510_000  # d has begun, nothing more in this slot
     chip.advance(500_000 + TICK_NS + 15_000)
-    assert chip.speaks_from() == 1_010_000  # in row 1 nothing follows b
+    assert chip.earliest_transmit_ns() == 1_010_000  # in row 1 nothing follows b
 
 
 def test_a_row_without_tasks_is_silent_and_the_row_after_it_is_not():
     log = Log()
     log.start(rows=((log.task("a", 600),), (), (log.task("b", 600),)), speakers=())
     chip = log.chip
-    assert chip.speaks_from() == 0  # a of row 0
+    assert chip.earliest_transmit_ns() == 0  # a of row 0
     chip.advance(TICK_NS + 5_000)
-    assert chip.speaks_from() > NEVER // 2  # nothing before the end of row 1
+    assert chip.earliest_transmit_ns() > NEVER // 2  # nothing before the end of row 1
     chip.advance(500_000 + TICK_NS)
-    assert chip.speaks_from() == 1_000_000  # b of row 2
+    assert chip.earliest_transmit_ns() == 1_000_000  # b of row 2
     chip.advance(1_000_000 + TICK_NS + 5_000)
-    assert chip.speaks_from() == 1_500_000  # a again
+    assert chip.earliest_transmit_ns() == 1_500_000  # a again
 
 
 def test_a_schedule_has_at_most_256_different_tasks():
@@ -424,20 +424,20 @@ def test_a_schedule_has_at_most_256_different_tasks():
         log.start(every=tasks)
 
 
-def test_a_replaced_function_may_speak_whatever_the_schedule_said():
+def test_a_replaced_function_may_send_whatever_the_schedule_declared():
     log = speaking(speakers=("b",))
     log.chip.advance(TICK_NS + 15_000)
     log.chip.scheduler.replace("c", lambda: None)
-    assert log.chip.speaks_from() == TICK_NS + 20_000
+    assert log.chip.earliest_transmit_ns() == TICK_NS + 20_000
 
 
-def test_a_speaker_that_is_no_task_of_every_slot_is_refused():
+def test_a_sender_that_is_not_a_task_of_every_slot_is_refused():
     log = Log()
     with pytest.raises(UserError, match=r"speaker 'x' is not a task of every slot \(available: a, b\)"):
         Schedule(every=(log.task("a", 1),), last=(log.task("b", 1),), speakers=("x",))
 
 
-def test_a_chip_told_to_stop_while_it_runs_stops_there_and_goes_on_later():
+def test_a_chip_ordered_to_stop_while_it_runs_stops_there_and_goes_on_later():
     log = Log()
     stop = Task(lambda: log.chip.stop_at(TICK_NS + 15_000) and None, cost=600, name="b")
     log.start(every=(log.task("a", 600), stop, log.task("c", 600)))

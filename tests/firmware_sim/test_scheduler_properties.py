@@ -135,6 +135,6 @@ def test_nothing_happens_before_next_time_and_something_does_at_it(table):
     assert chip.advance(then) == then
     assert before == (len(run.ran), len(run.log.entries), chip.tick_source.requests, chip.scheduler.slot_count)
     assert chip.due(then + 1)
-    instant = chip.instant
+    instant = chip.input_time
     assert chip.advance(then + 1) > then
-    assert chip.instant == then > instant
+    assert chip.input_time == then > instant

@@ -32,13 +32,13 @@ def ends(request):
         yield made
 
 
-def test_nothing_to_read_is_told_when_the_time_is_over(ends):
+def test_without_data_a_wait_returns_when_the_time_is_over(ends):
     reading, writing = ends
     assert descriptors.wait([reading], [], 0.001) == ([], [])
     assert descriptors.wait([reading], [writing], 0.001) == ([], [writing])
 
 
-def test_what_can_be_read_is_told_at_once(ends):
+def test_a_readable_descriptor_is_returned_at_once(ends):
     reading, writing = ends
     os.write(writing, b"x")
     assert descriptors.wait([reading], [], 60.0) == ([reading], [])

@@ -28,7 +28,7 @@ def test_an_earlier_message_overtakes_a_later_one():
     assert [kind for _, _, kind, *_ in drain(queue)] == [2, 1]
 
 
-def test_at_one_instant_the_lower_order_comes_first_and_equals_keep_their_arrival():
+def test_at_one_time_the_lower_order_comes_first_and_equals_keep_their_arrival():
     queue = EventQueue()
     queue.push(5, 2, 1)
     queue.push(5, 1, 2)
@@ -66,7 +66,7 @@ def test_a_queue_agrees_with_a_stable_sort(moves):
     assert queue.count == 0
 
 
-def test_a_message_that_is_not_urgent_only_tells_that_it_came():
+def test_a_message_that_is_not_urgent_only_lowers_the_arrival_time():
     queue, came, due = EventQueue(), integers(2, NEVER), integers(2, NEVER)
     queue.wake(came, due, 1)
     queue.put(50, 0, 1, 0, 0, 0, 0, 0, 0)

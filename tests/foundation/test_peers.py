@@ -8,14 +8,14 @@ import threading
 import pytest
 
 from ranger_sim.foundation import peers
-from ranger_sim.foundation.peers import LIMITS, MS, Door, Peer, SocketStream, Terminal
+from ranger_sim.foundation.peers import LIMITS, MS, Peer, PeerServer, SocketStream, Terminal
 from ranger_sim.foundation.user_error import UserError
 
 LIMIT = LIMITS["attach"]
 TEN = b"x" * 10
 
 
-class Echo(Door[Peer]):
+class Echo(PeerServer[Peer]):
     """Answers every line with ten bytes; counts what it read and wrote."""
 
     def __init__(self):
@@ -40,12 +40,12 @@ class Echo(Door[Peer]):
     def _takes_part(self, peer):
         return peer in self.partakers
 
-    def _apology(self, reason):
+    def _last_bytes(self, reason):
         return reason.encode()
 
 
 @pytest.fixture
-def door():
+def server():
     each = Echo()
     each.clients = []
 
@@ -70,209 +70,209 @@ def pour(client, data=b"\n" * 65536):
         return 0
 
 
-def test_one_look_reads_and_does_no_more_than_the_table_says_however_much_is_there(door):
-    clients = [door.connect() for _ in range(3)]
-    door.look(0)
+def test_one_poll_reads_and_executes_no_more_than_the_table_allows(server):
+    clients = [server.connect() for _ in range(3)]
+    server.receive(0)
     for client in clients:
         pour(client)
-    before = door.worked
-    door.look(0)
-    assert door.worked - before == LIMIT.burst
+    before = server.worked
+    server.receive(0)
+    assert server.worked - before == LIMIT.burst
     # each was read once: what it said and was not carried out is kept, and no more is read than one request needs
-    assert all(len(peer.incoming) <= LIMIT.read_bytes for peer in door.peers)
+    assert all(len(peer.incoming) <= LIMIT.read_bytes for peer in server.peers)
     for _ in range(5):
-        door.look(0)
-    assert all(len(peer.incoming) <= LIMIT.read_bytes + LIMIT.longest for peer in door.peers)
+        server.receive(0)
+    assert all(len(peer.incoming) <= LIMIT.read_bytes + LIMIT.longest for peer in server.peers)
 
 
-def test_over_time_requests_are_carried_out_at_the_rate_of_the_table(door):
-    pour(door.connect(), b"\n" * 4000)
-    door.look(0)
-    begun = door.worked
+def test_over_time_requests_are_carried_out_at_the_rate_of_the_table(server):
+    pour(server.connect(), b"\n" * 4000)
+    server.receive(0)
+    begun = server.worked
     for step in range(1, 321):  # 10 ms of the robot's time in the steps of a busy bus
-        door.look(step * MS // 32)
-    assert door.worked - begun == pytest.approx(10 * LIMIT.requests, abs=1)
+        server.receive(step * MS // 32)
+    assert server.worked - begun == pytest.approx(10 * LIMIT.requests, abs=1)
 
 
-def test_what_a_program_had_said_when_it_ended_is_carried_out_though_nobody_takes_the_answers(door):
-    client = door.connect()
+def test_requests_of_a_program_that_ended_are_carried_out_without_a_reader_of_the_answers(server):
+    client = server.connect()
     wanted = 3 * LIMIT.burst
     pour(client, b"\n" * wanted)
-    door.look(0)
-    door.write()
-    begun = door.worked
+    server.receive(0)
+    server.write()
+    begun = server.worked
     assert begun < wanted
     client.close()  # with answers unread: from now on writing to it fails
     for _ in range(4):
-        door.look(0)
-        door.write()
-    assert door.worked == wanted and not door.peers
+        server.receive(0)
+        server.write()
+    assert server.worked == wanted and not server.peers
 
 
-def test_a_peer_that_asks_without_end_does_not_keep_another_waiting(door):
-    greedy, modest = door.connect(), door.connect()
+def test_a_peer_with_endless_requests_does_not_keep_another_waiting(server):
+    greedy, modest = server.connect(), server.connect()
     pour(greedy)
-    door.look(0)
+    server.receive(0)
     modest.send(b"\n")
-    door.look(0)
-    door.write()
+    server.receive(0)
+    server.write()
     assert modest.recv(100) == TEN
 
 
-def test_who_takes_no_answers_is_not_read_and_holds_a_bounded_memory_and_is_sent_away(door):
+def test_a_peer_that_takes_no_answers_is_not_read_holds_bounded_memory_and_is_sent_away(server):
     clock = [0.0]
-    door.clock = lambda: clock[0]
-    client = door.connect()
-    door.look(0)
-    (peer,) = door.peers
+    server.clock = lambda: clock[0]
+    client = server.connect()
+    server.receive(0)
+    (peer,) = server.peers
     for _ in range(20_000):
         pour(client)
-        door.look(0)
-        door.write()
-        if peer.deaf(LIMIT):
+        server.receive(0)
+        server.write()
+        if peer.reads_too_little(LIMIT):
             break
     assert LIMIT.unread <= len(peer.outgoing) <= LIMIT.unread + LIMIT.burst * len(TEN)
-    held, read = len(peer.outgoing), door.worked
+    held, read = len(peer.outgoing), server.worked
     for _ in range(10):
         pour(client)
-        door.look(0)
-    assert (len(peer.outgoing), door.worked) == (held, read)
-    assert peer.stream.fileno() not in door.filenos()  # nobody is woken for it
+        server.receive(0)
+    assert (len(peer.outgoing), server.worked) == (held, read)
+    assert peer.stream.fileno() not in server.filenos()  # nobody is woken for it
     clock[0] = peers.PATIENCE_S + 0.1
-    door.look(0)
-    assert door.sent_away == {"stalled": 1} and not door.peers
+    server.receive(0)
+    assert server.sent_away == {"stalled": 1} and not server.peers
 
 
-def test_who_takes_its_answers_late_is_heard_again(door):
+def test_a_peer_that_takes_its_answers_late_is_read_again(server):
     clock = [0.0]
-    door.clock = lambda: clock[0]
-    client = door.connect()
-    door.look(0)
-    (peer,) = door.peers
-    while not peer.deaf(LIMIT):
+    server.clock = lambda: clock[0]
+    client = server.connect()
+    server.receive(0)
+    (peer,) = server.peers
+    while not peer.reads_too_little(LIMIT):
         pour(client)
-        door.look(0)
-        door.write()
+        server.receive(0)
+        server.write()
     for _ in range(5):  # ten seconds, but it takes something every two
-        door.look(0)
+        server.receive(0)
         clock[0] += peers.PATIENCE_S
         client.recv(65536)
-        door.write()
+        server.write()
     while peer.outgoing:
         client.recv(1 << 20)
-        door.write()
-    before = door.worked
-    door.look(0)
-    assert door.worked > before and not door.sent_away
+        server.write()
+    before = server.worked
+    server.receive(0)
+    assert server.worked > before and not server.sent_away
 
 
-def test_all_places_taken_by_partakers_one_more_is_told_and_closed(door):
+def test_with_all_places_taken_one_more_gets_the_reason_and_is_closed(server):
     for _ in range(LIMIT.peers):
-        door.connect()
-        door.look(0)
-    door.partakers.update(door.peers)
-    extra = door.connect()
-    door.look(0)
+        server.connect()
+        server.receive(0)
+    server.partakers.update(server.peers)
+    extra = server.connect()
+    server.receive(0)
     assert extra.recv(100) == b"full" and extra.recv(1) == b""
-    door.partakers.clear()
-    another = door.connect()
+    server.partakers.clear()
+    another = server.connect()
     another.send(b"\n")
-    door.look(0)
-    door.write()
-    assert another.recv(100) == TEN and door.sent_away == {"full": 1, "idle": 1}
+    server.receive(0)
+    server.write()
+    assert another.recv(100) == TEN and server.sent_away == {"full": 1, "idle": 1}
 
 
-def test_who_knocks_without_end_is_taken_in_at_a_rate_and_keeps_nobody_waiting(door):
+def test_endless_connections_are_accepted_at_a_rate_and_delay_no_other_peer(server):
     """250 in a second of the wall clock: 1 in 4 ms. Connections once used up the share of requests."""
     now = [0.0]
-    door.clock = lambda: now[0]
-    modest = door.connect()
-    door.look(0)
+    server.clock = lambda: now[0]
+    modest = server.connect()
+    server.receive(0)
     for _ in range(2 * LIMIT.peers - 1):  # what stood free at the beginning
-        door.connect()
-        door.look(0)
-        door.partakers.update(door.peers)
-    knocking = [door.connect() for _ in range(8)]
-    door.look(0)
-    begun = door.arrived
-    assert door.knocking and door.listener.fileno() not in door.filenos()  # nobody is woken for it
+        server.connect()
+        server.receive(0)
+        server.partakers.update(server.peers)
+    connections_wait = [server.connect() for _ in range(8)]
+    server.receive(0)
+    begun = server.arrived
+    assert server.connections_wait and server.listener.fileno() not in server.filenos()  # nobody is woken for it
     for step in range(1, 6):
         now[0] = step * 0.004 + 1e-9
         modest.send(b"\n")
-        door.look(0)
-        door.write()
+        server.receive(0)
+        server.write()
         assert modest.recv(100) == TEN
-        assert door.arrived - begun == step
+        assert server.arrived - begun == step
     now[0] = 1.0
-    door.look(0)
-    assert door.arrived - begun == len(knocking) and not door.knocking
+    server.receive(0)
+    assert server.arrived - begun == len(connections_wait) and not server.connections_wait
 
 
-def test_who_has_said_nothing_for_longest_makes_room(door):
-    first, *others = [door.connect() for _ in range(LIMIT.peers)]
-    door.look(0)
+def test_the_peer_that_has_sent_nothing_for_longest_gives_up_its_place(server):
+    first, *others = [server.connect() for _ in range(LIMIT.peers)]
+    server.receive(0)
     first.send(b"\n")
-    door.look(0)
-    door.connect()
-    door.look(0)
+    server.receive(0)
+    server.connect()
+    server.receive(0)
     assert others[0].recv(100) == b"idle"
     with pytest.raises(BlockingIOError):
         others[1].recv(100)
-    door.write()
+    server.write()
     assert first.recv(100) == TEN
 
 
-def test_who_has_left_makes_room_before_others_though_its_requests_are_not_all_carried_out(door):
+def test_a_peer_that_has_left_gives_up_its_place_before_others_with_requests_left(server):
     """Programs that fill the places, pour requests and leave once kept a new one out for 0.2 s of the robot."""
-    leavers = [door.connect() for _ in range(LIMIT.peers - 1)]
+    leavers = [server.connect() for _ in range(LIMIT.peers - 1)]
     for client in leavers:
         pour(client, b"\n" * 1000)
-    door.look(0)
-    quiet = door.connect()
-    door.look(0)
-    door.write()
-    door.partakers.update(door.peers[:-1])
+    server.receive(0)
+    quiet = server.connect()
+    server.receive(0)
+    server.write()
+    server.partakers.update(server.peers[:-1])
     for client in leavers:
         client.close()  # with answers unread: from now on writing to it fails
     for _ in range(4):
-        door.look(0)
-        door.write()
-    assert len(door.peers) == LIMIT.peers and sum(peer.lost for peer in door.peers) == LIMIT.peers - 1
-    new = door.connect()
+        server.receive(0)
+        server.write()
+    assert len(server.peers) == LIMIT.peers and sum(peer.lost for peer in server.peers) == LIMIT.peers - 1
+    new = server.connect()
     pour(new, b"\n")
-    door.look(0)
-    door.write()
+    server.receive(0)
+    server.write()
     assert new.recv(100) == TEN
     with pytest.raises(BlockingIOError):
         quiet.recv(1)  # it has kept its place
-    assert door.sent_away == {"idle": 1}
+    assert server.sent_away == {"idle": 1}
 
 
-def test_while_a_robot_waits_for_its_time_no_requests_are_carried_out_and_while_it_is_paused_at_the_rate(door):
+def test_while_a_robot_waits_for_its_time_no_requests_are_carried_out_and_while_it_is_paused_at_the_rate(server):
     now = [0.0]
-    door.clock = lambda: now[0]
-    client = door.connect()
-    door.look(MS)
+    server.clock = lambda: now[0]
+    client = server.connect()
+    server.receive(MS)
     done = []
     for _ in range(400):  # 0.4 s in which virtual time stands still
         pour(client)
         now[0] += 0.001
-        door.look(2 * MS)
-        done.append(door.worked)
+        server.receive(2 * MS)
+        done.append(server.worked)
     waiting = round(1000 * peers.PAUSED_S)
     assert done[waiting - 5] == done[3] <= 2 * LIMIT.burst
     assert done[-1] - done[waiting + 5] == pytest.approx((395 - waiting) * LIMIT.requests, rel=0.02)
 
 
-def test_another_users_program_is_told_and_closed(door, monkeypatch):
+def test_another_users_program_gets_the_reason_and_is_closed(server, monkeypatch):
     monkeypatch.setattr(peers, "user_behind", lambda connection: os.getuid() + 1)
-    client = door.connect()
+    client = server.connect()
     client.send(b"\n")
-    door.look(0)
-    assert client.recv(100) == b"foreign" and door.sent_away == {"foreign": 1} and not door.peers
+    server.receive(0)
+    assert client.recv(100) == b"foreign" and server.sent_away == {"foreign": 1} and not server.peers
 
 
-def test_a_server_of_another_user_is_not_trusted(door, monkeypatch):
+def test_a_server_of_another_user_is_not_trusted(server, monkeypatch):
     """Its process is forked, so that the kernel knows another user behind the socket; only root can do that."""
     if os.getuid() != 0:
         pytest.skip("only root can be another user")
@@ -301,17 +301,17 @@ def told_of(state, user, inode):
     return struct.pack("=IHHII", 16 + len(body), 20, 0, 0, 1299) + body
 
 
-def test_an_end_belongs_to_who_holds_it_open():
-    assert peers._owner_told(told_of(1, 1234, 77)) == 1234
-    assert peers._owner_told(told_of(5, 0, 0)) is None  # FIN_WAIT2: closed already, and the kernel says root
-    assert peers._owner_told(told_of(1, 0, 0)) is None
+def test_an_end_belongs_to_the_process_that_holds_it_open():
+    assert peers._owner_in(told_of(1, 1234, 77)) == 1234
+    assert peers._owner_in(told_of(5, 0, 0)) is None  # FIN_WAIT2: closed already, and the kernel says root
+    assert peers._owner_in(told_of(1, 0, 0)) is None
     refused = struct.pack("=IHHII", 36, 2, 0, 0, 0) + struct.pack("=i", -2) + bytes(16)  # ENOENT: no such connection
-    assert peers._owner_told(refused) is None
+    assert peers._owner_in(refused) is None
     with pytest.raises(OSError, match="not supported"):
-        peers._owner_told(struct.pack("=IHHII", 36, 2, 0, 0, 0) + struct.pack("=i", -95) + bytes(16))
+        peers._owner_in(struct.pack("=IHHII", 36, 2, 0, 0, 0) + struct.pack("=i", -95) + bytes(16))
 
 
-def test_a_kernel_that_tells_of_no_connection_shows_its_table(monkeypatch):
+def test_a_kernel_without_an_answer_for_a_connection_shows_its_table(monkeypatch):
     def refused(*ends):
         raise OSError("no netlink here")
 
@@ -319,9 +319,7 @@ def test_a_kernel_that_tells_of_no_connection_shows_its_table(monkeypatch):
         client = socket.create_connection(listener.getsockname())
         connection, _ = listener.accept()
         with connection:
-            assert (
-                peers._owner_told(peers._asked_of_kernel(client.getsockname(), listener.getsockname())) == os.getuid()
-            )
+            assert peers._owner_in(peers._asked_of_kernel(client.getsockname(), listener.getsockname())) == os.getuid()
             with monkeypatch.context() as patch:
                 patch.setattr(peers, "_asked_of_kernel", refused)
                 assert peers.user_behind(connection) == os.getuid()
@@ -329,7 +327,7 @@ def test_a_kernel_that_tells_of_no_connection_shows_its_table(monkeypatch):
             assert peers.fault_of_owner(connection) == peers.UNKNOWN
 
 
-def test_who_is_behind_a_loopback_connection_is_read_from_the_kernels_table():
+def test_the_owner_of_a_loopback_connection_is_read_from_the_kernels_table():
     table = (
         "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n"
         "   0: 0100007F:1F90 0100007F:C350 01 00000000:00000000 00:00000000 00000000     0        0 1 1\n"
@@ -365,10 +363,10 @@ def test_a_pseudo_terminal_is_for_this_user_alone():
         terminal.close()
 
 
-def test_connecting_waits_no_longer_than_it_is_told(door):
+def test_connecting_waits_no_longer_than_its_limit(server):
     """A server that never accepts: its queue takes the connection, so that only the answer is missing."""
     done = threading.Event()
-    with peers.connected(door.listener.getsockname(), "x", 0.01) as link:
+    with peers.connected(server.listener.getsockname(), "x", 0.01) as link:
         with pytest.raises(TimeoutError):
             link.recv(1)
         done.set()

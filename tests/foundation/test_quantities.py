@@ -18,7 +18,7 @@ def test_a_duration_is_whole_nanoseconds(text, ns):
 
 
 @pytest.mark.parametrize("text", ["450", "us", "1 light-year", "nan s", "inf s", "1 2 s", "", 5, None])
-def test_what_is_no_duration_is_refused_by_name(text):
+def test_a_text_that_is_not_a_duration_is_refused_by_name(text):
     with pytest.raises(UserError, match=r"within .*a number with one of the units ns, us, ms, s, min, h is needed"):
         nanoseconds(text, "within")
 
@@ -60,5 +60,5 @@ def test_a_unit_may_be_left_out_where_a_base_is_known():
 @pytest.mark.parametrize(
     ("ns", "text"), [(0, "0 ns"), (999, "999 ns"), (1000, "1 us"), (-12_500, "-12.5 us"), (1.25e9, "1.25 s")]
 )
-def test_a_duration_is_told_in_the_unit_that_reads_best(ns, text):
+def test_a_duration_is_printed_in_the_unit_that_reads_best(ns, text):
     assert duration_text(ns) == text

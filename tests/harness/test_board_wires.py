@@ -82,7 +82,7 @@ def watched(columns):
     return stream, rows
 
 
-def test_pins_and_pulse_widths_reach_the_bridge_and_other_pins_nobody(wires):
+def test_pins_and_pulse_widths_reach_the_bridge_and_other_pins_do_not(wires):
     for time, pin, level in ((10, 7, 1), (20, 2, 1), (30, 6, 1), (40, 2, 0), (50, 6, 0), (60, 5, 1), (70, 7, 0)):
         wires.push(time, 0, events.PIN_OUTPUT, pin, level)
     wires.push(80, 0, events.PWM_UPDATE, 100, 200, 3000)
@@ -104,21 +104,27 @@ def test_a_board_without_a_bridge_may_write_to_one():
 
 
 def test_a_frame_goes_to_the_bus_of_its_controller_and_shortens_the_turn(wires):
-    bus, heard = on_a_bus(wires, controller=3)
+    bus, received = on_a_bus(wires, controller=3)
     wires.push(5_000, 0, events.CAN_REQUEST, 3, 2, 0x123, 8, 1, 2)
     assert wires.board.horizon == 5_000 + WINDOW
     bus.advance(1_000_000)
-    assert heard.take() and (heard.kind, heard.b, heard.c, heard.d, heard.e) == (events.CAN_RX, 0x123, 8, 1, 2)
+    assert received.take() and (received.kind, received.b, received.c, received.d, received.e) == (
+        events.CAN_RX,
+        0x123,
+        8,
+        1,
+        2,
+    )
     wires.push(6_000, 0, events.CAN_REQUEST, 1, 1, 0x124, 8, 1, 2)  # leads nowhere
     bus.advance(2_000_000)
-    assert not heard.take()
+    assert not received.take()
     wires.board.horizon = 100
     wires.push(2_000_001, 0, events.CAN_REQUEST, 3, 1, 0x125, 8, 0, 0)
     assert wires.board.horizon == 100  # it stops before that anyway
 
 
 def test_a_frame_is_taken_back_and_a_controller_reset_and_set_going(wires):
-    bus, heard = on_a_bus(wires)
+    bus, received = on_a_bus(wires)
     wires.push(0, 0, events.CAN_REQUEST, 1, 1, 0x100, 8, 0, 0)
     wires.push(0, 0, events.CAN_REQUEST, 1, 2, 0x101, 8, 0, 0)
     wires.push(10, 0, events.CAN_ABORT, 1, 2)
@@ -147,7 +153,7 @@ def test_what_is_for_a_bus_outside_goes_there_whole(wires):
 
 def test_a_controller_moves_from_one_bus_to_another_and_off_it(wires):
     first, _ = on_a_bus(wires)
-    second, heard = on_a_bus(wires)
+    second, received = on_a_bus(wires)
     wires.push(0, 0, events.CAN_REQUEST, 1, 1, 0x100, 8, 0, 0)
     first.advance(1_000_000)
     second.advance(1_000_000)
@@ -160,7 +166,7 @@ def test_a_controller_moves_from_one_bus_to_another_and_off_it(wires):
         wires.connect_bus(1, "can1", 0)
 
 
-def test_a_board_speaks_no_sooner_than_its_schedule_says(wires):
+def test_a_board_sends_no_sooner_than_its_schedule_says(wires):
     on_a_bus(wires)
     wires.silent_until = 5_000
     with pytest.raises(UserError, match="MCH: a frame was sent at 4999 ns, .* none could be before 5000 ns"):
@@ -208,7 +214,7 @@ def exchanged(board):
     return found
 
 
-def test_an_exchange_gives_each_side_what_the_other_had_put_up_at_its_end(wires):
+def test_an_exchange_gives_each_side_what_the_other_had_loaded_at_its_end(wires):
     master, slave = wires.board, Ends("CSR")
     idle, first, second = segment(), segment((1, 2, 3)), segment((4, 5, 6))
     wires.link = SspWire(master, slave, 2_000, idle)

@@ -39,13 +39,13 @@ def test_a_branch_that_is_killed_has_crashed():
     assert error.value.outcome == "crashed"
 
 
-def test_a_result_that_cannot_be_told_is_a_crash_with_its_reason():
+def test_a_result_that_cannot_be_sent_is_a_crash_with_its_reason():
     with pytest.raises(BranchError, match="TypeError: Object of type object is not JSON serializable") as error:
         branched(lambda: {"what": object()})
     assert error.value.outcome == "crashed"
 
 
-def test_a_branch_that_dies_while_it_tells_has_crashed():
+def test_a_branch_that_dies_while_it_sends_its_result_has_crashed():
     def work():
         whole = os.fdopen
 
@@ -64,14 +64,14 @@ def test_a_branch_that_dies_while_it_tells_has_crashed():
 
 
 def test_a_branch_ends_with_the_process_that_it_branched_off(tmp_path):
-    told = tmp_path / "process"
+    reported = tmp_path / "process"
     parent = os.fork()
     if parent == 0:
-        branched(lambda: told.write_text(str(os.getpid())) and signal.pause())
+        branched(lambda: reported.write_text(str(os.getpid())) and signal.pause())
         os._exit(0)
-    while not (told.exists() and told.read_text()):
+    while not (reported.exists() and reported.read_text()):
         os.sched_yield()
-    watch = os.pidfd_open(int(told.read_text()))
+    watch = os.pidfd_open(int(reported.read_text()))
     os.kill(parent, signal.SIGKILL)
     os.waitpid(parent, 0)
     assert descriptors.wait([watch], [], 60.0)[0] == [watch]

@@ -235,7 +235,7 @@ def test_no_queue_overflows_and_no_slot_overruns_at_one_megabit():
     assert summary["profile"] == HIL and max(bus["load_mean"] for bus in summary["can"].values()) < 0.45
 
 
-def test_what_is_no_variable_cannot_be_sent():
+def test_a_name_that_is_not_a_variable_cannot_be_sent():
     io = MainBrainBoard(Crystal(), Quirks(), 0).io
     for numbers, dividers, turns in (([1, 99999], [1, 1], []), ([1], [1], [-1]), ([1, 2], [1], [])):
         with pytest.raises(UserError):

@@ -38,7 +38,7 @@ def sent():
     robot.close()
 
 
-def test_bytes_less_than_a_pause_apart_travel_as_one_message_and_others_apart(sent):
+def test_bytes_less_than_a_pause_apart_travel_as_one_message_and_others_separately(sent):
     together = sent((1_000_000, 0x11), (1_024_999, 0x22))
     assert [(each.time, each.count, each.low) for each in together] == [(1_024_999, 2, 0x2211)]
     apart = sent((1_000_000, 0x11), (1_025_000, 0x22))

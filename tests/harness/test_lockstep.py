@@ -58,11 +58,11 @@ def test_the_trace_does_not_depend_on_how_a_run_is_sliced():
     assert trace(slice_s=0.0007) == trace(slice_s=0.000_033) == trace()
 
 
-def test_a_board_that_hears_in_its_slots_misses_nothing_by_running_later():
-    assert trace(prompt=wiring.HEAR_IN_SLOTS) == trace()
+def test_a_board_that_receives_in_its_slots_misses_nothing_by_running_later():
+    assert trace(prompt=wiring.RECEIVE_IN_SLOTS) == trace()
 
 
-def test_whoever_looks_between_two_runs_finds_every_board_up_to_date():
+def test_between_two_runs_every_board_is_up_to_date():
     """Within a run a board that has only received something is not stepped, over many steps of the plant."""
     robot = Ranger(Scenario())
     for _ in range(40):  # some slices end between a frame and the slot that reads it
@@ -75,7 +75,7 @@ def test_whoever_looks_between_two_runs_finds_every_board_up_to_date():
         assert waiting == {}
 
 
-def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_hears_in_its_slots(monkeypatch):
+def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_receives_in_its_slots(monkeypatch):
     """Its error interrupt writes the controller's mode register: the bus's reports of errors are urgent.
 
     An error shows within a bit (333 ns), so only windows shorter than that leave no freedom at all here.
@@ -83,7 +83,7 @@ def test_a_board_whose_controller_went_bus_off_restarts_it_at_once_also_when_it_
     monkeypatch.setattr(lockstep, "WINDOW_NS", 300)
     at_leisure = trace(errors_on_can1=80)
     assert at_leisure[1] > 0  # frames were lost with bus-off
-    assert trace(prompt=wiring.HEAR_IN_SLOTS, errors_on_can1=80) == at_leisure
+    assert trace(prompt=wiring.RECEIVE_IN_SLOTS, errors_on_can1=80) == at_leisure
 
 
 def chatty(board):
@@ -138,7 +138,7 @@ class IdleBoard(Board):
         self.next_time = NEVER
         return NEVER
 
-    def listen_to_edges(self, buffer, pin, partner_pin):
+    def connect_edges(self, buffer, pin, partner_pin):
         """No test reads them."""
 
 

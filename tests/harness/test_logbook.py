@@ -127,15 +127,15 @@ def test_an_unknown_mode_is_refused_with_those_there_are():
 
 
 @pytest.mark.parametrize("mode", ["none", "window", "full"])
-def test_who_listens_gets_every_row_and_takes_none_away(mode, recorded):
+def test_a_subscriber_gets_every_row_and_removes_none(mode, recorded):
     logbook, recorder = recorded(mode)
     logbook.flush()
     before = len(frames_of(logbook))
-    heard = []
-    logbook.listen("can1", lambda rows: heard.extend(map(tuple, rows.tolist())))
+    received = []
+    logbook.listen("can1", lambda rows: received.extend(map(tuple, rows.tolist())))
     recorder.frames[0].add(2700 * MS, 3, 8, 4, 5)
     logbook.flush()
-    assert heard == [(2700 * MS, 4 << 12 | 8 << 4, 5 << 29 | 3)]
+    assert received == [(2700 * MS, 4 << 12 | 8 << 4, 5 << 29 | 3)]
     assert len(frames_of(logbook)) == (0 if mode == "none" else before + 1 - (mode == "window") * 50)
 
 

@@ -139,7 +139,7 @@ def test_waiting_in_vain_says_what_was_nearest_and_why_it_ended(firmware):
         (Wiring(bridges=[BridgeWire("LEFT", 3)]), "bridges 3: the plant has 1 of them"),
     ],
 )
-def test_a_wire_that_leads_nowhere_is_told_in_a_line(firmware, wiring, line):
+def test_a_wire_that_leads_nowhere_is_reported_in_one_line(firmware, wiring, line):
     with pytest.raises(UserError, match=line), machine(firmware, wiring):
         pass
 
@@ -184,7 +184,7 @@ def test_a_fault_of_the_machines_own_acts_from_its_condition_on_for_its_length(f
         ({"at": "hip in HI_premid"}, "it reads like 12.3 s, angle_rad > 0.3, or ended"),
     ],
 )
-def test_what_a_fault_does_not_take_is_told_in_a_line(firmware, asked, line):
+def test_a_parameter_that_a_fault_does_not_take_is_reported_in_one_line(firmware, asked, line):
     with machine(firmware) as robot, pytest.raises(UserError, match=line):
         robot.inject(WHEEL, NoEdges, **asked)
 

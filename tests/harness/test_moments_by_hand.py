@@ -51,7 +51,7 @@ def condition(text, machine=None):
 @pytest.mark.parametrize(
     ("text", "ns"), [("0 s", 0), ("12.5 ms", 12_500_000), ("1 us", 1000), ("2s", 2_000_000_000), ("3 ns", 3)]
 )
-def test_an_instant_is_met_from_its_nanosecond_on(text, ns):
+def test_a_time_is_met_from_its_nanosecond_on(text, ns):
     machine = Machine()
     made = condition(text, machine)
     machine.loop.time = machine.start_ns + ns - 1
@@ -61,7 +61,7 @@ def test_an_instant_is_met_from_its_nanosecond_on(text, ns):
 
 
 @pytest.mark.parametrize("text", ["12", "-1 s", "soon", "1 m", "angle_rad = 1", "angle_rad", ""])
-def test_what_is_no_condition_is_refused(text):
+def test_a_text_that_is_not_a_condition_is_refused(text):
     with pytest.raises(UserError, match="it reads like 12.3 s, angle_rad > 0.3, error LATE, or ended"):
         condition(text)
     with pytest.raises(UserError, match="it reads like 12.3 s, angle_rad > 0.3, or ended"):
@@ -89,7 +89,7 @@ def test_a_quantity_is_compared_as_it_says(sign, met):
     assert found == met
 
 
-def test_the_nearest_value_that_a_quantity_had_is_told_with_its_unit():
+def test_the_nearest_value_that_a_quantity_had_is_reported_with_its_unit():
     machine = Machine()
     made = condition("angle_rad > 2", machine)
     for machine.angle in (-3.0, 1.25, 0.5):
@@ -127,11 +127,11 @@ def test_an_error_is_noted_when_the_count_of_its_board_has_grown():
     assert begun.met()
     machine.noted["B"].clear()
     assert condition("error LATE from B", machine).counts() == [0]
-    for text, told in (
+    for text, reported in (
         ("error LATER", "unknown error 'LATER'"),
         ("error LATE from C", "unknown board 'C' .available: A, B."),
     ):
-        with pytest.raises(UserError, match=told):
+        with pytest.raises(UserError, match=reported):
             condition(text)
 
 
@@ -180,7 +180,7 @@ def strikes(*rows):
     for steps, strike_ms, leg, slot_ms in rows:
         plant.steps, plant.strike_time_ns = steps, strike_ms * MS
         brain.leg, brain.slot = leg, slot_ms * MS
-        watch.look()
+        watch.observe()
     return watch.statistics()
 
 

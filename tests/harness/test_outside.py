@@ -46,17 +46,17 @@ def test_the_drive_obeys_a_control_board_that_is_outside(servo, tmp_path):
     path = written(tmp_path, socketcan="virtual", vcan0="servo outside")
     with can.Bus(interface="virtual", channel="servo outside") as control:
         put_outside(servo, profile.load(path, table=TABLE), speed=50.0)
-        heard = []
+        received = []
         while servo.time_s < 0.8:
             for message in (frame(STATE, "I", 1), frame(ANGLE, "f", 0.5), frame(RATE, "f", 0.0)):
                 control.send(message)
             servo.run_for(0.004)
             while (message := control.recv(0)) is not None:
                 if message.arbitration_id == SHOWN:
-                    heard.append(struct.unpack("<f", bytes(message.data[:4]))[0])
+                    received.append(struct.unpack("<f", bytes(message.data[:4]))[0])
         assert servo.quantities()["angle_rad"] == pytest.approx(0.5, abs=0.02)
         # every 2 ms; what left at the very end may still be under way
-        assert 390 <= len(heard) <= 401 and heard[-1] == pytest.approx(0.5, abs=0.02)
+        assert 390 <= len(received) <= 401 and received[-1] == pytest.approx(0.5, abs=0.02)
         assert servo.boards["CONTROL"].counters().slots.count == 0
 
 

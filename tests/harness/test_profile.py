@@ -81,7 +81,7 @@ def test_what_is_given_is_taken(tmp_path):
     assert found.buses["can1"].schedule.turns("MCH_ANGLE") == 2
 
 
-def test_a_schedule_beside_the_profile_goes_before_a_shipped_one(tmp_path):
+def test_a_schedule_next_to_the_profile_goes_before_a_shipped_one(tmp_path):
     (tmp_path / "schedules").mkdir()
     written(tmp_path / "schedules", "[every]\nMCH_ANGLE = 7\n", "1mbit.toml")
     found = load(written(tmp_path, '[buses.can1]\nschedule = "1mbit"\n'))

@@ -42,7 +42,7 @@ def test_a_gap_may_be_a_period_and_five_milliseconds():
     assert (one.seen, one.last_ns, watch.faults, watch.now_ns) == (6, 25 * MS, 1, 25 * MS)
 
 
-def test_a_variable_is_missing_after_three_periods_and_five_milliseconds_and_told_once():
+def test_a_variable_is_missing_after_three_periods_and_five_milliseconds_and_reported_once():
     watch, one = watching(start_ns=100 * MS)
     watch.check(111 * MS)
     assert not one.missing
@@ -80,7 +80,7 @@ def test_nineteen_frames_come_within_three_quarters_of_their_time_only_when_they
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "reported"),
     [
         (-1.0, None),
         (2.0, None),
@@ -90,14 +90,14 @@ def test_nineteen_frames_come_within_three_quarters_of_their_time_only_when_they
         (math.nan, "out of range: nan is not a number"),
     ],
 )
-def test_a_value_may_be_its_limit(value, told):
+def test_a_value_may_be_its_limit(value, reported):
     watch, one = watching()
     say(watch, 0, value)
-    assert one.faults == ({} if told is None else {"out of range": 1}) and one.last_fault == (told or "")
+    assert one.faults == ({} if reported is None else {"out of range": 1}) and one.last_fault == (reported or "")
 
 
 def test_a_variable_with_one_limit_or_none_is_held_against_what_it_has():
-    for low, high, value, told in (
+    for low, high, value, reported in (
         (None, 2.0, -99.0, ""),
         (None, 2.0, 3.0, "out of range: 3 is outside any ... 2"),
         (-1.0, None, 99.0, ""),
@@ -106,7 +106,7 @@ def test_a_variable_with_one_limit_or_none_is_held_against_what_it_has():
     ):
         watch, one = watching(low=low, high=high, unit="")
         say(watch, 0, value)
-        assert one.last_fault == told
+        assert one.last_fault == reported
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_a_stamp_is_held_against_the_time_of_its_own_bus_and_of_own_variables_al
         assert one.faults == {}
 
 
-def test_a_frame_that_is_no_data_frame_of_eight_bytes_is_malformed_and_counts_for_nothing_else():
+def test_a_frame_other_than_a_data_frame_of_eight_bytes_is_malformed_and_counts_for_nothing_else():
     watch, one = watching()
     say(watch, 0, flags=7)
     assert one.last_fault == "malformed: 7 bytes instead of 8"
@@ -206,7 +206,7 @@ def test_a_report_has_counts_by_kind_and_every_variable_with_a_fault():
     assert watch.lines() == ["A: 1 of 2 variables, 5 frames; no faults"]
 
 
-def test_a_variable_comes_as_often_as_the_places_where_it_stands_together():
+def test_a_variable_comes_as_often_as_all_its_places_together():
     board = Made(
         name="A", slot_us=500, every=["e", "(nothing)"], rows=[["r", "both"], ["r"], []], occasional=["both", "o"]
     )

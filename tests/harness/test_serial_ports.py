@@ -239,7 +239,7 @@ def test_a_pseudo_terminal_carries_every_byte_value_both_ways(pty):
     assert pty.read(300) == b""
 
 
-def test_a_pseudo_terminal_nobody_reads_takes_some_bytes_and_then_none(pty):
+def test_an_unread_pseudo_terminal_takes_some_bytes_and_then_none(pty):
     taken = [pty.write(bytes(1000)) for _ in range(200)]
     assert taken[-1] == 0 and 0 < sum(taken) < 200_000
 
@@ -253,7 +253,7 @@ def test_a_real_port_is_whatever_pyserial_opens(pty):
         assert read_all(pty, 2) == b"de"
 
 
-def test_a_port_whose_other_side_is_gone_says_so():
+def test_a_port_whose_other_side_is_gone_reports_it():
     pty = PtyPort()
     with contextlib.closing(RealPort(pty.path, 921_600)) as port:
         pty.close()
@@ -312,16 +312,16 @@ def test_a_real_inertial_unit_takes_the_place_of_the_plants():
         assert robot.variable("UI_ANG_RATE_X") == 0.5
 
 
-def test_the_plants_inertial_unit_can_be_read_by_a_real_host_beside_its_board():
+def test_the_plants_inertial_unit_can_be_read_by_a_real_host_in_addition_to_its_board():
     with contextlib.closing(Ranger(Scenario())) as robot:
         offer = robot_ports.offer_imu(robot, PtyPort())
         with serial.Serial(offer.port.path, serial_ports.IMU_BAUD, timeout=10) as host:
             robot.run_for(0.1)
-            heard = host.read(offer.counters()["bytes_out"])
+            received = host.read(offer.counters()["bytes_out"])
         board = robot.board("UI").imu
         reader = ImuParser(pytest.fail, 0xC2)
-        for start in range(0, len(heard), 31):
-            for byte in heard[start : start + 31]:
+        for start in range(0, len(received), 31):
+            for byte in received[start : start + 31]:
                 reader.push(byte)
             reader.update()
         assert reader.packets > 50 and abs(reader.packets - board.packets) <= 2
@@ -339,9 +339,9 @@ def test_a_host_may_command_the_plants_inertial_unit():
             host.write(start_command(0xCF))
             descriptors.wait(offer.filenos(), [], 10.0)
             robot.run_for(0.02)
-            heard = host.read(offer.counters()["bytes_out"] - before)
-    assert bytes((0xC4, 0xCF)) in heard  # the acknowledgement
-    assert heard.count(0xCF) >= 2
+            received = host.read(offer.counters()["bytes_out"] - before)
+    assert bytes((0xC4, 0xCF)) in received  # the acknowledgement
+    assert received.count(0xCF) >= 2
     assert offer.asynchronous
 
 

@@ -96,7 +96,7 @@ def test_a_schedule_that_is_kept_on_one_side_only_is_noticed(frames):
         assert any(one["variable"] == "MCH_BATT_POWER" for one in watch.report()["MCH"]["variables"])
 
 
-def test_regular_frames_are_no_fault():
+def test_regular_frames_are_not_a_fault():
     assert of_angle(hip()) == {}
 
 
@@ -210,7 +210,7 @@ def test_an_absent_boards_variables_come_at_their_periods():
     assert len(times) == 2000 and {b - a for a, b in zip(times, times[1:], strict=False)} == {4_500_000}
 
 
-def test_an_emulated_rest_hears_an_absent_board_as_if_it_were_there():
+def test_an_emulated_rest_receives_an_absent_board_as_if_it_were_there():
     """The generator passes the supervision that the board itself would have to pass."""
     watch = supervision.Watch(having(MCFO="external"))
     rest = rest_bus.RestBus(having(MCFO="absent"))

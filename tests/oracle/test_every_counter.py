@@ -108,27 +108,27 @@ def late():
     return Run(slow, 0.1)
 
 
-def test_errors_are_told_of_every_board(late):
+def test_errors_of_every_board_are_reported(late):
     for board in BOARDS:  # an unfinished schedule is an error of the board itself, and told once for each
         assert late.summary["errors"][board]["ASCHED_DNF"] == late.summary["slots"][board]["overruns"]
 
 
-def test_every_error_of_the_table_is_told_by_its_name():
+def test_every_error_of_the_table_is_reported_by_its_name():
     rows = [(int(row["id"]), row["name"], row["boards"].split(";")) for row in table("errors.csv")]
     with contextlib.closing(Ranger()) as robot:
         for number, _, boards in rows:
             for place, board in enumerate(boards, start=1):
                 for _ in range(place):
                     robot.board(board).errors.report(number)
-        told = robot.summary()["errors"]
+        reported = robot.summary()["errors"]
     for board in BOARDS:
-        assert told[board] == {name: boards.index(board) + 1 for _, name, boards in rows if board in boards}
+        assert reported[board] == {name: boards.index(board) + 1 for _, name, boards in rows if board in boards}
 
 
-def test_every_fault_is_told_with_its_times(late):
-    told = late.summary["faults"]
-    assert [fault["fault"].partition(":")[0] for fault in told] == [f"{board}.processor" for board in BOARDS]
-    for fault in told:
+def test_every_fault_is_reported_with_its_times(late):
+    reported = late.summary["faults"]
+    assert [fault["fault"].partition(":")[0] for fault in reported] == [f"{board}.processor" for board in BOARDS]
+    for fault in reported:
         assert fault["armed_s"] == 0.0
         assert fault["activated_s"] == pytest.approx(0.040, abs=0.00025)
         assert fault["ended_s"] == pytest.approx(0.060, abs=0.00025)
@@ -157,38 +157,38 @@ def test_frames_that_no_queue_took_are_counted(cut):
     counted = {board: run.summary["errors"][board].get("CAN_TX_QUEUE_FULL", 0) for board in asked}
     for board, frames in asked.items():
         assert counted[board] == pytest.approx(max(0, frames - 9), rel=0.08, abs=3), board
-    told = {name: run.summary["can"][name]["queue_full"] for name in BUSES}
-    assert told == dict.fromkeys(BUSES, 0) | {bus: sum(counted.values())}
+    reported = {name: run.summary["can"][name]["queue_full"] for name in BUSES}
+    assert reported == dict.fromkeys(BUSES, 0) | {bus: sum(counted.values())}
 
 
 def test_time_stamps_that_could_not_go_out_are_counted(cut):
     bus, run = cut
-    told = {name: run.summary["can"][name]["single_shot_skipped"] for name in BUSES}
+    reported = {name: run.summary["can"][name]["single_shot_skipped"] for name in BUSES}
     # one a millisecond, and the one that is on its way when the cable is cut
-    assert told == dict.fromkeys(BUSES, 0) | {bus: pytest.approx(160, abs=1)}
+    assert reported == dict.fromkeys(BUSES, 0) | {bus: pytest.approx(160, abs=1)}
 
 
 def test_error_frames_are_those_in_the_log(cut):
     bus, run = cut
-    told = {name: run.summary["can"][name]["errors"] for name in BUSES}
-    assert told == {name: run.count(name, error=True) for name in BUSES}
-    assert told[bus] > 1000 and sum(told.values()) == told[bus]
+    reported = {name: run.summary["can"][name]["errors"] for name in BUSES}
+    assert reported == {name: run.count(name, error=True) for name in BUSES}
+    assert reported[bus] > 1000 and sum(reported.values()) == reported[bus]
     frames = {name: run.summary["can"][name]["frames"] for name in BUSES}
     assert frames == {name: run.count(name) for name in BUSES}
 
 
 def test_a_frame_whose_sender_falls_off_the_bus_is_lost():
     run = Run([("MCH.can1", "bus_off", "40 ms", None, {})], 0.1)
-    told = {name: run.summary["can"][name]["lost"] for name in BUSES}
+    reported = {name: run.summary["can"][name]["lost"] for name in BUSES}
     # the frame that drove it off, and one more where the second buffer was filled
-    assert told["can1"] in (1, 2) and sum(told.values()) == told["can1"]
+    assert reported["can1"] in (1, 2) and sum(reported.values()) == reported["can1"]
 
 
 # --- the body -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("force", "cause"), [(300.0, "fell forward"), (-300.0, "fell backward")])
-def test_a_fall_is_told_with_its_cause(force, cause):
+def test_a_fall_is_reported_with_its_cause(force, cause):
     run = Run([("world.robot", "push", "2 s", None, {"force": force, "length_ms": 300.0})], 10.0)
     assert run.summary["fell"] is True and run.summary["fall_cause"] == cause
     assert 2.0 < run.summary["time_s"] < 5.0

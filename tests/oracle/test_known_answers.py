@@ -31,7 +31,7 @@ def powered_up():
 # --- what was asked for ---------------------------------------------------------------------------------------
 
 
-def test_what_was_asked_for_is_told_as_it_was_asked_for(tmp_path):
+def test_options_are_reported_as_they_were_given(tmp_path):
     model = tmp_path / "model.toml"
     model.write_text("", encoding="utf-8")
     asked = {
@@ -45,28 +45,28 @@ def test_what_was_asked_for_is_told_as_it_was_asked_for(tmp_path):
     wanted = Scenario(**asked, battery_charge=0.625, battery_capacity_Wh=493.0, electronics_off=("left-outer-ankle",))
     with contextlib.closing(Ranger(wanted, profile=profile.load("hil-1mbit"))) as robot:
         robot.run(StopRule(time_s=0.01), 1.0)
-        told = json.loads(json.dumps(robot.summary()))
-    assert {name: told[name] for name in asked} == asked
-    assert told["electronics_off"] == ["left-outer-ankle"]
-    assert told["battery"]["capacity_Wh"] == 493.0 and told["battery"]["charge_at_start"] == 0.625
-    assert told["profile"] == "hil-1mbit"
-    assert told["oddities"]["contact"] == "sticking"  # plant/bodies/appendix.toml
-    assert told["steps"] == 0 and told["fell"] is False and told["fall_cause"] is None
+        reported = json.loads(json.dumps(robot.summary()))
+    assert {name: reported[name] for name in asked} == asked
+    assert reported["electronics_off"] == ["left-outer-ankle"]
+    assert reported["battery"]["capacity_Wh"] == 493.0 and reported["battery"]["charge_at_start"] == 0.625
+    assert reported["profile"] == "hil-1mbit"
+    assert reported["oddities"]["contact"] == "sticking"  # plant/bodies/appendix.toml
+    assert reported["steps"] == 0 and reported["fell"] is False and reported["fall_cause"] is None
     # methods of compiled classes are no Python functions
-    assert told["compiled"] is not isinstance(Bus.advance, types.FunctionType)
-    assert told["compiled"] is loading.RUNS_COMPILED
+    assert reported["compiled"] is not isinstance(Bus.advance, types.FunctionType)
+    assert reported["compiled"] is loading.RUNS_COMPILED
 
 
 def test_a_run_without_options_says_so():
     with contextlib.closing(Ranger()) as robot:
-        told = robot.summary()
-    assert told["profile"] is None and told["model_file"] is None and told["electronics_off"] == []
+        reported = robot.summary()
+    assert reported["profile"] is None and reported["model_file"] is None and reported["electronics_off"] == []
 
 
 def test_paces_are_virtual_time_over_that_of_the_clocks(powered_up):
     powered_up.wall_s, powered_up.cpu_s = 0.03, 0.24
-    told = powered_up.summary()
-    assert told["realtime_factor"] == pytest.approx(2.0) and told["cpu_factor"] == pytest.approx(0.25)
+    reported = powered_up.summary()
+    assert reported["realtime_factor"] == pytest.approx(2.0) and reported["cpu_factor"] == pytest.approx(0.25)
     powered_up.cpu_s = 0.0
     assert powered_up.summary()["cpu_factor"] is None
 
@@ -74,15 +74,15 @@ def test_paces_are_virtual_time_over_that_of_the_clocks(powered_up):
 # --- energy ---------------------------------------------------------------------------------------------------
 
 
-def test_empty_batteries_are_told():
+def test_empty_batteries_are_reported():
     # 5.15 W of electronics empty 5 mWh in 3.5 s, before the motors have walked any far
     with contextlib.closing(Ranger(Scenario(battery_capacity_Wh=0.005))) as robot:
         robot.run(StopRule(time_s=10.0), 10.0)
-        told = robot.summary()
-    assert told["battery"]["empty"] is True and told["battery"]["charge"] == 0.0
-    assert told["fell"] is True and told["fall_cause"] == "battery empty"
+        reported = robot.summary()
+    assert reported["battery"]["empty"] is True and reported["battery"]["charge"] == 0.0
+    assert reported["fell"] is True and reported["fall_cause"] == "battery empty"
     # what the packs held is what they gave and lost: the curve's charge at its own voltage, 3.0 to 4.2 V, mean 3.72
-    assert told["battery"]["delivered_Wh"] + told["battery"]["lost_inside_Wh"] == pytest.approx(0.005, rel=0.01)
+    assert reported["battery"]["delivered_Wh"] + reported["battery"]["lost_inside_Wh"] == pytest.approx(0.005, rel=0.01)
 
 
 def test_what_motors_took_before_the_robot_was_let_go_is_nobodys_walk():
@@ -123,7 +123,7 @@ class Brain(Board):
 def noticed(watch, brain, slot_ms):
     """The main brain flips the swing leg in the slot that began at `slot_ms`."""
     brain.leg, brain.slot_ns = 1 - brain.leg, slot_ms * 1_000_000
-    watch.look()
+    watch.observe()
 
 
 def test_delays_of_strikes_have_a_known_mean_and_deviation():
@@ -137,9 +137,9 @@ def test_delays_of_strikes_have_a_known_mean_and_deviation():
         plant.strike_time_ns = strike_ms * 1_000_000
         noticed(watch, brain, slot_ms)
     noticed(watch, brain, 7400)  # no new strike
-    watch.look()  # no flip
-    told = watch.statistics()
-    assert told == {"mean": pytest.approx(13.0), "std": pytest.approx(3.0), "count": 4, "unmatched": 1, "missed": 3}
+    watch.observe()  # no flip
+    reported = watch.statistics()
+    assert reported == {"mean": pytest.approx(13.0), "std": pytest.approx(3.0), "count": 4, "unmatched": 1, "missed": 3}
 
 
 def touch(record, ms, leg, strike=True, ahead=0.3, x=0.0, push=1.0, gap=0.01):
@@ -187,7 +187,7 @@ def test_touches_and_departures_of_feet_count_for_what_they_are():
     assert record.min_clearance_m == 0.02
 
 
-def test_every_count_of_the_record_is_told_under_its_own_name():
+def test_every_count_of_the_record_is_reported_under_its_own_name():
     counts = (
         "touches", "lift_offs", "bounces", "recontacts", "scuffs", "flights", "slides", "jams", "lead_lifts",
         "tensile_strikes",
@@ -200,11 +200,11 @@ def test_every_count_of_the_record_is_told_under_its_own_name():
     seen = types.SimpleNamespace(friction_ratio_max=0.7, slip_s=0.25, normal_force_min=-3.0, pull_s=0.125)
     body = types.SimpleNamespace(seen=seen, compliant=False)
     plant = types.SimpleNamespace(record=record, body=body, parameters=types.SimpleNamespace(contact="coulomb"))
-    told = oddities(plant)
-    assert {name: told[name] for name in counts} == {name: number for number, name in enumerate(counts, start=11)}
-    assert told["tensile_impulse_min_Ns"] == -0.5 and told["min_clearance_m"] == 0.0075
-    assert (told["friction_ratio_max"], told["slip_s"]) == (0.7, 0.25)
-    assert (told["normal_force_min_N"], told["pull_s"], told["contact"]) == (-3.0, 0.125, "coulomb")
+    reported = oddities(plant)
+    assert {name: reported[name] for name in counts} == {name: number for number, name in enumerate(counts, start=11)}
+    assert reported["tensile_impulse_min_Ns"] == -0.5 and reported["min_clearance_m"] == 0.0075
+    assert (reported["friction_ratio_max"], reported["slip_s"]) == (0.7, 0.25)
+    assert (reported["normal_force_min_N"], reported["pull_s"], reported["contact"]) == (-3.0, 0.125, "coulomb")
     record.steps = 1  # the first step starts anywhere in the swing
     assert oddities(plant)["min_clearance_m"] is None and oddities(plant)["tensile_strikes"] == 20
     body.compliant = True  # strikes that last have no impulse
@@ -214,7 +214,7 @@ def test_every_count_of_the_record_is_told_under_its_own_name():
 # --- boards ---------------------------------------------------------------------------------------------------
 
 
-def test_the_longest_slot_is_told_in_the_boards_own_cycles(powered_up):
+def test_the_longest_slot_is_reported_in_the_boards_own_cycles(powered_up):
     # a function of many cycles in every board: its slot is that long, in cycles of 60 MHz or the main brain's 208 MHz
     tasks = {"MB": ("parse_ssp", 208.0), "CSR": ("send_time", 60.0), "MCH": ("dn_safety", 60.0)}
     before = powered_up.summary()["slots"]

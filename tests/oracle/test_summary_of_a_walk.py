@@ -35,9 +35,9 @@ SCENARIO = "tests/oracle/test_every_counter.py"
 KNOWN = "tests/oracle/test_known_answers.py"
 ODD = "tests/plant/walking/test_odd_figures.py"
 OTHER_ORACLES = (
-    (NONE_IN_A_WALK, "fell fall_cause", f"{SCENARIO}::test_a_fall_is_told_with_its_cause"),
+    (NONE_IN_A_WALK, "fell fall_cause", f"{SCENARIO}::test_a_fall_is_reported_with_its_cause"),
     (NONE_IN_A_WALK, "failed_boards", f"{SCENARIO}::test_each_board_that_hangs_is_named_and_no_other"),
-    (NONE_IN_A_WALK, "battery.empty", f"{KNOWN}::test_empty_batteries_are_told"),
+    (NONE_IN_A_WALK, "battery.empty", f"{KNOWN}::test_empty_batteries_are_reported"),
     (
         NONE_IN_A_WALK,
         "heel_strike_delay_ms.unmatched heel_strike_delay_ms.missed",
@@ -47,16 +47,16 @@ OTHER_ORACLES = (
     (NONE_IN_A_WALK, "can.*.queue_full", f"{SCENARIO}::test_frames_that_no_queue_took_are_counted"),
     (NONE_IN_A_WALK, "can.*.single_shot_skipped", f"{SCENARIO}::test_time_stamps_that_could_not_go_out_are_counted"),
     (NONE_IN_A_WALK, "slots.*.overruns", f"{SCENARIO}::test_each_board_that_takes_too_long_overruns_its_slots"),
-    (NONE_IN_A_WALK, "faults", f"{SCENARIO}::test_every_fault_is_told_with_its_times"),
+    (NONE_IN_A_WALK, "faults", f"{SCENARIO}::test_every_fault_is_reported_with_its_times"),
     (
         "told over the serial link, not on a bus",
         "errors.MB.* errors.CSR.*",
-        f"{SCENARIO}::test_errors_are_told_of_every_board",
+        f"{SCENARIO}::test_errors_of_every_board_are_reported",
     ),
     (
         "main brain and router publish none",
         "slots.MB.max_execution_us slots.CSR.max_execution_us",
-        f"{KNOWN}::test_the_longest_slot_is_told_in_the_boards_own_cycles",
+        f"{KNOWN}::test_the_longest_slot_is_reported_in_the_boards_own_cycles",
     ),
     (
         OF_THE_MODEL,
@@ -78,7 +78,7 @@ OTHER_ORACLES = (
     (
         OF_THE_MODEL,
         "oddities.jams oddities.pull_s",
-        f"{KNOWN}::test_every_count_of_the_record_is_told_under_its_own_name",
+        f"{KNOWN}::test_every_count_of_the_record_is_reported_under_its_own_name",
     ),
     (
         "of the clocks of this machine",
@@ -94,7 +94,7 @@ OTHER_ORACLES = (
         "what was asked for, and the program that ran",
         "compiled controller body profile model_file seed slope_rad floor_roughness_m electronics_off "
         "battery.capacity_Wh battery.charge_at_start oddities.contact",
-        f"{KNOWN}::test_what_was_asked_for_is_told_as_it_was_asked_for",
+        f"{KNOWN}::test_options_are_reported_as_they_were_given",
     ),
 )
 
@@ -147,7 +147,7 @@ def run(request, tmp_path_factory):
     return Run(tmp_path_factory.mktemp("appendix"), "appendix", 0.11, controller="robust")  # appendix table 2
 
 
-def test_every_figure_that_the_files_tell_is_the_summarys(run):
+def test_every_figure_in_the_files_is_the_summarys(run):
     wrong = [
         f"{path}: summary {run.told.get(path)}, files {value} +/- {tolerance}"
         for path, (value, tolerance) in run.recomputed.items()
@@ -156,12 +156,12 @@ def test_every_figure_that_the_files_tell_is_the_summarys(run):
     assert not wrong, "\n".join(wrong)
 
 
-def test_errors_are_those_that_the_boards_tell_on_the_buses(run):
+def test_errors_are_those_that_the_boards_send_on_the_buses(run):
     for board, bus in figures.CAN_OF.items():
-        told = figures.of_errors(board, run.logs[bus], run.error_names)
+        reported = figures.of_errors(board, run.logs[bus], run.error_names)
         counted = {path: count for path, count in run.told.items() if path.startswith(f"errors.{board}.")}
-        assert set(told) == set(counted)
-        for path, (count, waiting) in told.items():  # what was noted since the last frame waits to be told
+        assert set(reported) == set(counted)
+        for path, (count, waiting) in reported.items():  # what was noted since the last frame waits to be told
             assert count <= counted[path] <= count + waiting, path
 
 

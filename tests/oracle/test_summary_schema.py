@@ -63,7 +63,7 @@ def test_a_summary_is_as_the_schema_has_it(summary):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "told"),
+    ("spoil", "reported"),
     [
         (lambda s: s.pop("tcot"), "summary.tcot is missing"),
         (lambda s: s["can"]["can2"].pop("lost"), "summary.can.can2.lost is missing"),
@@ -76,10 +76,10 @@ def test_a_summary_is_as_the_schema_has_it(summary):
         (lambda s: s["faults"][0].pop("acted"), "summary.faults[0].acted is missing"),
     ],
 )
-def test_a_summary_that_is_wrong_is_found_out(summary, spoil, told):
+def test_a_summary_that_is_wrong_is_found_out(summary, spoil, reported):
     wrong = copy.deepcopy(summary)
     spoil(wrong)
-    assert violations(wrong, json_schema()) == [told]
+    assert violations(wrong, json_schema()) == [reported]
 
 
 def test_every_figure_has_a_meaning_and_every_number_a_unit():
@@ -105,8 +105,8 @@ def test_the_page_has_the_table_of_the_program():
 
 def test_the_command_prints_the_schema(capsys):
     assert main(["summary-schema"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told == json_schema()
-    assert told["properties"]["battery"]["properties"]["delivered_Wh"]["unit"] == "Wh"
-    assert told["properties"]["tcot"]["type"] == ["number", "null"]
-    assert "additionalProperties" in told["properties"]["errors"]
+    reported = json.loads(capsys.readouterr().out)
+    assert reported == json_schema()
+    assert reported["properties"]["battery"]["properties"]["delivered_Wh"]["unit"] == "Wh"
+    assert reported["properties"]["tcot"]["type"] == ["number", "null"]
+    assert "additionalProperties" in reported["properties"]["errors"]

@@ -25,9 +25,9 @@ def written(tmp_path, text):
 def refused(tmp_path, text):
     """The one line with which a file is refused."""
     path = written(tmp_path, text)
-    with pytest.raises(UserError) as told:
+    with pytest.raises(UserError) as reported:
         body_files.load(path)
-    line = str(told.value)
+    line = str(reported.value)
     assert path in line and "\n" not in line
     return line
 
@@ -98,7 +98,7 @@ def test_gears_and_rotor_of_body_motors_and_encoders_are_the_same(tmp_path):
         assert turned == pytest.approx(0.1 / (2.0 * math.pi) * edges, abs=1.0)  # errors of the disc: below an edge
 
 
-def test_each_leg_has_the_foot_of_its_own(tmp_path):
+def test_each_leg_has_its_own_foot(tmp_path):
     body = Body(
         BodyParameters(
             outer_foot_radius_m=0.168,
@@ -155,7 +155,7 @@ def test_values_that_contradict_each_other_are_refused_with_the_file(tmp_path):
     assert "3.3" in line and "3.2" in line
 
 
-def test_an_unknown_body_is_told_which_there_are():
+def test_an_unknown_body_is_reported_with_those_that_exist():
     with pytest.raises(UserError, match="appendix, ranger"):
         body_files.load("unicorn")
 
@@ -211,7 +211,7 @@ def test_the_command_shows_every_number_with_unit_limits_and_source(capsys):
         "source": "",
     }
     assert cli.main(["body", "show", "ranger", "--changes"]) == 0
-    told = capsys.readouterr().out
-    assert "outer_ankle_offset_m" in told and "leg_length_m" not in told
+    reported = capsys.readouterr().out
+    assert "outer_ankle_offset_m" in reported and "leg_length_m" not in reported
     assert cli.main(["body", "list"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(body_files.available())

@@ -114,7 +114,7 @@ def test_the_gyro_sends_the_outer_legs_rate():
     assert plant.imu.rate_x == pytest.approx(-0.004 - rate, abs=tolerance)
 
 
-def test_power_drawn_since_letting_go_is_kept_apart():
+def test_power_drawn_since_letting_go_is_kept_separately():
     plant, walker = walking_plant()
     for motor in plant.motors[:3]:
         assert 0.0 <= motor.drawn_before_J < motor.drawn_J

@@ -51,7 +51,7 @@ def test_torque_forms_have_their_formulas_at_the_hip(form, values, expected):
     assert torques(form, "hip_joint", state=MOVING, **values) == (pytest.approx(expected), 0.0, 0.0, 0.0, 0.0)
 
 
-def test_the_five_places_of_a_torque_are_told_apart():
+def test_the_five_places_of_a_torque_are_distinguished():
     for at, place in (("outer_ankle", 1), ("inner_ankle", 2), ("outer_motor", 3), ("inner_motor", 4)):
         rate = (-2.0, 3.0, -2.5, 2.0)[place - 1]
         shown = torques("viscous_friction", at, state=MOVING, change_Nms=1.0)
@@ -73,7 +73,7 @@ def test_cogging_repeats_with_the_rotor():
     assert later == pytest.approx(first)
 
 
-def test_a_commutation_ripple_is_one_of_torque_and_back_emf_where_the_motor_stands():
+def test_a_commutation_ripple_is_one_of_torque_and_back_emf_at_the_motors_angle():
     plant = built(dict(form="commutation_ripple", at="outer_motor", fraction=0.1, periods_per_turn=14))
     plant.hold("outer", 0.1, 0.3)
     motor = plant.outer_ankle
@@ -263,7 +263,7 @@ def test_a_model_file_that_is_not_there_is_a_users_mistake(tmp_path):
         terms.load(tmp_path / "none.toml")
 
 
-def test_a_file_that_is_no_text_is_a_users_mistake(tmp_path):
+def test_a_file_that_is_not_text_is_a_users_mistake(tmp_path):
     path = tmp_path / "model.toml"
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UserError, match="not UTF-8 text"):

@@ -30,7 +30,7 @@ def robot():
         ("error MC_TCURR_OOB from MCX", "unknown board 'MCX' (available: MCH, MCFO"),
     ],
 )
-def test_a_text_that_is_no_condition_is_refused_with_what_was_perhaps_meant(text, what):
+def test_a_text_that_is_not_a_condition_is_refused_with_a_suggestion(text, what):
     with pytest.raises(UserError, match=what):
         condition(text)
 
@@ -40,7 +40,7 @@ def test_an_unknown_state_is_refused_with_the_states_of_the_machine(robot):
         robot.until("hip in HI_mid")
 
 
-def test_until_an_instant_ends_at_the_first_step_of_the_plant_from_there_on(robot):
+def test_until_a_time_ends_at_the_first_step_of_the_plant_from_there_on(robot):
     assert robot.until("1.1 ms") == pytest.approx(1.25e-3)
     assert robot.loop.time == 5 * STEP_NS
     assert robot.until("1.25 ms") == pytest.approx(1.25e-3)  # holds already: no time passes
@@ -91,7 +91,7 @@ def test_an_error_of_a_board_that_begins_anew_counts_from_nothing(robot):
     assert wanted.met()
 
 
-def test_a_fall_ends_the_waiting_and_is_told():
+def test_a_fall_ends_the_waiting_and_is_reported():
     robot = Ranger(Scenario(controller="record-2011", slope_rad=0.2))
     with pytest.raises(ConditionNotMetError, match=r"step 1000: the robot fell \(.*\) after .*; step \d+ was reached"):
         robot.until("step 1000", within="30 s")

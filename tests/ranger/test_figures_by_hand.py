@@ -112,7 +112,7 @@ def test_slots_are_in_microseconds_and_errors_have_their_names():
 
 
 def test_the_whole_summary_is_of_these_figures():
-    told = summary.of(robot())
+    reported = summary.of(robot())
     expected = {
         "steps": 20,
         "fell": False,
@@ -147,23 +147,23 @@ def test_the_whole_summary_is_of_these_figures():
         "slope_rad": 0.1,
     }
     for name, value in expected.items():
-        assert told[name] == (pytest.approx(value) if type(value) is float else value), name
-    assert told["errors"] == {"MCH": {"AE_SPIKE": 3}, "MB": {}} and told["slots"]["MB"]["overruns"] == 2
+        assert reported[name] == (pytest.approx(value) if type(value) is float else value), name
+    assert reported["errors"] == {"MCH": {"AE_SPIKE": 3}, "MB": {}} and reported["slots"]["MB"]["overruns"] == 2
 
 
 def test_what_needs_time_or_steps_is_none_without_them():
-    told = summary.of(robot(walked_s=0.0, cpu_s=0.0, time_sum_s=0.0))
+    reported = summary.of(robot(walked_s=0.0, cpu_s=0.0, time_sum_s=0.0))
     nothing = ("speed_m_per_s", "motor_power_W", "total_power_W", "tcot", "cpu_factor")
-    assert [told[name] for name in nothing] == [None] * 5
+    assert [reported[name] for name in nothing] == [None] * 5
     standing = summary.of(robot(length_sum=0.0))
     assert (standing["speed_m_per_s"], standing["tcot"], standing["total_power_W"]) == (0.0, None, 17.0)
     fallen = robot()
     fallen.plant.fell, fallen.plant.fall_cause, fallen.loop.time = 1, "forward", 61 * S
-    told = summary.of(fallen)
-    assert (told["fell"], told["fall_cause"], told["failed_boards"]) == (True, "forward", ["MCH", "MB"])
+    reported = summary.of(fallen)
+    assert (reported["fell"], reported["fall_cause"], reported["failed_boards"]) == (True, "forward", ["MCH", "MB"])
 
 
-def test_a_program_in_c_is_told_with_its_end_and_what_of_it_ran():
+def test_a_program_in_c_is_reported_with_its_end_and_the_lines_that_ran():
     sides = {"lines": 10, "covered": 7, "branches": 4, "taken": 1}
     made = Made(
         manifest=Made(name="p"),
@@ -178,28 +178,28 @@ def test_a_program_in_c_is_told_with_its_end_and_what_of_it_ran():
     written = []
     board = Made(apart=False, write_counts=lambda: written.append(1))
     whole = Made(firmware={"MCH": made, "MCFO": made}, deaths=[], loop=Made(board=lambda name: board))
-    told = summary.firmware(whole, "MCH")
-    assert (told["name"], told["folder"], told["own_process"], told["lost_s"], told["why"]) == (
+    reported = summary.firmware(whole, "MCH")
+    assert (reported["name"], reported["folder"], reported["own_process"], reported["lost_s"], reported["why"]) == (
         "p",
         "f",
         False,
         None,
         None,
     )
-    assert {name: told["coverage"][name] for name in (*sides, "whole")} == {
+    assert {name: reported["coverage"][name] for name in (*sides, "whole")} == {
         "lines": 20,
         "covered": 14,
         "branches": 8,
         "taken": 2,
         "whole": True,
     }
-    assert [each["file"] for each in told["coverage"]["files"]] == ["a", "b"] and written == [1]
-    board.apart = True
+    assert [each["file"] for each in reported["coverage"]["files"]] == ["a", "b"] and written == [1]
+    board.out_of_process = True
     for why, whole_count in (("", False), ("it divided by 0", True)):
         whole.deaths = [{"board": "MCFO", "time_s": 1.0, "why": "x"}, {"board": "MCH", "time_s": 2.0, "why": why}]
-        told = summary.firmware(whole, "MCH")
-        assert (told["own_process"], told["lost_s"], told["why"]) == (True, 2.0, why or None)
-        assert told["coverage"]["whole"] is whole_count
+        reported = summary.firmware(whole, "MCH")
+        assert (reported["own_process"], reported["lost_s"], reported["why"]) == (True, 2.0, why or None)
+        assert reported["coverage"]["whole"] is whole_count
     assert written == [1]
     made.coverage = False
     assert summary.ran(made, True)["lines"] is None and summary.ran(made, True)["whole"] is None

@@ -17,16 +17,16 @@ def robot_with(board, words):
     return contextlib.closing(Ranger(Scenario(seed=2), images={board: image_of(words)}))
 
 
-def test_a_board_with_an_image_sends_its_frames_on_its_bus_beside_the_others():
+def test_a_board_with_an_image_sends_its_frames_on_its_bus_with_the_others():
     with robot_with("MCH", words_of("ticker")) as robot:
         wire = robot.wire("can1")
         robot.run_for(0.05)
         counters = robot.counters()["MCH"]
-        heard = wire.frames(14)
+        received = wire.frames(14)
         # the ticker sends its count as id 14 every 100 us, from half a millisecond after its power-up (up to 2 ms)
-        assert 470 <= len(heard) <= 500
-        assert abs(counters.can[0].sent - len(heard)) <= 1
-        assert counters.slots.count == pytest.approx(len(heard), abs=2)
+        assert 470 <= len(received) <= 500
+        assert abs(counters.can[0].sent - len(received)) <= 1
+        assert counters.slots.count == pytest.approx(len(received), abs=2)
         assert robot.summary()["failed_boards"] == []
         assert counters.processor.idle_cycles > 0.5 * counters.processor.cycles
 

@@ -62,7 +62,7 @@ def recorded():
     return Recorded(robot)
 
 
-def test_samples_stand_under_their_names_with_times_since_power_up(recorded):
+def test_samples_are_under_their_names_with_times_since_power_up(recorded):
     assert {name: list(column) for name, column in recorded.samples.items()} == {
         "time_s": [0.0, 0.5],
         "lean": [1.0, 2.0],
@@ -71,7 +71,7 @@ def test_samples_stand_under_their_names_with_times_since_power_up(recorded):
     assert (recorded.steps, recorded.footholds) == ("the steps", "the footholds")
 
 
-def test_loads_stand_in_the_middle_of_their_windows_of_10_ms(recorded):
+def test_loads_are_in_the_middle_of_their_windows_of_10_ms(recorded):
     times, loads = recorded.bus_load["can1"]
     assert list(loads) == [0.1, 0.2, 0.3]
     # twelve windows end at 120 ms; the last three are 90 to 120 ms
@@ -89,19 +89,19 @@ def test_a_machines_states_are_those_of_its_variable(recorded):
     assert list(states) == [4, 4, 4, 7, 7, 7] and names == {4: "hold", 7: "swing"}
 
 
-def test_states_are_told_as_they_stood_at_an_instant(recorded):
+def test_states_are_those_at_the_given_time(recorded):
     """Before the first row the first state, behind the last one the last."""
     found = recorded.state_text([-1.0, 0.0059, 0.006, 9.0])
     assert [each[0] for each in found] == ["hip: hold", "hip: hold", "hip: swing", "hip: swing"]
     assert found[0][1:] == ["outer foot: flip", "inner foot: flip"]
 
 
-def test_a_state_without_a_name_is_told_as_such(recorded):
+def test_a_state_without_a_name_is_shown_as_such(recorded):
     recorded.words[:, HIP_STATE] = 99
     assert recorded.state_text([0.0])[0][0] == "hip: ?"
 
 
-def test_variables_are_told_where_they_changed_and_at_both_ends(recorded):
+def test_variables_are_written_where_they_changed_and_at_both_ends(recorded):
     series = {each.name: each for each in recorded.variables()}
     assert set(series) == set(all_variables.NAMES.values())
     angle = series["MCH_ANGLE"]

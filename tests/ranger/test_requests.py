@@ -168,7 +168,7 @@ def test_the_next_request_waits_for_the_answer_to_the_one_before(robot):
     assert answers(client) == [{"done": 1}] and [each.do for _, each in robot.requests] == ["pause", "resume"]
 
 
-def test_an_answer_for_a_client_that_left_reaches_nobody_else(robot):
+def test_an_answer_for_a_client_that_left_reaches_no_other_client(robot):
     robot.silent = True
     gone = robot.connect()
     gone.send(b'{"do": "pause"}\n')
@@ -181,7 +181,7 @@ def test_an_answer_for_a_client_that_left_reaches_nobody_else(robot):
     assert answers(other) == []
 
 
-def test_a_thousand_silent_connections_leave_room_for_one_that_asks(robot):
+def test_a_thousand_silent_connections_leave_a_place_for_one_that_asks(robot):
     """1011 of them at 1024 descriptors ended a run: the review of 22 November 2026, R3."""
     seconds = itertools.count()
     robot.server.clock = lambda: float(next(seconds))  # time enough for all who knock
@@ -196,7 +196,7 @@ def test_a_thousand_silent_connections_leave_room_for_one_that_asks(robot):
     assert robot.server.sent_away["idle"] == 1012 - LIMIT.peers
 
 
-def test_a_look_carries_out_no_more_than_its_share_however_much_has_come(robot):
+def test_a_poll_carries_out_no_more_than_its_share_however_much_has_arrived(robot):
     clients = [robot.connect() for _ in range(3)]
     for _ in clients:
         robot.server.poll()
@@ -209,7 +209,7 @@ def test_a_look_carries_out_no_more_than_its_share_however_much_has_come(robot):
     assert max(shares) - min(shares) <= 4  # one of each in turn; the turn passes on with every look
 
 
-def test_a_line_without_an_end_is_told_its_limit_and_closed(robot):
+def test_a_client_with_an_endless_line_gets_the_limit_and_is_closed(robot):
     client = robot.connect()
     client.send(b"x" * LIMIT.longest)
     robot.server.poll()
@@ -219,7 +219,7 @@ def test_a_line_without_an_end_is_told_its_limit_and_closed(robot):
     assert client.recv(1) == b"" and robot.server.sent_away["too_long"] == 1
 
 
-def test_a_second_robot_of_a_name_is_told(robot):
+def test_a_second_robot_of_a_name_is_reported(robot):
     name = robot.server.listener.getsockname()[1:].decode().rpartition("/")[2]
     assert address(name).endswith(name)
     with pytest.raises(UserError, match=f"a robot named {name} is already running"):

@@ -21,7 +21,7 @@ def robot():
     robot.close()
 
 
-def test_importing_the_package_loads_no_room_and_nothing_heavy():
+def test_importing_the_package_loads_no_subpackage_and_nothing_heavy():
     look = (
         "import json, sys; import ranger_sim; dir(ranger_sim);"
         "print(json.dumps(sorted(name.partition('.')[0] if not name.startswith('ranger_sim') else name"
@@ -54,13 +54,13 @@ def test_the_names_work_together(robot):
     assert robot.board("MB") is robot.boards["MB"]
 
 
-def test_a_board_that_is_not_there_is_told_with_those_that_are(robot):
+def test_a_board_that_is_not_there_is_reported_with_those_that_are(robot):
     for ask in (lambda: robot.board("NOPE"), lambda: robot.replace("NOPE", "task", lambda: None, 1)):
         with pytest.raises(UserError, match=r"board 'NOPE': .* MCH, MCFO, MCFI, MCSI, UI, CSR, MB$"):
             ask()
 
 
-def test_a_variable_that_is_not_there_is_told_with_those_of_like_name(robot):
+def test_a_variable_that_is_not_there_is_reported_with_those_of_like_name(robot):
     with pytest.raises(UserError, match=r"unknown variable 'MCH_ANGEL'; did you mean 'MCH_ANGLE'"):
         robot.variable("MCH_ANGEL")
     with pytest.raises(UserError, match=r"unknown variable '%%'; `ranger-sim table list`"):

@@ -241,7 +241,7 @@ def test_the_command_prints_the_catalogue_one_cause_and_what_channels_show(capsy
         (["drag", "--experiment", "ankle"], "either one cause or an experiment"),
     ],
 )
-def test_a_mistake_on_the_command_line_is_told_in_a_line(capsys, arguments, line):
+def test_a_mistake_on_the_command_line_is_reported_in_one_line(capsys, arguments, line):
     code, printed = told(capsys, *arguments)
     assert code == 2 and line in printed.err and printed.err.count("\n") == 1
 

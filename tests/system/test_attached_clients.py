@@ -77,7 +77,7 @@ def pass_time(robot, server, clients, until_ns, act=lambda: None):
         client.hear()
 
 
-def test_listeners_hear_what_the_robot_logs_and_change_nothing():
+def test_listeners_receive_what_the_robot_logs_and_change_nothing():
     with contextlib.closing(Ranger(Scenario(seed=2))) as alone:
         alone.run_for(0.5)
         digest = alone.trace_digest()
@@ -97,20 +97,20 @@ def test_listeners_hear_what_the_robot_logs_and_change_nothing():
         client.socket.close()
 
 
-def test_beside_a_running_robot_python_can_sees_what_the_robot_logs(tmp_path):
+def test_next_to_a_running_robot_python_can_sees_what_the_robot_logs(tmp_path):
     name = fresh_name()
     call = ("-m", "ranger_sim", "up", "--time", "2s", "--name", name, "--log", "full", "--out", str(tmp_path))
     with Program(*call, together=True) as robot:
         robot.until(r"python-can: .*\n")
-        heard = []
+        got = []
         with can.Bus(interface="ranger_sim", channel=f"{name}/can4", ignore_config=True) as bus:
             with pytest.raises(can.CanOperationError, match="has gone"):
                 while True:
-                    heard.append(bus.recv())
+                    got.append(bus.recv())
             assert bus.statistics()["missed"] == 0
         assert robot.ended()[0] == 0
     logged = [entry[1:] for entry in read_candump(tmp_path / "can4.log")]
-    seen = [(round(each.timestamp * 1e9), *frame_of_message(each)) for each in heard]
+    seen = [(round(each.timestamp * 1e9), *frame_of_message(each)) for each in got]
 
     def same(one, other):  # stamps pass through a float, the log cuts to microseconds
         return one[1:] == other[1:] and abs(one[0] - other[0]) <= 1000

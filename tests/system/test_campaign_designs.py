@@ -91,8 +91,8 @@ def test_a_search_finds_the_least_push_that_a_scan_of_all_pushes_finds_and_goes_
     assert len(search.cases) == 10  # some of them the same
     assert outcomes(search).items() <= outcomes(scan).items()
     assert least_force(search) == least_force(scan)
-    (told,) = summary.of(search)["extremes"]
-    assert told["least"]["axes"]["force"] == least_force(scan)
+    (reported,) = summary.of(search)["extremes"]
+    assert reported["least"]["axes"]["force"] == least_force(scan)
 
 
 def test_a_sample_stops_at_the_look_at_which_the_rule_says_so(tmp_path):
@@ -110,9 +110,9 @@ def test_a_sample_stops_at_the_look_at_which_the_rule_says_so(tmp_path):
     sample = done(data, tmp_path)
     assert [sample.result(case)["outcome"] for case in sample.cases] == ["no effect"] * 8
     assert sample.stopped_at == 2
-    told = summary.of(sample)
-    assert told["finished"] and told["foreseen"] == 12
-    assert told["outcomes"]["no effect"]["low"] == pytest.approx(8.0 / (8.0 + 2.454**2), abs=1e-3)
+    reported = summary.of(sample)
+    assert reported["finished"] and reported["foreseen"] == 12
+    assert reported["outcomes"]["no effect"]["low"] == pytest.approx(8.0 / (8.0 + 2.454**2), abs=1e-3)
     again = engine.Campaign(sample.plan, tmp_path)
     try:
         again.take_known()
@@ -145,8 +145,8 @@ def test_a_sweeps_slot_margin_falls_by_the_cost_that_was_added(tmp_path):
         fall = margins[gear, few]["margin"] - margins[gear, many]["margin"]
         assert fall == pytest.approx(added, abs=0.03)
     assert all(each["overruns"] == 0 and 0.0 < each["margin"] < 1.0 for each in margins.values())
-    told = summary.of(sweep)["settings"]
-    assert [row["slot"]["board"] for row in told if row["axes"][f"cost.MCH.{task}"] == many] == ["MCH", "MCH"]
+    reported = summary.of(sweep)["settings"]
+    assert [row["slot"]["board"] for row in reported if row["axes"][f"cost.MCH.{task}"] == many] == ["MCH", "MCH"]
 
 
 OWN_MODE = """
@@ -202,8 +202,8 @@ def test_a_plan_may_name_a_file_with_a_users_own_modes(tmp_path):
     (line,) = missing.stderr.splitlines()
     assert missing.returncode == 2 and f"fault module {tmp_path / 'own.py'}: there is no such file" in line
     (tmp_path / "own.py").write_text(OWN_MODE)
-    told = command(path, folder)
-    assert told.returncode == 0, told.stderr
+    reported = command(path, folder)
+    assert reported.returncode == 0, reported.stderr
     (row,) = json.loads((folder / "summary.json").read_text())["rows"]
     assert (row["mode"], row["acted"]) == ("burnt", True)
     assert f"--fault-module {tmp_path / 'own.py'}" in row["replay"]

@@ -124,8 +124,8 @@ def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path, 
         os.close(worker)
     before = results_in(killed)
     assert HEALTHY + 2 <= len(before) < HEALTHY + RUNS
-    told = run(few, killed, "--jobs", "2").stderr
-    assert f"{len(before) - HEALTHY} of them have results already" in told
+    reported = run(few, killed, "--jobs", "2").stderr
+    assert f"{len(before) - HEALTHY} of them have results already" in reported
     after = results_in(killed)
     assert len(after) == HEALTHY + RUNS and after == results_in(whole)
     assert {key: after[key] for key in before} == before
@@ -253,7 +253,7 @@ print("refused")
 
 
 @needs_dask
-def test_a_dask_cluster_of_its_own_is_on_the_loopback_address_and_refuses_who_lacks_its_certificate(few, tmp_path):
+def test_its_own_dask_cluster_is_on_the_loopback_address_and_refuses_clients_without_its_certificate(few, tmp_path):
     out = tmp_path / "out"
     with campaign_at_work(few, out, "--pool", "dask", "--jobs", "2") as process:
         found = listening(process.pid)
@@ -319,17 +319,17 @@ def test_a_dask_cluster_that_loses_a_part_gives_the_same_results(few, tmp_path, 
     try:
         until_results(process, cluster, 1)
         (scheduler if killed == "scheduler" else workers[0]).kill()
-        _, told = process.communicate(timeout=PATIENCE_S)
+        _, reported = process.communicate(timeout=PATIENCE_S)
     finally:
         process.kill()
-    assert "Traceback" not in told
+    assert "Traceback" not in reported
     if killed == "scheduler":
-        assert process.returncode == 2, told
-        assert f"campaign: the Dask scheduler at {address} ended" in told
+        assert process.returncode == 2, reported
+        assert f"campaign: the Dask scheduler at {address} ended" in reported
         run(few, cluster)
     else:
-        assert process.returncode == 0, told
-        assert "warning" not in told
+        assert process.returncode == 0, reported
+        assert "warning" not in reported
     assert results_in(cluster) == results_in(local)
 
 
@@ -380,7 +380,7 @@ def test_files_that_are_not_certificates_are_refused_in_one_line(few, tmp_path):
     assert "--scheduler tls://127.0.0.1:1: TLS files: " in line
 
 
-def test_what_cannot_be_reached_or_read_is_told_in_one_line(few, tmp_path):
+def test_unreachable_and_unreadable_inputs_are_reported_in_one_line(few, tmp_path):
     for arguments, wanted in (
         ((few, tmp_path / "out", "--replay", "nothing"), "the plan has no such run of this version"),
         ((tmp_path / "none.toml", tmp_path / "out"), "No such file"),

@@ -138,7 +138,7 @@ def test_a_letter_that_the_output_has_not_is_written_as_its_escape(command):
     assert command("walk", "--controller", "Größe", PYTHONIOENCODING="ascii").stderr.count(r"Gr\xf6\xdfe") == 1
 
 
-def test_a_run_that_ends_at_its_first_instants_leaves_whole_files(command, tmp_path):
+def test_a_run_that_ends_at_once_leaves_whole_files(command, tmp_path):
     done = command("walk", "--time", "1ms", "--out", tmp_path / "short")
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "short" / "summary.json").read_text(encoding="utf-8"))
@@ -159,7 +159,7 @@ def test_a_full_disk_behind_the_output_gets_one_line(command):
     assert done.stderr.endswith("No space left on device\n") and len(done.stderr.splitlines()) == 1
 
 
-def test_a_bad_master_table_tells_every_fault_and_leaves_with_2(command, tmp_path):
+def test_a_bad_master_table_gives_every_fault_and_exit_code_2(command, tmp_path):
     master = ROOT / "datatable" / "master"
     for file in master.iterdir():
         (tmp_path / file.name).write_bytes(file.read_bytes())
@@ -177,7 +177,7 @@ def test_a_master_folder_that_is_not_there_leaves_with_2(command):
     assert "/no-such-folder/variables.csv" in done.stderr and "Traceback" not in done.stderr
 
 
-def test_a_reader_that_leaves_is_no_error():
+def test_a_reader_that_leaves_is_not_an_error():
     """`ranger-sim table list --json | head -c 1`"""
     with subprocess.Popen(
         [sys.executable, "-m", "ranger_sim", "table", "list", "--json"],
@@ -225,7 +225,7 @@ def test_json_on_standard_output_is_json_only(command):
     assert done.stderr == ""
 
 
-def test_the_version_is_said(command):
+def test_the_version_is_printed(command):
     from ranger_sim import __version__
 
     done = command("--version")
@@ -233,13 +233,13 @@ def test_the_version_is_said(command):
 
 
 def test_every_command_says_what_it_does(capsys):
-    def told(*arguments):
+    def reported(*arguments):
         with pytest.raises(SystemExit) as left:
             cli.main([*arguments, "--help"])
         assert left.value.code == 0
         return capsys.readouterr().out
 
-    names = re.findall(r"^    ([a-z][a-z-]*)\b", told(), re.MULTILINE)
+    names = re.findall(r"^    ([a-z][a-z-]*)\b", reported(), re.MULTILINE)
     assert {"walk", "up", "ctl", "body", "daq", "bench", "can-bounds", "check-bus", "table", "vm"} <= set(names)
     for name in set(names) - {"help"}:  # `help` shows the help of another command
-        assert told(name).startswith(f"usage: ranger-sim {name} ")
+        assert reported(name).startswith(f"usage: ranger-sim {name} ")

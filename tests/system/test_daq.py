@@ -29,7 +29,7 @@ from ranger_sim.tools.robodaq.codec import write_packet
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ID = all_variables.ID_OF
-LOOK_S = 0.005
+POLL_S = 0.005
 
 
 class Robot:
@@ -56,7 +56,7 @@ class Robot:
                     action()
                 if self.written_bytes > robot.line.bytes_in:
                     select.select(robot.line.filenos(), [], [], 10.0)
-                robot.ranger.run_for(LOOK_S)
+                robot.ranger.run_for(POLL_S)
                 # its time is the clock: once it stands still, nothing that waits for a time would ever end
                 assert not robot.ranger.ended, f"the robot {robot.ranger.ended} at {robot.ranger.time_s:.3f} s"
                 data = b""
@@ -75,14 +75,14 @@ class Robot:
                 return taken
 
         monkeypatch.setattr(daq, "RealPort", Port)
-        monkeypatch.setattr(daq, "LOOK_S", 0.0)
+        monkeypatch.setattr(daq, "POLL_S", 0.0)
         monkeypatch.setattr(daq.wallclock, "monotonic_s", lambda: self.ranger.time_s)
 
     def daq(self, *arguments):
         """(exit code, its output, its errors)."""
         code = cli.main(["daq", "--port", self.line.port.path, *map(str, arguments)])
-        told = self.capsys.readouterr()
-        return code, told.out, told.err
+        reported = self.capsys.readouterr()
+        return code, reported.out, reported.err
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_a_parameter_is_written_and_read_back(robot):
         (["--log", "log.csv"], "must end in .txt"),
     ],
 )
-def test_a_mistake_gets_one_line_and_the_robot_hears_nothing(robot, arguments, words):
+def test_a_mistake_gets_one_line_and_the_robot_receives_nothing(robot, arguments, words):
     code, out, err = robot.daq(*arguments)
     assert (code, out) == (2, "")
     assert words in err and len(err.splitlines()) == 1
@@ -121,7 +121,7 @@ def test_a_mistake_gets_one_line_and_the_robot_hears_nothing(robot, arguments, w
     assert robot.line.bytes_in == 0
 
 
-def test_a_packet_for_what_is_no_parameter_raises_an_error_that_daq_shows(robot):
+def test_a_packet_for_a_variable_that_is_not_a_parameter_raises_an_error_that_daq_shows(robot):
     bad = write_packet(ID["MCH_ANGLE"], 0)
 
     def another_program():
@@ -208,7 +208,7 @@ def test_drop_outs_leave_gaps_in_the_log_that_are_counted_and_no_bad_checksum(mo
     assert (result["bad_checksums"], result["lost"]) == (0, None)
 
 
-def test_a_robot_that_does_not_answer_is_said_so(robot):
+def test_a_robot_that_does_not_answer_is_reported(robot):
     robot.board.computer.rate_sum = -(1 << 40)  # it never sends
     robot.before_look.append(lambda: setattr(robot.board.computer, "rate_sum", -(1 << 40)))
     robot.board.computer.calls_to_wait = 1 << 40
@@ -237,7 +237,7 @@ def test_a_port_that_is_not_there_gets_one_line(capsys):
     )  # fmt: skip
 
 
-def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
+def test_daq_in_its_own_process_writes_to_a_robot_in_processes():
     """`up` as fast as it goes, and `daq`; both are real, and only what was written is looked at."""
     up = subprocess.Popen(
         [sys.executable, "-m", "ranger_sim", "up", "--speed", "max", "--daq-port", "pty", "--json", "-"]
@@ -250,7 +250,7 @@ def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
     try:
         place = re.search(r"--port (\S+)", up.stderr.readline()).group(1)
         asked = ["--write", "C_F_ST_F_ANG=4.25", "--read", "C_F_ST_F_ANG", "--timeout", "60s", "--json", "-"]
-        told = subprocess.run(
+        reported = subprocess.run(
             [sys.executable, "-m", "ranger_sim", "daq", "--port", place, *asked],
             cwd=ROOT,
             capture_output=True,
@@ -258,8 +258,8 @@ def test_daq_in_a_process_of_its_own_writes_to_a_robot_in_processes():
             timeout=300,
             check=False,
         )
-        result = json.loads(told.stdout)
-        assert (told.returncode, result["read"]) == (0, {"C_F_ST_F_ANG": 4.25}), told.stderr
+        result = json.loads(reported.stdout)
+        assert (reported.returncode, result["read"]) == (0, {"C_F_ST_F_ANG": 4.25}), reported.stderr
         assert result["bad_checksums"] == 0
     finally:
         up.send_signal(signal.SIGINT)

@@ -48,8 +48,8 @@ def elsewhere(module, *arguments, interpreted, hash_seed):
 
 def outcomes_elsewhere(cases, interpreted, hash_seed):
     """`outcome` of each case, in another process."""
-    told = json.dumps([dataclasses.asdict(case) for case in cases])
-    return elsewhere("tests.system.digest_of", told, interpreted=interpreted, hash_seed=hash_seed).splitlines()
+    reported = json.dumps([dataclasses.asdict(case) for case in cases])
+    return elsewhere("tests.system.digest_of", reported, interpreted=interpreted, hash_seed=hash_seed).splitlines()
 
 
 @pytest.mark.parametrize(
@@ -95,13 +95,13 @@ def test_a_step_is_the_same_bytes_compiled_and_interpreted_in_every_scenario(cas
     assert [compiled] == outcomes_elsewhere([case], interpreted=True, hash_seed=2)
 
 
-def test_boards_in_processes_of_their_own_start_with_the_same_bytes_compiled_and_interpreted():
+def test_boards_in_their_own_processes_start_with_the_same_bytes_compiled_and_interpreted():
     up = ("up", "--speed", "max", "--no-real-time", "--seed", "3", "--time", f"{PROCESSES_S}s", "--json", "-")
     expected = outcome(Case(PROCESSES_S, seed=3)).split()[0]
     for interpreted in (True, False):
-        told = json.loads(elsewhere("ranger_sim", *up, interpreted=interpreted, hash_seed=3))
-        assert told["compiled"] != interpreted or not loading.RUNS_COMPILED
-        assert told["trace_digest"] == expected
+        reported = json.loads(elsewhere("ranger_sim", *up, interpreted=interpreted, hash_seed=3))
+        assert reported["compiled"] != interpreted or not loading.RUNS_COMPILED
+        assert reported["trace_digest"] == expected
 
 
 def test_the_robot_steps_on_across_the_wrap_of_its_clock():

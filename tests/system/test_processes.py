@@ -173,7 +173,7 @@ def test_the_robot_as_processes_walks_the_same_walk_at_any_pace(up, walked, spee
     assert all(each["damaged_messages"] == 0 for each in found["processes"]["boards"].values())
 
 
-def test_real_time_scheduling_is_asked_for_and_what_was_obtained_is_said(up):
+def test_real_time_scheduling_is_requested_and_the_one_obtained_is_reported(up):
     robot = up("--time", "0.02s")
     assert "ordinary scheduling, memory not locked (as asked for)" in robot.wait_for("ranger-sim up.*").group()
     assert robot.end() == 0
@@ -448,7 +448,7 @@ def test_a_mistake_in_an_option_is_one_line(command, arguments, complaint):
     assert done.returncode == 2 and complaint in done.stderr and "Traceback" not in done.stderr
 
 
-def test_a_probe_for_calibration_that_nobody_speaks_to_leaves_the_run_as_it_is(command):
+def test_an_unused_probe_for_calibration_leaves_the_run_as_it_is(command):
     run = ("up", "--time", "0.1s", "--speed", "max", "--json", "-", "--name", f"test-{uuid.uuid4().hex[:12]}")
     digests = []
     for more in ((), ("--xcp-can", "--xcp-udp", "0")):
@@ -476,21 +476,21 @@ def test_a_timeline_that_cannot_be_is_refused_before_any_process_begins(command,
     assert done.returncode == 2 and "is not a format" in done.stderr and done.stderr.count("\n") == 1
 
 
-def test_a_fault_whose_place_is_taken_when_it_is_to_begin_is_told_by_status_and_by_the_robot(up):
+def test_a_fault_whose_place_is_taken_when_it_is_to_begin_is_reported_by_status_and_by_the_robot(up):
     robot = up(speed="0.05")
     robot.running()
     first = control.ask(robot.name, {"do": "fault", "fault": "MCH.absolute_encoder:offset"})
     start = f"{first['time_s'] + 0.05:.3f}"  # later than the next request can come: a second by the wall clock
     late = f"MCH.absolute_encoder:stuck@{start} s"
     assert control.ask(robot.name, {"do": "fault", "fault": late})["time_s"] < float(start)
-    [told] = robot.until(lambda status: status["gave_way"], "told")["gave_way"]
-    assert told == (
+    [reported] = robot.until(lambda status: status["gave_way"], "told")["gave_way"]
+    assert reported == (
         f"fault 1, {late}, gave way at {start} s: MCH.absolute_encoder:offset still works at MCH.absolute_encoder"
     )
-    robot.wait_for(re.escape(told))
+    robot.wait_for(re.escape(reported))
 
 
-def test_a_fault_at_a_sensor_acts_beside_processes_and_one_inside_a_board_is_refused(command):
+def test_a_fault_at_a_sensor_acts_with_boards_in_processes_and_one_inside_a_board_is_refused(command):
     run = ("up", "--time", "0.06s", "--speed", "max", "--json", "-", "--name", f"test-{uuid.uuid4().hex[:12]}")
     done = command(*run, "--fault", "MCH.absolute_encoder:offset@0.03 s")
     [fault] = json.loads(done.stdout)["faults"]

@@ -44,10 +44,10 @@ def test_a_walk_leaves_its_files_and_nothing_else(folder):
         "report.html",
         "x.json",
     }
-    told = json.loads((folder / "summary.json").read_text())
-    assert told["complete"] is True
-    assert told["files"] == dict.fromkeys(names - {"summary.json", "x.json"}, "complete")
-    assert told == json.loads((folder / "x.json").read_text())
+    reported = json.loads((folder / "summary.json").read_text())
+    assert reported["complete"] is True
+    assert reported["files"] == dict.fromkeys(names - {"summary.json", "x.json"}, "complete")
+    assert reported == json.loads((folder / "x.json").read_text())
 
 
 def test_the_logged_frames_decode_with_the_generated_dbc(folder):
@@ -164,7 +164,7 @@ class TestInABrowser:
         assert len(axes) >= 2 * 13
         assert [text for text in axes if not re.fullmatch(r"\w.* \(.+\)|board", text)] == []
 
-    def test_pointing_at_a_chart_moves_the_robot_and_every_chart_to_that_instant(self, page):
+    def test_pointing_at_a_chart_moves_the_robot_and_every_chart_to_that_time(self, page):
         page.value("rangerReport.setRunning(false)")
         chosen = []
         for key, share in (("hip-angle", 0.3), ("voltage", 0.6)):
@@ -213,5 +213,5 @@ class TestInABrowser:
         page.until(f"{ink} > 0.7")
         assert page.value(paper) < 0.2
 
-    def test_the_page_has_no_error_of_its_own(self, page):
+    def test_the_page_itself_has_no_error(self, page):
         assert page.errors == []

@@ -12,7 +12,7 @@ from ranger_sim.tools.bench import cases, command, flooders, floods, interfaces,
 from tests.can_bus.hosting import hosted
 
 
-def told(capsys, *arguments):
+def reported(capsys, *arguments):
     code = cli.main(["bench", *arguments])
     return code, capsys.readouterr()
 
@@ -47,7 +47,7 @@ def test_what_is_timed_is_compared_with_python_cans_virtual_turn_by_turn(capsys,
         return {"figure": next(speeds[name])}
 
     monkeypatch.setattr(command, "measured", measured)
-    code, out = told(capsys, "robot", "--seconds", "7", "--json", "-")
+    code, out = reported(capsys, "robot", "--seconds", "7", "--json", "-")
     assert code == 0
     result = json.loads(out.out)
     assert order == ["robot", "robot-longer", "virtual"] * 3
@@ -59,7 +59,7 @@ def test_what_is_timed_is_compared_with_python_cans_virtual_turn_by_turn(capsys,
     assert row.endswith("x real time  1 s costs 2,000 of its frames")
 
 
-def test_a_case_is_timed_in_a_process_of_its_own(monkeypatch):
+def test_a_case_is_timed_in_its_own_process(monkeypatch):
     assert cases.measured("plant", 0.02)["figure"] > 1.0
     monkeypatch.setitem(cases.CASES, "nowhere", cases.CASES["plant"])  # here, but not in the other process
     with pytest.raises(RuntimeError, match="bench: case nowhere: KeyError: 'nowhere'"):
@@ -114,7 +114,7 @@ def test_a_frame_lost_doubled_or_out_of_order_is_noticed():
         tally = benchmark.Tally()
         for number in numbers:
             tally.take(benchmark.numbered(0, benchmark.IDENTIFIERS * number))
-        assert (tally.heard, tally.reordered) == (3, reordered)
+        assert (tally.received, tally.reordered) == (3, reordered)
 
 
 def test_interfaces_are_compared_with_a_line_each(monkeypatch):
@@ -127,7 +127,7 @@ def test_interfaces_are_compared_with_a_line_each(monkeypatch):
     assert "udp_multicast: left out, it needs the package msgpack" in said
 
 
-def test_a_walk_that_is_kept_says_how_it_went():
+def test_a_walk_that_is_kept_records_how_it_went():
     row = walks.walked(Scenario(), 2)
     assert row["steps"] == 2 and not row["fell"] and row["lost"] == row["overruns"] == 0
     assert set(walks.KEPT) <= set(row)
@@ -144,9 +144,9 @@ def test_the_robot_as_processes_is_measured_by_its_own_report():
 def test_an_answer_later_than_its_bound_is_exit_code_1(capsys, monkeypatch):
     from ranger_sim.can_bus import bound_check
 
-    assert told(capsys, "bounds", "--sets", "3")[0] == 0
+    assert reported(capsys, "bounds", "--sets", "3")[0] == 0
     monkeypatch.setattr(bound_check, "random_sets", lambda count: {"sets": count, "exceeded": 1})
-    assert told(capsys, "bounds", "--sets", "3")[0] == 1
+    assert reported(capsys, "bounds", "--sets", "3")[0] == 1
 
 
 def test_a_queue_of_wrong_frames_is_counted_by_the_load():
@@ -191,8 +191,8 @@ def test_a_robot_under_floods_runs_as_fast_as_the_machine_can_hold(processors, s
     assert floods.speed_for(processors) == speed
 
 
-def test_every_flood_has_a_program_and_together_they_use_each_door():
-    doors = flooders.Doors("x")
+def test_every_flood_has_a_program_and_together_they_use_each_endpoint():
+    doors = flooders.Endpoints("x")
     counts = {name: len(flooders.programs(name, doors)) for name in flooders.NAMES}
     assert set(flooders.FLOODS) < set(counts)
     nobody = set(flooders.PEACE_OF.values())
@@ -205,7 +205,7 @@ def test_every_flood_has_a_program_and_together_they_use_each_door():
 
 def test_a_page_of_a_flood_speaks_as_a_browser_does():
     """The handshake of RFC 6455, 1.3, and a masked text of its 5.7 but for the mask."""
-    head = flooders.handshake(flooders.Doors("x", panel=80), "word", "http://a")
+    head = flooders.handshake(flooders.Endpoints("x", panel=80), "word", "http://a")
     assert head.startswith(b"GET /socket?token=word HTTP/1.1\r\nHost: 127.0.0.1:80\r\n") and head.endswith(b"\r\n\r\n")
     assert b"Sec-WebSocket-Version: 13\r\nOrigin: http://a\r\n" in head
     assert flooders.message("Hello") == b"\x81\x85\0\0\0\0Hello"
@@ -216,12 +216,12 @@ def test_a_sender_in_the_window_is_served_as_long_as_it_lasts():
     """The dearest client that keeps to the protocol, against a bus alone: it is never sent away."""
     with (
         hosted("can1", speed=50.0) as (name, host),
-        flooders.flooded(flooders.FRAMES_IN_WINDOW, flooders.Doors(name)),
+        flooders.flooded(flooders.FRAMES_IN_WINDOW, flooders.Endpoints(name)),
     ):
         (server,) = host.servers
-        listener = flooders.attached(flooders.Doors(name))
+        listener = flooders.attached(flooders.Endpoints(name))
         with listener:
-            heard = 0
-            while heard < 40_000:  # some 1,000 frames
-                heard += len(listener.recv(1 << 16))
+            received = 0
+            while received < 40_000:  # some 1,000 frames
+                received += len(listener.recv(1 << 16))
         assert server.totals["frames_in"] > 500 and not server.sent_away

@@ -202,7 +202,7 @@ def test_what_the_held_out_strides_refuse_is_not_named():
     assert answer.causes == [] and "held-out" in answer.stopped
 
 
-def test_a_candidate_with_the_same_signature_is_told_as_a_tie():
+def test_a_candidate_with_the_same_signature_is_reported_as_a_tie():
     robot = StraightRobot()
     robot.columns["sensor_offset at hip angle"] = -3.0 * robot.columns["sensor_offset at leg angle"]
     answer = naming.Search(robot, *targets(robot.features({"sensor_offset at leg angle": -0.04}), 0.5, 1)).run()
@@ -274,7 +274,7 @@ def csv(tmp_path, walk, every=3, name="walk.csv"):
     return path
 
 
-def test_the_command_tells_what_differs_and_draws_it(tmp_path, capsys):
+def test_the_command_reports_what_differs_and_draws_it(tmp_path, capsys):
     path = csv(tmp_path, walk_by_hand(4, slower={4: 1.03}))
     code = cli.main(["compare-walk", str(path), "--steps", "14", "--out", str(tmp_path / "out"), "--json", "-"])
     answer = json.loads(capsys.readouterr().out)
@@ -303,15 +303,15 @@ def test_the_command_tells_what_differs_and_draws_it(tmp_path, capsys):
         (("--body", "nobody"), ("nobody",)),
     ],
 )
-def test_what_cannot_be_compared_is_told_in_one_line(tmp_path, capsys, options, words):
+def test_logs_that_cannot_be_compared_are_reported_in_one_line(tmp_path, capsys, options, words):
     walk = walk_by_hand(3)
     still = gait.Walk(walk.hip, walk.lean, (walk.state[0], np.ones(len(walk.state[0]))))
     assert cli.main(["compare-walk", str(csv(tmp_path, still)), *options]) == 2
-    told = capsys.readouterr().err.strip()
-    assert told.count("\n") == 0 and all(word in told for word in words), told
+    reported = capsys.readouterr().err.strip()
+    assert reported.count("\n") == 0 and all(word in reported for word in words), reported
 
 
-def test_a_state_that_is_no_whole_number_is_refused(tmp_path, capsys):
+def test_a_state_that_is_not_a_whole_number_is_refused(tmp_path, capsys):
     walk = walk_by_hand(3)
     path = csv(tmp_path, walk)
     text = path.read_text(encoding="utf-8").replace(",2\n", ",2.5\n")

@@ -38,7 +38,7 @@ def test_the_list_has_every_place_with_its_modes(capsys):
     assert "jammed" in printed
 
 
-def test_a_place_tells_its_modes_parameters_limits_sources_and_what_it_refuses(capsys):
+def test_a_place_lists_its_modes_parameters_limits_sources_and_what_it_refuses(capsys):
     printed = "\n".join(lines_of(capsys, "faults", "MCH.absolute_encoder"))
     assert re.search(r"^offset +shows a constant too much$", printed, re.MULTILINE)
     assert re.search(r"^ +offset +100 counts \(-4096 to 4096\): what is added$", printed, re.MULTILINE)
@@ -76,7 +76,7 @@ def test_the_json_has_the_same_for_programs(capsys):
         ("CSR.adc_internal:late_conversion", "burst mode"),
     ],
 )
-def test_what_is_typed_wrong_is_refused_in_a_line_that_says_what_was_perhaps_meant(capsys, typed, words):
+def test_a_mistyped_name_is_refused_in_one_line_with_a_suggestion(capsys, typed, words):
     assert words in refused(capsys, "walk", "--time", "1ms", "--fault", typed)
 
 
@@ -110,7 +110,7 @@ def walk(capsys, *arguments):
     return code, json.loads(printed.out), printed.err
 
 
-def test_a_walk_tells_what_became_of_its_faults_in_its_summary(capsys):
+def test_a_walk_reports_the_course_of_its_faults_in_its_summary(capsys):
     code, summary, _ = walk(
         capsys, "--time", "60ms",
         "--fault", "MCH.absolute_encoder:offset@20 ms..40 ms",
@@ -215,7 +215,7 @@ def test_a_mode_or_a_place_that_is_there_already_is_refused():
         CATALOGUE.add_places([CATALOGUE.places["world.robot"]])
 
 
-TOLD = {
+REPORTED = {
     "of_faults": 1,
     "first_difference": {"where": "can1", "name": "MCH_ANGLE", "after_ms": 2.621},
     "detected": {"code": "MCFI_ANKL_LO", "board": "MCFI", "rate": False},
@@ -243,18 +243,18 @@ TOLD = {
             "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), no error reports it",
         ),
         (
-            {"detected": {**TOLD["detected"], "rate": True}, "reaction": None, "fall_ms": None},
+            {"detected": {**REPORTED["detected"], "rate": True}, "reaction": None, "fall_ms": None},
             "; against the run without it: MCH_ANGLE differs after 2.621 ms (can1), reported by MCFI_ANKL_LO from "
             "MCFI, more often than without after 738.5 ms",
         ),
     ],
 )
-def test_a_proof_is_told_in_the_faults_line(changes, words):
-    assert faults.proof_text(TOLD | changes) == words
+def test_a_proof_is_reported_in_the_faults_line(changes, words):
+    assert faults.proof_text(REPORTED | changes) == words
     assert faults.proof_text(None) == ""
 
 
-def test_a_walk_with_proof_says_when_who_told_and_changes_nothing(capsys, tmp_path):
+def test_a_walk_with_proof_reports_when_and_by_which_board_and_changes_nothing(capsys, tmp_path):
     fault = "MCH.absolute_encoder:offset,offset=300@300 ms"
     summaries = []
     for proof in ([], ["--proof"]):

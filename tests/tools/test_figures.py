@@ -92,15 +92,15 @@ def answer(capsys, *words):
 
 
 def test_the_wrong_number_is_named_and_the_corrected_body_has_it(asked, tmp_path, capsys):
-    code, told = answer(capsys, asked, "--out", tmp_path / "out")
+    code, reported = answer(capsys, asked, "--out", tmp_path / "out")
     assert code == 1
-    (cause,) = told["causes"]
+    (cause,) = reported["causes"]
     assert (cause["name"], cause["at"]) == ("geometry", "ankle_offset_m")
     assert cause["parameters"]["ankle_offset_m"]["value"] == pytest.approx(0.14, abs=0.004)
-    body = body_files.load(told["model_file"])
+    body = body_files.load(reported["model_file"])
     assert body.values["outer_ankle_offset_m"] == body.values["inner_ankle_offset_m"] == pytest.approx(0.14, abs=0.004)
     assert body.base == "appendix"
-    assert json.loads((tmp_path / "out" / "diagnosis.json").read_text()) == told
+    assert json.loads((tmp_path / "out" / "diagnosis.json").read_text()) == reported
 
 
 def test_walks_that_are_kept_are_not_walked_again(asked, tmp_path, capsys, monkeypatch):
@@ -114,8 +114,8 @@ def test_walks_that_are_kept_are_not_walked_again(asked, tmp_path, capsys, monke
 
 
 def test_a_hidden_number_is_looked_for_in_place_of_the_measured_figures(asked, capsys):
-    _, told = answer(capsys, asked, "--hide", "hip_spring_Nm_per_rad=-30%", "--hide", "body.leg_length_m=+0.01")
-    spring, leg = told["blind"]
+    _, reported = answer(capsys, asked, "--hide", "hip_spring_Nm_per_rad=-30%", "--hide", "body.leg_length_m=+0.01")
+    spring, leg = reported["blind"]
     assert spring["candidate"] == "hip_spring_Nm_per_rad" and spring["truth"] == pytest.approx(0.7 * 7.6)
     (cause,) = spring["answer"]["causes"]
     low, high = cause["parameters"]["hip_spring_Nm_per_rad"]["ci95"]
@@ -124,17 +124,17 @@ def test_a_hidden_number_is_looked_for_in_place_of_the_measured_figures(asked, c
 
 
 def test_a_further_figure_is_weighed_with_the_others(asked, capsys):
-    _, told = answer(capsys, asked, "--also", "ankle_height_m=0.06+-0.0005")
-    low, high = told["causes"][0]["parameters"]["ankle_offset_m"]["ci95"]
+    _, reported = answer(capsys, asked, "--also", "ankle_height_m=0.06+-0.0005")
+    low, high = reported["causes"][0]["parameters"]["ankle_offset_m"]["ci95"]
     assert low < 0.14 < high and high - low < 0.004
-    assert told["evidence"]["figures"] == 4
+    assert reported["evidence"]["figures"] == 4
 
 
-def test_a_person_is_told_what_is_wrong_and_what_to_measure(asked, capsys):
+def test_the_user_reads_what_is_wrong_and_what_to_measure(asked, capsys):
     assert cli.main(["diagnose-figures", str(asked), "--jobs", "1"]) == 1
-    told = capsys.readouterr().out
-    assert told.startswith("Wrong is ankle_offset_m 0.1") and "was 0.11" in told
-    assert "next: ankle_height_m to 0.001 (ruler)" in told
+    reported = capsys.readouterr().out
+    assert reported.startswith("Wrong is ankle_offset_m 0.1") and "was 0.11" in reported
+    assert "next: ankle_height_m to 0.001 (ruler)" in reported
 
 
 @pytest.mark.parametrize(
@@ -150,10 +150,10 @@ def test_a_person_is_told_what_is_wrong_and_what_to_measure(asked, capsys):
         (("{file}", "--body", "atlas"), "atlas"),
     ],
 )
-def test_a_mistake_on_the_command_line_is_told_in_a_line(asked, capsys, words, complaint):
+def test_a_mistake_on_the_command_line_is_reported_in_one_line(asked, capsys, words, complaint):
     assert cli.main(["diagnose-figures", *(word.format(file=asked) for word in words), "--jobs", "1"]) == 2
-    told = capsys.readouterr().err
-    assert complaint in told and told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert complaint in reported and reported.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -166,12 +166,12 @@ def test_a_mistake_on_the_command_line_is_told_in_a_line(asked, capsys, words, c
         ('"body.hip_spring_Nm_per_rad" = 1', '"body.hips" = 1', "the body has no such number"),
     ],
 )
-def test_a_file_that_does_not_fit_the_robot_is_told_in_a_line(asked, capsys, old, new, complaint):
+def test_a_file_that_does_not_fit_the_robot_is_reported_in_one_line(asked, capsys, old, new, complaint):
     assert old in FILE
     asked.write_text(FILE.replace(old, new, 1), encoding="utf-8")
     assert cli.main(["diagnose-figures", str(asked), "--jobs", "1"]) == 2
-    told = capsys.readouterr().err
-    assert complaint in told and "asked.toml" in told and told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert complaint in reported and "asked.toml" in reported and reported.count("\n") == 1
 
 
 def test_the_question_of_the_record_walk_fits_the_robot():
@@ -199,9 +199,9 @@ def test_what_never_got_going_is_neither_figure_nor_failure():
     setup = walks.Setup(body="appendix", steps=20, settle_steps=10)
     # a centre of mass 60 mm ahead tips it over
     point = setup.settings({"body.outer_mass_offset_kg_m": 0.3, "body.inner_mass_offset_kg_m": 0.3}, 1)
-    told = Outcome(**walks.walk(walks.Order(point, 20, 10)))
-    assert told.survived == 0.0 and not told.failed
-    assert "step_length_m" not in told.figures and "sole_to_hip_m" in told.figures
+    reported = Outcome(**walks.walk(walks.Order(point, 20, 10)))
+    assert reported.survived == 0.0 and not reported.failed
+    assert "step_length_m" not in reported.figures and "sole_to_hip_m" in reported.figures
 
 
 def test_walks_are_the_same_in_one_process_and_in_two():
@@ -224,7 +224,7 @@ def test_a_store_of_walks_that_was_cut_short_is_begun_anew(tmp_path):
     assert walks.Walks(walks.Setup(), (), 1, tmp_path).known == {}
 
 
-def test_a_folder_that_cannot_be_is_told(asked, tmp_path):
+def test_an_impossible_folder_is_reported(asked, tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(UserError, match="cannot write"):
         work.run(cli.parser().parse_args(["diagnose-figures", str(asked), "--out", str(tmp_path / "file")]))

@@ -19,7 +19,7 @@ def everything(folder):
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
 
 
-def test_what_is_written_is_what_the_list_says_with_the_folders_name(tmp_path, capsys):
+def test_the_files_written_are_those_of_the_list_with_the_folders_name(tmp_path, capsys):
     assert cli.main(["new", str(tmp_path / "my-wheel")]) == 0
     project = tmp_path / "my-wheel"
     assert capsys.readouterr().out == f"{project}: written. cd {project}; pytest\n"
@@ -32,7 +32,7 @@ def test_what_is_written_is_what_the_list_says_with_the_folders_name(tmp_path, c
     assert everything(tmp_path) == sorted(["my-wheel", *(f"my-wheel/{path}" for path in everything(project))])
 
 
-def test_an_empty_folder_is_taken_also_the_one_that_a_shell_stands_in(tmp_path, monkeypatch):
+def test_an_empty_folder_is_taken_also_the_current_one_of_a_shell(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["new", "."]) == 0
     assert (tmp_path / "machine.py").is_file() and not list(tmp_path.glob(".ranger-sim-new-*"))

@@ -41,7 +41,7 @@ def test_every_figure_is_drawn_within_the_width_of_the_window(identified, tmp_pa
         assert page.errors == []
 
 
-def test_what_a_figure_says_cannot_end_its_script_or_become_markup():
+def test_the_text_of_a_figure_cannot_end_its_script_or_become_markup():
     figure = go.Figure(go.Scatter(x=[0.0, 1.0], y=[0.5, 2.5], name="</script><b>bold</b>"))
     html = str(figures.placed(figure))
     (numbers,) = re.findall(r'<script type="application/json" class="figure">(.*?)</script>', html)

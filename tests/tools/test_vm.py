@@ -197,12 +197,12 @@ def test_at_the_time_limit_what_was_held_back_is_written(attendant, monkeypatch)
     assert b"".join(written) == b"half" + END[:3]
 
 
-def test_without_qemu_the_user_is_told_what_to_run(capfd, monkeypatch):
+def test_without_qemu_the_command_to_run_is_printed(capfd, monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
     assert cli.main(["vm", "--", "true"]) == 2
-    told = capfd.readouterr().err
-    assert "qemu-system-x86_64 is not installed; run " in told and "install-packages.sh" in told
-    assert told.count("\n") == 1
+    reported = capfd.readouterr().err
+    assert "qemu-system-x86_64 is not installed; run " in reported and "install-packages.sh" in reported
+    assert reported.count("\n") == 1
 
 
 def test_options_that_cannot_be_are_refused(capfd, tmp_path):

@@ -44,7 +44,7 @@ def check_bus(tmp_path, capsys):
     return run
 
 
-def test_a_wrong_bit_rate_is_reported_and_the_command_beside_it_mends_it(check_bus, figure):
+def test_a_wrong_bit_rate_is_reported_and_the_command_next_to_it_mends_it(check_bus, figure):
     set_up("can0")
     set_up("can1", BIT_RATE // 2)
     code, found = check_bus()

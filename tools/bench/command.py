@@ -38,42 +38,42 @@ class Part:
     alone: Callable[[argparse.Namespace, Callable[[str], None]], Any] | None = None
 
 
-def interfaces(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
+def interfaces(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
     """Frames through python-can interfaces."""
     from ranger_sim.tools.bench import interfaces as part
 
-    return part.run(options.frames, say)
+    return part.run(options.frames, report)
 
 
-def processes(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
+def processes(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
     """The robot as processes."""
     from ranger_sim.tools.bench import processes as part
 
-    return part.run(options.seconds, say)
+    return part.run(options.seconds, report)
 
 
-def floods(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
+def floods(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
     """The robot under clients that write endlessly and read nothing."""
     from ranger_sim.tools.bench import floods as part
 
     kept = None if options.keep is None else pathlib.Path(options.keep)
-    return part.run(options.seconds, say, speed=options.speed, kept=kept)
+    return part.run(options.seconds, report, speed=options.speed, kept=kept)
 
 
-def walks(options: argparse.Namespace, say: Callable[[str], None]) -> list[dict]:
+def walks(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
     """The acceptance walks."""
     from ranger_sim.tools.bench import walks as part
 
-    return part.run(say)
+    return part.run(report)
 
 
-def bounds(options: argparse.Namespace, say: Callable[[str], None]) -> dict:
+def bounds(options: argparse.Namespace, report: Callable[[str], None]) -> dict:
     """Random message sets against their bounds."""
     from ranger_sim.can_bus import bound_check
 
     figures = bound_check.random_sets(options.sets)
     for name, value in figures.items():
-        say(f"{name:28} {value:.4g}" if isinstance(value, float) else f"{name:28} {value}")
+        report(f"{name:28} {value:.4g}" if isinstance(value, float) else f"{name:28} {value}")
     return figures
 
 
@@ -158,12 +158,12 @@ def run(options: argparse.Namespace) -> int:
     chosen = [name for name in PARTS if name in (options.part or TOGETHER)]
     result: dict = {"date": wallclock.today_iso(), "machine": machine()}
 
-    def say(text: str) -> None:
+    def report(text: str) -> None:
         if options.json != "-":
             print(text, flush=True)
 
     about = result["machine"]
-    say(
+    report(
         f"{about['processor']}, {about['cores']} cores, Python {about['python']}, {about['runs']}; "
         f"load average before: {about['load_average_before']:.2f}"
     )
@@ -171,12 +171,12 @@ def run(options: argparse.Namespace) -> int:
     if cases:
         result.update(runs=options.runs, figures=timed_together(cases, options.runs, options.seconds))
         for line in lines_of(result["figures"], options.runs):
-            say(line)
+            report(line)
     for name in chosen:
         alone = PARTS[name].alone
         if alone is not None:
-            say(f"{name}: {PARTS[name].line}")
-            result[name] = alone(options, lambda text: say(f"  {text}"))
+            report(f"{name}: {PARTS[name].line}")
+            result[name] = alone(options, lambda text: report(f"  {text}"))
     text = json.dumps(result, indent=2)
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())

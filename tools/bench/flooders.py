@@ -25,7 +25,7 @@ from ranger_sim.tools.robodaq.codec import write_packet
 
 CHUNK = 1 << 16  # bytes offered at once: what a socket takes
 LET_IN_S = 5.0  # how long a page waits for its place
-LOOK_S = 0.1  # between two checks by programs that only stay connected
+POLL_S = 0.1  # between two checks by programs that only stay connected
 
 # The robot that is flooded: one of Python boards with every interface open; one with a board that runs machine code and
 # a debugger port; one with a panel connected.
@@ -33,7 +33,7 @@ WHOLE, DEBUGGED, SHOWN = "whole", "debugged", "shown"
 
 
 @dataclasses.dataclass(frozen=True)
-class Doors:
+class Endpoints:
     """Addresses of the robot under test. gdb, panel: ports, 0 if not open."""
 
     name: str
@@ -48,103 +48,103 @@ class Doors:
 
 # --- ways in ---------------------------------------------------------------------------------------------
 
-Way = Callable[[Doors], "socket.socket | int"]
+Way = Callable[[Endpoints], "socket.socket | int"]
 
 
-def attached(doors: Doors, channel: str = "can1") -> socket.socket:
+def attached(endpoints: Endpoints, channel: str = "can1") -> socket.socket:
     """A client of the attach protocol on a bus."""
     hello = wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0) + channel.encode())
-    return _local(wire.SOCKET_PREFIX + doors.name, hello)
+    return _local(wire.SOCKET_PREFIX + endpoints.name, hello)
 
 
-def unknown(doors: Doors) -> socket.socket:
+def unknown(endpoints: Endpoints) -> socket.socket:
     """A connection to the attach protocol that has not identified itself."""
-    return _local(wire.SOCKET_PREFIX + doors.name, b"")
+    return _local(wire.SOCKET_PREFIX + endpoints.name, b"")
 
 
-def daemon(doors: Doors) -> socket.socket:
+def daemon(endpoints: Endpoints) -> socket.socket:
     """A client of socketcand on can1."""
-    return _distant(doors.port, b"< open can1 >< rawmode >")
+    return _distant(endpoints.port, b"< open can1 >< rawmode >")
 
 
-def asking(doors: Doors) -> socket.socket:
+def asking(endpoints: Endpoints) -> socket.socket:
     """A client of the supervisor."""
-    return _local(control.address(doors.name), b"")
+    return _local(control.address(endpoints.name), b"")
 
 
-def viewing(doors: Doors) -> socket.socket:
+def viewing(endpoints: Endpoints) -> socket.socket:
     """A viewer of the feed."""
-    return _local(records.address(doors.name), b"")
+    return _local(records.address(endpoints.name), b"")
 
 
-def calibrating(doors: Doors) -> socket.socket:
+def calibrating(endpoints: Endpoints) -> socket.socket:
     """The XCP master on UDP that holds the connection."""
-    client = stranger(doors)
+    client = stranger(endpoints)
     client.send(xcp_packets(b"\xff\x00"))
     return client
 
 
-def stranger(doors: Doors) -> socket.socket:
+def stranger(endpoints: Endpoints) -> socket.socket:
     """A client that sends datagrams to the XCP slave."""
     client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    client.connect(("127.0.0.1", doors.xcp))
+    client.connect(("127.0.0.1", endpoints.xcp))
     return client
 
 
-def probing(doors: Doors) -> socket.socket:
+def probing(endpoints: Endpoints) -> socket.socket:
     """An XCP master on the bus, connected."""
-    client = attached(doors, XCP_BUS.lower())
+    client = attached(endpoints, XCP_BUS.lower())
     client.sendall(xcp_frame(b"\xff\x00"))
     return client
 
 
-def debugging(doors: Doors) -> socket.socket:
+def debugging(endpoints: Endpoints) -> socket.socket:
     """A debugger that has let its board run."""
-    return _distant(doors.gdb, framed(b"c"))
+    return _distant(endpoints.gdb, framed(b"c"))
 
 
-def debugger(doors: Doors) -> socket.socket:
+def debugger(endpoints: Endpoints) -> socket.socket:
     """A debugger that sends nothing."""
-    return _distant(doors.gdb, b"")
+    return _distant(endpoints.gdb, b"")
 
 
-def visiting(doors: Doors) -> socket.socket:
+def visiting(endpoints: Endpoints) -> socket.socket:
     """A connection to the panel that sends nothing."""
-    return _distant(doors.panel, b"")
+    return _distant(endpoints.panel, b"")
 
 
-def page(doors: Doors) -> socket.socket:
+def page(endpoints: Endpoints) -> socket.socket:
     """A page of the panel that has been admitted."""
-    client = _distant(doors.panel, handshake(doors, doors.token))
+    client = _distant(endpoints.panel, handshake(endpoints, endpoints.token))
     client.settimeout(LET_IN_S)
-    heard = b""
-    while b"\r\n\r\n" not in heard:
+    received = b""
+    while b"\r\n\r\n" not in received:
         if not (data := client.recv(1)):
             client.close()
             raise ConnectionResetError
-        heard += data
+        received += data
     client.settimeout(None)
     return client
 
 
-def page_of_another_site(doors: Doors) -> socket.socket:
+def page_of_another_site(endpoints: Endpoints) -> socket.socket:
     """A page that was loaded from another site and knows the token."""
-    return _distant(doors.panel, handshake(doors, doors.token, "http://elsewhere.example"))
+    return _distant(endpoints.panel, handshake(endpoints, endpoints.token, "http://elsewhere.example"))
 
 
-def page_with_a_wrong_token(doors: Doors) -> socket.socket:
+def page_with_a_wrong_token(endpoints: Endpoints) -> socket.socket:
     """A page that guesses the token."""
-    return _distant(doors.panel, handshake(doors, "guess"))
+    return _distant(endpoints.panel, handshake(endpoints, "guess"))
 
 
-def line(doors: Doors) -> int:
+def line(endpoints: Endpoints) -> int:
     """The pseudo-terminal of slcan, its channel open."""
-    return _terminal(doors.terminal, b"O\r")
+    return _terminal(endpoints.terminal, b"O\r")
 
 
-def computer(doors: Doors) -> int:
+def computer(endpoints: Endpoints) -> int:
     """The pseudo-terminal of the data link."""
-    return _terminal(doors.data_link, b"")
+    return _terminal(endpoints.data_link, b"")
 
 
 def _local(address: str, greeting: bytes) -> socket.socket:
@@ -185,10 +185,10 @@ def xcp_frame(packet: bytes) -> bytes:
     return wire.send_record(XCP_MASTER_ID, len(packet), low, high)
 
 
-def handshake(doors: Doors, token: str, origin: str = "") -> bytes:
+def handshake(endpoints: Endpoints, token: str, origin: str = "") -> bytes:
     """A browser's opening handshake for a WebSocket (RFC 6455, section 4.1)."""
     return (
-        f"GET /socket?token={token} HTTP/1.1\r\nHost: 127.0.0.1:{doors.panel}\r\nUpgrade: websocket\r\n"
+        f"GET /socket?token={token} HTTP/1.1\r\nHost: 127.0.0.1:{endpoints.panel}\r\nUpgrade: websocket\r\n"
         "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
         + (f"Origin: {origin}\r\n" if origin else "")
         + "\r\n"
@@ -202,13 +202,13 @@ def message(text: str) -> bytes:
     return b"\x81" + length + bytes(4) + data
 
 
-def wish(**content: object) -> bytes:
+def page_request(**content: object) -> bytes:
     """A request of a page."""
     return message(json.dumps(content))
 
 
 # Everything that a page may request at once: 48 channels, each with the most points.
-ALL_PLOTS = wish(do="look", plots=[{"channels": list(range(48)), "span": 60, "points": 4000}])
+ALL_PLOTS = page_request(do="look", plots=[{"channels": list(range(48)), "span": 60, "points": 4000}])
 REQUEST = b"GET /panel.js?token=guess HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 
 # --- floods ----------------------------------------------------------------------------------------------
@@ -284,8 +284,8 @@ FLOODS = {
     "panel, 100 pages that never read": Flood(page, b"", PAGES, ALL_PLOTS, stays=True, robot=SHOWN),
     "panel, 100 pages that never show": Flood(page, b"", PAGES, stays=True, robot=SHOWN),
     "panel, broken messages": Flood(page, message("{"), robot=SHOWN),
-    "panel, shown without end": Flood(page, wish(do="shown"), PLACES, robot=SHOWN),
-    "panel, requests without end": Flood(page, wish(do="values", channels=[0], number=1), robot=SHOWN),
+    "panel, shown without end": Flood(page, page_request(do="shown"), PLACES, robot=SHOWN),
+    "panel, requests without end": Flood(page, page_request(do="values", channels=[0], number=1), robot=SHOWN),
 }
 
 PEACE, BUSY = "no client", "a busy program, no port"
@@ -322,29 +322,29 @@ def burn() -> None:
         pass
 
 
-def send_in_window(doors: Doors) -> None:
+def send_in_window(endpoints: Endpoints) -> None:
     """Send frames as fast as the attach protocol allows and read every answer, until killed."""
-    client, window, waiting, heard = attached(doors), 64, 0, bytearray()
+    client, window, waiting, received = attached(endpoints), 64, 0, bytearray()
     while True:
         client.sendall(wire.send_record(0x7FF, 8, 1, 2) * (window - waiting))
         waiting = window
         while waiting == window:
-            heard += client.recv(CHUNK)
-            while (record := wire.next_record(heard)) is not None:
+            received += client.recv(CHUNK)
+            while (record := wire.next_record(received)) is not None:
                 waiting -= record[0] in (wire.SENT, wire.DROPPED)
 
 
-def read(doors: Doors) -> None:
+def read(endpoints: Endpoints) -> None:
     """Run viewers that read everything in the feed, until killed."""
-    clients = [viewing(doors) for _ in range(4)]
+    clients = [viewing(endpoints) for _ in range(4)]
     while True:
         for number in descriptors.wait([each.fileno() for each in clients], [], 1.0)[0]:
             os.read(number, 1 << 20)
 
 
-def draw(doors: Doors) -> None:
+def draw(endpoints: Endpoints) -> None:
     """Open as many pages as have a place; each requests everything and confirms it at once. Runs until killed."""
-    clients = {client.fileno(): client for client in (page(doors) for _ in range(PLACES))}
+    clients = {client.fileno(): client for client in (page(endpoints) for _ in range(PLACES))}
     for client in clients.values():
         client.sendall(ALL_PLOTS)
     while clients:
@@ -353,33 +353,33 @@ def draw(doors: Doors) -> None:
             if not data:
                 clients.pop(number).close()
             elif b'"picture"' in data:
-                clients[number].sendall(wish(do="shown"))
+                clients[number].sendall(page_request(do="shown"))
 
 
-def stay(flood: Flood, doors: Doors) -> None:
+def stay(flood: Flood, endpoints: Endpoints) -> None:
     """Keep clients connected that send `once` and then nothing, until killed. A disconnected client reconnects."""
     ends: list[socket.socket | int] = []
     watch = select.poll()
     while True:
         with suppress(OSError):
             while len(ends) < flood.clients:
-                ends.append(_greeted(flood, doors))
+                ends.append(_connected(flood, endpoints))
                 watch.register(_number(ends[-1]), select.POLLRDHUP)  # reports a disconnection, not incoming data
-        lost = {number for number, _ in watch.poll(LOOK_S * 1000)}
+        lost = {number for number, _ in watch.poll(POLL_S * 1000)}
         for each in [each for each in ends if _number(each) in lost]:
             watch.unregister(_number(each))
             _close(each)
             ends.remove(each)
 
 
-def pour(flood: Flood, doors: Doors) -> None:
+def pour(flood: Flood, endpoints: Endpoints) -> None:
     """Flood until killed. Reconnect where a connection is ended or refused."""
     data = flood.piece if flood.whole else flood.piece * (CHUNK // max(1, len(flood.piece)))
     ends: list[socket.socket | int] = []
     while True:
         try:
             while len(ends) < flood.clients or not data:
-                ends.append(_greeted(flood, doors))
+                ends.append(_connected(flood, endpoints))
                 os.set_blocking(_number(ends[-1]), False)
         except OSError:
             if not ends:
@@ -397,8 +397,8 @@ def pour(flood: Flood, doors: Doors) -> None:
                 break
 
 
-def _greeted(flood: Flood, doors: Doors) -> socket.socket | int:
-    end = flood.way(doors)
+def _connected(flood: Flood, endpoints: Endpoints) -> socket.socket | int:
+    end = flood.way(endpoints)
     if flood.once:
         os.write(_number(end), flood.once)
     return end
@@ -418,28 +418,28 @@ def _close(end: socket.socket | int) -> None:
 Run = tuple[Callable[..., None], tuple]  # function that a program runs, and its arguments
 
 
-def programs(name: str, doors: Doors) -> list[Run]:
+def programs(name: str, endpoints: Endpoints) -> list[Run]:
     """The programs that disturb the robot under this name."""
     alone: dict[str, Run] = {
         BUSY: (burn, ()),
-        FRAMES_IN_WINDOW: (send_in_window, (doors,)),
-        READ: (read, (doors,)),
-        DRAWN: (draw, (doors,)),
+        FRAMES_IN_WINDOW: (send_in_window, (endpoints,)),
+        READ: (read, (endpoints,)),
+        DRAWN: (draw, (endpoints,)),
     }
     if name in PEACE_OF.values():
         return []
     if name == ALL:
-        return [program for each in TOGETHER for program in programs(each, doors)]
+        return [program for each in TOGETHER for program in programs(each, endpoints)]
     if name in alone:
         return [alone[name]]
-    return [(stay if FLOODS[name].stays else pour, (FLOODS[name], doors))]
+    return [(stay if FLOODS[name].stays else pour, (FLOODS[name], endpoints))]
 
 
 @contextmanager
-def flooded(name: str, doors: Doors) -> Iterator[None]:
+def flooded(name: str, endpoints: Endpoints) -> Iterator[None]:
     """Run the programs of this name inside the context."""
     context = multiprocessing.get_context("fork")
-    running = [context.Process(target=what, args=on, daemon=True) for what, on in programs(name, doors)]
+    running = [context.Process(target=what, args=on, daemon=True) for what, on in programs(name, endpoints)]
     for each in running:
         each.start()
     try:

@@ -34,7 +34,7 @@ from ranger_sim.tools.bench.flooders import (
     PEACE_OF,
     SHOWN,
     WHOLE,
-    Doors,
+    Endpoints,
     debugging,
     flooded,
     robot_of,
@@ -59,27 +59,27 @@ class Started:
     """One of our programs and its output."""
 
     def __init__(self, *words: str) -> None:
-        self.said = ""
+        self.output = ""
         self.process = subprocess.Popen(
             [sys.executable, "-m", "ranger_sim", *words],
             stderr=subprocess.PIPE,
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
 
-    def hear(self, seconds: float) -> None:
+    def read_output(self, seconds: float) -> None:
         """Append its output, waiting at most this long."""
         assert self.process.stderr is not None
         number = self.process.stderr.fileno()
         if descriptors.wait([number], [], seconds)[0]:
-            self.said += os.read(number, 1 << 16).decode()
+            self.output += os.read(number, 1 << 16).decode()
 
-    def told(self, pattern: str) -> re.Match[str]:
+    def wait_for(self, pattern: str) -> re.Match[str]:
         """Wait for the first line that matches the pattern and return the match."""
         end = wallclock.monotonic_s() + PATIENCE_S
-        while not (match := re.search(pattern, self.said)):
+        while not (match := re.search(pattern, self.output)):
             if self.process.poll() is not None or wallclock.monotonic_s() > end:
-                raise RuntimeError(f"no {pattern!r} in:\n{self.said}")
-            self.hear(0.1)
+                raise RuntimeError(f"no {pattern!r} in:\n{self.output}")
+            self.read_output(0.1)
         return match
 
     def close(self) -> None:
@@ -88,7 +88,7 @@ class Started:
             self.process.send_signal(signal.SIGINT)
         end = wallclock.monotonic_s() + PATIENCE_S
         while self.process.poll() is None and wallclock.monotonic_s() < end:
-            self.hear(0.1)
+            self.read_output(0.1)
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
@@ -112,7 +112,7 @@ class Robot:
             words += ["--image", f"{IMAGE_BOARD}={image}", "--gdb", f"{IMAGE_BOARD}=0"]
         self.up = self.files.enter_context(contextlib.closing(Started(*words)))
         self.programs = [self.up]
-        self.doors = Doors(name)
+        self.endpoints = Endpoints(name)
         try:
             self._open(name)
         except BaseException:
@@ -122,31 +122,31 @@ class Robot:
     def _open(self, name: str) -> None:
         """Find the interfaces and wait until all are available."""
         if self.kind == WHOLE:
-            self.doors = Doors(
+            self.endpoints = Endpoints(
                 name,
-                self.up.told(r"slcan: can1 is (\S+)")[1],
-                int(self.up.told(r"socketcand: [\d.]+:(\d+)")[1]),
-                self.up.told(r"data link: ranger-sim daq --port (\S+)")[1],
-                int(self.up.told(r"XCP on UDP: [\d.]+:(\d+)")[1]),
+                self.up.wait_for(r"slcan: can1 is (\S+)")[1],
+                int(self.up.wait_for(r"socketcand: [\d.]+:(\d+)")[1]),
+                self.up.wait_for(r"data link: ranger-sim daq --port (\S+)")[1],
+                int(self.up.wait_for(r"XCP on UDP: [\d.]+:(\d+)")[1]),
             )
         if self.kind == DEBUGGED:
-            self.doors = Doors(name, gdb=int(self.up.told(r"target remote :(\d+)")[1]))
-            self.up.told("name " + name)
-            with debugging(self.doors) as first:  # the run waits for a debugger, which lets it continue
+            self.endpoints = Endpoints(name, gdb=int(self.up.wait_for(r"target remote :(\d+)")[1]))
+            self.up.wait_for("name " + name)
+            with debugging(self.endpoints) as first:  # the run waits for a debugger, which lets it continue
                 first.recv(1)
         self.status: dict = {}
         end = wallclock.monotonic_s() + PATIENCE_S
         while "time_s" not in self.status:
             if wallclock.monotonic_s() > end:
-                raise RuntimeError(f"the robot does not start:\n{self.up.said}")
+                raise RuntimeError(f"the robot does not start:\n{self.up.output}")
             with contextlib.suppress(UserError):
                 self.status = control.ask(name, {"do": "status"})
-            self.up.hear(0.05)
+            self.up.read_output(0.05)
         if self.kind == SHOWN:
             panel = self.files.enter_context(contextlib.closing(Started("panel", "--name", name, "--http-port", "0")))
             self.programs.append(panel)
-            found = panel.told(r":(\d+)/\?token=(\w+)")
-            self.doors = Doors(name, panel=int(found[1]), token=found[2])
+            found = panel.wait_for(r":(\d+)/\?token=(\w+)")
+            self.endpoints = Endpoints(name, panel=int(found[1]), token=found[2])
 
     @property
     def ended(self) -> bool:
@@ -161,7 +161,7 @@ class Robot:
         end = wallclock.monotonic_s() + PATIENCE_S
         while wallclock.monotonic_s() < end and not self.ended:
             with contextlib.suppress(UserError):
-                status = control.ask(self.doors.name, {"do": "status"})
+                status = control.ask(self.endpoints.name, {"do": "status"})
                 return status["at_s"], status["time_s"]
             self.wait(0.1)
         return 0.0, 0.0
@@ -185,7 +185,7 @@ class Robot:
         end = wallclock.monotonic_s() + seconds
         while (left := end - wallclock.monotonic_s()) > 0.0:
             for each in self.programs:
-                each.hear(min(left, 0.1) / len(self.programs))
+                each.read_output(min(left, 0.1) / len(self.programs))
             if self.ended:
                 return
 
@@ -212,7 +212,7 @@ def speed_for(processors: int) -> float:
 def measured(name: str, seconds: float, robot: Robot) -> dict:
     """One flood of this many seconds: pace, processor time per second of the robot, memory."""
     memory = robot.memory_kb()
-    with flooded(name, robot.doors):
+    with flooded(name, robot.endpoints):
         robot.wait(SETTLE_S)
         (wall, virtual), cpu = robot.moment(), robot.cpu_s()
         robot.wait(seconds)
@@ -268,19 +268,19 @@ def verdict(rows: list[dict]) -> str:
 
 def run(
     seconds: float,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
     names: tuple[str, ...] = (),
     speed: float | None = None,
     kept: Path | None = None,
 ) -> list[dict]:
-    """Nobody, a busy program, then every flood (or those named), one after the other; a line each.
+    """Measure the undisturbed robot, a busy program, then every flood (or those named), one by one; a line each.
 
-    speed: times real time; None: what `speed_for` says. kept: a file that gets each row when it is measured, and whose
+    speed: times real time; None: that of `speed_for`. kept: a file that gets each row when it is measured, and whose
     rows of an earlier, interrupted measurement are not measured again.
     """
     speed = speed_for(os.cpu_count() or 1) if speed is None else speed
     before = {row["flood"]: row for row in _rows(kept) if (row["speed"], row["asked_s"]) == (speed, seconds)}
-    say(f"the robot at {speed:g} of real time, {seconds:g} s each")
+    report(f"the robot at {speed:g} of real time, {seconds:g} s each")
     rows: list[dict] = []
     robot = None
     try:
@@ -296,11 +296,11 @@ def run(
                     with kept.open("a", encoding="utf-8") as file:
                         file.write(json.dumps(row) + "\n")
             rows.append(row)
-            say(text_of(row, undisturbed(rows, name)))
+            report(text_of(row, undisturbed(rows, name)))
     finally:
         if robot is not None:
             robot.close()
-    say(verdict(rows))
+    report(verdict(rows))
     return rows
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 SHARE = {"ranger_sim": 1.0, "virtual": 1.0, "udp_multicast": 0.1}
 
 
-def run(frames: int, say: Callable[[str], None]) -> list[dict]:
+def run(frames: int, report: Callable[[str], None]) -> list[dict]:
     """Send `frames` through each interface and report a line for each.
 
     In one thread three nodes receive each other's frames, and rates are per second of processor time. Between processes
@@ -24,11 +24,11 @@ def run(frames: int, say: Callable[[str], None]) -> list[dict]:
     ):
         for interface in interfaces:
             if interface == "udp_multicast" and importlib.util.find_spec("msgpack") is None:
-                say("udp_multicast: left out, it needs the package msgpack")
+                report("udp_multicast: left out, it needs the package msgpack")
                 continue
             row = {"interface": interface, "way": way, **measure(interface, max(1, round(frames * SHARE[interface])))}
             rows.append(row)
-            say(
+            report(
                 f"{interface}, {way}: {row['frames_per_s']:,.0f} frames/s; of {row['frames']:,} "
                 f"{row['lost']:,} lost, {row['reordered']:,} reordered"
             )

@@ -32,7 +32,7 @@ def walked(speed: str, seconds: float) -> dict:
     }
 
 
-def run(seconds: float, say: Callable[[str], None]) -> list[dict]:
+def run(seconds: float, report: Callable[[str], None]) -> list[dict]:
     """Measure both paces and report a line for each."""
     rows = []
     for speed in PACES:
@@ -44,5 +44,5 @@ def run(seconds: float, say: Callable[[str], None]) -> list[dict]:
             for words, key in (("99 % of a board's slots late by at most", "p99_us"), ("the latest by", "max_us"))
             if late
         )
-        say(f"up --speed {speed}: {row['paced_factor']:.2f} x real time by the wall clock{lateness}")
+        report(f"up --speed {speed}: {row['paced_factor']:.2f} x real time by the wall clock{lateness}")
     return rows

@@ -1,4 +1,4 @@
-"""How fast the bus is: a load for four of them; every receiver checks every frame.
+"""Speed of the bus: a load for four of them; every receiver checks every frame.
 
 The load is compiled like the bus, so that the figures are those of the bus.
 """

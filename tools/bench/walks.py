@@ -47,14 +47,14 @@ def walked(scenario: Scenario, steps: int) -> dict:
     }
 
 
-def run(say: Callable[[str], None]) -> list[dict]:
+def run(report: Callable[[str], None]) -> list[dict]:
     """Walk every case of WALKS and report a line for each."""
     rows = []
     for controller, seeds, steps, roughness in WALKS:
         for seed in seeds:
             row = walked(Scenario(controller=controller, seed=seed, floor_roughness_m=roughness), steps)
             rows.append(row)
-            say(
+            report(
                 f"{controller}, seed {seed}, {1000 * roughness:g} mm: {row['steps']} of {steps} steps"
                 f"{', ' + row['fall_cause'] if row['fell'] else ''}; {figure(row['mean_step_length_m'], '{:.3f} m')}, "
                 f"{figure(row['mean_step_time_s'], '{:.3f} s')}, {figure(row['motor_power_W'], '{:.1f} W')}, "

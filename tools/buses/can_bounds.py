@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def of_profile(options: argparse.Namespace) -> list[dict]:
-    """The four buses of a profile, or of the robot as it is."""
+    """The four buses of a profile, or of the robot."""
     chosen = profile.load(options.profile) if options.profile else profile.default()
     table = bus_schedule.robots_table()
     found = []

@@ -76,7 +76,7 @@ def check(chosen: profile.Profile, name: str, table: Table, seconds: float) -> d
         known = {variable.id: variable.name for variable in on_bus}
         expected = {variable.id: variable.name for variable in on_bus if variable.publisher in chosen.external()}
         try:
-            findings += edge.check_traffic(channel, edge.listen(arguments, seconds), known, expected)
+            findings += edge.check_traffic(channel, edge.observe(arguments, seconds), known, expected)
         except edge.NotReadError as error:
             findings.append(
                 edge.Finding(

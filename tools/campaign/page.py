@@ -39,8 +39,8 @@ SHORT = {
 }
 
 
-def render(told: dict[str, Any]) -> str:
-    """The page as text. `told`: of harness/campaigns/summary.py."""
+def render(results: dict[str, Any]) -> str:
+    """The page as text. `results`: of harness/campaigns/summary.py."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=jinja2.select_autoescape(["j2"]),
@@ -49,16 +49,16 @@ def render(told: dict[str, Any]) -> str:
     environment.filters["share"] = share_text
     environment.filters["why"] = why_text
     environment.filters["ms"] = lambda value: "" if value is None else f"{value:.4g} ms"
-    heat = told["heat"]
+    heat = results["heat"]
     return environment.get_template("template.html.j2").render(
-        told=told,
+        results=results,
         colours=COLOURS,
         criteria=CRITERIA,
         heat_html=heat_map(heat) if heat["places"] else "",
-        extremes=[extremes_text(each) for each in told["extremes"]],
+        extremes=[extremes_text(each) for each in results["extremes"]],
         setting_columns=SETTING_COLUMNS,
-        settings=[(list(each["axes"].values()), setting_cells(each)) for each in told["settings"]],
-        times_html=times(told["rows"]) if any(row["detection_ms"] is not None for row in told["rows"]) else "",
+        settings=[(list(each["axes"].values()), setting_cells(each)) for each in results["settings"]],
+        times_html=times(results["rows"]) if any(row["detection_ms"] is not None for row in results["rows"]) else "",
         library=library(),
     )
 
@@ -73,13 +73,13 @@ def share_text(share: dict[str, Any]) -> str:
 
 def heat_map(heat: dict[str, Any]) -> str:
     """Places by modes, coloured by the worst outcome of the cell; the text counts the outcomes."""
-    colours, texts, told = [], [], []
+    colours, texts, counts = [], [], []
     for place in heat["places"]:
         cells = [heat["cells"][place].get(mode) for mode in heat["modes"]]
         worst = [None if cell is None else worst_of(cell) for cell in cells]
         colours.append([None if name is None else ORDER.index(name) for name in worst])
         texts.append(["" if name is None else SHORT[name] for name in worst])
-        told.append([counts_text(cell) for cell in cells])
+        counts.append([counts_text(cell) for cell in cells])
     steps = len(ORDER)
     scale = []
     for place, name in enumerate(ORDER):
@@ -90,7 +90,7 @@ def heat_map(heat: dict[str, Any]) -> str:
             x=heat["modes"],
             y=heat["places"],
             text=texts,
-            customdata=told,
+            customdata=counts,
             texttemplate="%{text}",
             hovertemplate="%{y}: %{x}<br>%{customdata}<extra></extra>",
             colorscale=scale,
@@ -113,13 +113,13 @@ def heat_map(heat: dict[str, Any]) -> str:
 
 
 def counts_text(outcomes: list[str] | None) -> str:
-    """How often each outcome."""
+    """A table of the outcomes and their shares."""
     listed = outcomes or []
     return ", ".join(f"{name} x {listed.count(name)}" for name in dict.fromkeys(listed))
 
 
 def times(rows: list[dict[str, Any]]) -> str:
-    """How soon faults were detected: the share of the runs by the time since the fault's start."""
+    """Plot of detection times: the share of the runs by the time since the fault's start."""
     figure = go.Figure()
     for name, column in (
         ("first error that reports it", "detection_ms"),
@@ -140,26 +140,30 @@ def times(rows: list[dict[str, Any]]) -> str:
     return placed(figure)
 
 
-def markdown(told: dict[str, Any]) -> str:
+def markdown(results: dict[str, Any]) -> str:
     """The same in Markdown, without the plots."""
-    lines = [f"# {told['title']}", "", told["description"], ""] if told["description"] else [f"# {told['title']}", ""]
-    runs = f"{told['runs']} runs"
-    if not told["finished"]:
-        runs = f"**Not finished: {told['runs']} of {told['foreseen']} runs, shares are of these.** The plan"
+    lines = (
+        [f"# {results['title']}", "", results["description"], ""]
+        if results["description"]
+        else [f"# {results['title']}", ""]
+    )
+    runs = f"{results['runs']} runs"
+    if not results["finished"]:
+        runs = f"**Not finished: {results['runs']} of {results['foreseen']} runs, shares are of these.** The plan"
     lines += [
-        f"{runs} ({told['population']}), version {told['version']}. {told['interval']}",
+        f"{runs} ({results['population']}), version {results['version']}. {results['interval']}",
         "",
         "| Outcome | Runs | Share | Criterion |",
         "|---|---|---|---|",
     ]
-    for name, share in told["outcomes"].items():
+    for name, share in results["outcomes"].items():
         lines.append(f"| {name} | {share['count']} | {share_text(share)} | {CRITERIA[name]} |")
     lines += ["", "| Coverage | Share | Runs |", "|---|---|---|"]
-    for what, share in told["coverage"].items():
+    for what, share in results["coverage"].items():
         lines.append(f"| {what} | {share_text(share)} | {share['count']} of {share['of']} |")
-    for each in told["tolerances"]:
+    for each in results["tolerances"]:
         lines += ["", tolerance_text(each)]
-    for each in told["healthy"]:
+    for each in results["healthy"]:
         count, total = each["false_alarms"]
         codes = ", ".join(each["false_alarm_codes"])
         lines += [
@@ -168,7 +172,7 @@ def markdown(told: dict[str, Any]) -> str:
             "from four times: "
             f"{count} false alarms of {total}" + (f" ({codes})." if codes else "."),
         ]
-    heat = told["heat"]
+    heat = results["heat"]
     if heat["places"]:
         lines += ["", "## Worst outcome by place and mode", ""]
         lines += ["| Place | " + " | ".join(heat["modes"]) + " |", "|---" * (len(heat["modes"]) + 1) + "|"]
@@ -176,30 +180,32 @@ def markdown(told: dict[str, Any]) -> str:
             cells = [heat["cells"][place].get(mode) for mode in heat["modes"]]
             lines.append(f"| {place} | " + " | ".join(SHORT[worst_of(cell)] if cell else "" for cell in cells) + " |")
         lines += ["", "; ".join(f"{short}: {name}" for name, short in SHORT.items()) + "."]
-    if told["codes"]:
+    if results["codes"]:
         lines += ["", "## What reported the faults first", ""]
         lines += ["| Error | From | First | Of the faulty board | Median |", "|---|---|---|---|---|"]
-        for each in told["codes"]:
+        for each in results["codes"]:
             told_first = f"{each['first']} | {each['own_board']} | {each['median_ms']:.4g} ms"
             lines.append(f"| {each['code']} | {each['board']} | {told_first} |")
-    if told["stopped_at_look"] is not None and told["runs"] < told["foreseen"]:
-        early = f"Stopped early, at analysis {told['stopped_at_look']}: {told['runs']} of {told['foreseen']} runs."
+    if results["stopped_at_look"] is not None and results["runs"] < results["foreseen"]:
+        early = (
+            f"Stopped early, at analysis {results['stopped_at_look']}: {results['runs']} of {results['foreseen']} runs."
+        )
         lines += ["", early]
-    for each in told["extremes"]:
+    for each in results["extremes"]:
         lines += ["", extremes_text(each)]
-    if told["settings"]:
-        axes = list(told["settings"][0]["axes"])
+    if results["settings"]:
+        axes = list(results["settings"][0]["axes"])
         lines += ["", "## Settings", ""]
         lines += [
             "| " + " | ".join([*axes, *SETTING_COLUMNS]) + " |",
             "|---" * (len(axes) + len(SETTING_COLUMNS)) + "|",
         ]
         lines += [f"| {' | '.join([str(each['axes'][name]) for name in axes] + setting_cells(each))} |"
-                  for each in told["settings"]]  # fmt: skip
+                  for each in results["settings"]]  # fmt: skip
     for title, name in (("Worst cases", "worst"), ("Runs that prove nothing", "unsure")):
-        if told[name]:
+        if results[name]:
             lines += ["", f"## {title}", "", "| Outcome | Fault | Why | Detected | Again |", "|---|---|---|---|---|"]
-            for each in told[name]:
+            for each in results[name]:
                 first = each["detected"]
                 detected = f"{first['code']} from {first['board']}, {first['ms']:.4g} ms" if first else "no"
                 why = why_text(each)
@@ -209,11 +215,11 @@ def markdown(told: dict[str, Any]) -> str:
 
 
 def why_text(each: dict[str, Any]) -> str:
-    """Why a run has its outcome, and when it fell."""
+    """The reason of a run's outcome, and the time of its fall."""
     if each["fall_ms"] is None:
         return str(each["why"])
-    told = " after" if each["outcome"] == "fall" else "; fell after"
-    return f"{each['why']}{told} {each['fall_ms']:.0f} ms"
+    fallen = " after" if each["outcome"] == "fall" else "; fell after"
+    return f"{each['why']}{fallen} {each['fall_ms']:.0f} ms"
 
 
 SETTING_COLUMNS = ("outcome", "why", "step length", "step time", "motor power", "least slot margin", "overruns")
@@ -233,7 +239,7 @@ def setting_cells(each: dict[str, Any]) -> list[str]:
 
 
 def extremes_text(each: dict[str, Any]) -> str:
-    """What a search found for one listed combination, in a sentence."""
+    """A search's result for one listed combination, in a sentence."""
     parts = [f"{each['cell'] or 'Search'}: {each['hits']} of {each['runs']} runs ended as {each['outcome']}"]
     for what in ("least", "soonest"):
         if (found := each[what]) is not None:

@@ -23,11 +23,11 @@ from ranger_sim.tools.campaign.words import proof_text
 from ranger_sim.tools.command_line import interrupts, terminal
 from ranger_sim.tools.command_line.files import replace_file, writable_folder
 
-TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
+REPORT_EVERY_S = 10.0  # where there is no terminal for a progress bar
 TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"
 TABLES_END = "<!-- end -->\n"
 ENCRYPTED = "tls://"
-# option (as argparse names it): what Dask calls it
+# option (as argparse names it): its name in Dask
 TLS_FILES = {"tls_ca_file": "tls_ca_file", "tls_cert": "tls_client_cert", "tls_key": "tls_client_key"}
 EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 
@@ -58,13 +58,13 @@ def run(options: argparse.Namespace) -> int:
                     highlight=False,
                 )
                 return interrupts.EXIT_INTERRUPTED
-        told = summary.of(campaign)
-        write(told, folder)
+        results = summary.of(campaign)
+        write(results, folder)
         if options.document:
-            into_document(pathlib.Path(options.document), told)
-        show(told, console)
+            into_document(pathlib.Path(options.document), results)
+        show(results, console)
         console.print(f"page: {folder / 'index.html'}", soft_wrap=True, highlight=False)
-        return EXIT_UNSURE if any(told["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
+        return EXIT_UNSURE if any(results["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
     finally:
         campaign.close()
 
@@ -90,7 +90,7 @@ def check_scheduler(options: argparse.Namespace) -> None:
 
 
 def pool_of(options: argparse.Namespace, console: Console) -> Any:
-    """Who does the runs: processes of this machine unless Dask is asked for."""
+    """The pool that does the runs: processes of this machine, or Dask on request."""
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.scheduler and not options.scheduler.startswith(ENCRYPTED):
         console.print(
@@ -111,13 +111,13 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
     total, before = campaign.foreseen, len(campaign.cases)
     pool = pool_of(options, console)
     console.print(
-        f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.told}"
+        f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.description}"
         + (f"; {before} of them have results already" if before else ""),
         highlight=False,
         soft_wrap=True,
     )
     begun = wallclock.monotonic_s()
-    tell_at = [begun + TELL_EVERY_S]
+    report_at = [begun + REPORT_EVERY_S]
     since: list[tuple[int, float]] = []  # (runs done, when) as the first result of a run came: healthy walks go before
     with Progress(
         BarColumn(bar_width=20),
@@ -131,28 +131,28 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
     ) as progress:
         task = progress.add_task("runs", total=total, latest="")
 
-        def tell(done: int, latest: str) -> None:
+        def report(done: int, latest: str) -> None:
             if done and not since:
                 since.append((done, wallclock.monotonic_s()))
             progress.update(task, completed=done, latest=latest)
             now = wallclock.monotonic_s()
-            if not console.is_terminal and now >= tell_at[0]:
-                tell_at[0] = now + TELL_EVERY_S
+            if not console.is_terminal and now >= report_at[0]:
+                report_at[0] = now + REPORT_EVERY_S
                 left = ""
                 if since and done > since[0][0]:
                     left = f", {(total - done) * (now - since[0][1]) / (done - since[0][0]) / 60.0:.1f} min left"
                 console.print(f"{done} of {total}{left}", highlight=False)
 
         try:
-            campaign.run(pool, tell)
+            campaign.run(pool, report)
         finally:
             pool.close()
 
 
-def write(told: dict[str, Any], folder: pathlib.Path) -> None:
+def write(results: dict[str, Any], folder: pathlib.Path) -> None:
     """Summary as JSON and Markdown, the runs as CSV, and the page."""
-    rows = told["rows"]
-    replace_file(folder / "summary.json", (json.dumps(told, indent=1) + "\n").encode())
+    rows = results["rows"]
+    replace_file(folder / "summary.json", (json.dumps(results, indent=1) + "\n").encode())
     columns: dict[str, None] = {}
     for row in rows:
         columns.update(dict.fromkeys(row))
@@ -161,11 +161,11 @@ def write(told: dict[str, Any], folder: pathlib.Path) -> None:
     table.writeheader()
     table.writerows(rows)
     replace_file(folder / "runs.csv", text.getvalue().encode())
-    replace_file(folder / "report.md", page.markdown(told).encode())
-    replace_file(folder / "index.html", page.render(told).encode())
+    replace_file(folder / "report.md", page.markdown(results).encode())
+    replace_file(folder / "index.html", page.render(results).encode())
 
 
-def into_document(path: pathlib.Path, told: dict[str, Any]) -> None:
+def into_document(path: pathlib.Path, results: dict[str, Any]) -> None:
     """Put the tables, with date and version, between the marks of a document. UserError when it has none."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -175,29 +175,29 @@ def into_document(path: pathlib.Path, told: dict[str, Any]) -> None:
     _, end, after = rest.partition(TABLES_END)
     if not (begin and end):
         raise UserError(f"--document {path}: it needs the lines {TABLES_BEGIN.strip()} and {TABLES_END.strip()}")
-    tables = page.markdown({**told, "title": f"Results of {wallclock.today_iso()}", "description": ""})
+    tables = page.markdown({**results, "title": f"Results of {wallclock.today_iso()}", "description": ""})
     tables = re.sub("^#", "##", tables, flags=re.MULTILINE)
     replace_file(path, (before + begin + tables + end + after).encode())
 
 
-def show(told: dict[str, Any], console: Console) -> None:
+def show(results: dict[str, Any], console: Console) -> None:
     """The outcomes in a table."""
     table = Table(box=None, pad_edge=False)
     table.add_column("outcome")
     table.add_column("runs", justify="right")
     table.add_column("share", justify="right")
-    for name, share in told["outcomes"].items():
+    for name, share in results["outcomes"].items():
         if share["count"]:
             table.add_row(name, str(share["count"]), page.share_text(share))
     console.print(table)
-    for what, share in told["coverage"].items():
+    for what, share in results["coverage"].items():
         console.print(
             f"{what}: {page.share_text(share)} ({share['count']} of {share['of']})", highlight=False, soft_wrap=True
         )
 
 
 def replay(campaign: engine.Campaign, key: str) -> int:
-    """One case again, from power-up, and whether it comes out as it is on the disk."""
+    """Run one case again, from power-up, and compare it with its result on the disk."""
     campaign.take_known()
     for case in campaign.cases or ([] if campaign.plan.search else campaign.plan.cases()):
         if campaign.key(case).startswith(key):

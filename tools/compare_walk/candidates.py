@@ -1,8 +1,8 @@
-"""What could be wrong with the emulated robot's walk: numbers of body, sensors, floor and controller.
+"""Candidate causes of a wrong emulated walk: numbers of body, sensors, floor and controller.
 
 Identifiers are the catalogue's (`ranger-sim causes`). A candidate is one number that is added somewhere; its value 0 is
-the robot as it stands. Steps and limits are chosen by us: a step moves the gait by a few times the scatter of seeds, a
-limit is what a measurement by hand would have shown.
+the present robot. Steps and limits are chosen by us: a step moves the gait by a few times the scatter of seeds, a
+limit is the largest error that a measurement by hand would have missed.
 """
 
 from __future__ import annotations

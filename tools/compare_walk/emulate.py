@@ -1,7 +1,7 @@
 """Walks of the emulated robot with some numbers changed, through the files that a user would write.
 
-A change becomes a body, a model or a controller file beside the ones that were asked for; `ranger-sim walk` takes the
-same files, so that what was found walks anywhere.
+A change becomes a body, a model or a controller file next to the requested ones; `ranger-sim walk` takes the
+same files, so that the result can walk anywhere.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from ranger_sim.tools.compare_walk import gait
 from ranger_sim.tools.compare_walk.candidates import BY_NAME
 
 PROGRAM = "head-2015"
-SECONDS_PER_STEP = 3.0  # a walk that is slower stands (chosen by us: five times a step)
+SECONDS_PER_STEP = 3.0  # a slower robot counts as standing (chosen by us: five times a step)
 
 
 @dataclasses.dataclass
 class Emulator:
-    """Walks one scenario. `walks`: how many so far. `settled`: strides at the end of `steps` that are the gait."""
+    """Walks one scenario. `walks`: how many so far. `settled`: strides at the end of `steps` that form the gait."""
 
     scenario: Scenario
     steps: int = 18
@@ -59,7 +59,7 @@ class Emulator:
             return gait.of_robot(robot)
 
     def settled_strides(self, changes: Mapping[str, float] | None = None) -> list[gait.Stride]:
-        """The last strides of the walk; none when it fell or stood before it had as many as two more."""
+        """The last strides of the walk; none when the robot fell or stopped before it had as many as two more."""
         walk = self.walk(changes)
         strides = walk.strides()
         if walk.ended or len(strides) < self.settled + 2:
@@ -89,16 +89,16 @@ def with_changes(scenario: Scenario, changes: Mapping[str, float], folder: pathl
 def write_body(name: str, changes: Mapping[str, float], path: pathlib.Path) -> pathlib.Path:
     """A body file with these numbers added to the body's."""
     base = body_files.load(name)
-    told = "found by `ranger-sim compare-walk`"
-    lines = [f'title = "{base.title}, extended"', f'description = "{told}"', f"base = {json.dumps(base_name(name))}"]
+    origin = "found by `ranger-sim compare-walk`"
+    lines = [f'title = "{base.title}, extended"', f'description = "{origin}"', f"base = {json.dumps(base_name(name))}"]
     lines += ["", "[parameters]", *(f"{key} = {float(base.values[key]) + value!r}" for key, value in changes.items())]
-    lines += ["", "[sources]", *(f'{key} = "{told}: {value:+.4g}"' for key, value in changes.items())]
+    lines += ["", "[sources]", *(f'{key} = "{origin}: {value:+.4g}"' for key, value in changes.items())]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 
 def base_name(name: str) -> str:
-    """How a file in another folder names its base."""
+    """The name of a base for a file in another folder."""
     return str(pathlib.Path(name).resolve()) if str(name).endswith(".toml") else str(name)
 
 
@@ -117,9 +117,9 @@ def write_model(path: str | None, offsets: Mapping[str, float], target: pathlib.
 def write_controller(name: str, changes: Mapping[str, float], path: pathlib.Path) -> pathlib.Path:
     """A parameter set with these numbers added to the set's."""
     base = controllers.load(name)
-    told = "found by `ranger-sim compare-walk`"
+    origin = "found by `ranger-sim compare-walk`"
     lines = [f'title = "{base.title}, extended"', f"base = {json.dumps(base_name(name))}", "", "[parameters]"]
     lines += [f"{key} = {base.values[key] + value!r}" for key, value in changes.items()]
-    lines += ["", "[reasons]", *(f'{key} = "{told}: {value:+.4g}"' for key, value in changes.items())]
+    lines += ["", "[reasons]", *(f'{key} = "{origin}: {value:+.4g}"' for key, value in changes.items())]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path

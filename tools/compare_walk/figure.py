@@ -1,4 +1,4 @@
-"""The plot of a comparison: strides of the log and of the emulated robot over each other, and what they differ by.
+"""The plot of a comparison: strides of the log and of the emulated robot over each other, and their differences.
 
 An SVG made of the answer alone (the JSON of `ranger-sim compare-walk`): the same answer gives the same bytes.
 """
@@ -61,12 +61,12 @@ def heading(answer: Mapping[str, Any]) -> list[str]:
 
 
 def longest_s(curves: Mapping[str, Any]) -> float:
-    """Where the time axis ends: a tenth of a second after the longest stride."""
+    """End of the time axis: a tenth of a second after the longest stride."""
     return max(each["changes_s"][-1] for group in curves.values() for each in group) + 0.05
 
 
 def place(value: float, limits: tuple[float, float], ends: tuple[float, float]) -> float:
-    """Where a value lies between two ends, in pixels."""
+    """Position of a value between two ends, in pixels."""
     return ends[0] + (value - limits[0]) / (limits[1] - limits[0]) * (ends[1] - ends[0])
 
 
@@ -133,6 +133,6 @@ def features(answer: Mapping[str, Any]) -> list[str]:
         marks = [(row["measured"], MEASURED), (row["emulated"], BEFORE), *([(extended[i], AFTER)] if extended else [])]
         for value, colour in marks:
             parts.append(f'<circle cx="{x(value):.1f}" cy="{y + 10}" r="4.5" fill="{colour}"/>')
-        told = f"{row['measured']:.3f}, {row['emulated']:.3f}" + (f", {extended[i]:.3f}" if extended else "")
-        parts.append(text(DOTS[0] - 190, y + 14, f"{told} {row['unit']}", size=11, colour=MEASURED))
+        shown = f"{row['measured']:.3f}, {row['emulated']:.3f}" + (f", {extended[i]:.3f}" if extended else "")
+        parts.append(text(DOTS[0] - 190, y + 14, f"{shown} {row['unit']}", size=11, colour=MEASURED))
     return parts

@@ -1,8 +1,8 @@
-"""What a walk of the controller of 2015 looks like: its strides and their features, from a log or from the emulator.
+"""Strides of a walk of the controller of 2015 and their features, from a log or from the emulator.
 
 A stride goes from the beginning of inner swing to the next one, through four states of the walk machine (robot.md C6.3
 C): inner swing, outer push, outer swing, inner push. Its features are the four durations and the angles at the four
-changes of state. The outer leg's lean where a push begins is no feature: there the machine itself sets it.
+changes of state. The outer leg's lean where a push begins is not a feature: there the machine itself sets it.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ STATE_NAMES = {
     INNER_PUSH: "inner push",
 }
 CHANNELS = ("hip_angle_rad", "outer_leg_angle_rad", "walk_state")
-POINTS = 25  # of a state, where trajectories are held against each other; a state lasts 0.2 to 0.4 s
+POINTS = 25  # of a state, for the comparison of trajectories; a state lasts 0.2 to 0.4 s
 ALIKE = 0.15  # strides whose durations differ by less are of one gait (chosen by us: the limp is 8 %)
 
 
 @dataclasses.dataclass(frozen=True)
 class Feature:
-    """One number of a stride: name, unit, what it is."""
+    """One number of a stride: name, unit, meaning."""
 
     name: str
     unit: str
@@ -78,7 +78,7 @@ class Stride:
 
 @dataclasses.dataclass(frozen=True)
 class Walk:
-    """A walk's signals, all (n,) on stamps of their own: hip angle, outer leg's lean, state. `ended`: why it fell."""
+    """A walk's signals, all (n,) with their own stamps: hip angle, outer leg's lean, state. `ended`: why it fell."""
 
     hip: tuple[Array, Array]
     lean: tuple[Array, Array]
@@ -86,7 +86,7 @@ class Walk:
     ended: str = ""
 
     def strides(self) -> list[Stride]:
-        """Every whole stride; none of those that a state out of order breaks off."""
+        """Every whole stride, without those that a state out of order interrupts."""
         times, states = self.state
         changes = np.flatnonzero(np.diff(states)) + 1
         order = [int(each) for each in states[changes]]
@@ -172,7 +172,7 @@ def steady(strides: list[Stride]) -> list[Stride]:
 def scatter(strides: list[Stride]) -> tuple[Array, int]:
     """(standard deviation of each feature in one stride (10,), degrees of freedom behind each).
 
-    Pooled over the features of one unit, because a handful of strides gives a feature of its own no scatter worth its
+    Pooled over the features of one unit, because a handful of strides gives a single feature no scatter worth its
     name. UserError with fewer than two strides.
     """
     if len(strides) < 2:

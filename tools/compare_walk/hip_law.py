@@ -1,4 +1,4 @@
-"""What the hip's motor makes up for, read off a walk's angles by the equation of the swing leg: no emulated walk.
+"""The spring that the hip's motor compensates, from a walk's angles by the equation of the swing leg: no emulated walk.
 
 With a leg's lean p positive forward, its centre of mass c below the hip and w ahead of the leg, about the hip:
 
@@ -6,9 +6,9 @@ With a leg's lean p positive forward, its centre of mass c below the hip and w a
 
 x, y: of the hip, which the standing leg carries about its ankle; h: hip angle; T: motor, positive with the inner legs
 ahead; minus for inner legs that swing. While a foot pushes, until the other feet land, the tracker wants kp (+-hold -
-h) - kd h' (robot.md C6.3 C). What the motor does beyond it goes with h: by the stiffness of the spring that it makes up
-for. That is one number, from all pushes; gains alone would be too many, because a push covers little of the hip's way.
-The interval comes from leaving out one push at a time.
+h) - kd h' (robot.md C6.3 C). The motor's further torque is proportional to h, by the stiffness of the spring that it
+compensates. That is one number, from all pushes; separate gains would be too many, because a push covers little of the
+hip's range. The interval comes from leaving out one push at a time.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FEWEST_PUSHES = 4
 
 @dataclasses.dataclass(frozen=True)
 class HipLaw:
-    """Stiffness that the motor makes up for, with its 95 % interval; torque left unexplained, rms; pushes looked at."""
+    """Stiffness that the motor compensates, with its 95 % interval; unexplained torque, rms; number of pushes used."""
 
     made_up_for_Nm_per_rad: float
     ci95: tuple[float, float]
@@ -92,7 +92,7 @@ def pushes(walk: Walk) -> list[tuple[float, float, int]]:
 
 
 def has_gap(walk: Walk, begin: float, end: float) -> bool:
-    """Whether the angles' stamps leave a hole in the push or in the window about it."""
+    """Whether stamps of the angles are missing in the push or in the window about it."""
     reach = 0.5 * WINDOW * STEP_S
     for time_s, _ in (walk.hip, walk.lean):
         inside = time_s[(time_s > begin - reach) & (time_s < end + reach)]
@@ -121,7 +121,7 @@ def swing_moment(
 
 
 def slope(blocks: list[tuple[Array, Array]]) -> float:
-    """Of the line through zero, over all rows."""
+    """Slope of the line through zero, over all rows."""
     angle = np.concatenate([each for each, _ in blocks])
     response = np.concatenate([each for _, each in blocks])
     return float(angle @ response / (angle @ angle))

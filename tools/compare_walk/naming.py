@@ -1,10 +1,10 @@
-"""Which wrong numbers explain why the emulated walk differs from the logged one, as far as a few strides allow.
+"""The wrong numbers that explain the differences between emulated and logged walk, as far as a few strides allow.
 
 The settled gait of the emulator is a point f(x) in the space of the stride's features, x the candidates' values. Its
-slopes come from emulated walks one step to either side. Causes are added one at a time: the slopes say which candidates
-promise most, the best of them are fitted by walking (Gauss-Newton with the steps held inside the limits), and the best
-fit stays if an F test takes it at `LEVEL` over the number of candidates and the held-out strides agree. The test holds
-the gain against what the model misses, not against the strides' scatter alone: the model may be wrong in many ways.
+slopes come from emulated walks one step to either side. Causes are added one at a time: the slopes select the most
+promising candidates, the best of them are fitted by walking (Gauss-Newton with the steps held inside the limits), and
+the best fit stays if an F test accepts it at `LEVEL` over the number of candidates and the held-out strides agree. The
+test compares the gain with the model's misfit, not with the strides' scatter alone: the model may have many errors.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ranger_sim.tools.compare_walk.candidates import CANDIDATES, Candidate
 from ranger_sim.tools.compare_walk.emulate import Emulator
 
 LEVEL = 0.01  # of a false name, over all candidates together
-MOST_CAUSES = 3  # ten features carry no more with intervals worth their name
+MOST_CAUSES = 3  # ten features support no more with useful intervals
 TRIED = 3  # promising candidates that are fitted by walking, in each round
 ITERATIONS = 4
 TIE = 0.95  # |cos| of two signatures from which on they are one (facts of the diagnosis: docs/diagnose.md)
@@ -34,7 +34,7 @@ Values = dict[str, float]
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """Features to be met (10,), their standard deviations, and the strides that they are the means of."""
+    """Target features (10,), their standard deviations, and the strides of which they are the means."""
 
     mean: Array
     deviation: Array
@@ -46,7 +46,7 @@ class Target:
         return cls(mean, scatter / math.sqrt(len(strides)), tuple(each.number for each in strides))
 
     def misses(self, features: Array) -> Array:
-        """What the features lack, in standard deviations."""
+        """Misses of the features, in standard deviations."""
         return (self.mean - features) / self.deviation
 
 
@@ -66,7 +66,7 @@ class Fit:
 
 @dataclasses.dataclass(frozen=True)
 class Cause:
-    """A named cause: its value, 95 % interval, and the candidates whose signature cannot be told from its own."""
+    """A named cause: its value, 95 % interval, and the candidates with an indistinguishable signature."""
 
     candidate: Candidate
     value: float
@@ -76,7 +76,7 @@ class Cause:
 
 @dataclasses.dataclass
 class Answer:
-    """All that was found. rounds: what each round tried. physical: what is left is no more than the scatter."""
+    """The whole result. rounds: the tries of each round. physical: the rest is no more than the scatter."""
 
     base: Fit
     extended: Fit
@@ -110,7 +110,7 @@ class Search:
         self.known: dict[tuple, Array | None] = {}
 
     def features(self, values: Values) -> Array | None:
-        """Of the settled gait; None where the robot falls, stands, or cannot be."""
+        """Features of the settled gait; None where the robot falls, stops, or is impossible."""
         key = tuple(sorted((name, round(value, 9)) for name, value in values.items() if value != 0.0))
         if key not in self.known:
             self.progress(", ".join(f"{name} {value:+.3g}" for name, value in key) or "unchanged")
@@ -163,7 +163,7 @@ class Search:
         return best
 
     def _along(self, best: Fit, chosen: Sequence[Candidate], move: Array) -> Fit | None:
-        """The first of a whole, a half and a quarter of the move that is better."""
+        """The first improvement among a whole, a half and a quarter of the move."""
         for share in (1.0, 0.5, 0.25):
             values = {
                 each.name: best.values[each.name] + share * float(d) for each, d in zip(chosen, move, strict=True)
@@ -177,13 +177,13 @@ class Search:
         return None
 
     def run(self) -> Answer:
-        """The whole search. The robot has to walk as it stands.
+        """The whole search. The unchanged robot has to walk.
 
-        A candidate that fails the test alone is kept for one more round: two causes of a size hide each other, and the
-        two together may pass where the first, with all of the second in what it leaves, did not.
+        A candidate that fails the test alone is kept for one more round: two causes of equal size hide each other, and
+        both together may pass where the first alone, with the effect of the second unexplained, did not.
         """
         base = self.fit({}, ())
-        assert base is not None  # asked for before
+        assert base is not None  # requested earlier
         accepted, trial, rounds = base, base, []
         stopped = f"{MOST_CAUSES} causes are as many as these features carry"
         while len(trial.values) < MOST_CAUSES:
@@ -206,7 +206,7 @@ class Search:
         return self._answer(base, self.needed(accepted), rounds, stopped)
 
     def needed(self, fit: Fit) -> Fit:
-        """The fit without causes that the others can do without: of two that passed together one may carry nothing."""
+        """The fit without superfluous causes: of two that passed together one may contribute nothing."""
         for name in list(fit.values):
             fewer = self.fit(fit.values, [each for each in fit.values if each != name])
             if fewer is not None and self.judge(fewer, fit)["p"] >= LEVEL / len(self.candidates):
@@ -217,7 +217,7 @@ class Search:
         """Whether the causes that `found` has more than `best` are named: F test and held-out strides."""
         more = len(found.values) - len(best.values)
         left = len(found.misses) - len(found.values)
-        # never held against less than the strides' scatter
+        # never compared with less than the strides' scatter
         ratio = (best.misfit - found.misfit) / more / max(1.0, found.misfit / left)
         p = float(f_distribution.sf(ratio, more, left))
         needed = LEVEL / math.comb(max(more, len(self.candidates)), more)
@@ -236,7 +236,7 @@ class Search:
         }
 
     def _round(self, best: Fit, slopes: dict[str, Array | None]) -> list[tuple[str, Fit]]:
-        """The candidates that promise most, fitted together with what is there."""
+        """The most promising candidates, fitted together with the present causes."""
         promises = []
         there = [slopes[name] for name in best.values]
         for each in self.candidates:
@@ -269,13 +269,13 @@ class Search:
                 candidate = next(each for each in self.candidates if each.name == name)
                 ties = tied(name, columns[:, i], np.delete(columns, i, axis=1), slopes)
                 causes.append(Cause(candidate, value, (value - float(reach[i]), value + float(reach[i])), ties))
-        # what a good model leaves: chi squared with the scatter's few degrees of freedom, an F distribution
+        # misses of a good model: chi squared with the scatter's few degrees of freedom, an F distribution
         physical = bool(best.misfit / left < f_distribution.ppf(0.95, left, self.degrees))
         return Answer(base, best, causes, rounds, stopped, physical)
 
 
 def why_not(refused: Sequence[dict]) -> str:
-    """What the refused rounds say, the first one's candidate alone, the second one's beside it."""
+    """A sentence on the refused rounds: the first one's candidate alone, the second one's with it."""
     first = refused[0]
     numbers = (
         f"squared misses from {first['misfit_before']:.0f} to {first['misfit_after']:.0f}, "
@@ -284,13 +284,13 @@ def why_not(refused: Sequence[dict]) -> str:
     value = first["values"][first["best"]]
     if not first["held_out_agrees"]:
         return f"the best further candidate, {first['best']} ({value:+.3g}), fails at the held-out strides ({numbers})"
-    told = f"the best further candidate, {first['best']} ({value:+.3g}), is not named: p {first['p']:.2g} where "
-    told += f"{first['needed']:.2g} is asked ({numbers})"
-    return told + (f"; nor together with {refused[1]['best']}" if len(refused) > 1 else "")
+    reason = f"the best further candidate, {first['best']} ({value:+.3g}), is not named: p {first['p']:.2g} where "
+    reason += f"{first['needed']:.2g} is asked ({numbers})"
+    return reason + (f"; nor together with {refused[1]['best']}" if len(refused) > 1 else "")
 
 
 def solve(fit: Fit, chosen: Sequence[Candidate]) -> Array:
-    """The move that the slopes promise most of, inside the candidates' limits."""
+    """The most promising move by the slopes, inside the candidates' limits."""
     low = [-each.limit - fit.values[each.name] - 1e-12 for each in chosen]
     high = [each.limit - fit.values[each.name] + 1e-12 for each in chosen]
     # scaled by the steps, so that radians and counts weigh alike
@@ -300,7 +300,7 @@ def solve(fit: Fit, chosen: Sequence[Candidate]) -> Array:
 
 
 def tied(name: str, own: Array, others: Array, slopes: dict[str, Array | None]) -> tuple[str, ...]:
-    """The candidates whose signature is this one's, once what the other causes can take is taken away."""
+    """The candidates with this one's signature, after removing the part that the other causes explain."""
 
     def rest(column: Array) -> Array:
         if others.shape[1] == 0:

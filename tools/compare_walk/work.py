@@ -32,7 +32,7 @@ from ranger_sim.tools.compare_walk import emulate, figure, gait, hip_law, naming
 from ranger_sim.tools.compare_walk.candidates import BY_NAME
 from ranger_sim.tools.recordings import datasets
 
-FALSE_ALARM = 0.01  # of a difference that is none
+FALSE_ALARM = 0.01  # of a false difference
 RESAMPLES = 2000
 FEWEST = 2  # steady strides; a third and further ones make the intervals shorter
 EXTENDED = ("extended-body.toml", "extended-model.toml", "extended-controller.toml")
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     )
     measured, findings = read(options)
     emulator = emulate.Emulator(scenario, options.steps)
-    with told(console) as progress:
+    with progress_of(console) as progress:
         answer = compare(options.log, measured, emulator, options.causes, progress)
     answer["data_findings"] = [sanity.as_json(each) for each in findings]
     if folder is not None:
@@ -63,12 +63,12 @@ def run(options: argparse.Namespace) -> int:
     if options.json == "-":
         streams.print_result(text)
     else:
-        tell(answer, console)
+        show(answer, console)
     return 1 if answer["detected"] else 0
 
 
 def read(options: argparse.Namespace) -> tuple[gait.Walk, list[Finding]]:
-    """The measured walk, and what is odd about its channels."""
+    """The measured walk, and remarks on its channels."""
     dataset = channels.named_for(datasets.open_with(options, options.log), "walk")
     for name in gait.CHANNELS:
         dataset[name]
@@ -82,8 +82,8 @@ def read(options: argparse.Namespace) -> tuple[gait.Walk, list[Finding]]:
 
 
 @contextlib.contextmanager
-def told(console: Console) -> Iterator[Any]:
-    """A line that says which walk is walked, where there is a screen."""
+def progress_of(console: Console) -> Iterator[Any]:
+    """A line that names the present walk, on a terminal."""
     if not console.is_terminal:
         yield lambda text: None
         return
@@ -134,14 +134,14 @@ def compare(log: str, measured: gait.Walk, emulator: emulate.Emulator, causes: b
 
 
 def hip_law_of(walk: gait.Walk, emulator: emulate.Emulator) -> dict[str, Any] | None:
-    """What the hip's motor makes up for in a walk, with body and gains of the emulated one."""
+    """The spring that the hip's motor compensates in a walk, with body and gains of the emulated one."""
     body = body_files.load(emulator.scenario.body).parameters
     law = hip_law.of_walk(walk, body, controllers.load(emulator.scenario.controller).values)
     return None if law is None else {**dataclasses.asdict(law), "ci95": list(law.ci95)}
 
 
 def misfit(chosen: Sequence[gait.Stride], features: Array, scatter: Array, degrees: int) -> dict[str, Any]:
-    """What differs, feature by feature and as a whole."""
+    """The differences, feature by feature and as a whole."""
     mean = np.mean([each.features for each in chosen], axis=0)
     error = scatter / math.sqrt(len(chosen))
     reach = float(t_distribution.ppf(0.975, degrees)) * error
@@ -170,7 +170,7 @@ def named(
     progress: Any,
     trajectories: dict,
 ) -> dict[str, Any]:
-    """Causes fitted on every other steady stride, beginning with the first, and held against the rest."""
+    """Causes fitted on every other steady stride, beginning with the first, and checked on the rest."""
     fitted = naming.Target.of(chosen[::2], scatter)
     held_out = naming.Target.of(chosen[1::2], scatter)
     found = naming.Search(emulator, fitted, held_out, progress=progress, degrees=degrees).run()
@@ -215,23 +215,23 @@ def named(
 
 
 def next_experiment(found: naming.Answer, strides: int) -> list[str]:
-    """What to measure next: whatever is promising and not named, then more of the same."""
+    """The next measurements: promising candidates that are not named, then more of the same."""
     wanted = []
     for each in found.rounds:
         if not each["accepted"]:
             candidate = BY_NAME[each["best"]]
-            told = inspection.look_at(candidate.cause, candidate.at)
+            hint = inspection.look_at(candidate.cause, candidate.at)
             value = f"{each['values'][candidate.name]:+.3g} {candidate.unit}"
-            wanted.append(f"{candidate.name}, not named ({value}): {told}")
+            wanted.append(f"{candidate.name}, not named ({value}): {hint}")
     wanted.append(f"More strides of one gait: {4 * strides} in place of {strides} halve every interval.")
     return wanted
 
 
 def gain(before: Array, after: Array, held_out: naming.Target, scatter: Array, fitted: int) -> dict[str, Any]:
-    """What the causes take away of the squared misses at the held-out strides, of what can be taken away.
+    """The share of the avoidable squared misses at the held-out strides that the causes remove.
 
-    The floor is what a perfect model fitted to strides with this scatter leaves. The interval is a bootstrap over the
-    features: it says how evenly the gain is spread over them, not what other strides would give.
+    The unavoidable part is that of a perfect model fitted to strides with this scatter. The interval is a bootstrap
+    over the features: it shows how evenly the gain is spread over them, not the result for other strides.
     """
     first, second = held_out.misses(before) ** 2, held_out.misses(after) ** 2
     floor = np.full(len(first), 1.0 + len(held_out.strides) / fitted)
@@ -262,7 +262,7 @@ def rms(strides: Sequence[gait.Stride], others: Sequence[gait.Stride]) -> dict[s
 
 
 def trajectory(stride: gait.Stride, most: int = 220) -> dict[str, Any]:
-    """A stride for the plot: rounded, at most so many points."""
+    """A stride for the plot: rounded, with a limited number of points."""
     every = max(1, -(-len(stride.time_s) // most))
     return {
         "stride": stride.number,
@@ -292,7 +292,7 @@ def write(answer: dict[str, Any], scenario: Scenario, folder: pathlib.Path) -> l
     return answer["files"]
 
 
-def tell(answer: dict[str, Any], console: Console) -> None:
+def show(answer: dict[str, Any], console: Console) -> None:
     """Print the answer."""
     extended = answer.get("extended_features") if answer["causes"] else None
     table = Table(

@@ -19,12 +19,12 @@ from ranger_sim.sysid.figures.question import Candidate, Outcome, Point
 from ranger_sim.tools.command_line.files import replace_file
 from ranger_sim.tools.command_line.workers import workers
 
-LEAST_STEPS = 20  # that a walk is asked for: the summary leaves five of them out of its means
-# A walk that takes three times the time of such a walk stands still (chosen by us).
+LEAST_STEPS = 20  # required of a walk: the summary leaves five of them out of its means
+# A walk that takes three times the time of such a walk counts as stopped (chosen by us).
 PATIENCE_S, PATIENCE_S_PER_STEP = 10.0, 1.8
 STORE = "walks.json"
 
-# name: unit, meaning. Those of a bench need no walk: they are the body's numbers as a measurement would give them.
+# name: unit, meaning. Those of a bench need no walk: they are the body's numbers as a measurement yields them.
 WALK_FIGURES = {
     "step_length_m": ("m", "mean length of a step"),
     "step_time_s": ("s", "mean time of a step"),
@@ -53,7 +53,7 @@ FIGURES = {**WALK_FIGURES, **BENCH_FIGURES}
 
 @dataclasses.dataclass(frozen=True)
 class Setup:
-    """What is walked. settle_steps: a walk that fell before had not begun: that is the start's doing, which is ours."""
+    """The walk. settle_steps: a fall before these counts as a failed start, which is ours, not as a fall."""
 
     controller: str = Scenario.controller
     body: str = Scenario.body
@@ -64,7 +64,7 @@ class Setup:
 
     @classmethod
     def of(cls, path: pathlib.Path, table: Mapping[str, Any]) -> "Setup":
-        """From the [run] of a file. UserError for what it does not have."""
+        """From the [run] of a file. UserError for missing values."""
         defaults = dataclasses.asdict(cls())
         for key, value in table.items():
             if key not in defaults:
@@ -83,15 +83,15 @@ class Setup:
 
     def number(self, key: str) -> float:
         """The number of a key, `body.NAME` or `controller.NAME`, before anything is changed. UserError for no such."""
-        room, _, name = key.partition(".")
-        if room == "body":
+        group, _, name = key.partition(".")
+        if group == "body":
             value = body_files.load(self.body).values.get(name)
-        elif room == "controller":
+        elif group == "controller":
             value = controllers.load(self.controller).values.get(name)
         else:
             raise UserError(f"{key}: body.NAME or controller.NAME is expected")
         if not isinstance(value, int | float) or isinstance(value, bool):
-            raise UserError(f"{key}: the {room} has no such number")
+            raise UserError(f"{key}: the {group} has no such number")
         return float(value)
 
     def settings(self, moved: Mapping[str, float], seed: int) -> Settings:
@@ -102,11 +102,11 @@ class Setup:
             "seed": seed,
             "floor_roughness_m": self.floor_roughness_m,
         }
-        rooms: dict[str, dict[str, float]] = {"body": {}, "controller": {}}
+        groups: dict[str, dict[str, float]] = {"body": {}, "controller": {}}
         for key, value in moved.items():
-            room, _, name = key.partition(".")
-            rooms[room][name] = value
-        return Settings(walk=walk, controller=rooms["controller"], body=rooms["body"], machine=REFERENCE)
+            group, _, name = key.partition(".")
+            groups[group][name] = value
+        return Settings(walk=walk, controller=groups["controller"], body=groups["body"], machine=REFERENCE)
 
 
 class Walks:
@@ -122,7 +122,7 @@ class Walks:
         self.path = folder / STORE if folder is not None else None
         self.known: dict[str, dict[str, Any]] = {}
         if self.path is not None and self.path.exists():
-            with contextlib.suppress(json.JSONDecodeError):  # cut short: those walks are walked again
+            with contextlib.suppress(json.JSONDecodeError):  # an incomplete line: those walks are walked again
                 self.known = json.loads(self.path.read_text(encoding="utf-8"))
 
     def moved(self, changes: Mapping[str, float]) -> dict[str, float]:
@@ -150,8 +150,8 @@ class Walks:
             found = zip(list(new), each(walk, list(new.values())), strict=True)
             for key in keys:
                 while key not in self.known:
-                    told, outcome = next(found)
-                    self.known[told] = outcome
+                    case, outcome = next(found)
+                    self.known[case] = outcome
                     self._keep()
                 yield Outcome(**self.known[key])
 
@@ -192,7 +192,7 @@ def walk(order: Order) -> dict[str, Any]:
 
 
 def of_walk(summary: Mapping[str, Any], returned_W: float) -> dict[str, float]:
-    """Figures of a walk; without those that it does not have."""
+    """The figures that a walk has."""
     powers = summary["motor_powers_W"]
     delay_ms = summary["heel_strike_delay_ms"]["mean"]
     found = {
@@ -214,7 +214,7 @@ def of_walk(summary: Mapping[str, Any], returned_W: float) -> dict[str, float]:
 
 
 def of_bench(body: BodyParameters) -> dict[str, float]:
-    """Results that benches would measure on a body; means of the legs."""
+    """Results of benches on a body; means of the legs."""
     radius = 0.5 * (body.outer_foot_radius_m + body.inner_foot_radius_m)
     height = radius - 0.5 * (body.outer_ankle_offset_m + body.inner_ankle_offset_m)
     moment = 0.5 * (body.outer_mass_moment_kg_m + body.inner_mass_moment_kg_m)

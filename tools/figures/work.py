@@ -1,4 +1,4 @@
-"""The work of `ranger-sim diagnose-figures`: walk, weigh, tell."""
+"""The work of `ranger-sim diagnose-figures`: walk, weigh, report."""
 
 import argparse
 import dataclasses
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def asked(options: argparse.Namespace) -> tuple[Setup, Question]:
-    """What a command line asks. UserError for what is wrong with it or with the file."""
+    """The question of a command line. UserError for a fault of it or of the file."""
     name = options.file
     there = sorted(path.stem for path in OURS.glob("*.toml"))
     path = pathlib.Path(name) if name.endswith(".toml") else OURS / f"{name}.toml"
@@ -97,8 +97,8 @@ def limits_met(path: pathlib.Path, setup: Setup, candidates: Sequence[Candidate]
         for value in (each.low, each.high):
             moved = walks.moved({each.name: value})
             for key, number in moved.items():
-                room, _, name = key.partition(".")
-                if room == "body" and not _within(body_files.keys()[name], number):
+                group, _, name = key.partition(".")
+                if group == "body" and not _within(body_files.keys()[name], number):
                     raise UserError(
                         f"{path}: candidate {each.name}: at {value:g} {key} would be {number:g}, allowed are "
                         f"{body_files.keys()[name].limits}"
@@ -123,15 +123,15 @@ def with_progress(walks: Walks, question: Question, rounds: int, console: Consol
     ) as progress:
         task = progress.add_task(title, total=None)
 
-        def tell(done: int, foreseen: int, what: str) -> None:
+        def report(done: int, foreseen: int, what: str) -> None:
             progress.update(task, completed=done, total=foreseen, description=f"{title}: {what}")
 
         seeds = range(1, walks.setup.seeds + 1)
-        return told_of_starts(diagnose(question, walks, seeds, tell, rounds))
+        return note_starts(diagnose(question, walks, seeds, report, rounds))
 
 
-def told_of_starts(found: Diagnosis) -> Diagnosis:
-    """The same, with a finding where walks never got going."""
+def note_starts(found: Diagnosis) -> Diagnosis:
+    """The same, with a finding where walks failed at their start."""
     runs = [run for at in found.simulated.outcomes for run in at]
     lost = sum(run.survived == 0.0 and not run.failed for run in runs)
     if lost:
@@ -143,7 +143,7 @@ def told_of_starts(found: Diagnosis) -> Diagnosis:
 
 
 def blind(walks: Walks, question: Question, text: str, rounds: int, console: Console) -> dict[str, Any]:
-    """A wrong number hidden in the body that walks, and what the figures of that walk say of it.
+    """Blind check: a wrong number hidden in the body that walks, and the diagnosis from the figures of that walk.
 
     The figures keep the errors of their measurement. The simulator errs nowhere else here, so model_sd is left out; the
     scatter of the hidden walks' own means takes its place.
@@ -170,7 +170,7 @@ def blind(walks: Walks, question: Question, text: str, rounds: int, console: Con
 
 
 def hidden(walks: Walks, question: Question, text: str) -> tuple[dict[str, float], str | None, float]:
-    """(numbers that are moved, the candidate that this is, its true value) of KEY=CHANGE."""
+    """(changed numbers, their candidate, its true value) of KEY=CHANGE."""
     key, equals, change = text.partition("=")
     share = change.endswith("%")
     try:
@@ -242,14 +242,14 @@ def show(answer: Mapping[str, Any], console: Console) -> None:
 
 
 def value_text(name: str, value: Mapping[str, Any]) -> str:
-    """A value with its interval; an end that the limits set says so."""
+    """A value with its interval; an end set by the limits is marked."""
     low, high = (f"{end:.3g}{' (limit)' if is_open else ''}" for end, is_open in
                  zip(value["ci95"], value["open_ends"], strict=True))  # fmt: skip
     return f"{name} {value['value']:.4g} ({low} to {high}; was {value['was']:g})"
 
 
 def sentence(answer: Mapping[str, Any]) -> str:
-    """What is wrong, in a sentence or two."""
+    """The diagnosis in a sentence or two."""
     moved = "; ".join(value_text(name, answer["estimates"][name]) for name in answer["sharper"])
     sharper = f" Within what was known, they say more of {moved}." if moved else ""
     if not answer["detected"]:

@@ -88,12 +88,12 @@ def run_build(options: argparse.Namespace) -> int:
     if options.sanitize and not sanitizers.is_ready():  # a built library is loaded for a check
         return run_sanitized(options, [options.folder])
     firmware = native_boards.build(options.folder, options.sanitize, options.coverage)
-    _tell(firmware.warnings)
+    _print(firmware.warnings)
     print(f"{firmware.library}{'' if firmware.was_made else ' is up to date'}")
     return 0
 
 
-def _tell(warnings: Sequence[str]) -> None:
+def _print(warnings: Sequence[str]) -> None:
     """Print the compiler's warnings, a line each."""
     console = terminal.console(stderr=True)
     for line in warnings:
@@ -106,7 +106,7 @@ def run_build_image(options: argparse.Namespace) -> int:
         asked = "--sanitize" if options.sanitize else "--coverage"
         raise UserError(f"{asked}: only on this computer, not with --target {options.target}")
     image = native_boards.build_image(options.folder)
-    _tell(image.warnings)
+    _print(image.warnings)
     print(f"{image.path}{'' if image.was_made else ' is up to date'}")
     print(
         f"{image.hex_path}: {image.flash_bytes} of {image_build.FLASH_BYTES} bytes of flash, "
@@ -145,7 +145,7 @@ def programs_in(folders: list[str]) -> list[sanitizers.Program]:
 
 
 def coverage_lines(summary: dict) -> list[str]:
-    """How much of each program ran, and which of its lines did not."""
+    """The share of each program that ran, and the lines that did not."""
     lines = []
     for board, each in summary["firmware"].items():
         ran = each["coverage"]
@@ -182,7 +182,7 @@ def run_sanitized(options: argparse.Namespace, folders: list[str]) -> int:
                 signal.signal(number, handler)
         found = sanitizers.findings(place, programs_in(folders))
     for each in found:
-        print(f"ranger-sim: firmware: {each.told()}", file=sys.stderr)
+        print(f"ranger-sim: firmware: {each.describe()}", file=sys.stderr)
     if code < 0:
         print(f"ranger-sim: the run was ended by {signal.Signals(-code).name}", file=sys.stderr)
         return EXIT_FOUND

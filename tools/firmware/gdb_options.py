@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ranger_sim.foundation.peers import loopback, told
+from ranger_sim.foundation.peers import loopback, reasons_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.command_line.options import Option
 from ranger_sim.tools.command_line.units import word
@@ -40,11 +40,13 @@ def never() -> bool:
     return False
 
 
-def line(door: GdbServer) -> str:
-    """The line that tells the user how to connect gdb to a port."""
-    host = "" if door.host == "127.0.0.1" else door.host
-    open_to_all = "" if loopback(door.host) else ", open to the network: any client there may do anything to the board"
-    return f"gdb for {door.board.name}: target remote {host}:{door.port}; the run waits for it{open_to_all}"
+def line(server: GdbServer) -> str:
+    """The line with the command that connects gdb to a port."""
+    host = "" if server.host == "127.0.0.1" else server.host
+    open_to_all = (
+        "" if loopback(server.host) else ", open to the network: any client there may do anything to the board"
+    )
+    return f"gdb for {server.board.name}: target remote {host}:{server.port}; the run waits for it{open_to_all}"
 
 
 @contextmanager
@@ -61,17 +63,17 @@ def debuggers(
         yield []
         return
     from ranger_sim.harness.firmware.debuggers import (  # sockets are imported only when needed
-        close_doors,
-        open_doors,
+        close_servers,
+        open_servers,
     )
 
-    doors = open_doors(robot.boards, options.gdb, options.allow_network, ends)
+    servers = open_servers(robot.boards, options.gdb, options.allow_network, ends)
     try:
-        for door in doors:
-            console.print(line(door), highlight=False, soft_wrap=True)
-        yield doors
+        for server in servers:
+            console.print(line(server), highlight=False, soft_wrap=True)
+        yield servers
     finally:
-        close_doors(doors)
-        for door in doors:
-            if away := told(door.sent_away):
-                console.print(f"gdb for {door.board.name}: {away}", highlight=False, soft_wrap=True)
+        close_servers(servers)
+        for server in servers:
+            if away := reasons_text(server.sent_away):
+                console.print(f"gdb for {server.board.name}: {away}", highlight=False, soft_wrap=True)

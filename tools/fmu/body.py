@@ -1,8 +1,9 @@
 """The body's interface for another simulator: parameters, inputs, steps, outputs. It does not depend on FMI.
 
-Inputs are what the boards put out: the match registers of each motor's PWM unit, its low-side enables, and whether its
-watchdog line moves. Outputs are what the sensors show at the end of a step, and the body itself. One step of the plant
-(250 us) is the grid: what was written before a step acts from its begin, as in the whole robot (harness/lockstep.py).
+Inputs are the outputs of the boards: the match registers of each motor's PWM unit, its low-side enables, and whether
+its watchdog line moves. Outputs are the sensors' values at the end of a step, and the body's state. One step of the
+plant (250 us) is the grid: inputs written before a step act from its begin, as in the whole robot
+(harness/lockstep.py).
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def quantities(given: dict[str, Any]) -> tuple[Quantity, ...]:
 
 
 def _parameters(given: dict[str, Any]) -> list[Quantity]:
-    """All that is fixed before the first step: every number of the body's table, floor, seed, and how it is held."""
+    """The values fixed before the first step: every number of the body's table, floor, seed, and the held pose."""
     found = []
     for key in body_files.keys().values():
         value = given["body"][key.name]
@@ -90,7 +91,7 @@ def _parameters(given: dict[str, Any]) -> list[Quantity]:
 
 
 def _inputs() -> list[Quantity]:
-    """What the boards put out, and the person who holds the robot."""
+    """Outputs of the boards, and the person who holds the robot."""
     found = []
     for motor in MOTOR_NAMES:
         for lead in (2, 6):
@@ -133,7 +134,7 @@ def _outputs() -> list[Quantity]:
 
 
 def given_of(scenario: Scenario) -> dict[str, Any]:
-    """Start values of all parameters: a walk's body, floor, batteries, and how its controller has it held."""
+    """Start values of all parameters: a walk's body, floor, batteries, and the held pose of its controller."""
     held = controllers.load(scenario.controller).operator
     return {
         "body": dict(body_files.load(scenario.body).values),
@@ -164,10 +165,10 @@ class ExportedBody:
         self.imu_mode = SILENT
         self.written: list[tuple[int, ...]] = []
         self.samples = array.array("d", [0.0]) * len(SAMPLES)
-        self.begin()  # outputs have values from the start, and a parameter of the file that cannot be is told at once
+        self.begin()  # outputs have values from the start, and an impossible parameter of the file is reported at once
 
     def set(self, name: str, value: Any) -> None:
-        """A parameter before `begin`, or an input. UserError for a number beyond its limits or that is none."""
+        """Set a parameter before `begin`, or an input. UserError for a number beyond its limits, or anything else."""
         each = self.quantities[name]
         if name == "imu.mode" and value not in IMU_MODES:
             raise UserError(f"imu.mode is {value!r}, allowed are {', '.join(map(str, IMU_MODES))}")
@@ -226,7 +227,7 @@ class ExportedBody:
         self.holding = True
         self.imu_mode = SILENT
         self.written = [(0, 0, PERIOD_COUNTS, True, True)] * len(MOTOR_NAMES)  # as a bridge is at power-up
-        self._look()
+        self._observe()
 
     def steps_in(self, time_s: float, length_s: float, start_s: float) -> int:
         """Steps of the plant from `time_s` on. UserError if not whole, or if the body is at another time."""
@@ -253,7 +254,7 @@ class ExportedBody:
             self._act(plant)
             plant.step()
             self.steps += 1
-        self._look()
+        self._observe()
         return not plant.fell
 
     def _act(self, plant: RangerPlant) -> None:
@@ -279,7 +280,7 @@ class ExportedBody:
             for byte in (SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD, self.imu_mode):
                 plant.imu.receive_byte(now, byte)
 
-    def _look(self) -> None:
+    def _observe(self) -> None:
         """Read the sensors and the body's state."""
         plant, values = self.plant, self.values
         assert plant is not None

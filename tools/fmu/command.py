@@ -38,7 +38,7 @@ def register(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file and say what is in it."""
+    """Write the file and print its contents."""
     path = pathlib.Path(options.file)
     if path.suffix != ".fmu":
         raise UserError(f"fmu {options.file!r}: a file that ends in .fmu is expected")
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def export(path: pathlib.Path, given: dict[str, Any]) -> list:
-    """Write the unit; returns its interface. UserError for a body that cannot be."""
+    """Write the unit; returns its interface. UserError for an impossible body."""
     from pythonfmu3 import FmuBuilder
 
     from ranger_sim.tools.fmu import interface, ranger_body

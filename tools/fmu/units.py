@@ -19,7 +19,7 @@ UNITS = {
     "ohm": (1, 2, -3, -2, 0),
     "h": (0, 0, 1, 0, 0),
 }
-FACTORS = {"h": 3600.0}  # of the units that are no coherent ones
+FACTORS = {"h": 3600.0}  # of the units that are not coherent
 
 
 def exponents(unit: str) -> tuple[dict[str, int], float]:

@@ -10,7 +10,7 @@ from typing import Any
 from ranger_sim.foundation.user_error import UserError
 
 HERE = pathlib.Path(__file__).resolve().parent
-# file of the project: (template beside this module, what stands in it for "board")
+# file of the project: (template next to this module, its word for "board")
 FILES: dict[str, tuple[str, str]] = {
     "README.md": ("README.md.j2", ""),
     "body.py": ("body.py.j2", ""),
@@ -27,7 +27,7 @@ FILES: dict[str, tuple[str, str]] = {
     "panel/firmware.toml": ("firmware.toml.j2", "panel"),
     "panel/panel.c": ("panel.c.j2", ""),
 }
-# Of its own, so that a configuration above does not reach in; and what is not for a repository.
+# Separate files, so that a configuration in a folder above has no effect; and the list of files not for a repository.
 WRITTEN = {"pytest.ini": "[pytest]\naddopts = --strict-markers\n", ".gitignore": "build/\nruns/\n__pycache__/\n"}
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,59}")
 
@@ -88,7 +88,7 @@ def check(folder: pathlib.Path) -> None:
 
 
 def write(project: pathlib.Path, name: str) -> None:
-    """The whole project, with what is generated from its table."""
+    """The whole project, with the files generated from its table."""
     from ranger_sim.datatable import generate
     from ranger_sim.datatable.loader import load_table
 

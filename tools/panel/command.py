@@ -24,7 +24,7 @@ from ranger_sim.tools.command_line.units import number, whole_number, word
 PORT = 8311  # chosen by us: among the ports that IANA has not assigned
 HERE = "127.0.0.1"
 START_S = 60.0  # an interpreted robot takes this long to start
-LOOK_S = 0.05
+POLL_S = 0.05
 END_S = 10.0
 GIVES_WAY = 5  # steps of nice(2) below the robot's processes; chosen by us: a third of their weight
 
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     console = terminal.console(stderr=True)
 
-    def say(text: str) -> None:
+    def report(text: str) -> None:
         console.print(text, highlight=False, soft_wrap=True)
 
     wanted = bool(options.recordings) + bool(options.walk) + bool(options.port)
@@ -84,12 +84,12 @@ def run(options: argparse.Namespace) -> int:
     address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(listening(address, options.http_port))
-        source = stack.enter_context(source_of(options, say))
-        return serve(source, listener, options.host, say)
+        source = stack.enter_context(source_of(options, report))
+        return serve(source, listener, options.host, report)
 
 
 @contextlib.contextmanager
-def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
+def source_of(options: argparse.Namespace, report: Any) -> Iterator[Any]:
     """The source that the options select."""
     if options.recordings:
         from ranger_sim.tools.panel.recording import Event, RecordingSource
@@ -103,7 +103,7 @@ def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
         with contextlib.closing(LinkSource(options.port)) as link:
             yield link
     elif options.walk:
-        with own_robot(say) as source:
+        with own_robot(report) as source:
             os.nice(GIVES_WAY)
             yield source
     else:
@@ -114,17 +114,17 @@ def source_of(options: argparse.Namespace, say: Any) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def own_robot(say: Any) -> Iterator[Any]:
+def own_robot(report: Any) -> Iterator[Any]:
     """A robot that walks in real time until the panel ends, for any reason."""
     from ranger_sim.tools.panel.robot import RobotSource
 
     name, parent = f"panel-{os.getpid()}", os.getpid()
     command = [sys.executable, "-m", "ranger_sim", "up", "--name", name]
-    with tempfile.TemporaryFile("w+", prefix="ranger-sim-") as said:
+    with tempfile.TemporaryFile("w+", prefix="ranger-sim-") as errors:
         robot = subprocess.Popen(
             command,
             stdout=subprocess.DEVNULL,
-            stderr=said,
+            stderr=errors,
             start_new_session=True,  # this process handles Ctrl-C
             preexec_fn=lambda: kernel.die_with_parent(parent),
         )
@@ -136,15 +136,15 @@ def own_robot(say: Any) -> Iterator[Any]:
                     break
                 except UserError:
                     if robot.poll() is not None:
-                        said.seek(0)
-                        lines = said.read().strip().splitlines()
+                        errors.seek(0)
+                        lines = errors.read().strip().splitlines()
                         raise UserError(
                             f"panel: the robot did not start: {lines[-1] if lines else 'no word'}"
                         ) from None
                     if wallclock.monotonic_s() > end_s:
                         raise UserError(f"panel: the robot was not there after {START_S:.0f} s") from None
-                    wallclock.sleep_s(LOOK_S)
-            say(f"a robot walks in real time, name {name}")
+                    wallclock.sleep_s(POLL_S)
+            report(f"a robot walks in real time, name {name}")
             yield source
         finally:
             robot.terminate()
@@ -171,7 +171,7 @@ def listening(address: str, port: int) -> Iterator[socket.socket]:
         yield listener
 
 
-def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
+def serve(source: Any, listener: socket.socket, host: str, report: Any) -> int:
     """Serve until Ctrl-C, or until the robot has ended and all pages have disconnected."""
     from ranger_sim.tools.panel.server import PanelServer, new_token
 
@@ -182,13 +182,13 @@ def serve(source: Any, listener: socket.socket, host: str, say: Any) -> int:
         if address in (HERE, "::1")
         else (HERE, "localhost", host, address, socket.gethostname())
     )
-    panel = PanelServer(source, token, names, say)
+    panel = PanelServer(source, token, names, report)
     shown = HERE if address in ("0.0.0.0", "::") else address
     with contextlib.suppress(KeyboardInterrupt):
-        say(f"{source.title}: http://{shown}:{port}/?token={token}   (Ctrl-C ends it)")
+        report(f"{source.title}: http://{shown}:{port}/?token={token}   (Ctrl-C ends it)")
         asyncio.run(http_server(panel).serve(sockets=[listener]))
     if panel.refused:
-        say("panel: refused: " + ", ".join(f"{count} {why}" for why, count in panel.refused.items()))
+        report("panel: refused: " + ", ".join(f"{count} {why}" for why, count in panel.refused.items()))
     return 0
 
 
@@ -196,7 +196,7 @@ def http_server(panel: Any) -> Any:
     """The HTTP server (uvicorn.Server)."""
     import uvicorn
 
-    from ranger_sim.tools.panel.server import LONGEST_WISH
+    from ranger_sim.tools.panel.server import LONGEST_REQUEST
 
     config = uvicorn.Config(
         panel.app,
@@ -204,7 +204,7 @@ def http_server(panel: Any) -> Any:
         log_level="critical",
         access_log=False,
         ws="websockets-sansio",
-        ws_max_size=LONGEST_WISH,
+        ws_max_size=LONGEST_REQUEST,
         ws_per_message_deflate=False,  # it would cost both sides more than it saves on the kilobytes of a picture
         ws_ping_interval=10.0,
         ws_ping_timeout=20.0,

@@ -2,7 +2,7 @@
 
 The server's own limit answers each excess request and keeps the connection; a silent client keeps its connection
 forever, and one that does not read is never closed, because its last bytes stay queued. Here the oldest connection
-that is not a page is closed to make room, and a refused client is cut off.
+that is not a page is closed to free its place, and a refused client is cut off.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Connections:
 
             def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
                 super().connection_made(transport)
-                connections.came(transport)
+                connections.on_connection(transport)
 
             def data_received(self, data: bytes) -> None:
                 try:
@@ -46,7 +46,7 @@ class Connections:
 
         self.protocol = Protocol
 
-    def came(self, transport: asyncio.Transport) -> None:
+    def on_connection(self, transport: asyncio.Transport) -> None:
         """Register a connection; the oldest that is not a page may be closed."""
         for client in [client for client, each in self.transports.items() if _closed(each)]:
             del self.transports[client]

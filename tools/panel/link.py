@@ -22,7 +22,7 @@ from ranger_sim.tools.robodaq.codec import Point
 from ranger_sim.tools.robodaq.rates import GAP_PERIODS, Rates, published_hz
 from ranger_sim.tools.robodaq.session import OWN, Session
 
-LOOK_S = 0.01
+POLL_S = 0.01
 MOST_CHOSEN = CHANNELS - len(OWN)
 MOST_POINTS = 60_000  # kept of each variable: two minutes of a fast one
 USUAL_OF = 50  # points whose median distance is the usual one, until the robot has sent its lists
@@ -40,18 +40,18 @@ NOTHING = np.full(1, np.nan, np.float32)
 class Kept:
     """The newest points of one variable. after_gap: 1 if the time before the point was too long.
 
-    stands: the variable is sent when written and holds its value until the next; else it is sampled.
+    held: the variable is sent when written and holds its value until the next; else it is sampled.
     """
 
-    def __init__(self, stands: bool) -> None:
-        self.stands = stands
+    def __init__(self, held: bool) -> None:
+        self.held = held
         self.times = array.array("d")
         self.values = array.array("f")
         self.after_gap = array.array("b")
 
     def add(self, time_s: float, value: float, after_gap: bool) -> None:
         """Add a point later than all before."""
-        if self.stands and not after_gap and self.times and time_s - self.times[-1] > STEP_S:
+        if self.held and not after_gap and self.times and time_s - self.times[-1] > STEP_S:
             self._append(time_s - STEP_S, self.values[-1], False)
         self._append(time_s, value, after_gap)
         if len(self.times) > 2 * MOST_POINTS:
@@ -122,7 +122,7 @@ class LinkSource(Source):
         super().__init__()
         self.title = f"data link on {port}"
         self.port = RealPort(port, DAQ_BAUD)
-        self.session = Session(self._hear)
+        self.session = Session(self._on_point)
         self.rates = Rates(self.session)
         table = table_channels(known_states())
         self.channels = list(table.values())
@@ -146,7 +146,7 @@ class LinkSource(Source):
             self.first_ms = stamp_ms
         return ((stamp_ms - self.first_ms + (1 << 31)) % (1 << 32) - (1 << 31)) * 1e-3
 
-    def _hear(self, point: Point) -> None:
+    def _on_point(self, point: Point) -> None:
         number, word, stamp = point
         if self.session.restarts != self.restarts:
             self.restarts = self.session.restarts
@@ -156,7 +156,7 @@ class LinkSource(Source):
             return
         kept, time_s = self.kept[self.place[number]], self._seconds(stamp)
         if self.stamps.get(number) == stamp and self.session.clock_ms is not None:
-            if not kept.stands:
+            if not kept.held:
                 return  # the slow list repeats a point that another list has already sent
             time_s = self._seconds(self.session.clock_ms) - STEP_S  # written long ago and still valid
         self.stamps[number] = stamp
@@ -177,7 +177,7 @@ class LinkSource(Source):
                 self.session.receive(data, loop.time())
                 unsent += self.session.outgoing(loop.time()) if not unsent else b""
                 unsent = unsent[self.port.write(unsent) :]
-                await asyncio.sleep(0.0 if data else LOOK_S)
+                await asyncio.sleep(0.0 if data else POLL_S)
         except (OSError, ValueError) as fault:
             self.lost = f"the port is lost: {reason_of(fault)}"
 
@@ -252,10 +252,10 @@ class LinkSource(Source):
         """A row of the link's rates, with its last gap in the page's time."""
         return {**row, "last_s": None if row["last_ms"] is None else self._seconds(row["last_ms"])}
 
-    async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
-        if wish.get("do") != "set":
+    async def request(self, request: dict[str, Any]) -> dict[str, Any]:
+        if request.get("do") != "set":
             raise UserError("the data link takes parameters alone")
-        name, value = wish.get("name"), wish.get("value")
+        name, value = request.get("name"), request.get("value")
         if not isinstance(name, str):
             raise UserError(f"set: {str(name)[:40]!r} is not the name of a parameter")
         self.session.write(name, value)  # type: ignore[arg-type]  # what is no number is refused there

@@ -17,7 +17,7 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.inside.buses import Bus
-from ranger_sim.tools.panel.inside.recorded import NO_SLOTS, TOLD_SLOTS, Decoded, RunLogs
+from ranger_sim.tools.panel.inside.recorded import NO_SLOTS, REPORTED_SLOTS, Decoded, RunLogs
 from ranger_sim.tools.panel.source import ANKLES, KNOWN_POSE, LEGS, TRUE_POSE, Source, known_pose, known_states
 from ranger_sim.tools.recordings import datasets
 
@@ -163,7 +163,7 @@ class RecordingSource(Source):
 
     def state(self, at: float | None) -> dict[str, Any]:
         end_s = self.span()[1]
-        no_slots = f"{NO_SLOTS} {TOLD_SLOTS}" if "MCH_EXECUTION_TIME" in self.number else NO_SLOTS
+        no_slots = f"{NO_SLOTS} {REPORTED_SLOTS}" if "MCH_EXECUTION_TIME" in self.number else NO_SLOTS
         buses = [bus for part in self.inside for bus in part.buses]
         return {
             "time_s": end_s,

@@ -44,7 +44,7 @@ class RobotSource(Source):
         except OSError:
             raise UserError(f"no robot named {name} is running here (ranger-sim up --name {name})") from None
         self.incoming = bytearray()
-        hello = self._greeting()
+        hello = self._hello()
         if hello["table"] != datatable.table_hash():
             raise UserError(f"the robot named {name} has another master table than this program")
         self.title = f"{name}: {hello['controller']} on {hello['body']}, seed {hello['seed']}"
@@ -86,7 +86,7 @@ class RobotSource(Source):
         self.gaps: Counter[str] = Counter()
         self.table_errors = {number: 0 for number in ERRORS if number in table}
 
-    def _greeting(self) -> dict[str, Any]:
+    def _hello(self) -> dict[str, Any]:
         """The first record."""
         while True:
             for kind, body in records.taken(self.incoming):
@@ -244,8 +244,8 @@ class RobotSource(Source):
         total_Wh: float = self.shown["energy_Wh"]["total"]
         return total_Wh * JOULES_PER_WH / (self.weight_N * distance_m)
 
-    async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
-        if not isinstance(wish.get("do"), str) or wish["do"] not in REQUESTS:
-            raise UserError(f"{str(wish.get('do'))[:40]!r} is not a request to a robot")
-        answer: dict[str, Any] = await asyncio.to_thread(control.ask, self.name, wish)
+    async def request(self, request: dict[str, Any]) -> dict[str, Any]:
+        if not isinstance(request.get("do"), str) or request["do"] not in REQUESTS:
+            raise UserError(f"{str(request.get('do'))[:40]!r} is not a request to a robot")
+        answer: dict[str, Any] = await asyncio.to_thread(control.ask, self.name, request)
         return answer

@@ -45,8 +45,8 @@ PLACES = 16  # pages at a time: each costs a picture 30 times a second
 AHEAD = 2  # pictures sent to a page and not yet shown: one is painted while the next is made
 PICTURE_S = 1 / 33  # so that 30 in a second remain if some are late
 STATE_S = 0.2
-LONGEST_WISH = 1 << 16  # bytes: setting a parameter by name takes below 20,000
-WISHES_PER_S = 50.0
+LONGEST_REQUEST = 1 << 16  # bytes: setting a parameter by name takes below 20,000
+REQUESTS_PER_S = 50.0
 BURST = 100.0
 MOST_PLOTS = 24
 MOST_CHANNELS = 48  # of all plots of a page, as RoboDAQ
@@ -212,8 +212,8 @@ class Session:
         self.unshown = 0  # pictures sent and not yet shown
         self.shown = asyncio.Event()  # the page has shown one
         self.changed = asyncio.Event()  # the page requests something else
-        self.wishes = BURST
-        self.wished_s = 0.0
+        self.allowance = BURST
+        self.request_s = 0.0
         self.next_state_s = 0.0
         self.sending = asyncio.Lock()
 
@@ -231,7 +231,7 @@ class Session:
                     return ""
                 if showing.done():
                     showing.result()
-                reason = await self.hear(text)
+                reason = await self.on_text(text)
                 if reason:
                     return reason
         except TimeoutError:
@@ -253,49 +253,49 @@ class Session:
 
     # --- requests of the page -------------------------------------------------------------------------------
 
-    async def hear(self, text: str) -> str:
+    async def on_text(self, text: str) -> str:
         """Handle one message of the page; returns the reason to close it, or ""."""
         now_s = asyncio.get_running_loop().time()
-        self.wishes = min(BURST, self.wishes + WISHES_PER_S * (now_s - self.wished_s))
-        self.wished_s = now_s
-        if self.wishes < 1.0:
+        self.allowance = min(BURST, self.allowance + REQUESTS_PER_S * (now_s - self.request_s))
+        self.request_s = now_s
+        if self.allowance < 1.0:
             return "too many requests"
-        self.wishes -= 1.0
+        self.allowance -= 1.0
         try:
-            wish = json_text.loads(text, "a message")
+            request = json_text.loads(text, "a message")
         except json_text.JsonError:
             return "a message that is not JSON"
-        if not isinstance(wish, dict):
+        if not isinstance(request, dict):
             return "a message that is not a JSON object"
-        number = wish.pop("number", None)
+        number = request.pop("number", None)
         try:
-            answer = await self.carry_out(wish)
+            answer = await self.carry_out(request)
         except UserError as fault:
             answer = {"error": str(fault)}
         if number is not None:
             await self.send(messages.text({"answer": number if isinstance(number, int) else 0, **answer}))
         return ""
 
-    async def carry_out(self, wish: dict[str, Any]) -> dict[str, Any]:
+    async def carry_out(self, request: dict[str, Any]) -> dict[str, Any]:
         """Carry out a request of the page. UserError for an impossible one."""
-        what = wish.get("do")
+        what = request.get("do")
         if what == "shown":
             if self.unshown > 0:
-                self.wishes += 1.0  # a confirmation that keeps the pace is not counted as a request
+                self.allowance += 1.0  # a confirmation that keeps the pace is not counted as a request
                 self.unshown -= 1
             self.shown.set()
             return {}
         if what == "look":
-            self.look(wish)
+            self.set_view(request)
             return {}
         if what == "values":
-            channels = channels_of(wish.get("channels"), self.source)
-            return {"values": self.source.values(channels, seconds(wish.get("at"), "at"))}
-        return await self.source.request(wish)
+            channels = channels_of(request.get("channels"), self.source)
+            return {"values": self.source.values(channels, seconds(request.get("at"), "at"))}
+        return await self.source.request(request)
 
-    def look(self, wish: dict[str, Any]) -> None:
+    def set_view(self, request: dict[str, Any]) -> None:
         """Set all plots of the page, and its cursor."""
-        plots = wish.get("plots")
+        plots = request.get("plots")
         if not isinstance(plots, list) or len(plots) > MOST_PLOTS:
             raise UserError(f"look: a list of up to {MOST_PLOTS} plots is expected")
         found = {}
@@ -310,16 +310,16 @@ class Session:
                 points_of(plot.get("points")),
             )
         for number, shown in self.plots.items():
-            if number in found and found[number].wish() == shown.wish():
-                found[number].told = shown.told
-        hidden = channels_of(wish.get("hidden", []), self.source)
+            if number in found and found[number].choices() == shown.choices():
+                found[number].sent_s = shown.sent_s
+        hidden = channels_of(request.get("hidden", []), self.source)
         if sum(len(plot.channels) for plot in found.values()) + len(hidden) > MOST_CHANNELS:
             raise UserError(f"look: {MOST_CHANNELS} channels at a time are possible")
         self.plots = found
         before, self.wanted = self.wanted, {*hidden, *(each for plot in found.values() for each in plot.channels)}
         if before != self.wanted:
             self.wants()
-        self.at = seconds(wish.get("at"), "at")
+        self.at = seconds(request.get("at"), "at")
         self.changed.set()
 
     # --- data for the page ----------------------------------------------------------------------------------
@@ -370,15 +370,15 @@ class Session:
 class Plot:
     """A plot of the page: `begin` to `end`, or the last `span` seconds while both are None.
 
-    told: the newest time when the page last received it, s; None before the first time.
+    sent_s: the newest time when the page last received it, s; None before the first time.
     """
 
     def __init__(self, channels: list[int], begin: float | None, end: float | None, span: float, points: int) -> None:
         self.channels, self.begin, self.end, self.points = channels, begin, end, points
         self.span = min(max(span, 1e-3), 36_000.0)
-        self.told: float | None = None
+        self.sent_s: float | None = None
 
-    def wish(self) -> tuple[Any, ...]:
+    def choices(self) -> tuple[Any, ...]:
         """The page's settings of this plot; if they change, the plot is sent whole."""
         return self.channels, self.begin, self.end, self.span, self.points
 
@@ -390,10 +390,10 @@ class Plot:
         """
         if self.begin is not None and self.end is not None:
             return self.begin, self.points, messages.Window(self.end, self.end - self.begin, self.points, 0)
-        told, self.told = self.told, newest
+        sent_s, self.sent_s = self.sent_s, newest
         begin, width = newest - self.span, self.span / self.points
-        if told is not None and told <= newest:
-            points = math.ceil((newest - told + late_s) / width - 1e-6) + 1
+        if sent_s is not None and sent_s <= newest:
+            points = math.ceil((newest - sent_s + late_s) / width - 1e-6) + 1
             if points < self.points:
                 window = messages.Window(newest, self.span, self.points, messages.FOLLOWS)
                 return newest - points * width, points, window

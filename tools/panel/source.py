@@ -75,7 +75,7 @@ class Source:
         """State without channels: boards, buses, panel, errors, frames, faults; missing: why no slots or buses."""
         return {}
 
-    async def request(self, wish: dict[str, Any]) -> dict[str, Any]:
+    async def request(self, request: dict[str, Any]) -> dict[str, Any]:
         """Carry out a request of the page to the robot. UserError with the reason if refused."""
         raise UserError("a recording takes no requests")
 

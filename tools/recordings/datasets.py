@@ -1,4 +1,4 @@
-"""Recordings of any kind as datasets: what `sysid.readers` knows, and recordings of CAN frames with their DBC files."""
+"""Recordings as datasets: the formats of `sysid.readers`, and recordings of CAN frames with their DBC files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ranger_sim.tools.command_line.units import SHARES, quantity
 
 
 def add_options(command: Any) -> None:
-    """The options that say how recordings are read."""
+    """Options for reading recordings."""
     command.add_argument(
         "--map",
         action="append",
@@ -33,7 +33,7 @@ def add_options(command: Any) -> None:
 
 
 def add_accept_loss(command: Any) -> None:
-    """The option that lets a verdict follow from a recording of which much is lost."""
+    """The option that allows a verdict from a recording with large losses."""
     command.add_argument(
         "--accept-loss",
         type=quantity(SHARES, "1", least=0.0, most=1.0),
@@ -53,8 +53,8 @@ def open_recording(
 ) -> Dataset:
     """The channels of a file or folder. `databases`: DBC files, for frames (can_bus.edge.logs), of these `buses`.
 
-    each_frame: is called with every frame that is read, to keep it.
-    An MDF file is read as frames when DBC files are given, and as channels otherwise. UserError for all that is wrong.
+    each_frame: called with every frame that is read, to keep it.
+    An MDF file is read as frames when DBC files are given, and as channels otherwise. UserError for any fault.
     """
     path = pathlib.Path(path)
     if path.is_file() and _has_frames(path, bool(databases)):
@@ -82,7 +82,7 @@ def _decoded(
     each_frame: Callable[[frames.Frame], None] | None,
     buses: Collection[str],
 ) -> Dataset:
-    """The channels of recorded frames, with what became of the file's lines."""
+    """The channels of recorded frames, with an account of the file's lines."""
     from ranger_sim.can_bus.edge.logs import read_log
 
     log = read_log(path)
@@ -104,7 +104,7 @@ def _decoded(
 
 
 def open_with(options: Any, path: str) -> Dataset:
-    """The recording `path` as `add_options` says."""
+    """The recording `path`, read with the options of `add_options`."""
     return open_recording(path, columns.mapping_of(options.map), options.dbc, options.time_unit, buses=options.bus)
 
 

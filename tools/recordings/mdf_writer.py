@@ -1,8 +1,8 @@
-"""ASAM MDF 4.10 written as it comes: the file can be read after every write, however the program ends.
+"""ASAM MDF 4.10 written continuously: the file can be read after every write, however the program ends.
 
 The blocks that describe the file (header, groups, channels) are written first, for groups that are all known. Rows are
-collected for each group, compressed and written at the end of the file; only when they are there the links and the
-count that lead to them are changed. So memory is flat, and a program that is killed leaves whole rows of every group.
+collected for each group, compressed and written at the end of the file; the links and counts that lead to them are
+changed only after that. So memory is flat, and a program that is killed leaves whole rows of every group.
 Names of blocks and fields are those of the ASAM standard, part 1, version 4.1.
 """
 
@@ -49,25 +49,25 @@ class Group:
 
     @property
     def dtype(self) -> np.dtype:
-        """Of its rows."""
+        """The dtype of its rows."""
         values = [(f"value_{place}", channel.dtype) for place, channel in enumerate(self.channels)]
         return np.dtype([("time_s", "<f8"), *values])
 
 
 class Rows:
-    """Where the rows of one group stand in the file, and those that wait."""
+    """The places of one group's rows in the file, and the rows that wait."""
 
     def __init__(self, row_bytes: int, cycle_count_at: int, data_link_at: int) -> None:
         self.row_bytes = row_bytes
         self.cycle_count_at = cycle_count_at
-        self.next_link_at = data_link_at  # the link that the next block of rows is hung on
+        self.next_link_at = data_link_at  # the link to the next block of rows
         self.count = 0  # of those in the file
         self.waiting: list[bytes] = []
         self.waiting_rows = 0
 
 
 class MdfWriter:
-    """A file with `groups`; `properties` stand in its header. OSError when it cannot be written."""
+    """A file with `groups`; `properties` go into its header. OSError when it cannot be written."""
 
     def __init__(self, path: pathlib.Path, groups: Sequence[Group], properties: Mapping[str, str]) -> None:
         self.file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644)
@@ -77,8 +77,8 @@ class MdfWriter:
         self.end = 0
         self._identification()
         header = self._block(b"HD", [0] * 6, struct.pack("<QhhBBBBdd", 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0))
-        told = "".join(f"<e name={quoteattr(name)}>{escape(text)}</e>" for name, text in properties.items())
-        described = f"<HDcomment><TX/><common_properties>{told}</common_properties></HDcomment>"
+        elements = "".join(f"<e name={quoteattr(name)}>{escape(text)}</e>" for name, text in properties.items())
+        described = f"<HDcomment><TX/><common_properties>{elements}</common_properties></HDcomment>"
         self._link(header, 5, self._text(described, b"MD"))
         tool = (
             "<FHcomment><TX/><tool_id>ranger-sim</tool_id><tool_vendor>ranger-sim</tool_vendor>"
@@ -98,7 +98,7 @@ class MdfWriter:
             self._write_rows(kept)
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write the waiting rows."""
         for each in self.rows:
             self._write_rows(each)
 
@@ -111,7 +111,7 @@ class MdfWriter:
                 self.abandon()
 
     def abandon(self) -> None:
-        """Leave the file as it is."""
+        """Close the file without finishing it."""
         if self.file >= 0:
             os.close(self.file)
             self.file = -1
@@ -145,7 +145,7 @@ class MdfWriter:
         self.end = ID_BYTES
 
     def _group(self, group: Group, before: int, place: int) -> int:
-        """Write a group and hang it on link `place` of the block `before`; returns its data group."""
+        """Write a group and link it from `place` of the block `before`; returns its data group."""
         dtype = group.dtype
         next_channel = 0
         for number, channel in reversed(list(enumerate(group.channels))):
@@ -169,7 +169,7 @@ class MdfWriter:
         return self._block(b"CN", links, struct.pack("<BBBBIIIIBBH6d", *fields, *(0.0,) * 6))
 
     def _text(self, text: str, kind: bytes = b"TX") -> int:
-        """The block of a text; texts that are alike share one, and an empty one has none."""
+        """The block of a text; equal texts share one, and an empty one has none."""
         if not text:
             return 0
         if (kind, text) not in self.texts:
@@ -178,7 +178,7 @@ class MdfWriter:
         return self.texts[kind, text]
 
     def _block(self, kind: bytes, links: Sequence[int], data: bytes) -> int:
-        """Write a block at the end of the file; returns where it stands."""
+        """Write a block at the end of the file; returns its position."""
         length = HEADER.size + 8 * len(links) + len(data)
         block = HEADER.pack(b"##" + kind, 0, length, len(links)) + struct.pack(f"<{len(links)}Q", *links) + data
         at = self.end
@@ -191,7 +191,7 @@ class MdfWriter:
         self._write(block + HEADER.size + 8 * place, struct.pack("<Q", target))
 
     def _write(self, at: int, data: bytes) -> None:
-        """All of `data`; a disk that is nearly full takes a part of it first."""
+        """Write all of `data`; a nearly full disk takes a part of it first."""
         while data:
             taken = os.pwrite(self.file, data, at)
             at, data = at + taken, data[taken:]

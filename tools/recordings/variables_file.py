@@ -2,7 +2,7 @@
 
 MDF 4 is the measurement format of the CAN world: asammdf's viewer, CANape, INCA, PlotJuggler (with its
 plug-in) and MATLAB open it, and it keeps unit, description and a time base per channel. Each variable
-of the data table is one channel at the instants when its value or its stamp changed, so a variable sent
+of the data table is one channel at the times when its value or its stamp changed, so a variable sent
 at 45 Hz has 45 samples a second.
 """
 
@@ -23,8 +23,8 @@ from ranger_sim.tools.recordings.mdf_writer import Group as MdfGroup
 Group = tuple[str, Any, list[tuple[str, str, str, Any]]]
 
 DTYPES = {"f32": "<f4", "i32": "<i4", "u32": "<u4"}
-WORD = np.dtype([("time_s", "<f8"), ("word", "<u4")])  # a row of a variable, before its type is looked at
-FLUSH_S = 5.0  # of virtual time: so much of a slow variable a killed run may lose; chosen by us
+WORD = np.dtype([("time_s", "<f8"), ("word", "<u4")])  # a row of a variable, before conversion to its type
+FLUSH_S = 5.0  # of virtual time: the loss of a slow variable in a killed run; chosen by us
 
 
 class VariablesFile:
@@ -38,7 +38,7 @@ class VariablesFile:
         self.numbers = np.array(list(all_variables.NAMES), dtype=np.int64)
         self.sampled = len(robot.plant.sample_names)
         scenario = robot.scenario
-        told = {
+        properties = {
             "author": "ranger-sim",
             "subject": "a walk of the Cornell Ranger, simulated",
             "controller": str(scenario.controller),
@@ -46,10 +46,10 @@ class VariablesFile:
             "seed": str(scenario.seed),
             "data table": datatable.table_hash(),
         }
-        self.writer = MdfWriter(path, groups_of(robot), told)
+        self.writer = MdfWriter(path, groups_of(robot), properties)
         self.last: Any = None  # words of the last row
         self.last_s = 0.0
-        self.told_s = np.full(len(self.numbers), -np.inf)  # when each variable was written last
+        self.written_s = np.full(len(self.numbers), -np.inf)  # when each variable was written last
         self.flush_at_s = FLUSH_S
 
     def add_samples(self, rows: Any) -> None:
@@ -60,7 +60,7 @@ class VariablesFile:
         self.writer.append(0, np.ascontiguousarray(found).view(dtype).ravel())
 
     def add_words(self, rows: Any) -> None:
-        """Rows of the main brain's table: time in ns, then every word. What did not change is left out."""
+        """Rows of the main brain's table: time in ns, then every word. Unchanged words are left out."""
         if not len(rows):
             return
         time_s = (rows[:, 0] - self.start_ns) * 1e-9
@@ -84,18 +84,18 @@ class VariablesFile:
         rows["word"] = words[at, variables].astype(np.uint32)
         present, begins = np.unique(variables, return_index=True)
         for variable, part in zip(present, np.split(rows, begins[1:]), strict=True):
-            self.told_s[variable] = part["time_s"][-1]
+            self.written_s[variable] = part["time_s"][-1]
             self.writer.append(1 + int(variable), part)
 
     def close(self) -> None:
-        """Finish the file: every variable's last value stands at the last instant too."""
+        """Finish the file: every variable's last value is repeated at the last time."""
         if self.last is not None:
-            late = (self.told_s < self.last_s)[np.newaxis, :]
+            late = (self.written_s < self.last_s)[np.newaxis, :]
             self._append(late, np.array([self.last_s]), self.last[np.newaxis, :])
         self.writer.close()
 
     def abandon(self) -> None:
-        """Leave the file as it is; what is in it can be read."""
+        """Close the file without finishing it; its content can be read."""
         self.writer.abandon()
 
 
@@ -114,7 +114,7 @@ def groups_of(robot: Any) -> list[MdfGroup]:
 
 
 def write(robot: Any, path: pathlib.Path) -> None:
-    """Write what the robot's log kept. `robot`: a `ranger.robot.Ranger` whose log was not "none"."""
+    """Write the contents of the robot's log. `robot`: a `ranger.robot.Ranger` whose log was not "none"."""
     file = VariablesFile(robot, path)
     try:
         for rows in robot.logbook.kept("samples"):

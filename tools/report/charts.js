@@ -1,6 +1,6 @@
 // Draws the charts by Plotly and marks the cursor's instant in each of them.
 // walk: `series` arrays over `series.time_s` [s since power-up], `steps` done by then, `states` {machine: {names, runs
-// [[since, number]]}}, `charts` as charts.py describes them, `told`: decimals of each unit. colour(name): of the page's
+// [[since, number]]}}, `charts` as charts.py describes them, `decimals`: those of each unit. colour(name): of the page's
 // style. onPoint(seconds, gone): the pointer stands on an instant, or has gone.
 function makeCharts(walk, colour, onPoint) {
   const time = walk.series.time_s, first = time[0], last = time[time.length - 1];
@@ -152,7 +152,7 @@ function makeCharts(walk, colour, onPoint) {
       if (kind === "time") {
         chart.lines.forEach((line, k) => {
           const value = line.y[before(line.x, seconds)];
-          chart.values[k].textContent = value === null ? "" : value.toFixed(walk.told[line.unit]) + " " + line.unit;
+          chart.values[k].textContent = value === null ? "" : value.toFixed(walk.decimals[line.unit]) + " " + line.unit;
         });
         const state = chart.spec.machine ? stateAt(chart.spec.machine, seconds) : null;
         chart.chips.forEach((chip) => chip.classList.toggle("on", chip.dataset.state === String(state)));

@@ -1,7 +1,7 @@
 """The charts of a walk's report as data: charts.js draws them, by the page's width and its light or dark colours.
 
-All that has a time shares one clock: seconds since power-up, of the last SHOWN_S seconds. What is kept of the body
-stands once, in `series`, and is named where it is drawn, by charts and by the animation.
+All data with a time share one clock: seconds since power-up, of the last SHOWN_S seconds. The body's motion
+is stored once, in `series`, and named where it is drawn, by charts and by the animation.
 """
 
 import dataclasses
@@ -12,12 +12,14 @@ import numpy as np
 
 from ranger_sim.plant.ranger import SAMPLES
 
-SHOWN_S = 8.0  # six or seven strides: what is drawn and animated of a walk; chosen by us, for a page of 3 MB at most
-STRAIGHT_M = 1e-3  # a path that stays so close to a line is one
+SHOWN_S = (
+    8.0  # six or seven strides: the part of a walk that is drawn and animated; chosen by us, for a page of 3 MB at most
+)
+STRAIGHT_M = 1e-3  # a path within this distance of a line counts as one
 
-# Decimals that are kept of each unit: a tenth of what an encoder, a current sensor or an eye tells apart.
+# Decimals kept of each unit: a tenth of the resolution of an encoder, a current sensor or an eye.
 DECIMALS = {"rad": 4, "rad/s": 3, "m": 4, "A": 3, "W": 2, "V": 3, "%": 2, "mm": 2, "s": 4}
-TOLD = {
+CURSOR_DECIMALS = {
     "rad": 3,
     "rad/s": 2,
     "m": 3,
@@ -27,7 +29,7 @@ TOLD = {
     "%": 1,
     "mm": 0,
     "s": 3,
-}  # and that are read at the cursor
+}  # and those at the cursor
 
 # Samples of the body that neither charts nor animation use.
 LEFT_OUT = {"motor_outer_rad_s", "motor_inner_rad_s", "outer_Fx_N", "outer_Fy_N", "inner_Fx_N", "inner_Fy_N"}
@@ -38,7 +40,7 @@ MACHINES = {"hip": "hip", "outer_foot": "outer foot", "inner_foot": "inner foot"
 
 @dataclasses.dataclass(frozen=True)
 class Line:
-    """One line or cloud of points. `x`, `y`: names of series, or arrays of their own; `colour`: of the page's style."""
+    """One line or cloud of points. `x`, `y`: names of series, or separate arrays; `colour`: of the page's style."""
 
     name: str
     colour: str
@@ -50,7 +52,7 @@ class Line:
 
 @dataclasses.dataclass(frozen=True)
 class Chart:
-    """One pair of axes. `kind`: what stands on x, and so what the cursor is: time, plane, steps or slots."""
+    """One pair of axes. `kind`: the quantity on x, which the cursor has too: time, plane, steps or slots."""
 
     key: str
     title: str
@@ -65,7 +67,7 @@ class Chart:
 
 @dataclasses.dataclass(frozen=True)
 class Group:
-    """Charts under one heading. `columns`: side by side where there is room."""
+    """Charts under one heading. `columns`: side by side where the width allows."""
 
     title: str
     charts: tuple[Chart, ...]
@@ -191,7 +193,7 @@ def bus_load(walk: Any) -> Group:
 
 
 def slot_times(walk: Any) -> Group:
-    """How long the slots of each board took, against their length."""
+    """The time used of each board's slots, as a share of their length."""
     boards = list(walk.slot_histograms)
     percent = walk.slot_histograms[boards[0]][0]
     shares = [100.0 * counts / max(1, counts.sum()) for _, counts in walk.slot_histograms.values()]
@@ -217,7 +219,7 @@ def slot_times(walk: Any) -> Group:
 
 
 def path(walk: Any) -> list[Group]:
-    """The walk seen from above; nothing of a straight one."""
+    """The walk seen from above; none for a straight one."""
     first = begin_of(walk)
     aside = walk.samples["path_y_m"][first:]
     if not len(aside) or float(np.ptp(aside)) < STRAIGHT_M:
@@ -228,7 +230,7 @@ def path(walk: Any) -> list[Group]:
 
 
 def shown_from(walk: Any) -> float:
-    """The first instant that is shown, s since power-up."""
+    """The first time that is shown, s since power-up."""
     return float(walk.samples["time_s"][-1]) - SHOWN_S
 
 
@@ -238,12 +240,12 @@ def begin_of(walk: Any) -> int:
 
 
 def rounded(values: Any, unit: str) -> list[float | None]:
-    """The numbers with the decimals of their unit; what is no number becomes a gap."""
+    """The numbers with the decimals of their unit; anything but a number becomes a gap."""
     return [each if math.isfinite(each) else None for each in np.round(values, DECIMALS[unit]).tolist()]
 
 
 def data(robot: Any, walk: Any, drawn: list[Group]) -> dict:
-    """What charts.js and stage.js get: see charts.js for the fields."""
+    """The data for charts.js and stage.js; charts.js describes the fields."""
     first = begin_of(walk)
     series = {name: rounded(walk.samples[name][first:], unit) for name, unit in SERIES.items()}
     series["time_s"] = rounded(walk.samples["time_s"][first:], "s")
@@ -252,14 +254,14 @@ def data(robot: Any, walk: Any, drawn: list[Group]) -> dict:
         "steps": walk.samples["steps"][first:].astype(int).tolist(),
         "states": {machine: states(walk, machine, shown_from(walk)) for machine in MACHINES},
         "charts": [dataclasses.asdict(chart) for group in drawn for chart in group.charts],
-        "told": TOLD,
+        "decimals": CURSOR_DECIMALS,
         "geometry": robot.plant.geometry(),
         "footholds": walk.footholds,
     }
 
 
 def states(walk: Any, machine: str, begin_s: float) -> dict:
-    """{names: of the states that came, by number; runs: [[since s, number], ...]} of one machine."""
+    """{names: of the states that occurred, by number; runs: [[since s, number], ...]} of one machine."""
     time, numbers, names = walk.machine_states(machine)
     first = int(np.searchsorted(time, begin_s))
     time, numbers = time[first:], numbers[first:]

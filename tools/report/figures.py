@@ -1,4 +1,4 @@
-"""Plots on the pages of tools: their common look, and how a page carries them and their library in one file."""
+"""Plots on the pages of tools: their common look, and their embedding in a page with their library."""
 
 import base64
 import dataclasses
@@ -48,16 +48,16 @@ def placed(figure: Any) -> Markup:
 
 @functools.cache
 def library() -> Markup:
-    """What a page with figures ends with: plotly, packed, and the script that draws them."""
+    """The end of a page with figures: plotly, packed, and the script that draws them."""
     script = (HERE / "plots.js").read_text(encoding="utf-8")
-    told = "The plots need a browser of 2023 or later with JavaScript; they load nothing from elsewhere."
+    notice = "The plots need a browser of 2023 or later with JavaScript; they load nothing from elsewhere."
     return Markup(
-        f'<noscript><p>{told}</p></noscript>\n<p id="no-plots" hidden>{told}</p>\n'
+        f'<noscript><p>{notice}</p></noscript>\n<p id="no-plots" hidden>{notice}</p>\n'
         f'<script type="application/gzip+base64" id="packed-plotly">{packed(get_plotlyjs())}</script>\n'
         f"<script>{script}</script>"
     )
 
 
 def packed(text: str) -> Markup:
-    """Text that a page can carry and unpack by itself, with the same bytes every time: a third of Plotly's 4.8 MB."""
+    """Compressed text that a page unpacks by itself, with the same bytes every time: a third of Plotly's 4.8 MB."""
     return Markup(base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode())

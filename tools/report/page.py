@@ -24,7 +24,7 @@ HERE = pathlib.Path(__file__).parent
 SCRIPTS = ("stage.js", "charts.js", "report.js")
 MACHINES = (("hip", "hip", "hip"), ("outer_foot", "outer ankle", "outer"), ("inner_foot", "inner ankle", "inner"))
 
-# What the robot itself did on 1-2 May 2011 (appendix 1, table of the ultra-marathon walk).
+# Results of the real robot on 1-2 May 2011 (appendix 1, table of the ultra-marathon walk).
 ROBOT = {
     "step": "0.35 m",
     "time": "0.60 s",
@@ -77,8 +77,8 @@ def render(robot: Any, summary: dict) -> str:
 
 
 def firmware(robot: Any, summary: dict) -> list[dict]:
-    """Each program in C: what became of it, what was found, and its sources with how often each line ran."""
-    told = []
+    """Each program in C: its end, the findings, and its sources with the count of each line."""
+    programs = []
     shown: set[pathlib.Path] = set()
     for board, each in summary["firmware"].items():
         made = robot.firmware[board]
@@ -92,7 +92,7 @@ def firmware(robot: Any, summary: dict) -> list[dict]:
         # boards of one source have figures each; its lines are shown once, with all their counts
         shown.add(made.folder)
         ran = each["coverage"]
-        told.append(
+        programs.append(
             {
                 **each,
                 "board": board,
@@ -105,7 +105,7 @@ def firmware(robot: Any, summary: dict) -> list[dict]:
                 ],
             }
         )
-    return told
+    return programs
 
 
 def share(part: int, whole: int) -> str:
@@ -114,7 +114,7 @@ def share(part: int, whole: int) -> str:
 
 
 def rows_of(file: coverage.FileCounts) -> list[tuple[int, str, str, str]]:
-    """(line, how often it ran, what to colour it by, text) of a source; a branch never taken is "half"."""
+    """(line, count, colour class, text) of a source; a branch never taken is "half"."""
     try:
         lines = file.path.read_text(encoding="utf-8", errors="replace").splitlines()[:MOST_LINES]
     except OSError:
@@ -158,23 +158,23 @@ def tiles(summary: dict) -> list[dict]:
             None,
         ),
     )
-    return [{"name": name, "value": value, "beside": beside} for name, value, beside in rows]
+    return [{"name": name, "value": value, "beside": real_robot} for name, value, real_robot in rows]
 
 
 def energy_used(summary: dict) -> str:
-    """What the batteries gave since it was let go, and for each kilometre, which can be compared."""
+    """Energy from the batteries since the robot was let go, and per kilometre, which can be compared."""
     used_Wh, km = summary["energy_Wh"]["total"], summary["distance_m"] / 1000.0
     return energy_text(used_Wh) + (f", {used_Wh / km:.2f} Wh/km" if km > 0.0 else "")
 
 
 def since_release(summary: dict) -> str:
-    """How long it walked: hours, or seconds of less than one."""
+    """Duration of the walk: in hours, or in seconds below one hour."""
     hours: float = summary["walked_h"]
     return f"{hours:.1f} h" if hours >= 1.0 else f"{3600.0 * hours:.1f} s"
 
 
 def contact(oddities: dict) -> list[dict]:
-    """Tiles of what feet and floor did, beside what a real floor can do."""
+    """Tiles of the contact of feet and floor, next to the abilities of a real floor."""
     strikes = oddities["tensile_strikes"]
     rows = (
         ("contact", oddities["contact"], None),
@@ -189,17 +189,17 @@ def contact(oddities: dict) -> list[dict]:
         ("touches, lift-offs", f"{oddities['touches']}, {oddities['lift_offs']}", None),
         ("lowest clearance of the swing foot", figure(clearance_mm(oddities), "{:.0f} mm"), None),
     )
-    return [{"name": name, "value": value, "beside": beside} for name, value, beside in rows]
+    return [{"name": name, "value": value, "beside": real_robot} for name, value, real_robot in rows]
 
 
 def clearance_mm(oddities: dict) -> float | None:
-    """The least clearance in millimetres, if there was a swing to measure it in."""
+    """The least clearance in millimetres, if the walk had a swing."""
     metres = oddities["min_clearance_m"]
     return None if metres is None else 1e3 * metres
 
 
 def energy_scale(largest_Wh: float) -> tuple[str, float, int]:
-    """(unit, how many of it are 1 Wh, decimals) for a column: its largest energy has three digits."""
+    """(unit, units per Wh, decimals) for a column: its largest energy has three digits."""
     unit, factor = ("Wh", 1.0) if largest_Wh >= 1.0 else ("mWh", 1e3)
     digits = math.floor(math.log10(largest_Wh * factor)) if largest_Wh > 0.0 else 0
     return unit, factor, max(0, 2 - digits)
@@ -227,7 +227,7 @@ def energy(summary: dict) -> dict:
 
 
 def errors(robot: Any, summary: dict) -> dict[str, list[dict]]:
-    """{heading: rows} of the errors that boards noted, first those that a healthy walk has not."""
+    """{heading: rows} of the errors that boards noted, first those that a healthy walk does not have."""
     beyond = normal_errors.beyond(RANGER, summary["errors"], summary["time_s"])
     found: dict[str, list[dict]] = {"Unexpected": [], "As in every healthy walk": []}
     for board, names in summary["errors"].items():

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from ranger_sim.tools.robodaq.codec import Point
 
-LOOK_S = 0.02  # between two polls of the port when no data arrive
+POLL_S = 0.02  # between two polls of the port when no data arrive
 SHOW_S = 0.25  # between two updates of the picture on a terminal
 LINE_S = 5.0  # between two lines without a terminal
 TIMEOUT_S = 10.0  # for a request without an answer
@@ -126,11 +126,11 @@ def run(options: argparse.Namespace) -> int:
         stack.callback(port.close)
         kept = [stack.enter_context(contextlib.closing(logs.open_log(name))) for name in options.log]
 
-        def hear(point: Point) -> None:
+        def on_point(point: Point) -> None:
             for log in kept:
-                log.hear(point)
+                log.on_point(point)
 
-        session.hear = hear
+        session.on_point = on_point
         view = View(session, asked, options)
         interrupted = stack.enter_context(interrupts.noted())
         with view.shown():
@@ -201,7 +201,7 @@ def work(
         elif asked.anything() and (asked.after_writing(session) or now - answered > options.timeout):
             break
         try:
-            select.select(port.filenos(), [], [], LOOK_S)
+            select.select(port.filenos(), [], [], POLL_S)
             data = port.read(1 << 16)
             now = wallclock.monotonic_s()
             session.receive(data, now)

@@ -20,7 +20,7 @@ class Log(Protocol):
 
     path: pathlib.Path
 
-    def hear(self, point: Point) -> None:
+    def on_point(self, point: Point) -> None:
         """Keep a point."""
 
     def close(self) -> None:
@@ -36,7 +36,7 @@ class TextLog:
         for number, name in all_variables.NAMES.items():
             self.file.write(f"{name}\t{number}\t\n")
 
-    def hear(self, point: Point) -> None:
+    def on_point(self, point: Point) -> None:
         self.file.write(f"{point.number}\t{catalogue.text_of(point.number, point.word)}\t{point.stamp}\n")
 
     def close(self) -> None:
@@ -55,7 +55,7 @@ class MeasurementLog:
         self.stamps: dict[int, array.array[int]] = {}
         self.values: dict[int, array.array[float]] = {}
 
-    def hear(self, point: Point) -> None:
+    def on_point(self, point: Point) -> None:
         stamps = self.stamps.get(point.number)
         if stamps is None:
             stamps = self.stamps[point.number] = array.array("q")

@@ -65,7 +65,7 @@ class Rates:
         self.list_of: dict[int, str] = {}
         self.promised_hz = np.zeros(VARIABLES)
         self.patience_ms = np.full(VARIABLES, np.inf)
-        self.came_ms: dict[int, int] = {}
+        self.received_ms: dict[int, int] = {}
         self.gaps = np.zeros(VARIABLES, np.int64)
         self.longest_ms = np.zeros(VARIABLES, np.int64)
         self.last_gap_ms: dict[int, int] = {}  # when its latest gap ended, by the robot's clock
@@ -85,8 +85,8 @@ class Rates:
         self.bins[-1][number] += 1
         if FIRST_CHANNEL <= number < FIRST_CHANNEL + CHANNELS:
             self._learn()
-        before_ms = self.came_ms.get(number)
-        self.came_ms[number] = now_ms
+        before_ms = self.received_ms.get(number)
+        self.received_ms[number] = now_ms
         if before_ms is None or now_ms - before_ms <= self.patience_ms[number]:
             return False
         self.gaps[number] += 1
@@ -98,7 +98,7 @@ class Rates:
         """Advance to a bin; bins without a point count too. A clock that jumped back or far ahead restarts the bins."""
         if not self.bins or not 0 <= number - self.bin <= BINS:
             if not self.bins or number < self.bin:
-                self.came_ms.clear()
+                self.received_ms.clear()
             self.bins.clear()
             self.bins.append(np.zeros(VARIABLES, np.int64))
         else:
@@ -108,9 +108,9 @@ class Rates:
 
     def _learn(self) -> None:
         """Update the lists from the channel values that the robot sends; changed lists are measured anew."""
-        told = self.session.values
+        known = self.session.values
         numbers = range(FIRST_CHANNEL, FIRST_CHANNEL + CHANNELS)
-        words = [float(value_of_word("f32", told[number][0])) if number in told else 0.0 for number in numbers]
+        words = [float(value_of_word("f32", known[number][0])) if number in known else 0.0 for number in numbers]
         if words == self.words:
             return
         self.words = words
@@ -128,7 +128,7 @@ class Rates:
                 self.promised_hz[number], sure_hz = min(full[which], own_hz), min(least[which], own_hz)
             self.patience_ms[number] = max(GAP_PERIODS * 1000.0 / sure_hz, GAP_MS)
             if which != before.get(number, SLOW_LIST):
-                self.came_ms.pop(number, None)
+                self.received_ms.pop(number, None)
 
     # --- for displays -----------------------------------------------------------------------------------
 

@@ -59,8 +59,8 @@ class Session:
     `values`: {identifier: (word, stamp)} of the last point; `counts`: number of points of each.
     """
 
-    def __init__(self, hear: Callable[[Point], None] | None = None) -> None:
-        self.hear = hear
+    def __init__(self, on_point: Callable[[Point], None] | None = None) -> None:
+        self.on_point = on_point
         self.decoder = SegmentDecoder(all_variables.ID_OF_LAST)
         self.values: dict[int, tuple[int, int]] = {}
         self.counts: collections.Counter[int] = collections.Counter()
@@ -159,8 +159,8 @@ class Session:
         self.reads.discard(number)
         if number == ERRORS:
             self._note_error(word, stamp)
-        if self.hear is not None:
-            self.hear(point)
+        if self.on_point is not None:
+            self.on_point(point)
 
     def _pass_time(self, number: int, stamp: int) -> None:
         """Advance the robot's time to the newest stamp; a jump is a gap, a step back a restart of the robot."""

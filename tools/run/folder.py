@@ -55,13 +55,13 @@ class RunFolder:
 
     Files of an older run are removed first: only those of the names above, and only if a record of ours marks a run.
     UserError for a folder in which a file of such a name is not from a run, or in which another run is writing.
-    tell: called with a line for every file that could not be finished.
+    report: called with a line for every file that could not be finished.
     """
 
-    def __init__(self, name: str | pathlib.Path, command: str, tell: Callable[[str], None]) -> None:
+    def __init__(self, name: str | pathlib.Path, command: str, report: Callable[[str], None]) -> None:
         self.path = writable_folder(name)
         self.command = command
-        self.tell = tell
+        self.report = report
         self.files: dict[str, str] = {}  # "complete", or why it is not
         self.is_done = False
         self._claim()
@@ -103,7 +103,7 @@ class RunFolder:
     def failed(self, name: str, error: BaseException, until: str = "") -> None:
         """`name` stays partial."""
         self.files[name] = f"incomplete: {cause_of(error)}{until}"
-        self.tell(f"{self.path / partial(name)}: {cause_of(error)}: the file ends there{until}")
+        self.report(f"{self.path / partial(name)}: {cause_of(error)}: the file ends there{until}")
 
     @property
     def is_complete(self) -> bool:

@@ -50,7 +50,7 @@ __all__ = ["walk", "write_frames"]
 DEFAULT_STEPS = 100
 EXIT_INCOMPLETE = 2  # a requested file is not whole: the disk is full
 SLICE_S = 0.05  # virtual seconds between two checks of the screen and of Ctrl-C
-TELL_EVERY_S = 60.0  # of the wall clock: a line of progress if there is no screen to draw it on (chosen by us)
+REPORT_EVERY_S = 60.0  # of the wall clock: a line of progress if there is no screen to draw it on (chosen by us)
 PACED_SLICE_S = 0.005  # the same when a serial port is connected: the longest time that a byte waits
 
 
@@ -134,13 +134,13 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
                 f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", highlight=False, soft_wrap=True
             )
         with (
-            gdb_options.debuggers(robot, options, lambda: bool(interrupted), console) as doors,
+            gdb_options.debuggers(robot, options, lambda: bool(interrupted), console) as servers,
             claimed(options, stop, console) if options.out else contextlib.nullcontext() as folder,
         ):
             kept = PrintedFiles(printed, folder) if printed is not None and folder is not None else None
             logs = logs_of(robot, options, folder)
-            if doors:
-                doors[0].wait_for_debugger()
+            if servers:
+                servers[0].wait_for_debugger()
             walk(robot, stop, console, interrupted, paced=bool(ends))
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)
@@ -187,9 +187,9 @@ def firmware_of(options: argparse.Namespace, console: Console) -> dict[str, Firm
 
 @contextlib.contextmanager
 def printed_by(firmware: dict[str, Firmware], console: Console) -> Iterator[Printed | None]:
-    """Takes what the programs in C print; without a folder it is shown on standard error. None without such programs.
+    """Takes the output of programs in C; without a folder it goes to standard error. None without such programs.
 
-    With `--json -` as well, which shows nothing else.
+    It also goes there with `--json -`, which prints nothing else.
     """
     if not firmware:
         yield None
@@ -236,10 +236,10 @@ def arm(robot: Ranger, wanted: list[Fault], proof: bool) -> None:
 def claimed(options: argparse.Namespace, stop: StopRule, console: Console) -> RunFolder:
     """The requested folder, for this run alone. Errors in a run's options must have been reported before."""
 
-    def tell(line: str) -> None:
+    def report(line: str) -> None:
         console.print(line, highlight=False, soft_wrap=True)
 
-    return RunFolder(options.out, command_again(options, stop), tell)
+    return RunFolder(options.out, command_again(options, stop), report)
 
 
 def logs_of(robot: Ranger, options: argparse.Namespace, folder: RunFolder | None) -> RunLogs | None:
@@ -290,37 +290,37 @@ def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool
     with Progress(
         SpinnerColumn(),
         BarColumn(bar_width=20),
-        TextColumn("{task.fields[told]}"),
+        TextColumn("{task.fields[shown]}"),
         console=console,
         transient=False,
         disable=not console.is_terminal,
     ) as progress:
-        task = progress.add_task("walk", total=1.0, told="")
-        tell_at = started + TELL_EVERY_S
-        done, told = False, 0
+        task = progress.add_task("walk", total=1.0, shown="")
+        report_at = started + REPORT_EVERY_S
+        done, shown = False, 0
         while not done:
             done = robot.run(stop, PACED_SLICE_S if paced else SLICE_S) or bool(interrupted)
-            for death in robot.deaths[told:]:
-                told += 1
+            for death in robot.deaths[shown:]:
+                shown += 1
                 console.print(loss_text(death), highlight=False, soft_wrap=True)
             wall = wallclock.monotonic_s() - started
             if paced and not done and robot.time_s > wall:
                 wallclock.sleep_s(robot.time_s - wall)
             if console.is_terminal:
-                progress.update(task, completed=robot.fraction_done(stop), told=progress_text(robot, stop, wall))
-            elif started + wall >= tell_at:
-                tell_at += TELL_EVERY_S
+                progress.update(task, completed=robot.fraction_done(stop), shown=progress_text(robot, stop, wall))
+            elif started + wall >= report_at:
+                report_at += REPORT_EVERY_S
                 console.print(progress_text(robot, stop, wall), highlight=False, soft_wrap=True)
 
 
 def loss_text(death: dict) -> str:
-    """Which board was lost, when, and where its program was."""
+    """The lost board, the time, and the place of its program."""
     why = death["why"] or f"its process {death.get('how', 'ended')}"
     return f"{death['board']} was lost at {death['time_s']:.3f} s: {why}"
 
 
 def progress_text(robot: Ranger, stop: StopRule, wall_s: float) -> str:
-    """Where the walk is after `wall_s` seconds of the wall clock, and how many more it will take at this rate."""
+    """Progress of the walk after `wall_s` seconds of the wall clock, and the seconds left at this rate."""
     speed = robot.mean_speed_m_per_s()
     share = robot.fraction_done(stop)
     left = clock_text(wall_s * (1.0 - share) / share) if share > 0.0 else "?"
@@ -339,7 +339,7 @@ def clock_text(seconds: float) -> str:
 
 
 def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs | None, console: Console) -> None:
-    """Logs and report, as far as there is something to show, then the summary."""
+    """Write logs and report, if the run has data for them, then the summary."""
     if any(each.coverage for each in robot.firmware.values()):
         with folder.file(LCOV) as path:
             path.write_text(coverage.lcov(coverage.merged(each.ran() for each in robot.firmware.values())), "utf-8")
@@ -377,14 +377,14 @@ def print_summary(summary: dict, floor_friction: float, console: Console) -> Non
 
 
 def usual_lines(errors: dict, time_s: float) -> list[str]:
-    """How much of what boards noted was as in every healthy walk, in a line if there was any."""
+    """The number of errors that every healthy walk has too, in a line if there are any."""
     unusual = normal_errors.beyond(RANGER, errors, time_s)
     usual = sum(map(len, errors.values())) - sum(map(len, unusual.values()))
     return [f"errors as in every healthy walk: {usual} kinds (report and summary have them)"] if usual else []
 
 
 def end_text(summary: dict) -> str:
-    """How the walk ended."""
+    """The end of the walk, in words."""
     if summary["battery"]["empty"]:
         return f"{summary['fall_cause']}"
     if summary["fell"]:
@@ -393,7 +393,7 @@ def end_text(summary: dict) -> str:
 
 
 def energy_text(summary: dict) -> str:
-    """Where the energy went, and what is left."""
+    """The energy by consumer, and the charge left."""
     energy, battery = summary["energy_Wh"], summary["battery"]
     parts = ", ".join(f"{name.replace('_', ' ')} {Wh:.3g}" for name, Wh in energy.items() if name != "total")
     return (

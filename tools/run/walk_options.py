@@ -174,9 +174,9 @@ def stop_of(given: argparse.Namespace) -> StopRule | None:
 
 
 def log_of(given: argparse.Namespace) -> str:
-    """What the robot's own log keeps, for the report: the last seconds, or nothing without a folder for it.
+    """The contents of the robot's own log, for the report: the last seconds, or nothing without a folder for it.
 
-    The files of `--log full` take everything as it comes, and nothing of that is kept in memory.
+    The files of `--log full` take all rows at once, so that memory keeps none of them.
     """
     return "none" if not given.out or given.log == "none" else "window"
 

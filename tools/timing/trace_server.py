@@ -11,7 +11,7 @@ from typing import BinaryIO
 from urllib.parse import unquote
 
 from ranger_sim.foundation import descriptors
-from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, LIMITS, REASONS, Door, Peer, SocketStream
+from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, LIMITS, REASONS, Peer, PeerServer, SocketStream
 
 VIEWER = "https://ui.perfetto.dev"
 # The only port from which Perfetto's viewer may read: its Content-Security-Policy names trace_processor's port.
@@ -48,7 +48,7 @@ class Visitor(Peer):
             self.answer(piece)  # none: the file has become shorter, and the connection ends early
 
 
-class TraceServer(Door[Visitor]):
+class TraceServer(PeerServer[Visitor]):
     """Serves one file on loopback; `served`: a client has read all of it. OSError if the port is not available."""
 
     tolerated_s = TOLERATED_S
@@ -72,10 +72,10 @@ class TraceServer(Door[Visitor]):
         """Wait for an event and handle it."""
         if self.left_over:
             patience_s = 0.0
-        elif self.knocking:
+        elif self.connections_wait:
             patience_s = min(patience_s, 1.0 / ARRIVALS_PER_S)
         descriptors.wait(self.filenos(), self.filenos_to_write(), patience_s)
-        self.look(0)
+        self.receive(0)
         self.write()
 
     def _welcome(self, connection: socket.socket) -> Visitor:
@@ -85,7 +85,7 @@ class TraceServer(Door[Visitor]):
         """A client whose answer is being sent keeps its place."""
         return peer.ending
 
-    def _apology(self, reason: str) -> bytes:
+    def _last_bytes(self, reason: str) -> bytes:
         return _head(UNAVAILABLE if reason == FULL else BAD_REQUEST, {"Warning": f'199 - "{REASONS[reason]}"'})
 
     def _take(self, peer: Visitor) -> bool:
@@ -138,7 +138,7 @@ class TraceServer(Door[Visitor]):
 
 def _head(status: str, fields: dict[str, str] | None = None, length: int = 0) -> bytes:
     """The head of an answer; each allows only Perfetto's viewer to read it, even from a page of the internet."""
-    told = {
+    headers = {
         "Access-Control-Allow-Origin": VIEWER,
         "Access-Control-Allow-Private-Network": "true",
         "Cache-Control": "no-cache",
@@ -147,5 +147,7 @@ def _head(status: str, fields: dict[str, str] | None = None, length: int = 0) ->
         **(fields or {}),
     }
     if status == NO_CONTENT:
-        del told["Content-Length"]  # RFC 9110, section 8.6
-    return "\r\n".join([f"HTTP/1.1 {status}", *(f"{name}: {value}" for name, value in told.items()), "", ""]).encode()
+        del headers["Content-Length"]  # RFC 9110, section 8.6
+    return "\r\n".join(
+        [f"HTTP/1.1 {status}", *(f"{name}: {value}" for name, value in headers.items()), "", ""]
+    ).encode()

@@ -3,13 +3,13 @@
 Two searches. `pattern` (Hooke and Jeeves) moves one parameter at a time: each in turn is tried one step up and one step
 down; a change stays only when it lowers the cost by at least `--worth`, so that few parameters end up different from
 where they began. After each round without a change the steps are halved. `evolution` (CMA-ES, tools/tune/evolution.py)
-moves all of them at once and finds what one at a time does not; every parameter ends up a little different. The same
+moves all of them at once and finds improvements that need several; every parameter ends up a little different. The same
 call on the same program gives the same file, with however many `--jobs`.
 
-Every try is walked with seven boards, buses and body, once per seed and floor. What a walk costs: by `--aim robot` 0
-for a walk like the robot's in the 65 km of May 2011, and more with the squares of what differs, each in parts of what
-is allowed; by `--aim energy` a hundred times its cost of transport. A fall costs more than any walk that stays up, and
-the less the later it comes.
+Every try is walked with seven boards, buses and body, once per seed and floor. The cost of a walk: by `--aim robot` 0
+for a walk like the robot's in the 65 km of May 2011, plus the squares of the differences, each divided by its
+tolerance; by `--aim energy` a hundred times its cost of transport. A fall costs more than any walk without one, and the
+less the later it happens.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from ranger_sim.tools.command_line.units import LENGTHS, number, quantity, whole
 from ranger_sim.tools.command_line.workers import workers
 from ranger_sim.tools.tune.evolution import Evolution
 
-# What a walk should be, and the deviation that costs 1. Values: the robot's in May 2011 (0.35 m, 0.60 s, 11.3 W,
-# 0.28, 14 ms); tolerances: a quarter of the length, 15 % of the time, and what keeps 6 ... 15 W, 0.19 ... 0.35 and
-# 8 ... 20 ms inside 1. Steps should be alike: a spread of a tenth of a step costs 1 (chosen by us).
+# The target of a walk, and the deviation that costs 1. Values: the robot's in May 2011 (0.35 m, 0.60 s, 11.3 W,
+# 0.28, 14 ms); tolerances: a quarter of the length, 15 % of the time, and such that 6 ... 15 W, 0.19 ... 0.35 and
+# 8 ... 20 ms cost at most 1. Steps should be alike: a spread of a tenth of a step costs 1 (chosen by us).
 AIMS = {
     "mean_step_length_m": (0.35, 0.0875),
     "mean_step_time_s": (0.60, 0.09),
@@ -48,8 +48,8 @@ LOST_COST = 10.0  # per lost frame or slot overrun: none is allowed
 TCOT_COST = 100.0  # per unit of the cost of transport: 28 for the robot's walk, below any fall up to 0.49
 WORST_WALK_COST = 0.49 * FALL_COST
 
-# What is varied unless the caller says otherwise, by program: parameter and first step (chosen by us: about a tenth
-# of the value, or what the notes of 2010 and 2011 changed it by).
+# The varied parameters unless the caller names others, by program: parameter and first step (chosen by us: about a
+# tenth of the value, or the change in the notes of 2010 and 2011).
 RECORD_STEPS = {
     "C_H_OUTER_STIFFNESS": 2.0,
     "P_FO_PP_THEIGHT": 0.005,
@@ -106,7 +106,7 @@ TOGETHER = {"P_FO_PP_THEIGHT": "P_FI_PP_THEIGHT"}
 
 @dataclasses.dataclass(frozen=True)
 class Task:
-    """What each candidate has to walk: `steps` with every seed on every floor (roughness in m)."""
+    """The walks of each candidate: `steps` with every seed on every floor (roughness in m)."""
 
     base: str
     steps: int
@@ -234,7 +234,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 class Judge:
-    """Walks candidates and remembers what they cost. Call: judge(changes) -> (cost, falls).
+    """Walks candidates and keeps their costs. Call: judge(changes) -> (cost, falls).
 
     `each`: a `map`, perhaps one of several processes; `folder`: for the candidates' files.
     """
@@ -277,7 +277,7 @@ def walk(order: tuple[str, int, float, Task]) -> dict:
     controller, seed, roughness_m, task = order
     scenario = Scenario(controller=controller, body=task.body, seed=seed, floor_roughness_m=roughness_m)
     with contextlib.closing(Ranger(scenario)) as robot:
-        # three times the time of such a walk, so that one that stands still ends too (chosen by us)
+        # three times the time of such a walk, so that one without progress ends too (chosen by us)
         stop = StopRule(steps=task.steps, time_s=10.0 + 1.8 * task.steps)
         while not robot.run(stop, 60.0):
             pass
@@ -285,7 +285,7 @@ def walk(order: tuple[str, int, float, Task]) -> dict:
 
 
 def cost_of(summary: dict, steps: int, aim: str = "robot") -> float:
-    """What a walk costs; see AIMS, and TCOT_COST. A walk that ended early counts as a fall."""
+    """The cost of a walk; see AIMS, and TCOT_COST. A walk that ended early counts as a fall."""
     if summary["fell"] or summary["steps"] < steps:
         return FALL_COST * (1.0 - 0.5 * summary["steps"] / steps)
     if aim == "energy":
@@ -352,7 +352,7 @@ def search(
                 if new_cost < cost - worth:
                     changes, cost, falls, improved = candidate, new_cost, new_falls, True
                     break
-        # a change that no longer earns its keep is taken back
+        # a change that no longer lowers the cost enough is taken back
         for name in sorted(set(changes) - set(TOGETHER.values())):
             candidate = with_value(changes, values, name, values[name])
             new_cost, new_falls = judge(candidate)
@@ -364,7 +364,7 @@ def search(
 
 
 def with_value(changes: dict, values: dict, name: str, value: float) -> dict:
-    """`changes` with `name` (and its twin) at `value`; what equals the base is left out."""
+    """`changes` with `name` (and its twin) at `value`, without values equal to the base's."""
     result = dict(changes)
     for each in (name, TOGETHER.get(name)):
         if each is not None:

@@ -50,7 +50,7 @@ class Evolution:
         return self.mean + self.sigma * self.steps * ((normal * self.lengths) @ self.axes.T)
 
     def tell(self, points: Any, costs: Any) -> None:
-        """Learn from what the points of `ask` cost."""
+        """Update the distribution from the costs of the points of `ask`."""
         n = len(self.mean)
         self.generation += 1
         best = np.argsort(np.asarray(costs, dtype=float), kind="stable")[: len(self.weights)]

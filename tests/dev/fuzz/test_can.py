@@ -17,7 +17,7 @@ class DeadBoard(Board):
         self.next_time, self.horizon = NEVER, until
         return NEVER
 
-    def listen_to_edges(self, buffer, pin, partner_pin):
+    def connect_edges(self, buffer, pin, partner_pin):
         """No test reads them."""
 
 

@@ -13,7 +13,7 @@ def fuzz():
     each.close()
 
 
-def test_two_thousand_cases_reach_every_door_and_stop_nothing():
+def test_two_thousand_cases_reach_every_endpoint_and_stop_nothing():
     counted = doors.run(2000)
     assert counted["cases"] == 2000
     for name in ("answered", "admitted", "not_admitted", "frames", "attach_malformed", "socketcand_malformed"):
@@ -21,7 +21,7 @@ def test_two_thousand_cases_reach_every_door_and_stop_nothing():
     assert all(counted[f"{kind}_requests"] > 500 for kind in doors.GREETINGS)
 
 
-def test_a_door_that_does_too_much_or_holds_too_much_is_found(fuzz):
+def test_an_endpoint_that_does_too_much_or_holds_too_much_is_found(fuzz):
     fuzz.poll()
     fuzz.check(fuzz.control, fuzz.control.limits.burst)
     with pytest.raises(Finding, match=r"control: \d+ requests in a poll"):
@@ -46,7 +46,7 @@ def test_a_well_behaved_program_that_is_not_answered_is_found(fuzz, monkeypatch)
             fuzz.poll()
 
 
-def test_an_exception_at_a_door_leaves_with_its_case(monkeypatch):
+def test_an_exception_at_an_endpoint_is_reported_with_its_case(monkeypatch):
     monkeypatch.setattr(doors, "admitted", lambda line: 1 // 0)
     with pytest.raises(ZeroDivisionError) as fault:
         doors.run(100)

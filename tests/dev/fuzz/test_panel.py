@@ -18,7 +18,7 @@ def run(cases, seed, source):
     return panel.asyncio.run(panel._run(cases, seed, source))
 
 
-def test_hostile_pages_are_stood(source):
+def test_hostile_pages_stop_nothing(source):
     counted = run(500, 4, source)
     assert counted["cases"] == 500 and counted["well_behaved_answered"] == 26 and counted["pages_loaded"] == 1
     # how many exactly depends on when the kernel brings what was said
@@ -34,7 +34,7 @@ def test_a_request_that_ends_in_an_exception_is_found(source, monkeypatch):
         run(500, 4, source)
 
 
-def test_a_number_that_does_not_exist_in_what_a_page_is_told_is_found(source, monkeypatch):
+def test_a_number_that_does_not_exist_in_a_message_to_a_page_is_found(source, monkeypatch):
     monkeypatch.setattr(panel.Looked, "values", lambda self, wanted, at: [float("nan")] * len(wanted))
     monkeypatch.setattr(messages.json, "dumps", lambda content, **_: repr(content).replace("nan", "NaN"))
     with pytest.raises(Finding, match="does not understand"):
@@ -60,6 +60,6 @@ def test_a_panel_that_does_not_answer_is_found(source, monkeypatch):
         return ""
 
     monkeypatch.setattr(panel, "TURNS_TO_ANSWER", 50)
-    monkeypatch.setattr(server.Session, "hear", silent)
+    monkeypatch.setattr(server.Session, "on_text", silent)
     with pytest.raises(Finding, match="a well-behaved page is not answered"):
         run(100, 4, source)

@@ -8,7 +8,7 @@ from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.ranger.feed import FeedServer
 
 
-def test_hostile_requests_and_viewers_are_stood():
+def test_hostile_requests_and_viewers_stop_nothing():
     counted = requests.run(600, seed=4)
     assert counted["cases"] == 600 and counted["robots"] == 1
     assert counted["faults_armed"] > 20 and counted["faults_that_acted"] > 10
@@ -32,7 +32,7 @@ def test_a_fault_that_ends_the_run_of_others_is_found(monkeypatch):
     assert "python -m dev.fuzz requests: seed 1, case" in found.value.__notes__[0]
 
 
-def test_a_feed_that_shows_what_is_no_number_is_found(monkeypatch):
+def test_a_feed_that_shows_a_value_that_is_not_a_number_is_found(monkeypatch):
     state = FeedServer.state
     monkeypatch.setattr(FeedServer, "state", lambda self, now: {**state(self, now), "distance_m": float("nan")})
     with pytest.raises(Finding, match="NaN in a record"):

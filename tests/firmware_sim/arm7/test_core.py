@@ -64,7 +64,7 @@ def test_interrupts_that_are_off_wait():
     assert (made.pc, made.cpsr()) == (RAM + 4, SUPERVISOR)
 
 
-def test_nothing_at_an_address_is_told_with_the_program_counter():
+def test_an_access_to_an_empty_address_is_reported_with_the_program_counter():
     made = core(0xE5910000)  # ldr r0, [r1]
     made.r[1] = 0xE0004000
     with pytest.raises(BusFault, match="read from an address where nothing is: 0xe0004000, 4 bytes, at pc 0x40000000"):
@@ -148,7 +148,7 @@ def test_user_mode_changes_its_flags_and_nothing_else_of_its_status():
     assert made.cpsr() == 0xF0000010
 
 
-def test_a_mode_that_is_none_is_told():
+def test_an_unknown_mode_is_reported():
     made = core(0xE121F000)  # msr cpsr_c, r0
     with pytest.raises(UserError, match="mode 0x00 set at pc 0x40000000: there is no such mode"):
         made.step()

@@ -320,7 +320,7 @@ def test_a_condition_of_never_does_nothing():
     assert (made.pc, made.cycles) == (RAM + 4, 1)
 
 
-def test_a_status_with_a_mode_that_is_none_is_told_where_it_is_restored():
+def test_a_status_with_an_unknown_mode_is_reported_where_it_is_restored():
     made = core(0xE1B0F00E)  # movs pc, lr
     made.set_cpsr(0xC0 | INTERRUPT)  # its saved status was never written
     with pytest.raises(UserError, match="mode 0x00 set at pc 0x40000000: there is no such mode"):

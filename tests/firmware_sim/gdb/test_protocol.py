@@ -115,7 +115,7 @@ def transferred(client, what):
             return text
 
 
-def test_the_memory_map_tells_flash_ram_and_where_devices_may_be():
+def test_the_memory_map_lists_flash_ram_and_where_devices_may_be():
     def talk(client):
         found = xml.etree.ElementTree.fromstring(transferred(client, "memory-map:read:"))
         return [(each.get("type"), int(each.get("start"), 0), int(each.get("length"), 0)) for each in found]
@@ -144,7 +144,7 @@ def test_memory_is_read_and_written_at_any_address_and_length():
     session(tiny(), 1000, talk)
 
 
-def test_a_device_is_looked_at_without_a_read_and_read_when_asked_for():
+def test_a_device_is_inspected_without_a_read_and_read_when_asked_for():
     machine = tiny()
 
     def talk(client):
@@ -307,7 +307,7 @@ def test_what_the_program_may_not_do_halts_it_there_with_a_line_and_ends_the_run
         session(machine, END, talk)
 
 
-def test_without_points_a_fault_under_a_debugger_is_told_too():
+def test_without_points_a_fault_under_a_debugger_is_reported_too():
     machine = tiny()
     machine.core.place(LOOP, (0xE5912000).to_bytes(4, "little"))
     machine.core.r[1] = 0x60000000
@@ -324,7 +324,7 @@ def test_without_points_a_fault_under_a_debugger_is_told_too():
 
 
 @pytest.mark.parametrize("garbage", [b"GET / HTTP/1.1\r\n\r\n", b"\x00\x01\x02", b"$g#zz", b"#67"])
-def test_who_does_not_speak_the_protocol_is_sent_away_and_counted_and_the_run_goes_on(garbage, alone):
+def test_a_client_of_another_protocol_is_sent_away_and_counted_and_the_run_goes_on(garbage, alone):
     machine = tiny()
 
     def talk(client):
@@ -388,7 +388,7 @@ def test_what_is_not_formed_as_it_should_is_an_error_and_nothing_more(request_):
 
 
 @pytest.mark.parametrize("request_", ["c100000006", "s1ffffffff"])
-def test_an_address_of_more_than_32_bits_is_no_place_to_go_on_from(request_):
+def test_an_address_of_more_than_32_bits_is_refused_as_a_place_to_continue(request_):
     """A program counter beyond them once ended the run when the registers were asked for."""
 
     def talk(client):
@@ -422,15 +422,15 @@ def test_kill_lets_the_board_go_as_leaving_does(alone):
     assert machine.digest() == alone
 
 
-def test_a_second_debugger_is_told_and_the_first_one_keeps_the_board():
+def test_a_second_debugger_is_refused_and_the_first_one_keeps_the_board():
     def talk(first, second):
         assert "found no place free" in second.get()
         assert second.receive() == b""
         assert first.ask("?") == "T05thread:1;"
         return first.ask("D")
 
-    told, server = session(tiny(), END, talk, clients=2)
-    assert told == "OK"
+    reported, server = session(tiny(), END, talk, clients=2)
+    assert reported == "OK"
     assert server.sent_away["full"] == 1
 
 
@@ -448,7 +448,7 @@ def test_one_debugger_after_the_other():
     assert server.seen == 2
 
 
-def test_while_one_board_is_held_the_others_of_the_process_can_be_looked_at():
+def test_while_one_board_is_held_the_others_of_the_process_can_be_inspected():
     first, second = tiny(), tiny()
     other = GdbServer(second, 0)
 
@@ -468,7 +468,7 @@ def test_while_one_board_is_held_the_others_of_the_process_can_be_looked_at():
     assert second.core.r[1] == 42
 
 
-def test_whoever_ends_the_process_ends_the_hold_too():
+def test_the_end_of_the_process_ends_the_hold_too():
     asked = []
 
     def ends():
@@ -481,7 +481,7 @@ def test_whoever_ends_the_process_ends_the_hold_too():
     assert machine.core.cycles >= 1000
 
 
-def test_a_port_beyond_this_machine_must_be_asked_for_and_a_taken_one_is_told():
+def test_a_port_beyond_this_machine_must_be_asked_for_and_a_taken_one_is_reported():
     with pytest.raises(UserError, match="gdb for TINY on 0.0.0.0:0: .*--allow-network"):
         GdbServer(tiny(), 0, host="0.0.0.0")  # noqa: S104
     first = GdbServer(tiny(), 0)
@@ -495,7 +495,7 @@ def test_a_port_beyond_this_machine_must_be_asked_for_and_a_taken_one_is_told():
         first.close()
 
 
-def test_of_a_board_that_runs_a_debugger_asks_four_things_in_a_millisecond_and_of_one_that_stands_as_much_as_it_likes():
+def test_a_debugger_has_four_requests_per_millisecond_to_a_running_board_and_any_number_to_a_halted_one():
     machine = tiny()
     with contextlib.closing(GdbServer(machine, 0)) as server:
         server.begin()

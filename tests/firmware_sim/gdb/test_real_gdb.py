@@ -55,7 +55,7 @@ def debugged(machine, elf, commands, tmp_path, code=0):
 def test_a_session_from_the_first_breakpoint_to_leaving(program, tmp_path):
     elf, flash = program
     machine = tiny.Machine(flash)
-    told = debugged(
+    reported = debugged(
         machine,
         elf,
         [
@@ -90,30 +90,30 @@ def test_a_session_from_the_first_breakpoint_to_leaving(program, tmp_path):
         ],
         tmp_path,
     )
-    assert "Breakpoint 1, weigh (sample=1)" in told["continue"][0]
-    assert re.search(r"#0 .*weigh .*\n#1 .*main \(\) at .*program.c:32", told["backtrace"][0])
-    assert "$1 = 1" in told["print sample"][0]
-    assert "Value returned is" in told["finish"][0]
-    assert "remember (value=4)" in told["step"][0]
-    assert re.search(r"Old value = 0\nNew value = 4\n", told["continue"][1])
-    assert "read watchpoint" in told["continue"][2]
-    assert "0x00000002" in told["x/xw 0xe0000000"][0]  # looked at: the next that a read would give
-    assert re.search(r"TINY: \d+ cycles, \d+ instructions", told["monitor time"][0])
-    assert "= 1000" in told["print sum"][0]
-    assert "= 0x40003f00" in told["print/x $sp_irq"][0]
-    assert "tick ()" in told["continue"][3]
-    assert "= 0x12" in told["print/x $cpsr & 0x1f"][0]
-    assert "= 0x1f" in told["print/x $spsr_irq & 0x1f"][0]
-    assert "= 1" in told["print $cycles >= 700"][0]
-    assert "push\t{r" in told["disassemble tick,+4"][0] or "stmfd" in told["disassemble tick,+4"][0]
-    assert "detached" in told["detach"][0]
+    assert "Breakpoint 1, weigh (sample=1)" in reported["continue"][0]
+    assert re.search(r"#0 .*weigh .*\n#1 .*main \(\) at .*program.c:32", reported["backtrace"][0])
+    assert "$1 = 1" in reported["print sample"][0]
+    assert "Value returned is" in reported["finish"][0]
+    assert "remember (value=4)" in reported["step"][0]
+    assert re.search(r"Old value = 0\nNew value = 4\n", reported["continue"][1])
+    assert "read watchpoint" in reported["continue"][2]
+    assert "0x00000002" in reported["x/xw 0xe0000000"][0]  # looked at: the next that a read would give
+    assert re.search(r"TINY: \d+ cycles, \d+ instructions", reported["monitor time"][0])
+    assert "= 1000" in reported["print sum"][0]
+    assert "= 0x40003f00" in reported["print/x $sp_irq"][0]
+    assert "tick ()" in reported["continue"][3]
+    assert "= 0x12" in reported["print/x $cpsr & 0x1f"][0]
+    assert "= 0x1f" in reported["print/x $spsr_irq & 0x1f"][0]
+    assert "= 1" in reported["print $cycles >= 700"][0]
+    assert "push\t{r" in reported["disassemble tick,+4"][0] or "stmfd" in reported["disassemble tick,+4"][0]
+    assert "detached" in reported["detach"][0]
     assert machine.core.debugger is None
 
 
 def test_a_function_is_called_by_hand_and_everything_is_as_it_was(program, tmp_path):
     elf, flash = program
     machine = tiny.Machine(flash)
-    told = debugged(
+    reported = debugged(
         machine,
         elf,
         [
@@ -127,16 +127,16 @@ def test_a_function_is_called_by_hand_and_everything_is_as_it_was(program, tmp_p
         ],
         tmp_path,
     )
-    assert told["call weigh(5)"] == ["$2 = 16\n"]
-    assert told["print weigh(6) + 1"] == ["$3 = 20\n"]
-    assert told["print/x $lr"][0].split()[-1] == told["print/x $lr"][1].split()[-1]
-    assert "#0  remember (value=4)" in told["backtrace 1"][0]
+    assert reported["call weigh(5)"] == ["$2 = 16\n"]
+    assert reported["print weigh(6) + 1"] == ["$3 = 20\n"]
+    assert reported["print/x $lr"][0].split()[-1] == reported["print/x $lr"][1].split()[-1]
+    assert "#0  remember (value=4)" in reported["backtrace 1"][0]
 
 
 def test_what_editors_send_resets_and_halts(program, tmp_path):
     elf, flash = program
     machine = tiny.Machine(flash)
-    told = debugged(
+    reported = debugged(
         machine,
         elf,
         ["break remember", "continue", "monitor halt", "monitor reset halt", "maintenance flush register-cache",
@@ -144,25 +144,25 @@ def test_what_editors_send_resets_and_halts(program, tmp_path):
         tmp_path,
         code=1,
     )  # fmt: skip
-    assert "TINY: halted at" in told["monitor halt"][0]
-    assert "TINY: reset, halted at 0x00000000" in told["monitor reset halt"][0]
-    assert told["print/x $pc"] == ["$1 = 0x0\n"]
-    assert "weigh (sample=" in told["continue"][1]
-    assert "monitor explode: unknown command" in told["monitor explode"][0]
+    assert "TINY: halted at" in reported["monitor halt"][0]
+    assert "TINY: reset, halted at 0x00000000" in reported["monitor reset halt"][0]
+    assert reported["print/x $pc"] == ["$1 = 0x0\n"]
+    assert "weigh (sample=" in reported["continue"][1]
+    assert "monitor explode: unknown command" in reported["monitor explode"][0]
 
 
 def test_load_programs_the_flash_and_compares_it(program, tmp_path):
     elf, flash = program
     machine = tiny.Machine()
-    told = debugged(
+    reported = debugged(
         machine,
         elf,
         ["load", "compare-sections .text", "print/x $pc", "hbreak remember", "continue", "kill"],
         tmp_path,
     )
-    assert "Transfer rate" in told["load"][0]
-    assert "matched" in told["compare-sections .text"][0]
-    assert "remember (value=4)" in told["continue"][0]
+    assert "Transfer rate" in reported["load"][0]
+    assert "matched" in reported["compare-sections .text"][0]
+    assert "remember (value=4)" in reported["continue"][0]
     assert machine.core.peek(0) == int.from_bytes(flash[:4], "little")
 
 

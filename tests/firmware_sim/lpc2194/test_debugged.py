@@ -33,7 +33,7 @@ def readable(board):
     ]
 
 
-def test_a_register_that_a_read_changes_is_not_looked_at_and_all_others_are():
+def test_a_register_that_a_read_changes_is_not_inspected_and_all_others_are():
     board = ticker()
     Run(board).to(END, STEP)
     for block, offset in readable(board):

@@ -69,7 +69,7 @@ def test_a_timer_counts_to_its_match_asks_for_the_interrupt_and_begins_anew():
     assert chip.read(T1) == 1
 
 
-def test_a_second_match_acts_in_every_period_and_a_stop_stands():
+def test_a_second_match_acts_in_every_period_and_a_stop_lasts():
     chip = Chip()
     for register, value in ((0x18, 999), (0x1C, 499), (0x14, 2 | 1 << 3), (0x04, 1)):
         chip.write(T0 + register, value)
@@ -290,7 +290,7 @@ def test_pins_show_their_latch_when_they_are_outputs_and_masks_hide_them():
     assert chip.read(0xE0028000) == 8  # IO0PIN knows no mask
 
 
-def test_a_can_controller_is_silent_until_it_leaves_reset_and_marks_what_came_in_bypass():
+def test_a_can_controller_is_silent_until_it_leaves_reset_and_marks_frames_received_in_bypass():
     chip = Chip()
     chip.board.inbox.push(5_000, 512, CAN_RX, 1, 77, 8, 1, 2)
     assert chip.at(10.0).read(CAN1 + 0x1C) & 1 == 0
@@ -340,7 +340,7 @@ def test_the_pll_takes_over_when_it_was_fed_locked_and_fed_again():
         (0xE0024000, 0, "no device is modelled there"),
     ],
 )
-def test_what_is_asked_of_no_model_is_told_with_register_and_place(address, value, why):
+def test_an_access_that_is_not_modelled_is_reported_with_register_and_place(address, value, why):
     chip = Chip()
     with pytest.raises(NotModelledAccess) as caught:
         chip.write(address, value)

@@ -75,7 +75,7 @@ def test_an_elf_file_is_loaded_where_its_segments_are_stored_not_where_they_run(
     assert image.segments == ((0x0, CODE), (0x40, b"ABCD"))
 
 
-def test_names_of_addresses_are_told_with_the_distance_to_them(tmp_path):
+def test_names_of_addresses_are_shown_with_the_distance_to_them(tmp_path):
     names = [("main", 0x101, 8, 2), ("$a", 0x100, 0, 0), ("count", 0x40000010, 4, 1), ("tail", 0x108, 8, 2)]
     image = read(written(tmp_path, elf(names=names)))
     assert image.place_of(0x100) == "main"  # bit 0 only says Thumb
@@ -95,7 +95,7 @@ def test_intel_hex_is_read_record_by_record(tmp_path):
     assert image.segments == ((0x10, CODE + b"more"), (0x10000, b"seg"), (0x40000004, b"ram!"))
 
 
-def test_words_of_a_program_in_an_elf_file_stand_in_the_processors_memory(tmp_path):
+def test_words_of_a_program_in_an_elf_file_are_in_the_processors_memory(tmp_path):
     from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
 
     words = [0xE3A00001, 0xEAFFFFFE]  # mov r0, #1; b .
@@ -138,7 +138,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_no_image_is_told_in_one_line(tmp_path, name):
+def test_a_file_that_is_not_an_image_is_reported_in_one_line(tmp_path, name):
     data, message = WRONG[name]
     path = written(tmp_path, data)
     with pytest.raises(UserError, match=message) as caught:
@@ -186,7 +186,7 @@ def test_the_line_for_another_format_makes_the_image_of_it(tmp_path, kind, optio
     assert read(tmp_path / "program.hex").segments == read(elf_file).segments
 
 
-def test_a_file_cut_anywhere_is_told_in_one_line(tmp_path):
+def test_a_file_cut_anywhere_is_reported_in_one_line(tmp_path):
     whole = elf(names=[("main", 0x100, 8, 2)])
     for length in range(0, len(whole), 3):
         with pytest.raises(UserError) as caught:

@@ -22,7 +22,7 @@ def lines(action, *arguments, **how):
 
 
 @pytest.mark.parametrize(
-    ("manifest", "told"),
+    ("manifest", "reported"),
     [
         ("[firmware", "Expected ']' at the end of a table declaration"),
         ("[firmwear]\n", "firmwear: not known here; there are firmware, defines, hardware"),
@@ -37,10 +37,10 @@ def lines(action, *arguments, **how):
         ("[hardware.spi.0]\nwords = 1\n", "hardware.spi.0.words: not known here; there are word, bits,"),
     ],
 )
-def test_a_wrong_manifest_is_one_line_that_names_file_and_key(tmp_path, manifest, told):
+def test_a_wrong_manifest_is_one_line_that_names_file_and_key(tmp_path, manifest, reported):
     folder = folder_with(tmp_path / "small", TIMER, manifest)
     (line,) = lines(load, folder)
-    assert line.startswith(f"{folder / 'firmware.toml'}:") and told in line
+    assert line.startswith(f"{folder / 'firmware.toml'}:") and reported in line
 
 
 @pytest.mark.parametrize("name", ["control.cpp", "control.cc", "control.cxx"])
@@ -57,11 +57,11 @@ def test_cplusplus_next_to_c_is_refused_by_name(tmp_path, name):
     assert lines(load, folder) == [f"{folder / 'firmware.toml'}: {name} is C++, and firmware is built from C alone"]
 
 
-def test_a_folder_without_a_manifest_is_told(tmp_path):
+def test_a_folder_without_a_manifest_is_reported(tmp_path):
     assert lines(load, tmp_path) == [f"{tmp_path}: no firmware.toml in it, so it is not a folder of firmware"]
 
 
-def test_without_a_compiler_it_is_told_what_was_looked_for(tmp_path, monkeypatch):
+def test_without_a_compiler_the_names_tried_are_reported(tmp_path, monkeypatch):
     folder = folder_with(tmp_path / "small", TIMER + SCHEDULE + START)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
@@ -71,7 +71,7 @@ def test_without_a_compiler_it_is_told_what_was_looked_for(tmp_path, monkeypatch
 
 
 @needs_compiler
-def test_errors_of_the_compiler_are_told_with_file_and_line(tmp_path):
+def test_errors_of_the_compiler_are_reported_with_file_and_line(tmp_path):
     folder = folder_with(tmp_path / "small", "#include <ranger_sim/firmware.h>\nint f(void) { return x; }\nint g = 1\n")
     first, *errors = lines(library_of, folder)
     assert first == f"{folder}: small does not compile:"
@@ -83,7 +83,7 @@ def test_errors_of_the_compiler_are_told_with_file_and_line(tmp_path):
 
 
 @needs_compiler
-def test_a_function_that_no_source_defines_is_told_by_name_and_line(tmp_path):
+def test_a_function_that_no_source_defines_is_reported_by_name_and_line(tmp_path):
     source = TIMER.replace("TASK;", "other();").replace(
         "static int32_t calls;", "void other(void);\nstatic int32_t calls;"
     )
@@ -93,16 +93,16 @@ def test_a_function_that_no_source_defines_is_told_by_name_and_line(tmp_path):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("source", "told"),
+    ("source", "reported"),
     [
         (START, "no firmware_schedule() or firmware_main() in it"),
         (TIMER + SCHEDULE, "no firmware_start() in it"),
         (TIMER + SCHEDULE + START + "void firmware_main(void) {}", "are defined; one is allowed"),
     ],
 )
-def test_a_library_without_the_entry_points_is_refused_when_it_is_built(tmp_path, source, told):
+def test_a_library_without_the_entry_points_is_refused_when_it_is_built(tmp_path, source, reported):
     (line,) = lines(library_of, folder_with(tmp_path / "small", "#include <ranger_sim/firmware.h>\n" + source))
-    assert told in line
+    assert reported in line
 
 
 @needs_compiler
@@ -113,7 +113,7 @@ def test_a_library_for_another_version_of_the_header_is_refused(tmp_path, monkey
 
 
 @needs_compiler
-def test_what_is_no_library_is_refused(tmp_path):
+def test_a_file_that_is_not_a_library_is_refused(tmp_path):
     path = tmp_path / "text.so"
     path.write_text("not a library", encoding="utf-8")
     (line,) = lines(Library, path)
@@ -125,8 +125,8 @@ def test_what_is_no_library_is_refused(tmp_path):
 @needs_compiler
 def test_a_program_that_needs_a_long_of_32_bits_is_stopped_by_the_compiler_where_it_has_64(tmp_path):
     folder = folder_with(tmp_path / "small", "#define FW_NEEDS_32_BIT_LONG\n" + TIMER + SCHEDULE + START)
-    told = lines(library_of, folder)
-    assert any("fw_this_program_needs_a_long_of_32_bits" in line for line in told)
+    reported = lines(library_of, folder)
+    assert any("fw_this_program_needs_a_long_of_32_bits" in line for line in reported)
 
 
 @needs_compiler
@@ -142,7 +142,7 @@ def test_it_is_compiled_again_only_when_something_has_changed(tmp_path):
 
 @needs_compiler
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_that_cannot_be_written_to_is_told(tmp_path):
+def test_a_folder_that_cannot_be_written_to_is_reported(tmp_path):
     folder = folder_with(tmp_path / "small", TIMER + SCHEDULE + START)
     folder.chmod(0o500)
     try:

@@ -110,7 +110,7 @@ def test_what_ran_before_a_crash_is_counted(tmp_path):
 
 
 @needs_gcov
-def test_two_boards_of_one_source_are_counted_apart_and_added_in_the_tracefile(tmp_path):
+def test_two_boards_of_one_source_are_counted_separately_and_added_in_the_tracefile(tmp_path):
     folder = folder_of(tmp_path / "fw", table="mcfo")
     more = ["--firmware", f"MCFO={folder}", "--firmware", f"MCFI={folder}", "--log", "none"]
     summary, counts, _ = run("walk", tmp_path / "out", *more)
@@ -134,7 +134,7 @@ def test_a_tracefile_says_what_ran_by_the_letters_of_geninfo():
     assert (sum_.lines[3], sum_.branches[3], sum_.functions["f"]) == (4, [4, 0], (2, 4))
 
 
-def test_a_compiler_without_gcov_is_told(tmp_path, monkeypatch):
+def test_a_compiler_without_gcov_is_reported(tmp_path, monkeypatch):
     alone = tmp_path / "gcc"
     alone.write_text("#!/bin/sh\n", encoding="utf-8")
     alone.chmod(0o755)

@@ -46,7 +46,7 @@ def example(tmp_path_factory):
 
 
 @needs_cross_compiler
-def test_the_vectors_stand_at_0_and_sum_up_to_0_as_the_boot_loader_asks(example):
+def test_the_vectors_are_at_0_and_sum_up_to_0_as_the_boot_loader_asks(example):
     image = build_image(load(example))
     assert image.warnings == ()
     content = bytes_of_hex(image.hex_path)
@@ -78,23 +78,23 @@ def test_it_is_compiled_again_only_when_something_has_changed(tmp_path):
 
 @needs_cross_compiler
 @pytest.mark.parametrize(
-    ("addition", "told"),
+    ("addition", "reported"),
     [
         ("volatile uint8_t much[20000];", r"is .* bytes too large for the chip's ram of 16384 bytes"),
         ("static const uint8_t much[300000] = {1};", r"is .* bytes too large for the chip's flash of 253952 bytes"),
         ("volatile uint8_t much[13500];", "the variables leave less than 1024 bytes of RAM"),
     ],
 )
-def test_a_program_that_does_not_fit_is_told_in_a_line(tmp_path, addition, told):
+def test_a_program_that_does_not_fit_is_reported_in_one_line(tmp_path, addition, reported):
     source = TIMER.replace("calls++;", "calls += much[calls & 7];").replace(
         "static int32_t calls;", f"static int32_t calls;\n{addition}"
     )
     (line,) = lines(folder_with(tmp_path / "small", source + SCHEDULE + START))
-    assert re.search(told, line)
+    assert re.search(reported, line)
 
 
 @needs_cross_compiler
-def test_a_call_that_the_chip_does_not_have_and_errors_of_the_compiler_are_told_with_file_and_line(tmp_path):
+def test_a_call_that_the_chip_does_not_have_and_errors_of_the_compiler_are_reported_with_file_and_line(tmp_path):
     folder = folder_with(tmp_path / "small", TIMER.replace("TASK;", "fw_ssp_start(0);") + SCHEDULE + START)
     first, error = lines(folder)
     assert first == f"{folder}: small does not compile:"
@@ -103,7 +103,7 @@ def test_a_call_that_the_chip_does_not_have_and_errors_of_the_compiler_are_told_
     assert [line for line in lines(folder) if "error: " in line and "small.c:" in line]
 
 
-def test_without_the_cross_compiler_it_is_told_what_is_to_be_installed(tmp_path, monkeypatch):
+def test_without_the_cross_compiler_the_package_to_install_is_named(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     folder = folder_with(tmp_path / "small", TIMER + SCHEDULE + START)
     assert lines(folder) == [

@@ -56,7 +56,7 @@ def said(board, until, step):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_same_program_in_c_puts_out_the_same_at_the_same_instants(example, python_board, seed):
+def test_the_same_program_in_c_puts_out_the_same_at_the_same_times(example, python_board, seed):
     draw = RandomStream(seed, "example in C")
     ppb = (-50_000, 0, 20_000)[draw.integer(3)]
     # without a phase: README's board has its converter and timers begin at 0
@@ -83,7 +83,7 @@ def test_the_same_program_in_c_puts_out_the_same_at_the_same_instants(example, p
     assert sums[0] == sums[1]
 
 
-def test_a_schedule_in_c_can_be_looked_at_and_a_task_swapped(example):
+def test_a_schedule_in_c_can_be_inspected_and_a_task_swapped(example):
     board = native(example)
     names = [task.name for task in board.scheduler.schedule.row_tasks(0)]
     assert names == ["start_sequence", "receive_all", "wait", "control", "send_count"]
@@ -126,7 +126,7 @@ static const fw_schedule schedule = {.slot_ns = 500000, .every = FW_TASKS(every)
 
 
 @pytest.mark.parametrize(
-    ("call", "told"),
+    ("call", "reported"),
     [
         ("fw_timer_CR(1, 0)", "fw_timer_CR: timer 1 is not started (started: none)"),
         ("fw_pin_write(64, 1)", "fw_pin_write: pin 64 is not 0 ... 63"),
@@ -137,7 +137,7 @@ static const fw_schedule schedule = {.slot_ns = 500000, .every = FW_TASKS(every)
         ("fw_uart_start(0, 0, 0, 1, 8)", "fw_uart_start: EXAMPLE: UART 0: divisor 0, fraction 0/1 is impossible"),
     ],
 )
-def test_what_a_chip_would_not_survive_ends_the_run_with_the_calls_name(tmp_path, call, told):
+def test_what_a_chip_would_not_survive_ends_the_run_with_the_calls_name(tmp_path, call, reported):
     folder = folder_with(tmp_path / "small", TIMER.replace("TASK;", f"(void){call};") + SCHEDULE)
     source = (folder / "small.c").read_text(encoding="utf-8")
     (folder / "small.c").write_text(
@@ -146,11 +146,11 @@ def test_what_a_chip_would_not_survive_ends_the_run_with_the_calls_name(tmp_path
     board = NativeBoard("EXAMPLE", library_of(folder), hardware=Hardware())
     with pytest.raises(UserError) as mistake:
         board.advance(10_000_000)
-    assert str(mistake.value) == f"EXAMPLE: {told}"
+    assert str(mistake.value) == f"EXAMPLE: {reported}"
     assert board.scheduler.slot_count == 1
 
 
-def test_a_program_that_starts_wrongly_is_told_at_once(tmp_path):
+def test_a_program_that_starts_wrongly_is_reported_at_once(tmp_path):
     source = TIMER + SCHEDULE + "void firmware_start(void) { fw_can_start(7, 0, 0); }\n"
     with pytest.raises(UserError, match=r"^X: fw_can_start: X: CAN controller 7 is not 1 \.\.\. 4$"):
         NativeBoard("X", library_of(folder_with(tmp_path / "small", source)))

@@ -111,7 +111,7 @@ def test_a_clean_program_has_no_findings_and_the_digest_of_a_run_without_sanitiz
 
 
 @needs_sanitizers
-def test_building_with_sanitizers_looks_at_the_library(tmp_path):
+def test_building_with_sanitizers_checks_the_library(tmp_path):
     folder = folder_with(tmp_path / "fw", PROGRAM.replace("COUNT", "10").replace("STEP", "0"), MANIFEST)
     done = subprocess.run(
         [sys.executable, "-m", "ranger_sim", "firmware", "build", "--sanitize", str(folder)],
@@ -140,7 +140,7 @@ def test_sanitizers_without_firmware_are_refused_in_one_line():
     )
 
 
-def test_a_compiler_without_the_runtime_is_told(tmp_path, monkeypatch):
+def test_a_compiler_without_the_runtime_is_reported(tmp_path, monkeypatch):
     compiler = tmp_path / "plaincc"
     compiler.write_text("#!/bin/sh\necho libasan.so\n", encoding="utf-8")
     compiler.chmod(0o755)
@@ -149,7 +149,7 @@ def test_a_compiler_without_the_runtime_is_told(tmp_path, monkeypatch):
         sanitizers.environment(tmp_path)
 
 
-def test_what_was_found_twice_is_told_once_without_its_address(tmp_path):
+def test_a_repeated_finding_is_reported_once_without_its_address(tmp_path):
     (tmp_path / "findings.7").write_text(
         f"{tmp_path}/fw/a.c:3:9: runtime error: load of null pointer\n"
         f"{tmp_path}/fw/b.c:4:1: runtime error: store to address 0x7f00aa with insufficient space\n"
@@ -161,7 +161,7 @@ def test_what_was_found_twice_is_told_once_without_its_address(tmp_path):
         "    #0 0x1 in memcpy (/lib/libc.so.6+0x1)\n"
     )
     found = sanitizers.findings(tmp_path, [sanitizers.Program(tmp_path / "fw" / "build" / "a.so", tmp_path / "fw")])
-    assert [(each.told(), each.count) for each in found] == [
+    assert [(each.describe(), each.count) for each in found] == [
         ("stack-buffer-overflow: read of 8 bytes, outside of the program's code", 1),
         ("a.c:3: load of null pointer", 1),
         ("b.c:4: store to an address with insufficient space", 2),

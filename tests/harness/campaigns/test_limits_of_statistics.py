@@ -114,7 +114,7 @@ def test_looks_are_after_equal_parts_rounded_up_and_decide_outside_the_interval(
 
 def test_a_stopping_rule_is_refused_without_a_name_a_share_or_runs_enough():
     assert Stopping("fall", 0.5, 1, 1).looks == 1 and Stopping("fall", 0.5, 50, 50).looks == 50
-    for arguments, told in (
+    for arguments, reported in (
         (("fall", 0.5, 10, 5, "wald"), "stopping rule 'wald': allowed are obrien-fleming, pocock"),
         (("fall", 0.0, 10), "limit is 0.0"),
         (("fall", 1.0, 10), "limit is 1.0"),
@@ -122,5 +122,5 @@ def test_a_stopping_rule_is_refused_without_a_name_a_share_or_runs_enough():
         (("fall", 0.5, 10, 11), "11 looks at 10 runs"),
         (("fall", 0.5, 100, 51), "51 looks at 100 runs"),
     ):
-        with pytest.raises(UserError, match=told):
+        with pytest.raises(UserError, match=reported):
             Stopping(*arguments)

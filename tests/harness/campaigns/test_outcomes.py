@@ -42,7 +42,7 @@ def test_a_fault_that_never_acted_is_invalid_whatever_happened():
     assert judged(with_error(differing()), acted=False) == ("invalid", "the fault never acted")
 
 
-def test_nothing_in_the_firmware_is_no_effect():
+def test_no_change_in_the_firmware_is_not_an_effect():
     assert judged(record(LONG)) == ("no effect", "")
 
 
@@ -76,14 +76,14 @@ def test_damage_comes_before_a_fall():
     assert outcome == "damage" and why.startswith("outer motor beyond 9.6 A")
 
 
-def test_beside_a_golden_run_that_fell_a_fall_is_nobodys_fault_but_a_sweeps():
+def test_with_a_golden_run_that_fell_a_fall_counts_only_in_a_sweep():
     fell = ("fall", "fell forward")
     assert outcomes.against_fallen(*fell, None, "", False) == fell
-    told = ("invalid", "the golden run fell as well, after 812 ms (fell backward)")
-    assert outcomes.against_fallen(*fell, 812.4, "fell backward", False) == told
-    assert outcomes.against_fallen("masked", "", 812.4, "fell backward", False) == told
+    reported = ("invalid", "the golden run fell as well, after 812 ms (fell backward)")
+    assert outcomes.against_fallen(*fell, 812.4, "fell backward", False) == reported
+    assert outcomes.against_fallen("masked", "", 812.4, "fell backward", False) == reported
     assert outcomes.against_fallen(*fell, 812.4, "fell backward", True) == fell
-    assert outcomes.against_fallen("masked", "", 812.4, "fell backward", True) == told
+    assert outcomes.against_fallen("masked", "", 812.4, "fell backward", True) == reported
 
 
 def test_a_golden_run_counts_until_the_run_was_to_end():

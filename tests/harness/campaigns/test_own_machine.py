@@ -51,10 +51,10 @@ def test_settings_are_the_keywords_of_what_makes_it():
         ({"vary": {"fault": ["DRIVE.encoder:stuck@step 3"]}}, "it reads like 12.3 s, angle_rad > 0.3"),
     ],
 )
-def test_what_is_wrong_with_a_plan_is_told_in_a_line(data, line):
-    with pytest.raises(UserError, match=line) as told:
+def test_a_fault_of_a_plan_is_reported_in_one_line(data, line):
+    with pytest.raises(UserError, match=line) as reported:
         made(**data)
-    assert len(str(told.value).splitlines()) == 1
+    assert len(str(reported.value).splitlines()) == 1
 
 
 def test_a_run_is_judged_by_its_band_and_comes_out_the_same_again():

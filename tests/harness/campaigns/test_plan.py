@@ -123,7 +123,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reported"),
     [
         ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "unknown mode 'stuk'"),
         ({"vary": {"fault": ["MCH.encoder:stuck"]}}, "fault place 'MCH.encoder'"),
@@ -191,10 +191,12 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
         ({"whatever": 1}, "unknown key 'whatever'"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line_with_its_place(data, told):
+def test_a_fault_is_reported_in_one_line_with_its_place(data, reported):
     with pytest.raises(UserError) as mistake:
         made(**data)
-    assert told in str(mistake.value) and str(mistake.value).startswith("test.toml") and "\n" not in str(mistake.value)
+    assert (
+        reported in str(mistake.value) and str(mistake.value).startswith("test.toml") and "\n" not in str(mistake.value)
+    )
 
 
 def test_a_file_that_is_not_there_or_no_toml_is_named(tmp_path):

@@ -18,10 +18,10 @@ from ranger_sim.ranger.walks import REFERENCE, WALK, WALKS
 PATH = "here.toml"
 
 
-def refused(told, made, *arguments):
+def refused(reported, made, *arguments):
     with pytest.raises(UserError) as mistake:
         made(*arguments)
-    assert told in str(mistake.value) and "\n" not in str(mistake.value), str(mistake.value)
+    assert reported in str(mistake.value) and "\n" not in str(mistake.value), str(mistake.value)
 
 
 # ---- ranges
@@ -42,7 +42,7 @@ def test_a_range_gives_six_digits_between_its_ends():
     assert [Range(0, 20, step=10).at(share) for share in (0.0, 0.33, 0.34, 0.66, 0.67, 1.0)] == [0, 0, 10, 10, 20, 20]
 
 
-def test_a_range_is_told_with_its_step_or_that_it_goes_by_factors():
+def test_a_range_is_printed_with_its_step_or_as_going_by_factors():
     assert Range(0.5, 2.0).text() == "0.5 to 2"
     assert Range(0.5, 2.0, log=True).text() == "0.5 to 2, by factors"
     assert Range(1, 5, step=2).text() == "1 to 5 by 2"
@@ -65,7 +65,7 @@ def test_a_range_of_a_file_is_this(values, expected):
 
 
 @pytest.mark.parametrize(
-    ("values", "told"),
+    ("values", "reported"),
     [
         ({"low": 1, "high": 1}, "[vary] force = 1 to 1: low below high"),
         ({"low": 1, "high": "x"}, "low below high"),
@@ -80,8 +80,8 @@ def test_a_range_of_a_file_is_this(values, expected):
         ({"low": 1, "high": 3, "steps": 1}, "unknown key 'steps'"),
     ],
 )
-def test_a_range_that_is_none_is_refused(values, told):
-    refused(told, plan.range_of, WALKS, "force", values, PATH)
+def test_a_range_that_is_none_is_refused(values, reported):
+    refused(reported, plan.range_of, WALKS, "force", values, PATH)
 
 
 # ---- lists
@@ -128,7 +128,7 @@ def test_combinations_go_through_the_last_axis_first():
     assert list(plan.combinations(axes)) == [{"a": a, "b": b} for a in (1, 2) for b in (0, 1, 2)]
 
 
-def test_a_value_of_a_fault_has_six_digits_and_everything_else_stands_as_it_is():
+def test_a_value_of_a_fault_has_six_digits_and_everything_else_is_unchanged():
     assert [plan.shown(each) for each in (0.1234567, 2.0, 3, "1 s")] == ["0.123457", "2", "3", "1 s"]
 
 
@@ -178,7 +178,7 @@ def test_a_table_of_faults_comes_to_these(group, expected):
 
 
 @pytest.mark.parametrize(
-    ("group", "told"),
+    ("group", "reported"),
     [
         ("A.wire", "[[faults]]: a table is expected"),
         ({"place": "A.wire"}, "unknown key 'place'"),
@@ -188,8 +188,8 @@ def test_a_table_of_faults_comes_to_these(group, expected):
         ({"values": 3}, "values = 3: a table is expected"),
     ],
 )
-def test_a_table_of_faults_that_comes_to_nothing_is_refused(group, told):
-    refused(told, lambda: list(plan.faults_of(group, PATH, CATALOGUE)))
+def test_a_table_of_faults_that_comes_to_nothing_is_refused(group, reported):
+    refused(reported, lambda: list(plan.faults_of(group, PATH, CATALOGUE)))
 
 
 # ---- how it is watched
@@ -227,7 +227,7 @@ def test_tolerances_are_taken_whole(data, expected):
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reported"),
     [
         ({"detected": {"within": "1 s"}}, "allowed are detection, reaction"),
         ({"detection": "1 s"}, "a table with `within`"),
@@ -237,8 +237,8 @@ def test_tolerances_are_taken_whole(data, expected):
         *(({"detection": {"within": "1 s", "confidence": wrong}}, f"confidence {wrong!r}") for wrong in (0, 1, -0.5)),
     ],
 )
-def test_a_tolerance_that_is_none_is_refused(data, told):
-    refused(told, lambda: list(plan.tolerances_of({"tolerance": data}, PATH)))
+def test_a_tolerance_that_is_none_is_refused(data, reported):
+    refused(reported, lambda: list(plan.tolerances_of({"tolerance": data}, PATH)))
 
 
 # ---- samples and searches
@@ -262,7 +262,7 @@ STOP = {"outcome": "fall", "limit": 0.25}
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reported"),
     [
         ({}, "runs = None: a whole number from 1 to 1000000"),
         ({"runs": 0}, "runs = 0"),
@@ -289,8 +289,8 @@ STOP = {"outcome": "fall", "limit": 0.25}
         ({"runs": 5, "stop": {**STOP, "looks": 6}}, "6 looks at 5 runs"),
     ],
 )
-def test_a_sample_that_is_none_is_refused(data, told):
-    refused(told, plan.sample_of, {"sample": data}, PATH)
+def test_a_sample_that_is_none_is_refused(data, reported):
+    refused(reported, plan.sample_of, {"sample": data}, PATH)
 
 
 def test_a_search_is_taken_whole():
@@ -375,18 +375,18 @@ def test_a_small_file_is_this_plan():
     )
 
 
-def test_a_sample_and_a_search_stand_for_their_ranges():
+def test_a_sample_and_a_search_represent_their_ranges():
     ranges = {"force": {"low": 1.0, "high": 2.0}, "start": ["1 s"], "fault": ["world.robot:push,force={force}@{start}"]}
     sample = plan.of_data({"vary": ranges, "sample": {"runs": 3}}, PATH, REFERENCE)
     search = plan.of_data({"vary": ranges, "search": {"least": "force"}}, PATH, REFERENCE)
     assert (sample.design, search.design) == ("sample", "search")
-    told = "force from 1 to 2; start 1 s; fault world.robot:push,force={force}@{start}"
-    assert sample.population() == search.population() == told
+    reported = "force from 1 to 2; start 1 s; fault world.robot:push,force={force}@{start}"
+    assert sample.population() == search.population() == reported
     assert len(sample.cases()) == 3
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "reported"),
     [
         ({"sample": {"runs": 1}, "search": {}}, "one of them, or neither"),
         ({"vary": {"seed": list(range(1001)), "battery": [0.5] * 1000}}, "1001000 runs, allowed are 1 to 1000000"),
@@ -406,5 +406,5 @@ def test_a_sample_and_a_search_stand_for_their_ranges():
         ({"machine": {"make": "none.py:new"}}, "there is no file"),
     ],
 )
-def test_a_file_that_is_no_plan_is_refused(data, told):
-    refused(told, plan.of_data, data, PATH, REFERENCE)
+def test_a_file_that_is_not_a_plan_is_refused(data, reported):
+    refused(reported, plan.of_data, data, PATH, REFERENCE)

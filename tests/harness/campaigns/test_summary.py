@@ -65,8 +65,8 @@ TOLERANCE = {"tolerance": {"detection": {"within": "100 ms", "share": 0.5, "conf
     [(90.0, "met"), (110.0, "not met")],  # of 8: 0.5^8 is below 0.05 either way
 )
 def test_a_samples_tolerance_is_met_or_missed_only_as_its_size_allows(campaign_of, ms, verdict):
-    told = summary.of(campaign_of(["masked"] * 8, detection_ms=ms, **SAMPLE, **TOLERANCE))
-    assert [each["verdict"] for each in told["tolerances"]] == [verdict]
+    reported = summary.of(campaign_of(["masked"] * 8, detection_ms=ms, **SAMPLE, **TOLERANCE))
+    assert [each["verdict"] for each in reported["tolerances"]] == [verdict]
 
 
 def test_a_tolerance_is_open_when_neither_it_nor_its_contrary_is_shown(campaign_of):
@@ -75,8 +75,8 @@ def test_a_tolerance_is_open_when_neither_it_nor_its_contrary_is_shown(campaign_
     # one of eight is never told of; the largest would be the limit, as 1 - 0.6^8 = 0.98, and 7 of 8 are not few
     for number, result in enumerate(campaign.store.results.values()):
         result["detected"] = [] if number == 0 else result["detected"]
-    (told,) = summary.of(campaign)["tolerances"]
-    assert (told["within"], told["of"]) == (7, 8) and told["verdict"].startswith("open: this many runs")
+    (reported,) = summary.of(campaign)["tolerances"]
+    assert (reported["within"], reported["of"]) == (7, 8) and reported["verdict"].startswith("open: this many runs")
 
 
 def test_a_replay_has_every_digit_of_the_run_and_ends_when_it_did(campaign_of):

@@ -62,7 +62,7 @@ def test_a_share_has_the_interval_of_its_sample_and_of_the_look_at_which_it_stop
     assert summary.as_dict(Share(0, 0))["share"] is None
 
 
-def test_how_shares_are_to_be_read_is_told_by_the_design():
+def test_the_design_determines_how_shares_are_read():
     sample = Sample(2, confidence=0.9)
     looks = Sample(60, stopping=Stopping("fall", 0.5, 60, 3, "pocock"))
     for made, finished, expected in (
@@ -111,10 +111,10 @@ def test_a_tolerance_is_held_against_the_times(times, sample, expected):
         for n, each in enumerate(times)
     ]
     wanted = Tolerance("detection", 30.0, 0.75, sample or 0.95)
-    told = summary.tolerance(plan(sample=Sample(9) if sample else None), wanted, rows)
-    verdict = told.pop("verdict")
+    reported = summary.tolerance(plan(sample=Sample(9) if sample else None), wanted, rows)
+    verdict = reported.pop("verdict")
     assert verdict.startswith(expected.pop("verdict"))
-    assert told == {"what": "detection", "limit_ms": 30.0, "share": 0.75, **expected}
+    assert reported == {"what": "detection", "limit_ms": 30.0, "share": 0.75, **expected}
 
 
 def test_a_time_is_that_of_the_first_error_or_of_the_reaction_or_never():
@@ -136,7 +136,7 @@ def test_an_axis_is_a_table_when_it_has_two_to_twenty_values():
     assert summary.by_axis(mixed, "x") == {"1": {"fall": 2}, "2": {"masked": 1}}
 
 
-def test_outcomes_stand_by_place_and_mode():
+def test_outcomes_are_listed_by_place_and_mode():
     rows = [run("a", "fall"), run("b", "masked"), run("c", "fall", PUSH), run("d", "fall", None)]
     assert summary.heat(rows) == {
         "places": ["MCH.motor", "world.robot"],
@@ -170,7 +170,7 @@ def test_a_sweep_has_its_runs_in_a_table_with_the_slot_that_left_least():
     assert summary.settings_table(plan(), rows[:1] * 201) == []
 
 
-def test_errors_that_told_first_are_counted_with_those_of_the_faults_own_board():
+def test_first_detecting_errors_are_counted_with_those_of_the_faults_own_board():
     rows = [
         run("a", "masked", detected=[error("MCH", "X", 5), error("MB", "Y", 6)]),
         run("b", "masked", PUSH, detected=[error("MCH", "X", 50)]),
@@ -184,7 +184,7 @@ def test_errors_that_told_first_are_counted_with_those_of_the_faults_own_board()
     ]
 
 
-def test_the_worst_cases_are_those_from_a_degraded_gait_on_and_each_stands_once():
+def test_the_worst_cases_are_those_from_a_degraded_gait_on_and_each_is_listed_once():
     rows = [
         run("a", "detected and safe"),
         run("b", "degraded gait", deviation=2.0),
@@ -199,7 +199,7 @@ def test_the_worst_cases_are_those_from_a_degraded_gait_on_and_each_stands_once(
     assert summary.worst_of(["masked", "detected and safe"]) == "detected and safe"
 
 
-def test_a_search_tells_for_each_listed_value_the_least_that_came_to_the_outcome_and_the_soonest_fall():
+def test_a_search_reports_for_each_listed_value_the_least_that_led_to_the_outcome_and_the_soonest_fall():
     made = plan(axes={"force": Range(0.0, 9.0), "at": ["x", "y"]}, search=Search(least="force", outcome="damage"))
     rows = [
         run("a", "damage", axes={"force": 5.0, "at": "x"}),
@@ -272,25 +272,27 @@ def test_everything_of_a_small_campaign_adds_up():
         result=lambda case: found.get(id(case)),
         healthy_results=lambda: [{"healthy": 1, "seeds": [1]}],
     )
-    told = summary.of(whole)
-    assert {name: told[name] for name in ("title", "file", "design", "runs", "foreseen", "finished", "cpu_s")} == {
+    reported = summary.of(whole)
+    assert {name: reported[name] for name in ("title", "file", "design", "runs", "foreseen", "finished", "cpu_s")} == {
         "title": "T", "file": "a b.toml", "design": "census", "runs": 5, "foreseen": 5, "finished": True, "cpu_s": 3.2,
     }  # fmt: skip
-    assert {name: each["count"] for name, each in told["outcomes"].items()} == {
+    assert {name: each["count"] for name, each in reported["outcomes"].items()} == {
         "fall": 2,
         "masked": 1,
         "no effect": 1,
         "invalid": 1,
     }
-    assert {each["of"] for each in told["outcomes"].values()} == {5}
-    assert [(each["count"], each["of"]) for each in told["coverage"].values()] == [(1, 3), (2, 4), (1, 2)]
-    assert [(each["within"], each["of"], each["verdict"]) for each in told["tolerances"]] == [(1, 3, "not met")]
-    assert told["healthy"] == [{"seeds": [1]}]
-    assert told["axes"] == {"x": {"1": {"fall": 1}, "2": {"masked": 1, "no effect": 1, "invalid": 1, "fall": 1}}}
-    assert told["axis_names"] == ["x"]
-    assert [each["key"] for each in told["worst"]] == ["e", "a"] and [each["key"] for each in told["unsure"]] == ["d"]
-    assert told["worst"][1]["detected"] == error("MCH", "X", 5.0) and told["worst"][0]["detected"] is None
-    first, second = told["rows"][:2]
+    assert {each["of"] for each in reported["outcomes"].values()} == {5}
+    assert [(each["count"], each["of"]) for each in reported["coverage"].values()] == [(1, 3), (2, 4), (1, 2)]
+    assert [(each["within"], each["of"], each["verdict"]) for each in reported["tolerances"]] == [(1, 3, "not met")]
+    assert reported["healthy"] == [{"seeds": [1]}]
+    assert reported["axes"] == {"x": {"1": {"fall": 1}, "2": {"masked": 1, "no effect": 1, "invalid": 1, "fall": 1}}}
+    assert reported["axis_names"] == ["x"]
+    assert [each["key"] for each in reported["worst"]] == ["e", "a"] and [
+        each["key"] for each in reported["unsure"]
+    ] == ["d"]
+    assert reported["worst"][1]["detected"] == error("MCH", "X", 5.0) and reported["worst"][0]["detected"] is None
+    first, second = reported["rows"][:2]
     assert (first["first_firmware"], first["first_firmware_ms"], first["detected_by"]) == (
         "V on can1",
         2.0,
@@ -328,7 +330,7 @@ BAND = Band(0.25, 0.125, 0.5)
         (Gait(9, 0.4, 0.5, 9.0), Gait(9, 0.4, 0.5, 0.0), "", 0.0),
     ],
 )
-def test_a_gait_is_inside_its_band_or_what_is_outside_is_told(gait, golden, outside, deviation):
+def test_a_gait_is_inside_its_band_or_the_quantities_outside_are_reported(gait, golden, outside, deviation):
     assert outcomes.beyond(gait, golden, BAND) == outside
     assert outcomes.deviation(gait, golden, BAND) == pytest.approx(deviation)
 
@@ -365,12 +367,12 @@ def test_an_own_machines_run_is_judged_by_the_bands_of_its_body():
         found = made.judge(proof, golden, record(angle, rate), 500_000_000, band, sweep)
         return found["outcome"], found["why"], found["deviation"]
 
-    told = (Detection("A", "E", 1, False),)
+    reported = (Detection("A", "E", 1, False),)
     assert judged([9, 2, 0, 0]) == ("masked", "", 1.0)  # what was before does not count; just at its band
     assert judged([0, 0, 3, 0]) == ("undetected wrong", "angle off by 3 rad", 1.5)
-    assert judged([0, 0, -3, 0], detections=told) == ("degraded gait", "angle off by 3 rad; E from A", 1.5)
+    assert judged([0, 0, -3, 0], detections=reported) == ("degraded gait", "angle off by 3 rad; E from A", 1.5)
     assert judged([0, 0, 3, 0], rate=[0, 0, 0, 7]) == ("undetected wrong", "rate off by 7 rad/s", 1.75)
-    assert judged([0, 0, 0, 0], detections=told) == ("detected and safe", "E from A", 0.0)
+    assert judged([0, 0, 0, 0], detections=reported) == ("detected and safe", "E from A", 0.0)
     assert judged([0, 0, 3, 0], first_firmware=None)[0] == "no effect"
     assert judged([0, 0, 3, 0], acted=False)[:2] == ("invalid", "the fault never acted")
     assert judged([0, 0, 3, 0], fell_ns=0)[:2] == ("fall", "end of travel")

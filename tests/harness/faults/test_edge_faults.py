@@ -62,7 +62,7 @@ def ends_clear(bench, fault, miscount=0):
 @SIGNS
 @pytest.mark.parametrize("offset", [100, -100, 7, -1])
 @pytest.mark.parametrize("motion", [at_rest, forward, to_and_fro])
-def test_an_offset_is_exactly_so_many_edges_more_and_they_go_back(motion, offset, sign):
+def test_an_offset_is_its_exact_number_of_edges_which_are_taken_back(motion, offset, sign):
     bench = EdgeBench(motion, sign)
     fault = injected(bench, "offset", offset=offset)
     before = bench.board.edges
@@ -383,10 +383,10 @@ def test_one_that_gives_way_never_begins_where_another_works_and_the_run_goes_on
     bench.faults.append(late)
     run(bench, 10)
     assert first.active and late.activated_ns < 0 and late.over and not late.acted
-    told = late.summary()
-    assert told["gave_way_s"] == pytest.approx(0.005)  # its start
-    assert told["gave_way_to"] == "MCH.joint_encoder:offset@0 s..20 ms still works at MCH.joint_encoder"
-    assert fault_text(told) == (
+    reported = late.summary()
+    assert reported["gave_way_s"] == pytest.approx(0.005)  # its start
+    assert reported["gave_way_to"] == "MCH.joint_encoder:offset@0 s..20 ms still works at MCH.joint_encoder"
+    assert fault_text(reported) == (
         "fault MCH.joint_encoder:stuck@5 ms: INVALID, it gave way at 0.005 s: "
         "MCH.joint_encoder:offset@0 s..20 ms still works at MCH.joint_encoder; one fault at a time"
     )

@@ -83,7 +83,7 @@ def test_extra_edges_go_the_other_way_for_the_other_sign_and_the_other_mounting(
     assert line.noted == [(0, offset)]
 
 
-def test_a_step_has_room_for_25_extra_edges_and_the_rest_follows():
+def test_a_step_takes_25_extra_edges_and_the_rest_follows():
     line = Line(OFFSET, offset=30.0)
     assert [each[0] for each in line.step()] == list(range(0, 250, 10))
     assert [each[0] for each in line.step()] == [250, 260, 270, 280, 290]
@@ -132,7 +132,7 @@ def test_after_its_end_the_wire_runs_back_and_is_clear_when_it_is_there():
 
 
 @pytest.mark.parametrize(("off", "clear"), [(-0.51, False), (-0.5, True), (0.0, True), (1.5, True), (1.51, False)])
-def test_a_sensor_is_as_its_model_within_an_edges_room(off, clear):
+def test_a_sensor_is_as_its_model_within_an_edges_spacing(off, clear):
     line = Line(OFFSET, offset=0.0)
     line.off = off
     line.step(clear=clear)
@@ -276,7 +276,7 @@ def test_a_contact_bounces_so_often_and_three_microseconds_each_way():
         ((240.999,), [240.999, 243.999, 246.999]),
     ],
 )
-def test_a_contact_bounces_only_where_the_next_edge_leaves_it_room(sent, arrive):
+def test_a_contact_bounces_only_where_the_next_edge_leaves_time_for_it(sent, arrive):
     line = Line(edges.ContactBounce, share=0.5, times=2.0, chance=[0.0, 0.9][: len(sent)])
     assert [each[0] for each in line.step(*sent)] == arrive
 
@@ -288,7 +288,7 @@ def test_swapped_wires_count_every_edge_the_other_way():
     assert line.step(clear=True) == []
 
 
-def test_what_keeps_a_miscount_is_told_by_the_place_or_by_the_kind():
+def test_the_place_or_the_kind_reports_how_long_a_miscount_lasts():
     assert Line(edges.EdgesSwapped).fault.permanent == edges.KEPT
     line = Line(edges.EdgesSwapped)
     line.fault.place = Place("A", "edges", "x", {"encoder": 1, "kept": "a reset"})

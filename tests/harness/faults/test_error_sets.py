@@ -115,7 +115,7 @@ def test_a_set_whose_faults_had_no_time_to_begin_does_not_keep_the_next_one_wait
         ((ErrorSet("a", (), trigger="stp 3"),), "reads like"),
     ],
 )
-def test_mistakes_are_told_when_the_configuration_is_set(sets, words):
+def test_mistakes_are_reported_when_the_configuration_is_set(sets, words):
     with pytest.raises(UserError, match=words):
         port_of(Armed(), *sets)
 

@@ -27,7 +27,7 @@ class Outside:
         move_bus(self.robot, self.bus, {}, wiring.BOARDS)
         self.listener = can.Bus(interface="virtual", channel=channel)
 
-    def heard(self, identifier):
+    def received(self, identifier):
         """Data of the frames of this identifier since the last question."""
         found = []
         while (message := self.listener.recv(0)) is not None:
@@ -52,15 +52,15 @@ def test_a_babbling_node_outside_sends_at_its_period_or_as_fast_as_the_wire_carr
     robot = outside.robot
     fault = robot.inject("can1", "babbling", at="0.02 s", until="0.03 s", frame=str(FREE), period_us=period_us)
     robot.run_for(0.019)
-    assert outside.heard(FREE) == []
+    assert outside.received(FREE) == []
     robot.run_for(0.012)
-    sent = outside.heard(FREE)
+    sent = outside.received(FREE)
     # 10 ms of frames of eight bytes of zeros at 3 Mbit/s: some 130 bits with their stuff bits, 43 us
     assert least <= len(sent) <= most and set(sent) == {bytes(8)}
     assert fault.acted_count == len(sent)
     peers = len(outside.bus.peers)
     robot.run_for(0.01)
-    assert outside.heard(FREE) == [] and len(outside.bus.peers) == peers == 2  # those of MCH and of the router
+    assert outside.received(FREE) == [] and len(outside.bus.peers) == peers == 2  # those of MCH and of the router
     assert fault.cleared_ns > fault.ended_ns > 0
 
 
@@ -69,14 +69,14 @@ def test_a_duplicate_identifier_outside_follows_each_frame_with_another_value_an
     fault = robot.inject("can1", "duplicate", at="0.02 s", until="0.04 s", frame="MCH_ANGLE")
     identifier = all_variables.ID_OF["MCH_ANGLE"]
     robot.run_for(0.02)
-    outside.heard(identifier)
+    outside.received(identifier)
     robot.run_for(0.02)
-    words = [int.from_bytes(data[:4], "little") for data in outside.heard(identifier)]
+    words = [int.from_bytes(data[:4], "little") for data in outside.received(identifier)]
     assert 18 <= len(words) <= 21 and fault.acted_count in (len(words) // 2, len(words) // 2 + 1)  # each 2 ms, doubled
     assert all(other == own ^ BIT for own, other in zip(words[::2], words[1::2], strict=False))
     robot.run_for(0.01)
     assert fault.cleared_ns > 0 and outside.bus.sinks and len(outside.bus.peers) == 2
-    after = outside.heard(identifier)
+    after = outside.received(identifier)
     assert 4 <= len(after) <= 6
 
 

@@ -97,7 +97,7 @@ def test_a_fault_without_start_and_end_works_from_the_next_step_on_for_good():
     ]
 
 
-def test_a_fault_with_an_end_is_looked_at_until_its_place_is_clear():
+def test_a_fault_with_an_end_is_watched_until_its_place_is_clear():
     robot = Robot()
     fault = robot.inject("2 ms", "4 ms")
     fault.clear = False
@@ -134,7 +134,7 @@ def test_a_fault_is_stopped_with_the_next_step_and_never_begins_when_it_had_not(
     assert robot.loop.watchers == [] and waiting.done == []
 
 
-def test_a_length_is_told_while_it_lasts():
+def test_a_length_is_reported_while_it_lasts():
     lasting = end_condition("+ 3 ms", None)
     assert isinstance(lasting, Lasting) and lasting.length_ns == 3 * MS
     assert lasting.nearest() == "it has not begun" and not lasting.met()
@@ -191,7 +191,7 @@ def test_two_faults_share_no_place_until_the_first_is_clear():
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "told"),
+    ("first", "second", "reported"),
     [
         ({"restarts": "MCH"}, {"inside": "MCH"}, "MCH, which is not back yet"),
         ({"restarts": "MCH"}, {"restarts": "MCH"}, "MCH, which is not back yet"),
@@ -201,12 +201,12 @@ def test_two_faults_share_no_place_until_the_first_is_clear():
         ({"inside": "MB"}, {"restarts": "MCH"}, ""),
     ],
 )
-def test_a_board_is_not_taken_away_under_a_fault_nor_reached_into_while_it_is_gone(first, second, told):
+def test_a_board_is_not_taken_away_under_a_fault_nor_reached_into_while_it_is_gone(first, second, reported):
     robot, one, other = two()
     vars(one).update(first)
     vars(other).update(second)
-    if told:
-        assert f"still works at {told}" in refused(robot)
+    if reported:
+        assert f"still works at {reported}" in refused(robot)
     else:
         robot.step(3)
         assert other.active

@@ -32,7 +32,7 @@ class Run:
         return self.robot.boards[board].errors.totals[code] - self.before[board][code]
 
 
-def test_a_missing_acknowledgement_is_told_by_the_sender_and_the_frame_comes_all_the_same():
+def test_a_missing_acknowledgement_is_reported_by_the_sender_and_the_frame_comes_all_the_same():
     run = Run("MCH.can1", "ACK", frame="MCH_ANGLE", count=2)
     assert run.fault.acted_count == 2 and START_NS <= run.fault.acted_ns < END_NS
     assert run.fault.seen == {("MCH", "ACK", "primary"): 2, ("CSR", "FORM", "secondary"): 2}
@@ -42,7 +42,7 @@ def test_a_missing_acknowledgement_is_told_by_the_sender_and_the_frame_comes_all
 
 
 @pytest.mark.parametrize(
-    ("place", "error", "parameters", "told"),
+    ("place", "error", "parameters", "reported"),
     [
         ("MCH.can1", "BIT", {}, ("MCH", "CAN1_BUS_TX")),
         ("MCH.can1", "BIT", {"sender": 0}, ("MCH", "CAN1_BUS_RX")),
@@ -52,10 +52,12 @@ def test_a_missing_acknowledgement_is_told_by_the_sender_and_the_frame_comes_all
         ("CSR.can3", "BROKEN_ERROR_FRAME", {}, ("MCFO", "CAN1_BUS_RX")),
     ],
 )
-def test_every_error_of_the_bus_is_told_by_the_firmware_and_its_counters_fall_again(place, error, parameters, told):
+def test_every_error_of_the_bus_is_reported_by_the_firmware_and_its_counters_fall_again(
+    place, error, parameters, reported
+):
     run = Run(place, error, count=3, **parameters)
     assert run.fault.acted_count == 3
-    assert run.noted(*told) > 0
+    assert run.noted(*reported) > 0
     assert run.fault.cleared_ns >= END_NS
     assert all(node.mode == OPERATING and not node.passive for bus in run.robot.buses for node in bus.nodes)
 
@@ -72,7 +74,7 @@ def test_a_sender_that_cannot_see_an_error_is_refused_before_anything_runs():
             robot.inject("can1", "ACK")
 
 
-def test_a_lost_command_never_reaches_the_motor_board_and_nobody_tells():
+def test_a_lost_command_never_reaches_the_motor_board_and_is_not_reported():
     command = "MCH_COMMAND_CURRENT"
     run = Run("MCH.can1", "loss", frame=command)
     usual = Run("MCH.can1", "loss", frame=command, at="10 s", until="11 s")
@@ -225,6 +227,6 @@ def test_a_fault_that_is_armed_and_does_not_begin_changes_no_byte():
     assert len(digests) == 1
 
 
-def test_faults_are_typed_as_they_are_told():
+def test_faults_are_typed_as_they_are_printed():
     fault = CATALOGUE.typed("MCH.can1:ACK,frame=MCH_ANGLE,every=3@60 ms..70 ms")
     assert fault.text() == "MCH.can1:ACK,frame=MCH_ANGLE,every=3@60 ms..70 ms"

@@ -26,7 +26,7 @@ def test_equal_runs_show_no_difference_at_all():
     assert (found.first, found.first_firmware, found.detected, found.reaction, found.unusual) == (None,) * 5
 
 
-def test_a_golden_run_that_goes_on_longer_is_no_difference():
+def test_a_golden_run_that_goes_on_longer_is_not_a_difference():
     found = proven(record(until_ms=1500))
     assert (found.first, found.reaction) == (None, None)
 
@@ -65,7 +65,7 @@ def test_the_earlier_of_frame_and_variable_is_the_first():
     assert (first.where, first.name, first.time_ns) == ("MB", "MCH_ANGLE", 1100 * MS)
 
 
-def test_a_new_error_is_named_and_not_the_usual_one_that_comes_at_the_same_instant():
+def test_a_new_error_is_named_and_not_the_usual_one_that_comes_at_the_same_time():
     golden, faulty = record(), record()
     golden.errors = errors((1200, "MB", LIMIT, 1))
     faulty.errors = errors((1200, "MCFO", SPIKE, 1), (1200, "MB", LIMIT, 1))
@@ -74,13 +74,13 @@ def test_a_new_error_is_named_and_not_the_usual_one_that_comes_at_the_same_insta
         assert (first.where, first.name) == ("errors", "MCFO AE_SPIKE")
 
 
-def test_a_frame_under_way_at_the_end_is_no_difference():
+def test_a_frame_under_way_at_the_end_is_not_a_difference():
     faulty = record(until_ms=1500)
     faulty.frames["can1"] = frames(range(5, 1510, 10))  # the last one's receivers have it at 1505 ms
     assert proven(faulty).first is None
 
 
-def test_a_body_that_moves_otherwise_is_no_difference_of_the_firmware():
+def test_a_body_that_moves_otherwise_is_not_a_difference_of_the_firmware():
     faulty = record()
     faulty.samples[600:, COLUMN["hip_rad"]] = 0.1
     found = proven(faulty)
@@ -198,7 +198,7 @@ def test_a_gait_is_measured_from_strike_to_strike():
     assert found.motor_power_W == pytest.approx(10.0)
 
 
-def test_less_than_two_strikes_are_no_gait():
+def test_less_than_two_strikes_are_not_a_gait():
     found = proof.gait(record(until_ms=1300), 700 * MS)
     assert (found.steps, found.step_length_m, found.step_time_s) == (1, None, None)
 

@@ -70,7 +70,7 @@ def test_a_frame_at_the_very_end_counts():
     assert firmware_difference(faulty, golden) == found
 
 
-def test_of_two_frames_in_one_place_the_earlier_tells_the_time_whatever_is_in_it():
+def test_of_two_frames_in_one_place_the_earlier_gives_the_time_whatever_is_in_it():
     golden, faulty = record(until_ms=1500), record(until_ms=1500)
     for runs in ((golden, faulty), (faulty, golden)):
         runs[0].frames["can1"] = np.concatenate([frames(range(5, 1300, 10)), frames([1402], value=9)])
@@ -78,7 +78,7 @@ def test_of_two_frames_in_one_place_the_earlier_tells_the_time_whatever_is_in_it
         assert firmware_difference(*runs).time_ns == 1402 * MS
 
 
-def test_a_frame_that_is_no_variable_has_its_identifier_and_no_values():
+def test_a_frame_that_is_not_a_variable_has_its_identifier_and_no_values():
     golden, faulty = record(), record()
     golden.frames["can1"] = frames([100], identifier=0x7A0)
     faulty.frames["can1"] = frames([100], identifier=0x7A0, value=3)
@@ -94,7 +94,7 @@ def test_an_error_at_the_very_end_belongs_to_what_comes_after():
     assert firmware_difference(golden, faulty) == found and firmware_difference(faulty, golden) == found
 
 
-def test_a_memory_and_a_body_that_differ_are_told_with_both_values():
+def test_a_memory_and_a_body_that_differ_are_reported_with_both_values():
     golden, faulty = record(), record()
     faulty.words[700:, word("hip")] = 5
     golden.samples[650, COLUMN["hip_rad"]], faulty.samples[650, COLUMN["hip_rad"]] = 0.25, -0.5
@@ -121,7 +121,7 @@ def test_the_reaction_is_of_the_machine_that_differs_first_and_of_two_at_once_of
 # ---- what is normal
 
 
-def test_rates_are_looked_at_at_each_of_32_counts_and_then_a_tenth_further_each_time():
+def test_rates_are_compared_at_each_of_32_counts_and_then_a_tenth_further_each_time():
     further = [35, 38, 41, 45, 49, 53, 58, 63, 69, 75, 82, 90, 99, 108]
     counts = [*range(1, 33), *further]
     assert [proof.looked_at(places) for places in range(len(counts) + 1)] == [
@@ -178,7 +178,7 @@ def test_the_shortest_time_to_each_count_is_the_shortest_of_all_walks():
     assert Healthy.of([two]).merged(Healthy.of([one])).spans == spans
 
 
-def test_errors_are_told_apart_by_board_and_code():
+def test_errors_are_distinguished_by_board_and_code():
     run = record()
     run.errors = np.array([[1, 1, 0, 2], [5, 0, 0, 1], [7, 1, 60_000, 1], [9, 1, 0, 1]])
     found = {key: times.tolist() for key, times in proof.event_times(run).items()}
@@ -207,7 +207,7 @@ def test_an_unusual_change_is_from_the_state_just_before_and_from_the_activation
     assert healthy.unusual_change(faulty, BEGAN).time_ns == BEGAN
 
 
-def test_a_false_alarm_is_one_for_each_start_with_the_first_that_tells():
+def test_a_false_alarm_is_one_for_each_start_with_the_first_error():
     runs = [record() for _ in range(3)]
     runs[1].errors = errors((1500, "MCFO", SPIKE, 1), (1600, "MB", SPIKE, 1))
     assert proof.false_alarms(runs, [500 * MS, 1550 * MS, 1700 * MS]) == (
@@ -258,14 +258,14 @@ SUSTAINED = {"hip": 3.1, "outer": 3.1, "inner": 3.1, "steering": 0.3}
 def test_a_motor_is_damaged_by_a_fifth_above_its_peak_for_more_than_ten_milliseconds(motor, sign):
     seconds = np.arange(100) * 0.002
 
-    def told(factor, count, since_s=0.0):
+    def reported(factor, count, since_s=0.0):
         current = np.zeros(100)
         current[20 : 20 + count] = sign * factor * PEAKS[motor]
         return proof.damage(samples(seconds, **{f"{motor}_A": current}), round(since_s * 1e9))
 
-    assert told(1.21, 8) == f"{motor} motor beyond {1.2 * PEAKS[motor]:g} A for 16 ms"
-    assert told(1.19, 8) == told(1.21, 4) == "" and told(1.21, 6).endswith("for 12 ms")
-    assert told(1.21, 8, 0.042).endswith("for 14 ms") and told(1.21, 8, 0.048) == ""
+    assert reported(1.21, 8) == f"{motor} motor beyond {1.2 * PEAKS[motor]:g} A for 16 ms"
+    assert reported(1.19, 8) == reported(1.21, 4) == "" and reported(1.21, 6).endswith("for 12 ms")
+    assert reported(1.21, 8, 0.042).endswith("for 14 ms") and reported(1.21, 8, 0.048) == ""
 
 
 @pytest.mark.parametrize("motor", SUSTAINED)
@@ -278,7 +278,7 @@ def test_a_motor_is_damaged_by_a_fifth_more_heat_than_it_sustains(motor):
     assert proof.damage(over, 0) == f"{motor} motor's thermal state at {state:.0f} A2s"
 
 
-def test_exactly_a_fifth_above_the_peak_is_no_damage():
+def test_exactly_a_fifth_above_the_peak_is_not_damage():
     current = np.full(100, 6.0)
     assert proof.damage(samples(np.arange(100) * 0.002, hip_A=current), 0) == ""
 

@@ -16,7 +16,7 @@ def begun(kind, value=0.0, seed=1, **parameters):
     return signal
 
 
-def test_stuck_stands_at_its_start_or_at_its_level():
+def test_stuck_stays_at_its_start_or_at_its_level():
     assert [begun(signals.Stuck, 3.5, level=math.nan).shown(x, 0) for x in (-9.0, 9.0)] == [3.5, 3.5]
     assert begun(signals.Stuck, 3.5, level=-2.0).shown(9.0, 0) == -2.0
 
@@ -34,7 +34,7 @@ def test_drift_counts_from_its_start():
     assert [signal.shown(1.0, now * MS) for now in (500, 750, 1500)] == [1.0, 0.0, -3.0]
 
 
-def test_noise_stands_for_250_microseconds_and_has_its_deviation():
+def test_noise_is_constant_for_250_microseconds_and_has_its_deviation():
     signal = begun(signals.Noise, deviation=2.0)
     first = signal.shown(0.0, 0)
     assert signal.shown(5.0, 249_999) == 5.0 + first

@@ -71,7 +71,7 @@ def test_an_offset_is_in_the_joints_sense_and_held_out_from_its_begin_on(number,
     ]
 
 
-def test_what_is_no_other_word_is_not_noted():
+def test_an_unchanged_word_is_not_noted():
     made = Word(STUCK, 500, level=math.nan)
     assert made.noted == []
     assert made.step(500, 7) == 500 and made.noted == []

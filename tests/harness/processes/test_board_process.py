@@ -62,7 +62,7 @@ def lone():
 )
 @example(damage=[(0, 0)], used=20, until=LONG_TURN_NS, command=places.COMMAND_ADVANCE)  # and the answer does not fit
 @settings(max_examples=examples(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_board_survives_whatever_stands_in_its_channel(served, damage, used, until, command):
+def test_a_board_survives_any_content_of_its_channel(served, damage, used, until, command):
     """It answers, counts what it could not read, and goes on with its slots."""
     if command in (places.COMMAND_STOP, places.COMMAND_COUNTERS):
         command = places.COMMAND_MORE
@@ -140,7 +140,7 @@ def test_what_does_not_fit_in_one_answer_comes_in_the_next_ones(lone):
 
 
 @pytest.mark.parametrize("turns", [0, 1])
-def test_who_waits_for_a_board_whose_process_was_killed_is_told(lone, turns):
+def test_waiting_for_a_board_whose_process_was_killed_raises(lone, turns):
     """Also when it was killed before its first answer."""
     board = lone()
     for turn in range(turns):
@@ -152,7 +152,7 @@ def test_who_waits_for_a_board_whose_process_was_killed_is_told(lone, turns):
     assert board.end() == -signal.SIGKILL
 
 
-def test_who_waits_for_a_board_that_stands_still_is_told_and_it_is_killed(lone):
+def test_waiting_for_a_board_that_hangs_raises_and_it_is_killed(lone):
     board = lone(patience_s=0.001)
     os.kill(board.process, signal.SIGSTOP)
     os.waitpid(board.process, os.WUNTRACED)
@@ -161,7 +161,7 @@ def test_who_waits_for_a_board_that_stands_still_is_told_and_it_is_killed(lone):
     assert board.code == -signal.SIGKILL
 
 
-def test_who_waits_for_a_stopped_board_to_end_is_told_and_it_is_killed(lone):
+def test_waiting_for_a_stopped_board_to_end_raises_and_it_is_killed(lone):
     board = lone(patience_s=0.001)
     os.kill(board.process, signal.SIGSTOP)
     os.waitpid(board.process, os.WUNTRACED)

@@ -205,7 +205,7 @@ def in_range(message):
     used=st.one_of(st.none(), st.integers(-(2**63), 2**63 - 1)),
 )
 @settings(max_examples=examples(300))
-def test_whatever_stands_in_a_mailbox_nothing_raises_and_only_whole_messages_arrive(damage, used):
+def test_with_any_content_of_a_mailbox_nothing_raises_and_only_whole_messages_arrive(damage, used):
     pair = Pair(FROM_BOARD)
     for number in range(10):
         pair.put(NEAR, 0, events.CAN_REQUEST, 1, 1, number, 8, number, number)
@@ -283,7 +283,7 @@ def test_a_bell_between_two_processes_rings_as_often_as_it_was_rung(bells):
         assert child.ended().si_status == 0
 
 
-def test_who_sleeps_on_the_bell_of_a_process_that_ends_is_woken_and_told(bells):
+def test_a_sleeper_on_the_bell_of_a_process_that_ends_is_woken_with_the_reason(bells):
     block, ask, answer = bells
 
     def end_when_asked():

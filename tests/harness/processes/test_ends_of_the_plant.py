@@ -136,7 +136,7 @@ def test_on_a_bus_outside_they_go_through_a_peer_behind_every_board():
     assert robot.buses[0].buffers.waiting_count == 0
 
 
-def test_an_external_board_is_heard_and_judged_every_10_ms():
+def test_an_external_board_is_received_and_judged_every_10_ms():
     robot = Robot()
     outside = Outside("can1")
     end = HardwareInTheLoop(robot, with_boards(MCH="external"), [outside])
@@ -231,7 +231,7 @@ def test_a_log_that_was_there_before_has_its_readers_in_another_memory():
     assert before.sinks == [] and log.sinks == [kept.take]
 
 
-def test_an_answer_has_so_many_rows_and_the_rest_comes_with_the_next():
+def test_an_answer_has_a_bounded_number_of_rows_and_the_rest_comes_with_the_next():
     kept, _ = store()
     blocks = [bytes([n]) * (3000 * ROW) for n in range(3)]
     for n, block in enumerate(blocks):
@@ -244,7 +244,7 @@ def test_an_answer_has_so_many_rows_and_the_rest_comes_with_the_next():
     assert first[2] + second[2] + third[2] == whole
 
 
-def test_rows_older_than_what_shall_be_kept_are_given_up_and_told_once():
+def test_rows_older_than_the_kept_span_are_dropped_and_reported_once():
     kept, _ = store(keep_ns=100)
     for time in (0, 50, 100, 150, 151):
         kept.take(time, bytes(ROW))
@@ -263,28 +263,28 @@ def test_what_does_not_fit_is_given_up_from_the_old_end(monkeypatch):
     assert answer(kept) == (2, 0, b"".join(bytes([time]) * ROW for time in (2, 3, 4)))
 
 
-def test_who_reads_from_the_other_side_gets_all_that_is_left_and_adds_up_what_was_given_up():
+def test_the_reader_gets_all_rows_left_and_adds_up_those_dropped():
     kept, _ = store()
     words = {places.KEEP_NS: 0}
     remote = SimpleNamespace(reached=77, notes_of=lambda command, kind: kept.next())
     reader = activity.RemoteActivity(remote, words, None)
-    heard = []
-    reader.add_sink(lambda time, rows: heard.append((time, rows)))
-    heard.clear()
+    received = []
+    reader.add_sink(lambda time, rows: received.append((time, rows)))
+    received.clear()
     kept.take(1, b"x" * (5000 * ROW))
     kept.lost = 3
     reader.flush()
-    assert b"".join(rows for _, rows in heard) == b"x" * (5000 * ROW)
-    assert {time for time, _ in heard} == {77} and reader.lost == 3
+    assert b"".join(rows for _, rows in received) == b"x" * (5000 * ROW)
+    assert {time for time, _ in received} == {77} and reader.lost == 3
     kept.lost = 2
     reader.flush()
     assert reader.lost == 5
     reader.keep_ns = 9
     assert (words[places.KEEP_NS], reader.keep_ns) == (9, 9)
     remote.notes_of = lambda command, kind: b""  # it is gone
-    heard.clear()
+    received.clear()
     reader.flush()
-    assert heard == []
+    assert received == []
 
 
 # ---- settings
@@ -296,7 +296,7 @@ def test_both_limits_of_the_speed_are_taken(speed):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "reported"),
     [
         (dict(speed=0.99e-4), "speed is"),
         (dict(speed=1000.1), "speed is"),
@@ -307,8 +307,8 @@ def test_both_limits_of_the_speed_are_taken(speed):
         (dict(processor=1 << 20), "processor is"),
     ],
 )
-def test_settings_that_cannot_be_are_refused(wrong, told):
-    with pytest.raises(UserError, match=told):
+def test_settings_that_cannot_be_are_refused(wrong, reported):
+    with pytest.raises(UserError, match=reported):
         Settings(**wrong)
 
 

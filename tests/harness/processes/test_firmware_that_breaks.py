@@ -121,7 +121,7 @@ def broken(folder, function):
             board.turn(robot.start_ns + 20_000_000)  # forty slots
         record = board.words[places.CRASH : places.CRASH + places.CRASH_WORDS].tolist()
         firmware = robot.firmware["MCH"]
-        return crash.told(firmware.library, firmware.folder, record), remarks
+        return crash.describe(firmware.library, firmware.folder, record), remarks
 
 
 @needs_compiler
@@ -134,34 +134,34 @@ def broken(folder, function):
         (DIVIDE, "SIGFPE (Floating point exception)"),
     ],
 )
-def test_a_crash_is_told_with_signal_function_and_line(tmp_path, function, what):
-    told, remarks = broken(tmp_path / "fw", function)
-    assert told.startswith(f"{what} in break_down() at small.c:{remarks['HERE']}")
+def test_a_crash_is_reported_with_signal_function_and_line(tmp_path, function, what):
+    reported, remarks = broken(tmp_path / "fw", function)
+    assert reported.startswith(f"{what} in break_down() at small.c:{remarks['HERE']}")
 
 
 @needs_compiler
 @needs_addr2line
-def test_who_called_the_function_that_crashed_is_told_too(tmp_path):
-    told, remarks = broken(tmp_path / "fw", NULL_WRITE)
-    caller = re.search(r"called from control\(\) at small\.c:(\d+)$", told)
-    assert caller, told
+def test_the_caller_of_the_function_that_crashed_is_reported_too(tmp_path):
+    reported, remarks = broken(tmp_path / "fw", NULL_WRITE)
+    caller = re.search(r"called from control\(\) at small\.c:(\d+)$", reported)
+    assert caller, reported
     assert abs(int(caller[1]) - remarks["CALL"]) <= 1  # the call stands in the line before the remark
 
 
 @needs_compiler
 @needs_addr2line
-def test_an_instruction_that_does_not_exist_is_told_with_its_place(tmp_path):
-    told, remarks = broken(tmp_path / "fw", ILLEGAL)
-    assert re.match(r"SIG(ILL|TRAP) \(", told), told
-    assert f"in break_down() at small.c:{remarks['HERE']}" in told
+def test_an_instruction_that_does_not_exist_is_reported_with_its_place(tmp_path):
+    reported, remarks = broken(tmp_path / "fw", ILLEGAL)
+    assert re.match(r"SIG(ILL|TRAP) \(", reported), reported
+    assert f"in break_down() at small.c:{remarks['HERE']}" in reported
 
 
 @needs_compiler
 @needs_addr2line
-def test_a_stack_overflow_is_called_so_and_the_recursion_is_told_once(tmp_path):
-    told, remarks = broken(tmp_path / "fw", DEEP)
-    assert told.startswith("stack overflow, SIGSEGV (Segmentation fault) in deeper() at small.c:")
-    assert told.count(f"deeper() at small.c:{remarks['CALL OF ITSELF']}") == 1
+def test_a_stack_overflow_is_named_and_the_recursion_is_reported_once(tmp_path):
+    reported, remarks = broken(tmp_path / "fw", DEEP)
+    assert reported.startswith("stack overflow, SIGSEGV (Segmentation fault) in deeper() at small.c:")
+    assert reported.count(f"deeper() at small.c:{remarks['CALL OF ITSELF']}") == 1
 
 
 @needs_compiler
@@ -185,7 +185,7 @@ def test_firmware_that_never_returns_is_ended_and_the_robot_goes_on(tmp_path):
 
 
 @needs_compiler
-def test_firmware_in_a_process_of_its_own_makes_the_same_run_as_within_the_walk(tmp_path):
+def test_firmware_in_its_own_process_makes_the_same_run_as_within_the_walk(tmp_path):
     folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
     up(folder, tmp_path / "up.json")
     with contextlib.closing(Ranger(firmware={"MCH": folder}, in_process=True)) as robot:
@@ -242,7 +242,7 @@ def test_a_walk_finds_a_program_that_lets_no_time_pass_and_makes_the_run_of_one_
 
 
 @needs_compiler
-def test_a_program_in_a_process_of_its_own_makes_the_same_bytes_as_in_the_walks_with_the_robots_other_boards(tmp_path):
+def test_a_program_in_its_own_process_makes_the_same_bytes_as_in_the_walks_with_the_robots_other_boards(tmp_path):
     folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
     found = []
     for in_process in (False, True):
@@ -256,7 +256,7 @@ def test_a_program_in_a_process_of_its_own_makes_the_same_bytes_as_in_the_walks_
 
 
 @needs_compiler
-def test_what_is_in_the_process_of_a_program_in_c_is_out_of_reach_and_said_so(tmp_path):
+def test_state_in_the_process_of_a_program_in_c_is_reported_out_of_reach(tmp_path):
     folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
     with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
         assert robot.board("MCH").name == "MCH"  # before time passes it is here
@@ -278,15 +278,15 @@ def test_what_is_in_the_process_of_a_program_in_c_is_out_of_reach_and_said_so(tm
 
 @needs_compiler
 @needs_addr2line
-def test_in_the_walks_own_process_a_crash_ends_the_walk_and_its_last_line_says_where_to_look(tmp_path):
+def test_in_the_walks_own_process_a_crash_ends_the_walk_and_its_last_line_names_the_place(tmp_path):
     source, remarks = program(NULL_WRITE, slots=100)
     done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST), "--in-process")
     assert (done.returncode, found) == (-signal.SIGSEGV, None)
     said = re.search(r"^ranger-sim: MCH: its program has ended this process, where: (addr2line .*)$", done.stderr, re.M)
     assert said, done.stderr
-    told = subprocess.run(said[1].split(), capture_output=True, text=True, check=True).stdout.split()
-    assert told[0] == "break_down"
-    assert told[1].endswith(f"small.c:{remarks['HERE']}")
+    reported = subprocess.run(said[1].split(), capture_output=True, text=True, check=True).stdout.split()
+    assert reported[0] == "break_down"
+    assert reported[1].endswith(f"small.c:{remarks['HERE']}")
 
 
 @needs_compiler
@@ -301,18 +301,18 @@ def test_in_the_walks_own_process_an_endless_loop_ends_the_walk_in_the_same_way(
 @needs_compiler
 @needs_addr2line
 @pytest.mark.parametrize(
-    ("start", "told"),
+    ("start", "reported"),
     [
         ("*(volatile uint32_t *)8 = 1;", r"SIGSEGV \(Segmentation fault\) in firmware_start\(\) at small\.c:\d+"),
         ("while (1) sink++;", r"its program let no time pass in firmware_start\(\) at small\.c:\d+"),
         ("_exit(5);", r"it called exit\(5\) in firmware_start\(\) at small\.c:\d+"),
     ],
 )
-def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tmp_path, start, told):
+def test_a_program_that_does_not_get_through_its_start_is_refused_in_one_line(tmp_path, start, reported):
     source = program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start").replace("stdlib", "unistd")
     done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST))
     assert (done.returncode, found) == (2, None)
-    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program fails in its start: {told}\n", done.stderr)
+    assert re.fullmatch(rf"ranger-sim: \S+fw: MCH: its program fails in its start: {reported}\n", done.stderr)
 
 
 EXITS = ("exit(0);", "_exit(0);", "_Exit(0);", "quick_exit(0);")
@@ -444,19 +444,19 @@ def test_in_up_a_board_that_closes_its_descriptors_is_killed_too(tmp_path):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("start", "told"),
+    ("start", "reported"),
     [
         ("raise(SIGSTOP);", "no answer for 0.3 s"),
         ("pause();", "no answer for 0.3 s"),
         ("for (int each = 3; each < 1024; each++) close(each);", "it ended its process with code 1"),
     ],
 )
-def test_a_start_without_a_sign_of_life_is_refused(tmp_path, monkeypatch, start, told):
+def test_a_start_without_a_sign_of_life_is_refused(tmp_path, monkeypatch, start, reported):
     monkeypatch.setattr(trial, "PATIENCE_S", 0.3)
     head = "#define _POSIX_C_SOURCE 200809L\n#include <signal.h>\n#include <unistd.h>\n"
     source = head + program(WELL)[0].replace("{ fw_can_start", "{ " + start + " fw_can_start")
     folder = folder_with(tmp_path / "fw", source, MANIFEST)
-    with pytest.raises(UserError, match=re.escape(f"MCH: its program fails in its start: {told}")):
+    with pytest.raises(UserError, match=re.escape(f"MCH: its program fails in its start: {reported}")):
         Ranger(firmware={"MCH": folder})
 
 
@@ -485,11 +485,11 @@ def owing(monkeypatch):
 
 def looks(owing, count):
     for _ in range(count):
-        owing.guard.look("MCH")
+        owing.guard.check("MCH")
 
 
 def test_a_board_without_an_answer_is_asked_where_it_is_after_the_deadline_and_then_killed(owing):
-    looks(owing, guard.LOOKS)
+    looks(owing, guard.CHECKS)
     assert owing.sent == []
     looks(owing, 1)
     assert owing.sent == [crash.ASKED, signal.SIGCONT]
@@ -500,7 +500,7 @@ def test_a_board_without_an_answer_is_asked_where_it_is_after_the_deadline_and_t
 
 def test_every_answer_is_a_sign_of_life(owing):
     for turn in range(6, 40):
-        looks(owing, guard.LOOKS)
+        looks(owing, guard.CHECKS)
         owing.block.words[places.ASKED], owing.block.words[places.ANSWERED] = turn, turn - 1
     assert owing.sent == []
 
@@ -509,19 +509,19 @@ def test_every_answer_is_a_sign_of_life(owing):
 def test_a_board_that_cannot_answer_yet_is_waited_for(owing, state, used_s):
     looks(owing, 1)
     owing.state, owing.used_s = state, used_s
-    looks(owing, 10 * guard.LOOKS)
+    looks(owing, 10 * guard.CHECKS)
     assert owing.sent == []
 
 
 def test_a_board_whose_answer_is_there_or_is_not_waited_for_is_left_alone(owing):
     owing.block.words[places.ANSWERED] = 5
-    looks(owing, 10 * guard.LOOKS)  # nothing waits
+    looks(owing, 10 * guard.CHECKS)  # nothing waits
     owing.block.words[places.PLANT_SLEEPS] = 1
     os.eventfd_write(owing.block.answer_descriptor, 1)
-    looks(owing, 10 * guard.LOOKS)  # its answer arrived, and is read when the machine has time
+    looks(owing, 10 * guard.CHECKS)  # its answer arrived, and is read when the machine has time
     assert owing.sent == []
     os.eventfd_read(owing.block.answer_descriptor)
-    looks(owing, guard.LOOKS)
+    looks(owing, guard.CHECKS)
     assert owing.sent == [signal.SIGKILL]
     assert owing.block.fault().startswith("its answers no longer arrive (descriptors of its process are closed)")
 
@@ -540,8 +540,8 @@ def up(folder, summary):
 
 def test_a_record_without_places_says_that_it_was_outside_of_the_program(tmp_path):
     record = [signal.SIGBUS, 0, 0, 0, 0, 0, 0]
-    told = crash.told(tmp_path / "small.so", tmp_path, record)
-    assert told == f"SIGBUS ({signal.strsignal(signal.SIGBUS)}), outside of the program's code"
+    reported = crash.describe(tmp_path / "small.so", tmp_path, record)
+    assert reported == f"SIGBUS ({signal.strsignal(signal.SIGBUS)}), outside of the program's code"
 
 
 @pytest.mark.parametrize(
@@ -558,13 +558,13 @@ def test_a_record_without_places_says_that_it_was_outside_of_the_program(tmp_pat
     ],
 )
 def test_a_record_that_the_program_wrote_over_is_named_so(tmp_path, record):
-    told = crash.told(tmp_path / "small.so", tmp_path, [*record, 0, 0, 0, 0, 0])
-    assert told == "the record of its end is not readable: its program wrote over it"
+    reported = crash.describe(tmp_path / "small.so", tmp_path, [*record, 0, 0, 0, 0, 0])
+    assert reported == "the record of its end is not readable: its program wrote over it"
 
 
 @given(st.lists(st.integers(-(2**63), 2**63 - 1), min_size=crash.RECORD, max_size=crash.RECORD))
 def test_no_record_ends_in_a_traceback(record):
-    assert crash.told(pathlib.Path("small.so"), pathlib.Path("sources"), record) or record[0] == 0
+    assert crash.describe(pathlib.Path("small.so"), pathlib.Path("sources"), record) or record[0] == 0
 
 
 @given(st.integers(-(2**63), 2**63 - 1), st.binary(max_size=64))
@@ -572,28 +572,28 @@ def test_no_notebook_ends_in_a_traceback(length, scribbled):
     notebook = crash.Notebook()
     record = notebook.new_record("MCH", pathlib.Path("small.so"), pathlib.Path("sources"))
     record[0] = signal.SIGSEGV
-    assert notebook.told().startswith("MCH: SIGSEGV (")
+    assert notebook.describe().startswith("MCH: SIGSEGV (")
     notebook.words[crash.RECORD] = length
     notebook.words.cast("B")[8 * (crash.RECORD + 1) :][: len(scribbled)] = scribbled
-    assert "SIGSEGV" in notebook.told() or crash.UNREADABLE in notebook.told()
+    assert "SIGSEGV" in notebook.describe() or crash.UNREADABLE in notebook.describe()
 
 
 def test_no_record_says_nothing(tmp_path):
-    assert crash.told(tmp_path / "small.so", tmp_path, [0] * crash.RECORD) == ""
+    assert crash.describe(tmp_path / "small.so", tmp_path, [0] * crash.RECORD) == ""
 
 
-def test_without_addr2line_places_are_told_as_offsets_in_the_library(tmp_path, monkeypatch):
+def test_without_addr2line_places_are_offsets_in_the_library(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _name: None)
     record = [signal.SIGSEGV + crash.OVERFLOW, 0x1234, 0x5678, 0x1234, 0, 0, 0]
-    told = crash.told(tmp_path / "small.so", tmp_path, record)
-    assert told.startswith("stack overflow, SIGSEGV (")
-    assert told.endswith(" in small.so+0x1234, called from small.so+0x5678")
+    reported = crash.describe(tmp_path / "small.so", tmp_path, record)
+    assert reported.startswith("stack overflow, SIGSEGV (")
+    assert reported.endswith(" in small.so+0x1234, called from small.so+0x5678")
 
 
-def test_a_file_without_the_place_is_told_as_an_offset(tmp_path):
+def test_a_place_without_a_file_is_an_offset(tmp_path):
     (tmp_path / "small.so").write_bytes(b"no library")
-    told = crash.told(tmp_path / "small.so", tmp_path, [signal.SIGILL, 0x10, 0, 0, 0, 0, 0])
-    assert told.endswith(" in small.so+0x10")
+    reported = crash.describe(tmp_path / "small.so", tmp_path, [signal.SIGILL, 0x10, 0, 0, 0, 0, 0])
+    assert reported.endswith(" in small.so+0x10")
 
 
 @dataclasses.dataclass
@@ -604,9 +604,9 @@ class Hung:
     sent: list
     clock_s: float = 0.0
 
-    def look(self, watched):
+    def check(self, watched):
         self.clock_s += 2 * supervisor.HANG_S
-        watched.look()
+        watched.check()
 
 
 @pytest.fixture
@@ -625,11 +625,11 @@ def hung(monkeypatch):
             del watched.children["MCH"]
 
 
-def test_firmware_in_c_that_hangs_is_asked_where_first_and_killed_when_it_does_not_say(hung):
+def test_firmware_in_c_that_hangs_is_asked_for_its_place_and_killed_without_an_answer(hung):
     made, watched = hung
     made.robot.firmware["MCH"] = object()
     for _ in range(3):
-        made.look(watched)
+        made.check(watched)
     assert made.sent == [crash.ASKED, signal.SIGKILL]
     del made.robot.firmware["MCH"]
 
@@ -637,13 +637,13 @@ def test_firmware_in_c_that_hangs_is_asked_where_first_and_killed_when_it_does_n
 def test_a_python_board_that_hangs_is_killed_at_once(hung):
     made, watched = hung
     for _ in range(2):
-        made.look(watched)
+        made.check(watched)
     assert made.sent == [signal.SIGKILL]
 
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("return RANGER_TABLE_VERSION;", "return 5;", "compiled with version 0x00000005 of the master table"),
         ("{ fw_can_start(1, 0x00254001, 0); sink", "{ sink", "firmware_start() does not start CAN controller 1"),
@@ -651,12 +651,12 @@ def test_a_python_board_that_hangs_is_killed_at_once(hung):
     ],
     ids=["another table", "no CAN controller", "no schedule"],
 )
-def test_what_a_program_offers_wrongly_is_refused_in_one_line_and_no_folder_is_touched(tmp_path, old, new, told):
+def test_what_a_program_offers_wrongly_is_refused_in_one_line_and_no_folder_is_touched(tmp_path, old, new, reported):
     source, _ = program(WELL)
     assert old in source
     folder = folder_with(tmp_path / "fw", source.replace(old, new), MANIFEST)
     done, found = walked(folder, "--out", str(tmp_path / "out"))
     assert (done.returncode, found) == (2, None)
     (line,) = done.stderr.splitlines()
-    assert line.startswith("ranger-sim: ") and told in line
+    assert line.startswith("ranger-sim: ") and reported in line
     assert not list((tmp_path / "out").glob("*"))

@@ -40,5 +40,5 @@ def test_quantiles_of_known_slots():
     assert figures(bins, 60.0) == {"slots": 60, "p50_us": 30, "p99_us": 60, "p999_us": 60, "max_us": 60.0}
 
 
-def test_without_slots_there_are_no_figures():
+def test_without_slots_no_figures_exist():
     assert figures([0] * BINS, 0.0) == {"slots": 0, "p50_us": None, "p99_us": None, "p999_us": None, "max_us": None}

@@ -50,9 +50,9 @@ def test_every_field_takes_its_limits_and_nothing_beyond(kind):
         for value in (least, largest):
             assert Line(kind, {**more, field: value}).read() == (1, ""), (field, value)
         for value in (least - 1, largest + 1):
-            told = f"{KINDS[kind].name}: field {field} is {value}, allowed are {least} to {largest}"
+            reported = f"{KINDS[kind].name}: field {field} is {value}, allowed are {least} to {largest}"
             count, damage = Line(kind, {**more, field: value}).read()
-            assert count == 0 and told in damage, (field, value)
+            assert count == 0 and reported in damage, (field, value)
 
 
 @pytest.mark.parametrize("kind", [events.PIN_OUTPUT, events.PIN_EDGE])
@@ -92,7 +92,7 @@ def test_a_kind_goes_its_own_way_alone():
 
 
 @pytest.mark.parametrize("kind", SEGMENTS)
-def test_a_segment_has_all_its_words_of_sixteen_bits_and_so_many_in_use(kind):
+def test_a_segment_has_all_its_words_of_sixteen_bits_and_a_number_in_use(kind):
     def segment(at=0, word=0):
         words = [0] * SSP_WORDS
         words[at] = word
@@ -112,7 +112,7 @@ def test_a_segment_has_all_its_words_of_sixteen_bits_and_so_many_in_use(kind):
 
 
 @pytest.mark.parametrize("kind", [events.UART_OUTPUT, NOTE])
-def test_bytes_are_no_more_than_their_words_can_hold(kind):
+def test_bytes_are_at_most_what_their_words_can_hold(kind):
     for length, words in ((0, 1), (0, 2), (8, 2), (16, 3), (2040, NOTE_WORDS)):
         assert Line(kind, payload=[length] + [0] * (words - 1)).read() == (1, "")
     for length, words in ((1, 1), (9, 2), (-1, 2), (17, 3)):

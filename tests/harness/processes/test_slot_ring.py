@@ -7,7 +7,7 @@ import pytest
 
 from ranger_sim import Ranger, Scenario
 from ranger_sim.firmware_sim.activity import COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
-from ranger_sim.harness.processes.apart import Apart
+from ranger_sim.harness.processes.apart import RemoteBoards
 from ranger_sim.harness.processes.places import RING, RING_ROW
 
 SECONDS = 0.3
@@ -40,12 +40,12 @@ def make_slow(robot):
 
 
 @pytest.mark.parametrize("slow", [False, True])
-def test_the_ring_has_every_slot_with_its_instant_and_its_cycles(slow):
+def test_the_ring_has_every_slot_with_its_time_and_its_cycles(slow):
     expected = logged(slow)
     with contextlib.closing(Ranger(Scenario(seed=4))) as robot:
         if slow:
             make_slow(robot)
-        apart = Apart(robot, BOARDS)
+        apart = RemoteBoards(robot, BOARDS)
         found, at = {name: [] for name in BOARDS}, dict.fromkeys(BOARDS, 0)
         try:
             for _ in range(round(SECONDS / 0.02)):
@@ -63,9 +63,9 @@ def test_the_ring_has_every_slot_with_its_instant_and_its_cycles(slow):
         assert (slots[:, 2] == -1).all()  # no pace is kept here
 
 
-def test_who_looks_too_rarely_is_told_how_many_slots_it_missed():
+def test_a_reader_that_polls_too_rarely_gets_the_number_of_slots_missed():
     with contextlib.closing(Ranger(Scenario(seed=4))) as robot:
-        apart = Apart(robot, ("MCH",))
+        apart = RemoteBoards(robot, ("MCH",))
         try:
             robot.run_for(0.5)  # a thousand slots of 0.5 ms
             data, following, missed = apart.remotes["MCH"].slots_since(0)

@@ -46,7 +46,7 @@ def test_orders_to_a_plant_that_does_not_listen_are_not_waited_for(alone):
         assert child.ended().si_status == 0
 
 
-def test_a_board_that_ended_because_it_was_told_to_is_no_news_even_when_it_is_found_first(alone):
+def test_a_board_that_ended_by_order_is_not_reported_even_when_it_is_found_first(alone):
     """The plant's process has reported that it collects, and no process has read since."""
 
     def find():

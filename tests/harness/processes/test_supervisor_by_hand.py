@@ -29,7 +29,7 @@ class Said(supervisor.View):
     def show(self, state):
         self.shown.append(state)
 
-    def heard(self):
+    def received(self):
         """What was reported since the last call."""
         lines, self.lines = self.lines, []
         return lines
@@ -73,30 +73,30 @@ def plants(alone):
 
 def tells(alone, **news):
     alone.plant_link.send(json.dumps(news).encode())
-    alone.hear_plant()
+    alone.receive_from_plant()
 
 
 # ---- boards that hang
 
 
-def test_a_board_that_keeps_its_turn_too_long_is_killed_and_told(alone):
+def test_a_board_that_keeps_its_turn_too_long_is_killed_and_reported(alone):
     alone.children["MCH"] = Child("MCH", 41)
     words = alone.blocks["MCH"].words
     words[places.ASKED], words[places.ANSWERED] = 7, 6
     alone.used[41] = 3.0
-    alone.look()
+    alone.check()
     alone.clock.now += HANG_S - 0.001
-    alone.look()
-    assert alone.killed == [] and alone.view.heard() == []
+    alone.check()
+    assert alone.killed == [] and alone.view.received() == []
     alone.clock.now += 0.001
     alone.used[41] = 4.25
-    alone.look()
+    alone.check()
     assert alone.killed == [(41, signal.SIGKILL)]
-    assert alone.view.heard() == [
+    assert alone.view.received() == [
         f"MCH (process 41) hangs: no answer for {HANG_S:.1f} s, 1.2 s of them computing; it is killed"
     ]
     alone.clock.now += HANG_S / 2
-    alone.look()
+    alone.check()
     assert len(alone.killed) == 1  # it is given its time anew
     assert alone.children["MCH"].was_asked
 
@@ -187,90 +187,90 @@ def test_a_board_hangs_only_when_it_has_its_turn_and_could_run(alone, change, ki
     child = alone.children["MCH"] = Child("MCH", 41)
     words = alone.blocks["MCH"].words
     words[places.ASKED], words[places.ANSWERED] = 7, 6
-    alone.look()
+    alone.check()
     words[places.ASKED] = change.get("asked", 7)
     words[places.ANSWERED] = change.get("answered", 6)
     words[places.HELD] = change.get("held", 0)
     child.state = change.get("state", RUNNING)
     alone.states[41], alone.used[41] = change.get("kernel", "S"), change.get("used", 0.0)
     alone.clock.now += HANG_S
-    alone.look()
+    alone.check()
     assert bool(alone.killed) is killed
 
 
-def test_a_board_that_a_debugger_has_is_told_once_each_time(alone):
+def test_a_board_that_a_debugger_holds_is_reported_once_each_time(alone):
     words = alone.blocks["MCH"].words
     words[places.HELD] = 1
     assert alone.is_held("MCH", words) and alone.is_held("MCH", words)
-    assert alone.view.heard() == ["MCH is held by its debugger, or waits for it: all wait"]
+    assert alone.view.received() == ["MCH is held by its debugger, or waits for it: all wait"]
     words[places.HELD] = 0
     assert not alone.is_held("MCH", words)
     words[places.HELD] = 1
-    assert alone.is_held("MCH", words) and len(alone.view.heard()) == 1
+    assert alone.is_held("MCH", words) and len(alone.view.received()) == 1
 
 
 def test_a_plant_without_progress_is_named_once_until_it_goes_on(alone):
     plant = alone.children[PLANT] = Child(PLANT, 50, turn=0)
     alone.stage[0][places.HEARTBEAT_NS] = 5
-    alone.look()
+    alone.check()
     alone.clock.now += HANG_S
-    alone.look()
-    assert alone.view.heard() == []
+    alone.check()
+    assert alone.view.received() == []
     alone.clock.now += 0.5
     alone.states[50] = "T"
-    alone.look()
-    assert alone.view.heard() == []
+    alone.check()
+    assert alone.view.received() == []
     alone.states[50] = "S"
-    alone.look()
+    alone.check()
     alone.clock.now += 5
-    alone.look()
-    assert alone.view.heard() == [f"{PLANT} (process 50) hangs: no progress for {HANG_S + 0.5:.1f} s"]
+    alone.check()
+    assert alone.view.received() == [f"{PLANT} (process 50) hangs: no progress for {HANG_S + 0.5:.1f} s"]
     alone.stage[0][places.HEARTBEAT_NS] = 6
-    alone.look()
+    alone.check()
     assert plant.turn == 0
     alone.clock.now += HANG_S + 0.1
     alone.blocks["MCH"].words[places.ASKED] = 1  # a board keeps it waiting
-    alone.look()
-    assert alone.view.heard() == []
+    alone.check()
+    assert alone.view.received() == []
     alone.blocks["MCH"].words[places.ANSWERED] = 1
     alone.clock.now += HANG_S + 0.1
-    alone.look()
-    assert len(alone.view.heard()) == 1
+    alone.check()
+    assert len(alone.view.received()) == 1
     assert alone.view.shown[-1]["plant"] == 50
     alone.ending = True
     shown = len(alone.view.shown)
     alone.clock.now += 99
-    alone.look()
-    assert alone.view.heard() == [] and len(alone.view.shown) == shown
+    alone.check()
+    assert alone.view.received() == [] and len(alone.view.shown) == shown
 
 
 # ---- children that end
 
 
 @pytest.mark.parametrize(
-    ("code", "told"),
+    ("code", "reported"),
     [(-9, "MCH (process 41) was killed by signal 9"), (3, "MCH (process 41) ended with code 3: broken")],
 )
-def test_a_board_that_ended_is_told_with_its_reason_and_waited_for_no_longer(alone, code, told):
+def test_a_board_that_ended_is_reported_with_its_reason_and_waited_for_no_longer(alone, code, reported):
     child = alone.children["MCH"] = Child("MCH", 41)
     if code > 0:
         alone.blocks["MCH"].leave_fault("broken")
     alone.ended(child, code)
-    assert alone.view.heard() == [told] and child.state == GONE
+    assert alone.view.received() == [reported] and child.state == GONE
     assert alone.blocks["MCH"].words[places.FATE] == 1 and plants(alone) == []
     assert os.eventfd_read(alone.blocks["MCH"].answer_descriptor) == 1
 
 
-def test_a_board_that_was_to_be_restarted_gets_its_room_and_then_its_process(alone, monkeypatch):
+def test_a_board_to_be_restarted_gets_its_place_and_then_its_process(alone, monkeypatch):
     child = alone.children["MCH"] = Child("MCH", 41, state=RESTARTING)
     alone.ended(child, -9)
-    assert child.state == RESTARTING and alone.view.heard() == []
+    assert child.state == RESTARTING and alone.view.received() == []
     assert plants(alone) == [{"do": "make_room", "board": "MCH", "number": "restart MCH"}]
     started = []
     monkeypatch.setattr(alone, "start_board", lambda name, fresh: started.append((name, fresh)))
     tells(alone, answer="restart MCH", time_s=1.25)
     assert started == [("MCH", True)] and plants(alone) == [{"do": "revive", "board": "MCH"}]
-    assert alone.view.heard() == ["MCH restarted at 1.250 s of the robot's time"]
+    assert alone.view.received() == ["MCH restarted at 1.250 s of the robot's time"]
 
 
 def test_a_board_that_ends_while_the_run_does_is_not_restarted(alone):
@@ -280,15 +280,15 @@ def test_a_board_that_ends_while_the_run_does_is_not_restarted(alone):
         alone.ended(Child("MCH", 41, state=RESTARTING), 1)
         assert plants(alone) == []
     alone.ending = True
-    alone.view.heard()
+    alone.view.received()
     alone.ended(Child("MCH", 41), 0)
-    assert alone.view.heard() == []
+    assert alone.view.received() == []
     alone.ended(Child("MCH", 41), 2)
-    assert alone.view.heard() == ["MCH (process 41) ended with code 2"]
+    assert alone.view.received() == ["MCH (process 41) ended with code 2"]
 
 
 @pytest.mark.parametrize(
-    ("ending", "code", "exit_code", "told"),
+    ("ending", "code", "exit_code", "reported"),
     [
         (True, 0, 0, ""),
         (True, 3, 3, ""),
@@ -297,22 +297,22 @@ def test_a_board_that_ends_while_the_run_does_is_not_restarted(alone):
         (False, 2, 1, "ended with code 2"),
     ],
 )
-def test_the_end_of_the_plant_is_that_of_the_run(alone, ending, code, exit_code, told):
+def test_the_end_of_the_plant_is_that_of_the_run(alone, ending, code, exit_code, reported):
     alone.ending = ending
     alone.ended(Child(PLANT, 50), code)
     assert alone.exit_code == exit_code
-    lines = [f"{PLANT} (process 50) {told}: the run is lost, no files are finished"] if told else []
-    assert alone.view.heard() == lines
+    lines = [f"{PLANT} (process 50) {reported}: the run is lost, no files are finished"] if reported else []
+    assert alone.view.received() == lines
 
 
 # ---- news, orders and requests
 
 
-def test_news_of_the_plant_are_kept_said_and_answered(alone):
+def test_news_of_the_plant_are_kept_printed_and_answered(alone):
     tells(alone, status={"time_s": 3.0, "damaged": {"MCH": 2}})
     assert alone.status == {"time_s": 3.0, "damaged": {"MCH": 2}}
     tells(alone, gone="MCH", time_s=2.5)
-    assert alone.view.heard() == ["MCH is off its bus since 2.500 s of the robot's time"]
+    assert alone.view.received() == ["MCH is off its bus since 2.500 s of the robot's time"]
     tells(alone, answer=7, time_s=2.0)
     tells(alone, answer=0, time_s=2.5)
     tells(alone, answer=8, error="no")
@@ -335,7 +335,7 @@ def test_one_interrupt_stops_and_lets_go_and_two_break_off(alone):
     assert all(block.words[places.LET_GO] == 1 for block in alone.blocks.values())
     assert alone.killed == [(42, signal.SIGCONT)]
     alone.interrupt()
-    assert alone.exit_code == 130 and alone.view.heard() == ["broken off: no files are finished"]
+    assert alone.exit_code == 130 and alone.view.received() == ["broken off: no files are finished"]
     assert plants(alone) == []
 
 
@@ -368,15 +368,15 @@ def test_a_restart_ends_what_runs_and_is_refused_where_nothing_is(alone):
     assert plants(alone)[0]["do"] == "make_room" and len(alone.killed) == 1 and child.state == RESTARTING
 
 
-def test_a_client_that_is_sent_away_is_told_once_for_each_door_and_reason(alone):
+def test_a_client_that_is_sent_away_is_reported_once_for_each_endpoint_and_reason(alone):
     reason, other = list(supervisor.REASONS)[:2]
     alone.status = {"sent_away": {"feed": {reason: 1}}}
-    alone.say_who_was_sent_away()
+    alone.report_disconnected()
     alone.status = {"sent_away": {"feed": {reason: 5, other: 1}}}
     alone.control.sent_away[reason] += 1
-    alone.say_who_was_sent_away()
-    alone.say_who_was_sent_away()
-    assert alone.view.heard() == [
+    alone.report_disconnected()
+    alone.report_disconnected()
+    assert alone.view.received() == [
         f"{door}: a client {supervisor.REASONS[why]}, and was sent away; others of this kind are counted"
         for door, why in (("feed", reason), ("feed", other), ("control", reason))
     ]

@@ -11,14 +11,14 @@ from ranger_sim.ranger.names import RANGER
 
 
 def test_blocks_of_the_window_are_kept_and_passed_on():
-    heard, flushed = [], []
-    stream = Made(sink=lambda last_ns, block: heard.append((last_ns, block)), flush=lambda: flushed.append(1))
+    received, flushed = [], []
+    stream = Made(sink=lambda last_ns, block: received.append((last_ns, block)), flush=lambda: flushed.append(1))
     keeper = frames.FrameKeeper({"can0": stream}, Names(), window_s=2.0)
     assert flushed == [1] and keeper.window_ns == 2_000_000_000
     for last_s, block in ((1, b"a"), (2, b"b"), (3, b"c"), (4, b"d")):
         stream.sink(last_s * 10**9, block)
     assert [block for _, block in keeper.blocks["can0"]] == [b"b", b"c", b"d"]  # from 2 s on: the window's both ends
-    assert [block for _, block in heard] == [b"a", b"b", b"c", b"d"] and heard[0][0] == 10**9
+    assert [block for _, block in received] == [b"a", b"b", b"c", b"d"] and received[0][0] == 10**9
 
 
 def test_a_keeper_needs_no_other_listener_and_knows_its_buses():

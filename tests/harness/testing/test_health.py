@@ -41,7 +41,7 @@ def test_the_normal_rates_are_those_of_the_master_table():
     assert set(error_table.NORMAL_PER_S) < set(error_table.NAMES)
 
 
-def test_an_error_is_told_when_it_is_more_than_normal_and_not_before(robot):
+def test_an_error_is_reported_when_it_is_more_than_normal_and_not_before(robot):
     robot.run_for(0.02)
     health = Health(robot)
     robot.run_for(0.01)
@@ -70,7 +70,7 @@ def test_what_comes_once_after_power_up_is_normal_only_then(robot):
     assert "CSR: 1 x SSP_LOW_RATE" in health.faults()[0]
 
 
-def test_an_overrun_is_told_and_may_be_expected_of_its_board(robot):
+def test_an_overrun_is_reported_and_may_be_expected_of_its_board(robot):
     robot.run_for(0.01)
     health = Health(robot)
     robot.replace("MCSI", "dn_update_pwm", NOTHING, cost=40_000)
@@ -83,12 +83,12 @@ def test_an_overrun_is_told_and_may_be_expected_of_its_board(robot):
     robot.run_for(0.01)
     assert health.faults(Expected(overruns=True)) == []
     robot.run_for(0.01)
-    told = health.faults(Expected(overruns="MCH"))
-    assert "expected and not seen: slot overruns of MCH" in told
-    assert any("MCSI" in line and "expected only of MCH" in line for line in told)
+    reported = health.faults(Expected(overruns="MCH"))
+    assert "expected and not seen: slot overruns of MCH" in reported
+    assert any("MCSI" in line and "expected only of MCH" in line for line in reported)
 
 
-def test_bus_errors_and_bus_off_are_told_and_may_be_expected(robot):
+def test_bus_errors_and_bus_off_are_reported_and_may_be_expected(robot):
     robot.run_for(0.01)
     health = Health(robot)
     node = next(node for node in robot.buses[0].nodes if node.name == "MCH")
@@ -96,10 +96,10 @@ def test_bus_errors_and_bus_off_are_told_and_may_be_expected(robot):
     robot.buses[0].set_bit_error_rate(2e-3)
     robot.run_for(0.02)
     robot.buses[0].set_bit_error_rate(0.0)
-    told = health.faults()
-    assert any(line.startswith("error frames: can1 ") for line in told)
-    assert any(line.startswith("bus-off: ") and "MCH" in line for line in told)
-    assert any("CAN1_BUS" in line or "CAN1_TX_BUSOFF" in line for line in told)
+    reported = health.faults()
+    assert any(line.startswith("error frames: can1 ") for line in reported)
+    assert any(line.startswith("bus-off: ") and "MCH" in line for line in reported)
+    assert any("CAN1_BUS" in line or "CAN1_TX_BUSOFF" in line for line in reported)
 
 
 def test_error_frames_that_are_expected_bring_the_errors_of_their_controllers_along(robot):
@@ -125,7 +125,7 @@ def test_an_expected_error_must_come_and_on_its_board(robot):
     assert health.faults(Expected(("MCFO:AE_SPIKE",))) == ["expected and not seen: error MCFO:AE_SPIKE"]
 
 
-def test_a_fall_is_told_once_and_may_be_expected():
+def test_a_fall_is_reported_once_and_may_be_expected():
     robot = new_robot(seed=1, warmed_up="step 2")
     health = Health(robot)
     robot.operator.press(2, robot.loop.time, 200_000_000)  # stops the controller
@@ -137,7 +137,7 @@ def test_a_fall_is_told_once_and_may_be_expected():
     assert "expected and not seen: a fall" in Health(Ranger(Scenario())).faults(Expected(fall=True))
 
 
-def test_an_injected_fault_that_did_not_act_is_told_unless_it_is_expected_or_called_off(robot):
+def test_an_injected_fault_that_did_not_act_is_reported_unless_it_is_expected_or_called_off(robot):
     robot.run_for(0.01)
     health = Health(robot)
     robot.inject("MCH.absolute_encoder", "offset")

@@ -78,11 +78,11 @@ class Robot:
         (LATE, "A", 3.0, True, 0.0),
     ],
 )
-def test_so_many_errors_are_normal_with_one_second_more_than_has_passed(code, board, passed_s, from_power_up, most):
+def test_normal_errors_allow_for_one_second_more_than_has_passed(code, board, passed_s, from_power_up, most):
     assert normal_errors.most_normal(Robot().names, board, code, passed_s, from_power_up) == most
 
 
-def test_what_is_beyond_the_normal_of_a_whole_walk_is_told_by_board():
+def test_errors_beyond_the_normal_of_a_whole_walk_are_reported_by_board():
     errors = {"A": {"SPIKE": 8, "LATE": 1}, "B": {"LATE": 3}, "C": {}}
     assert normal_errors.beyond(Robot().names, errors, 3.0) == {"A": {"LATE": 1}}
     assert normal_errors.beyond(Robot().names, {"A": {"SPIKE": 9}, "B": {"LATE": 4}}, 3.0) == {
@@ -91,7 +91,7 @@ def test_what_is_beyond_the_normal_of_a_whole_walk_is_told_by_board():
     }
 
 
-def test_errors_are_counted_since_the_last_look_and_told_above_the_normal():
+def test_errors_are_counted_since_the_last_check_and_reported_above_the_normal():
     robot = Robot()
     robot.totals["A"][SPIKE] = 1000
     health = Health(robot)
@@ -133,12 +133,12 @@ def test_errors_that_a_test_expects_are_wanted_by_name_and_by_board():
     robot.totals["B"][SPIKE] += 5
     assert health.faults(Expected(errors=("B:SPIKE",))) == []
     robot.totals["B"][SPIKE] += 5
-    told = health.faults(Expected(errors=("A:SPIKE", "LATE")))
-    assert told[0].startswith("B: 5 x SPIKE")
-    assert told[1:] == ["expected and not seen: error A:SPIKE", "expected and not seen: error LATE"]
+    reported = health.faults(Expected(errors=("A:SPIKE", "LATE")))
+    assert reported[0].startswith("B: 5 x SPIKE")
+    assert reported[1:] == ["expected and not seen: error A:SPIKE", "expected and not seen: error LATE"]
 
 
-def test_every_count_of_buses_and_boards_is_told_with_its_place():
+def test_every_count_of_buses_and_boards_is_reported_with_its_place():
     robot = Robot()
     health = Health(robot)
     robot.slots["B"].overruns = 2
@@ -168,7 +168,7 @@ def test_every_count_of_buses_and_boards_is_told_with_its_place():
     assert [each for each in health.faults() if each.startswith("bus-off")] == ["bus-off: B 2"]
 
 
-def test_a_fall_is_told_once_and_expected_ones_must_come():
+def test_a_fall_is_reported_once_and_expected_ones_must_come():
     robot = Robot()
     health = Health(robot)
     assert health.faults(Expected(fall=True)) == ["expected and not seen: fall"]
@@ -178,7 +178,7 @@ def test_a_fall_is_told_once_and_expected_ones_must_come():
     assert Health(robot, from_power_up=True).faults(Expected(fall=True)) == []
 
 
-def test_a_fault_that_did_not_act_is_told_unless_it_was_called_off():
+def test_a_fault_that_did_not_act_is_reported_unless_it_was_called_off():
     robot = Robot()
 
     def fault(**more):
@@ -214,7 +214,7 @@ def test_errors_that_follow_from_what_is_expected_are_excused(expected, board, n
     assert excused(expected, board, name) is whether
 
 
-def test_amounts_are_told_against_what_was_wanted():
+def test_amounts_are_reported_with_those_expected():
     assert amount("x", 2, {"a": 1}) == ["x: a 1, expected are 2"] and amount("x", 2, {}) == ["x: none, expected are 2"]
     assert amount("x", "a", {"b": 1}) == ["expected and not seen: x of a", "x: b 1, expected only of a"]
     assert amount("x", "a", {"a": 0}) == ["expected and not seen: x of a"]
@@ -249,7 +249,7 @@ def test_the_traffic_of_a_bus_is_that_of_its_own_ends():
         (500, 0, True),
     ],
 )
-def test_a_board_stands_still_when_it_finished_no_slot_for_twenty(time_ms, silent_ns, alive):
+def test_a_board_hangs_when_it_finished_no_slot_for_twenty(time_ms, silent_ns, alive):
     start = 1000 * MS
     machine = Made(loop=Made(time=start + round(time_ms * MS)), start_ns=start)
     board = Made(slots=Made(finished_ns=machine.loop.time - silent_ns, slot_ns=500_000))

@@ -144,7 +144,7 @@ def test_an_execution_time_is_the_longest_that_the_board_sent():
 # ---- a bench
 
 
-def test_functions_are_called_at_their_instants_and_in_the_order_in_which_they_were_given():
+def test_functions_are_called_at_their_times_and_in_the_order_in_which_they_were_given():
     bus, called = BusAlone(), []
     bus.call_at(5 * US, lambda time_s: called.append(("b", round(time_s * 1e9))))
     bus.call_at(5 * US, lambda time_s: called.append(("c", round(time_s * 1e9))))
@@ -158,7 +158,7 @@ def test_functions_are_called_at_their_instants_and_in_the_order_in_which_they_w
     assert called[5:] == [("e", 12_000), ("e", 14_000)] and bus.time_s == pytest.approx(15e-6)
 
 
-def test_waiting_looks_at_its_condition_in_windows_of_36_bits_and_not_beyond_its_time():
+def test_waiting_checks_its_condition_in_windows_of_36_bits_and_not_beyond_its_time():
     bus = BusAlone(bit_rate=1_000_000)
     window_ns = AHEAD_BITS * 1_000_000_000 // 3_000_000  # as of the robot's own buses, which are faster
     assert AHEAD_BITS == 36 and bus.window_ns == window_ns == 12_000
@@ -176,7 +176,7 @@ def test_waiting_looks_at_its_condition_in_windows_of_36_bits_and_not_beyond_its
         bus.until(never, "1 us")
 
 
-def test_a_node_sends_what_it_was_given_in_order_of_its_instants_and_numbers():
+def test_a_node_sends_its_frames_in_order_of_their_times_and_numbers():
     bus = BusAlone()
     one, other = bus.node("one"), bus.node("other")
     one.send(0x100, b"ab", at="20 us")
@@ -198,7 +198,7 @@ def test_a_node_sends_what_it_was_given_in_order_of_its_instants_and_numbers():
         other.wait_for("MCH_ANGLE", within="1 ms")
 
 
-def test_a_frame_is_told_in_a_line():
+def test_a_frame_is_printed_in_one_line():
     assert frame(1500, lo=0x3F000000).text() == f"    0.001500 s  can1  {ANGLE:03X} MCH_ANGLE 0.5 (stamp 7)"
     assert frame(1500, flags=FLAG_ERROR).text() == "    0.001500 s  can1  error frame"
     assert frame(0, flags=FLAG_ERROR).is_error and not frame(0).is_error

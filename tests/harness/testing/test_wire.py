@@ -124,7 +124,7 @@ def test_what_was_measured_is_kept_with_its_limit(recording):
     assert figure.text() == "1 intervals, least 2 ms, mean 2 ms, most 2 ms (limit 2 ms +- 1 us)"
 
 
-def test_what_is_not_there_is_told_with_what_is_near(recording):
+def test_an_unknown_name_is_reported_with_similar_ones(recording):
     with pytest.raises(UserError, match="unknown bus 'can9' .available: can1, can3"):
         recording.wire("can9")
     with pytest.raises(UserError, match="unknown frame 'MCH_ANGEL'; did you mean 'MCH_ANGLE'"):

@@ -97,7 +97,7 @@ def test_a_bus_is_busy_for_as_long_as_its_load_says(files, dump):
         assert busy_ns == pytest.approx(expected, rel=0.02)
 
 
-def test_a_frame_and_a_state_are_told_by_name(dump):
+def test_a_frame_and_a_state_are_shown_by_name(dump):
     frames = [value for _, value in dump.changes["buses.can1_frame"]]
     # every 2 ms from the first slot on, 1.4 ms after power-up
     assert frames.count("MCH_ANGLE") == 15 and "TIMESTAMP" in frames

@@ -91,13 +91,13 @@ def order_of(outer, inner):
     return " ".join(f"{letters[code & 3]}{code >> 2}" for code in order.tolist())
 
 
-def test_inner_slices_stand_within_their_outer_ones():
+def test_inner_slices_are_within_their_outer_ones():
     outer, inner = [(0, 10), (10, 20)], [(1, 3), (3, 10), (10, 10), (12, 13)]
     # the inner one without a length, at the instant at which both outer ones meet, belongs to the first
     assert order_of(outer, inner) == "(0 [0 ]0 [1 ]1 [2 ]2 )0 (1 [3 ]3 )1"
 
 
-def test_inner_slices_without_an_outer_one_stand_alone():
+def test_inner_slices_without_an_outer_one_are_on_their_own():
     assert order_of([(5, 6)], [(0, 1), (7, 8)]) == "[0 ]0 (0 )0 [1 ]1"
     assert order_of([], [(0, 1)]) == "[0 ]0"
     assert order_of([(0, 1)], []) == "(0 )0"
@@ -121,5 +121,5 @@ def test_packets_are_found_without_parsing_them():
 @pytest.mark.parametrize(
     "data", [b"\x0b\x01\x00", b"\x0a\x05\x40", b"\x0a\x02\x40\x80", b"not a trace at all", b"\x0a"]
 )
-def test_what_is_no_row_of_packets_is_told(data):
+def test_a_file_that_is_not_a_row_of_packets_is_reported(data):
     assert index_packets(data, np.zeros(15, dtype=np.int64)) == -1

@@ -60,7 +60,7 @@ def test_slots_are_selected_by_what_held_at_their_start():
         assert len(starts) == 20 and min(starts) >= 10_000_000 and max(starts) < 20_250_000
 
 
-def test_before_it_was_looked_at_a_condition_did_not_hold():
+def test_before_it_was_checked_a_condition_did_not_hold():
     answers = iter((False, True, True, False))
     held = Held(types.SimpleNamespace(start_ns=1000), condition(lambda robot: next(answers)))
     for now_ns in (1100, 1200, 1300, 1400):
@@ -100,7 +100,7 @@ def test_a_board_that_lost_its_supply_is_recorded_on_when_it_comes_back():
     assert not any((drawn.inside.end_ns > 100_250_000) & (drawn.inside.start_ns < 121_000_000))
 
 
-def test_every_interrupt_of_every_board_has_a_name_of_its_own():
+def test_every_interrupt_of_every_board_has_its_own_name():
     with contextlib.closing(Ranger()) as robot:
         for name in BOARD_CLASSES:
             names = [source.name for source in robot.boards[name].legend().interrupts]

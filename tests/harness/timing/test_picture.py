@@ -22,7 +22,7 @@ def test_a_piece_of_time_fills_the_cells_that_it_covers_and_no_other():
     assert sums[0] == 3.0 and sums[-1] == 4.0
 
 
-def test_a_cell_shows_who_had_most_of_it_if_a_tenth_was_used():
+def test_a_cell_shows_the_largest_user_if_a_tenth_was_used():
     assert picture._most({"a": 3.0, "b": 4.0}, 10.0) == "b"
     assert picture._most({"a": 1.0}, 10.0) == "a" and picture._most({"a": 0.9}, 10.0) == " "
     assert picture._most({}, 10.0) == " "
@@ -52,7 +52,7 @@ def test_a_scale_has_at_most_twelve_round_steps():
     assert "|10 " not in picture._scale(120_001.0)
 
 
-def test_a_mark_has_its_text_behind_it_or_before_it_where_there_is_no_room():
+def test_a_mark_has_its_text_behind_it_or_before_it_for_want_of_space():
     first, last = picture._marks({200: "late", 20: "tick"}, 10.0), picture._marks({960: "limit"}, 10.0)
     assert first == [" " * 12 + "  ^ tick", " " * 12 + " " * 20 + "^ late"]
     assert last[0] == " " * 12 + " " * 96 + "^ limit"
@@ -68,7 +68,7 @@ def run(name, cycles, limit=0, interrupt=False, latency_ns=0):
     return Made(name=name, cycles=cycles, limit=limit, interrupt=interrupt, latency_ns=latency_ns)
 
 
-def test_a_list_tells_what_exceeded_its_limit_and_gathers_what_is_short():
+def test_a_list_reports_what_exceeded_its_limit_and_gathers_what_is_short():
     slot = Made(legend=Made(cycles_per_ns=0.06, slot_cycles=30_000))
     runs = [run("work", 700, 1000), run("work", 1001, 1000), run("tiny", 59), run("just", 60), run("small", 1)]
     lines = picture._list(slot, runs, {"work": "a", "tiny": "b", "just": "c", "small": "d"}, "function", "limit")
@@ -90,7 +90,7 @@ def legend(rows, entries=()):
     return Made(rows=rows, tasks=[Made(entries=lists.get(number, ())) for number in range(12)])
 
 
-def test_tasks_stand_in_the_table_s_order_common_ones_once():
+def test_tasks_are_in_the_tables_order_common_ones_once():
     table = legend([(0, 1, 4, 9), (0, 1, 5, 6, 9), (0, 1, 9)], {5: (7, 8)})
     assert static_check.in_order(table) == [0, 1, 4, 5, 7, 8, 6, 9]
     assert static_check.in_order(legend([(0, 1, 2, 8, 9), (0, 3, 8, 9)])) == [0, 1, 2, 3, 8, 9]
@@ -133,7 +133,7 @@ def test_a_source_comes_so_often_in_a_slot_of_one_millisecond(kind, board, expec
     assert static_check.services(made, source, 1_000_000, {"encoder_edge_0": 6}, {})[:3] == expected
 
 
-def test_sources_without_edges_or_work_of_their_own_are_never_served():
+def test_sources_without_edges_or_their_own_work_are_never_served():
     made = Made(name="MCH")
     edge = Made(kind=static_check.PIN_EDGE, name="another", index=0)
     assert static_check.services(made, edge, 1_000_000, {"encoder_edge_0": 6}, {})[0] == 0

@@ -174,7 +174,7 @@ def long_row(log):
     return ((log.task("long", 36_000), log.task("x", 60), log.task("y", 60)), (log.task("next", 60),))
 
 
-def test_an_overrun_tells_what_was_dropped_and_lasts_until_its_last_task_is_through():
+def test_an_overrun_lists_what_was_dropped_and_lasts_until_its_last_task_is_through():
     view = recorded(rows=long_row, until_ns=999_000)
     late, after = view
     assert late.overran and late.dropped == ["x", "y"] and late.end_ns == 600_000 + 2 * TICK_NS
@@ -234,7 +234,7 @@ def test_an_entry_of_an_occasional_list_is_seen_in_the_picture_and_in_the_statis
 # --- questions without an answer
 
 
-def test_a_past_that_was_not_recorded_is_told_plainly():
+def test_a_past_that_was_not_recorded_is_reported():
     log = Log()
     log.start(rows=two_rows(log))
     log.chip.advance(1_200_000)
@@ -245,7 +245,7 @@ def test_a_past_that_was_not_recorded_is_told_plainly():
 
 
 @pytest.mark.parametrize(
-    "question, told",
+    "question, reported",
     [
         (lambda view: view.of_row(2), "row 2 is none of 0 ... 1"),
         (lambda view: view.between("1 ms", "1 ms"), "nothing is between"),
@@ -258,12 +258,12 @@ def test_a_past_that_was_not_recorded_is_told_plainly():
         (lambda view: view.between("5 s", "6 s").overruns, "none was recorded"),
     ],
 )
-def test_a_wrong_question_is_told_in_one_line(question, told):
-    with pytest.raises(UserError, match=told):
+def test_a_wrong_question_is_reported_in_one_line(question, reported):
+    with pytest.raises(UserError, match=reported):
         question(recorded(rows=two_rows))
 
 
-def test_what_was_given_up_for_newer_rows_is_told_and_a_selection_of_what_is_kept_has_an_answer():
+def test_rows_dropped_for_newer_ones_are_reported_and_a_selection_of_the_kept_ones_has_an_answer():
     log = Log()
     log.start(rows=two_rows(log))
     recording = Recording(log.chip, most_rows=40)

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from ranger_sim.harness.processes import activity, places
-from ranger_sim.harness.processes.apart import Undertaker
+from ranger_sim.harness.processes.apart import ProcessReaper
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.ranger.testing.process_robot import ProcessRobot
@@ -57,7 +57,7 @@ class Written:
         pass
 
 
-def test_who_does_not_ask_for_long_gets_the_newest_and_is_told_what_was_given_up(monkeypatch):
+def test_a_reader_that_does_not_ask_for_long_gets_the_newest_and_the_number_dropped(monkeypatch):
     monkeypatch.setattr(activity, "MOST_BYTES", 10 * activity.ROW_BYTES)
     monkeypatch.setattr(activity, "ANSWER_BYTES", 4 * activity.ROW_BYTES)
     board, words = Written(), array.array("q", bytes(8 * places.SLOTS))
@@ -104,13 +104,13 @@ def test_the_timeline_of_boards_in_processes_is_byte_for_byte_that_of_one_proces
             timeline.write(tmp_path / f"{kind.__name__}.pftrace")
             timeline.close()
             assert all(
-                isinstance(watcher, Undertaker) for watcher in robot.loop.watchers
+                isinstance(watcher, ProcessReaper) for watcher in robot.loop.watchers
             )  # it belongs to the processes
     written = [path.read_bytes() for path in sorted(tmp_path.iterdir())]
     assert len(written) == 2 and written[0] == written[1] and len(written[0]) > 900_000
 
 
-def test_a_board_in_a_process_keeps_no_more_of_the_past_than_it_was_told(monkeypatch):
+def test_a_board_in_a_process_keeps_no_more_of_the_past_than_ordered(monkeypatch):
     board, words = Written(), array.array("q", bytes(8 * places.SLOTS))
     log = activity.RemoteActivity(None, words, None)
     log.keep_ns = 100

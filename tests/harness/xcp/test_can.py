@@ -113,7 +113,7 @@ def test_a_packet_is_a_frame_without_length_or_counter():
         assert probe.counters()["commands"] == 5 and probe.counters()["packets_out"] == 4
 
 
-def test_the_transport_layer_says_who_is_there_and_which_identifier_a_list_has():
+def test_the_transport_layer_reports_the_slave_and_the_identifier_of_a_list():
     with attached() as (_, _, master):
         assert master.say("F2FF 584350 00") == "FF 58 43 50 D0 07 00 00"
         assert master.say("F2FF 584350 01") == "FF A7 BC AF D0 07 00 00"
@@ -157,7 +157,7 @@ def test_a_parameter_is_written_under_the_one_check():
         assert master.say("F004 00000000") == "FE 24"
 
 
-def test_lists_are_sampled_at_slot_rate_and_say_what_the_main_brain_had_at_that_instant():
+def test_lists_are_sampled_at_slot_rate_with_the_values_of_the_main_brain_at_that_time():
     with attached(log="full") as (robot, _, master):
         master.say("FF00")
         assert master.measure(["MCH_ANGLE", "TIMESTAMP"], event=0) == []
@@ -247,13 +247,13 @@ def test_at_full_measurement_every_frame_of_the_robot_and_every_packet_keeps_its
     longest = {}
     for number, took in zip(rows[:, TIMES_IDENTIFIER], rows[:, TIMES_END] - rows[:, TIMES_ASKED], strict=True):
         longest[int(number)] = max(longest.get(int(number), 0), int(took))
-    heard = {number for number in longest if number not in (XCP_MASTER_ID, XCP_SLAVE_ID)}
-    assert len(heard) >= 5 and all(longest[number] <= limits[number] for number in heard)
+    received = {number for number in longest if number not in (XCP_MASTER_ID, XCP_SLAVE_ID)}
+    assert len(received) >= 5 and all(longest[number] <= limits[number] for number in received)
     late_us = [10 * ((at // 10_000 - struct.unpack_from("<H", data, 1)[0]) % 65536) for at, data in master.frames]
     assert len(late_us) >= 15_000 and max(late_us) * 1000 <= packet.response_ns
 
 
-def test_the_router_hears_xcp_and_sends_it_nowhere():
+def test_the_router_receives_xcp_and_sends_it_nowhere():
     assert routes.DESTINATIONS[XCP_MASTER_ID] == routes.DESTINATIONS[XCP_SLAVE_ID] == 0
     with attached() as (robot, _, master):
         master.say("FF00")
@@ -280,7 +280,7 @@ def test_after_bus_off_the_probe_comes_back():
         assert master.say("FD") == "FF 00 00 00 00 00"
 
 
-def test_on_a_bus_outside_the_probe_is_a_peer_of_its_own():
+def test_on_a_bus_outside_the_probe_is_a_separate_peer():
     channel = f"xcp-{os.getpid()}"  # python-can's `virtual`: all of a process with this name are on one bus
     where = {"interface": "virtual", "channel": channel, "ignore_config": True}
     with contextlib.closing(Ranger(Scenario(seed=3))) as robot, can.Bus(**where) as master:
@@ -325,6 +325,6 @@ def test_a_bus_may_be_filled_to_the_bound_and_no_bit_further():
         assert not probe.bears(lists)
 
 
-def test_a_bus_that_there_is_not_is_told():
+def test_a_bus_that_does_not_exist_is_reported():
     with contextlib.closing(Ranger(Scenario(seed=3))) as robot, pytest.raises(UserError, match="can1, can2"):
         XcpCanProbe(robot, "can5")

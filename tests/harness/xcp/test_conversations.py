@@ -77,14 +77,14 @@ def test_a_packet_may_be_as_long_as_the_slave_said_and_no_longer():
     assert slave.command(b"", 0) == b""
 
 
-def test_what_a_packet_is_too_short_for_is_no_command():
+def test_a_packet_that_is_too_short_is_not_a_command():
     held(connected(8), ("ED 01 00 00 00010000", "FE 20"), ("C7 00", "FE 20"))
     held(connected(9), ("ED 01 00 00 00010000 07", "FF"), ("C7 00", "FE 20"))
     held(connected(10), ("C7 00", "FF"), ("C7 01 FF 04 00010000 00 00", "FE 29"))
 
 
 @pytest.mark.parametrize(("max_cto", "packets"), [(8, 43), (10, 32), (32, 9), (248, 2), (255, 2), (17, 17), (19, 15)])
-def test_a_block_of_255_bytes_comes_in_so_many_packets(max_cto, packets):
+def test_a_block_of_255_bytes_comes_in_several_packets(max_cto, packets):
     held(connected(max_cto), ("FB", f"FF 00 01 00 {packets:02X} 00 00 10"))
 
 

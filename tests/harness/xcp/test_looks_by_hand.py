@@ -97,7 +97,7 @@ def test_a_master_that_has_ended_without_a_word_gives_its_place_to_the_next(serv
     assert asks(server, CONNECT, sender=ME) == []  # of another machine nothing is known
 
 
-def test_who_is_unknown_or_of_another_user_is_not_answered(server):
+def test_a_client_that_is_unknown_or_of_another_user_is_not_answered(server):
     server.owners = {OTHER: 8}
     assert asks(server, CONNECT) == asks(server, CONNECT, sender=OTHER) == []
     counted = server.counters()
@@ -106,7 +106,7 @@ def test_who_is_unknown_or_of_another_user_is_not_answered(server):
     assert len(asks(server, CONNECT)) == 1
 
 
-def test_who_does_not_connect_is_not_heard_whoever_has_the_place(server):
+def test_a_client_that_does_not_connect_is_not_answered_whether_the_place_is_taken_or_not(server):
     for datagrams in (datagram(STATUS), datagram(STATUS, CONNECT), b"", b"\x02\x00\x00\x00"):
         server.socket.coming.append((datagrams, OTHER))
         server.poll(0)
@@ -133,15 +133,15 @@ def test_the_kernel_is_asked_about_strangers_as_often_as_others_are_taken_in(ser
     assert server.sent_away[UNKNOWN] == 2 * udp.QUESTIONS + 1
 
 
-def test_a_look_takes_so_many_strangers_and_the_next_the_rest(server):
-    server.socket.coming += [(datagram(STATUS), OTHER)] * (udp.STRANGERS_A_LOOK + 1)
+def test_a_poll_takes_a_number_of_unknown_clients_and_the_next_poll_the_rest(server):
+    server.socket.coming += [(datagram(STATUS), OTHER)] * (udp.UNKNOWN_PER_POLL + 1)
     server.poll(0)
     assert server.left_over and len(server.socket.coming) == 1
     server.poll(0)
-    assert not server.left_over and server.sent_away[MALFORMED] == udp.STRANGERS_A_LOOK + 1
+    assert not server.left_over and server.sent_away[MALFORMED] == udp.UNKNOWN_PER_POLL + 1
 
 
-def test_a_look_carries_out_as_many_commands_as_its_burst_and_the_next_goes_on(server):
+def test_a_poll_carries_out_as_many_commands_as_its_burst_and_the_next_goes_on(server):
     asks(server, CONNECT)
     assert len(asks(server, *[STATUS] * (BURST + 3))) == BURST
     assert server.left_over and server.speaker == ME
@@ -163,7 +163,7 @@ def test_a_look_carries_out_as_many_commands_as_its_burst_and_the_next_goes_on(s
         (datagram(STATUS) + struct.pack("<HH", 0, 0) + datagram(STATUS), 1),
     ],
 )
-def test_what_is_no_packet_ends_its_datagram_and_is_counted(server, data, answers):
+def test_bytes_that_are_not_a_packet_end_their_datagram_and_are_counted(server, data, answers):
     asks(server, CONNECT)
     server.socket.coming.append((data, ME))
     before = len(server.socket.sent)
@@ -173,11 +173,11 @@ def test_what_is_no_packet_ends_its_datagram_and_is_counted(server, data, answer
     assert server.rest == b""
 
 
-def test_a_datagram_that_found_nobody_does_not_end_a_look(server):
+def test_a_datagram_without_a_receiver_does_not_end_a_poll(server):
     asks(server, CONNECT)
     server.socket.coming.append(ConnectionRefusedError())
     assert len(asks(server, STATUS)) == 1
-    server.socket.coming += [ConnectionRefusedError()] * udp.DATAGRAMS_A_LOOK
+    server.socket.coming += [ConnectionRefusedError()] * udp.DATAGRAMS_PER_POLL
     server.poll(0)
     assert server.left_over
     server.poll(0)
@@ -192,7 +192,7 @@ def test_a_packet_that_cannot_be_sent_is_counted_and_the_counter_shows_it(server
     assert server.counters()["packets_dropped"] == 1 and server.counters()["packets_out"] == 2
 
 
-def test_what_is_measured_waits_for_the_next_look_and_no_more_than_there_is_room_for(server, monkeypatch):
+def test_measurements_wait_for_the_next_poll_up_to_the_size_of_the_buffer(server, monkeypatch):
     asks(server, CONNECT)
     asked = []
     monkeypatch.setattr(server.slave, "sample", lambda *at: asked.append(at) or [b"ab", b"c"])
@@ -223,7 +223,7 @@ def test_a_port_that_is_none_or_open_to_the_network_is_refused():
     assert robot.loop.watchers == []
 
 
-def test_the_kernels_table_tells_whose_a_port_is(monkeypatch):
+def test_the_kernels_table_has_the_owner_of_a_port(monkeypatch):
     table = (
         "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n"
         "  1: 0100007F:1389 00000000:0000 07 00000000:00000000 00:00000000 00000000  1000        0 1 2 x 0\n"

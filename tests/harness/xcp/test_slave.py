@@ -201,7 +201,7 @@ def test_a_short_download_brings_its_address_where_a_packet_has_room():
     assert say(slave, "ED 04 00 01 0C010000 05060708") == "FE 22"
 
 
-def test_a_list_tells_its_mode(slave):
+def test_a_list_reports_its_mode(slave):
     arranged(slave, "0100", "03")
     assert say(slave, "DF 00 0000") == "FF 50 00 00 01 00 03 00"  # running, with stamps; event 1, every third
     say(slave, "DE 00 0000")
@@ -229,7 +229,7 @@ def test_several_entries_are_written_by_one_command_where_a_packet_has_room():
     assert say(Slave(Bytes()), "C7 01") == ""
 
 
-def test_a_list_that_the_transport_does_not_bear_is_refused_beside_those_that_run():
+def test_a_list_beyond_the_transports_rate_is_refused_and_those_that_run_go_on():
     asked = []
     slave = Slave(Bytes(), bears=lambda packets: asked.append(list(packets)) or len(packets) < 3)
     say(slave, "FF00")
@@ -246,7 +246,7 @@ def test_a_list_that_the_transport_does_not_bear_is_refused_beside_those_that_ru
         ("D3 00 0000 00 02",),  # an entry that nobody wrote
     ],
 )
-def test_a_list_that_was_changed_after_it_was_selected_is_looked_at_again(slave, change):
+def test_a_list_that_was_changed_after_it_was_selected_is_checked_again(slave, change):
     slave.bears = lambda packets: all(period_ns > MS for _, period_ns in packets)
     for command in ("D6", "D500 0100", "D400 0000 01", "D300 0000 00 01", "E200 0000 00 00", "E1FF0400 00010000",
                     "E010 0000 0200 03 00", "DE02 0000", *change):  # fmt: skip

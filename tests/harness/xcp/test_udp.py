@@ -35,9 +35,9 @@ class Client:
             packet = bytes.fromhex(command)
             self.socket.send(struct.pack("<HH", len(packet), 0) + packet)
         self.robot.run_for(0.002)
-        return self.heard()
+        return self.received()
 
-    def heard(self):
+    def received(self):
         packets = []
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -72,7 +72,7 @@ def test_a_master_that_measures_leaves_the_run_as_it_is():
         packets = []
         while measured.time_s < 0.2:  # a socket keeps 0.1 s of these packets
             measured.run_for(min(0.05, 0.2 - measured.time_s))
-            packets += [each for each in client.heard() if each[0] == 0]
+            packets += [each for each in client.received() if each[0] == 0]
         stamps = [struct.unpack_from("<I", each, 1)[0] for each in packets]
         assert len(stamps) > 300 and {b - a for a, b in zip(stamps, stamps[1:], strict=False)} == {500}
         assert measured.trace_digest() == expected
@@ -94,7 +94,7 @@ def test_a_second_master_is_not_answered_and_counted(robot):
         client.close()
 
 
-def test_a_master_that_ended_without_a_word_makes_room_and_its_lists_stop(robot):
+def test_a_master_that_ended_without_disconnecting_gives_up_its_place_and_its_lists_stop(robot):
     server = XcpUdpServer(robot, 0)
     robot.attach(server)
     first, second = Client(robot, server), Client(robot, server)
@@ -118,7 +118,7 @@ def test_beyond_this_machine_it_listens_only_when_that_is_asked_for(robot):
 GET_STATUS, CONNECT = struct.pack("<HH", 1, 0) + b"\xfd", struct.pack("<HH", 2, 0) + b"\xff\x00"
 
 
-def test_a_look_carries_out_so_many_commands_however_packed(robot):
+def test_a_poll_carries_out_a_bounded_number_of_commands_however_packed(robot):
     with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
         client.socket.send(CONNECT + GET_STATUS * 99)
         counts = []
@@ -126,7 +126,7 @@ def test_a_look_carries_out_so_many_commands_however_packed(robot):
             server.poll(robot.loop.time + look)
             counts.append(server.totals["commands"])
         assert counts == [16, 32, 48, 64, 80, 96, 100, 100, 100]
-        assert len(client.heard()) == 100
+        assert len(client.received()) == 100
 
 
 def test_strangers_are_not_asked_about_but_for_connecting_and_then_so_often_in_a_second(robot, monkeypatch):
@@ -147,7 +147,7 @@ def test_strangers_are_not_asked_about_but_for_connecting_and_then_so_often_in_a
         with contextlib.closing(Client(robot, server)) as client:
             client.socket.send(CONNECT)
             server.poll(robot.loop.time)
-            assert len(asked) == 1 and len(client.heard()) == 1
+            assert len(asked) == 1 and len(client.received()) == 1
             assert looks(10, GET_STATUS) == 1
             assert looks(20, CONNECT) == udp.QUESTIONS  # each time whether the master is still there
             now_s += 0.75 / ARRIVALS_PER_S
@@ -155,7 +155,7 @@ def test_strangers_are_not_asked_about_but_for_connecting_and_then_so_often_in_a
             now_s += 0.75 / ARRIVALS_PER_S
             assert looks(20, CONNECT) == udp.QUESTIONS + 1
         assert server.sent_away == {MALFORMED: 10, FULL: 70}
-        assert stranger.heard() == []
+        assert stranger.received() == []
 
 
 def test_what_strangers_pour_does_not_reach_the_masters_queue(robot):
@@ -171,15 +171,15 @@ def test_what_strangers_pour_does_not_reach_the_masters_queue(robot):
         before = server.sent_away[FULL]
         for _ in range(3):
             server.poll(robot.loop.time)
-        assert len(client.heard()) == 21
-        assert server.sent_away[FULL] - before == 3 * udp.STRANGERS_A_LOOK
+        assert len(client.received()) == 21
+        assert server.sent_away[FULL] - before == 3 * udp.UNKNOWN_PER_POLL
         assert server.left_over
         client.socket.send(struct.pack("<HH", 1, 0) + b"\xfe")
         server.poll(robot.loop.time)
         assert server.private is None and server.master is None
 
 
-def test_a_port_that_an_xcp_slave_has_is_not_had_by_another_also_while_a_master_is_there(robot):
+def test_a_port_of_an_xcp_slave_is_refused_to_another_also_while_a_master_is_there(robot):
     with contextlib.closing(XcpUdpServer(robot, 0)) as server, contextlib.closing(Client(robot, server)) as client:
         for _ in range(2):
             with pytest.raises(UserError, match=f"127.0.0.1:{server.port}: Address already in use"):

@@ -271,7 +271,7 @@ def test_the_current_of_a_rippling_motor_agrees_with_a_fine_numerical_integratio
     assert worst < 0.01
 
 
-def test_a_motor_without_ripple_keeps_its_constant_wherever_it_stands():
+def test_a_motor_without_ripple_keeps_its_constant_at_any_angle():
     unit = MotorUnit("m", HIP_MOTOR)
     unit.turn(0.3, 5.0, 1e-3)
     assert unit.angle_factor == 1.0

@@ -109,9 +109,9 @@ def test_a_step_on_one_foot_is_nystroms(stance, foot, swing):
             return body
 
         body, _ = follows(make, x, v, STEP_S, on_feet)
-        told = body.hip_x, body.hip_y, body.swing.gap, body.stance.gap
+        reported = body.hip_x, body.hip_y, body.swing.gap, body.stance.gap
         body.update_pose()
-        assert told == pytest.approx((body.hip_x, body.hip_y, body.swing.gap, 0.0), abs=1e-12)
+        assert reported == pytest.approx((body.hip_x, body.hip_y, body.swing.gap, 0.0), abs=1e-12)
 
 
 @pytest.mark.parametrize("stance", [OUTER, INNER])

@@ -319,7 +319,7 @@ def test_bounces_are_drawn_edge_by_edge_and_the_buffer_grows_with_them():
     assert [encoder.edges.edge(i) for i in range(encoder.edges.count)] == expected
 
 
-def test_a_new_disc_has_its_errors_and_the_encoder_starts_again_where_it_stands():
+def test_a_new_disc_has_its_errors_and_the_encoder_starts_again_where_it_is():
     disc, fresh = Disc(64, 2.0, seed=5), Disc(64, 2.0, 1, 0.04, -0.2, seed=5)
     disc.encoder.update(0, STEP, 0.5, 0.0, 0.5, 0.0)
     disc.encoder.set_disc(0.04, -0.2)
@@ -334,7 +334,7 @@ def test_a_new_disc_has_its_errors_and_the_encoder_starts_again_where_it_stands(
     assert disc.encoder.has_errors and disc.encoder.threshold(-1) == -0.9 and disc.encoder.threshold(-2) == -2.0
 
 
-def test_an_encoder_stands_in_the_cell_of_its_position_and_shows_both_levels():
+def test_an_encoder_is_in_the_cell_of_its_position_and_shows_both_levels():
     stream = RandomStream(2, "stand")
     for disc in (Disc(32, 3.0, 1, 0.1, 0.4, seed=1), Disc(32, 3.0, -1, 0.1, -0.4, seed=2), Disc(32, 3.0)):
         for _ in range(300):

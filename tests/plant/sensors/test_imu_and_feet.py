@@ -15,11 +15,11 @@ BYTE_NS = 10_000_000_000 // 460_800
 
 def listen(imu, steps, lean=0.1, rate=0.5, yaw=0.0, yaw_rate=0.0, start=0):
     """All bytes of some plant steps as (time, value)."""
-    heard = []
+    received = []
     for k in range(start, start + steps):
         imu.update(k * STEP, (k + 1) * STEP, lean, rate, lean, rate, yaw, yaw_rate)
-        heard += [(imu.bytes.times[i], imu.bytes.values[i]) for i in range(imu.bytes.count)]
-    return heard
+        received += [(imu.bytes.times[i], imu.bytes.values[i]) for i in range(imu.bytes.count)]
+    return received
 
 
 def command(imu, header, time=0):
@@ -27,15 +27,17 @@ def command(imu, header, time=0):
         imu.receive_byte(time, byte)
 
 
-def packets(heard, header):
+def packets(received, header):
     """Packets of 31 bytes with a right sum, as (time of the last byte, six floats, timer)."""
-    values = bytes(value for _, value in heard)
+    values = bytes(value for _, value in received)
     found = []
     i = 0
     while i + 31 <= len(values):
         packet = values[i : i + 31]
         if packet[0] == header and sum(packet[:29]) & 0xFFFF == int.from_bytes(packet[29:], "big"):
-            found.append((heard[i + 30][0], struct.unpack(">6f", packet[1:25]), int.from_bytes(packet[25:29], "big")))
+            found.append(
+                (received[i + 30][0], struct.unpack(">6f", packet[1:25]), int.from_bytes(packet[25:29], "big"))
+            )
             i += 31
         else:
             i += 1
@@ -51,11 +53,11 @@ def test_the_command_is_acknowledged_with_eight_bytes_and_a_sum():
     command(imu, 0xC2, time=1000)
     imu.samples = 1
     imu.next_sample_ns = imu.sample_time(1)
-    heard = listen(imu, 40)
-    values = [value for _, value in heard]
+    received = listen(imu, 40)
+    values = [value for _, value in received]
     assert values[:2] == [0xC4, 0xC2] and len(values) == 8
     assert sum(values[:6]) == (values[6] << 8) + values[7]
-    assert heard[0][0] == 1000 + imu.latency_ns + BYTE_NS
+    assert received[0][0] == 1000 + imu.latency_ns + BYTE_NS
 
 
 def test_rates_come_every_millisecond_and_the_firmware_gets_the_legs_rate_back():
@@ -92,8 +94,8 @@ def test_angles_come_at_250_hz_with_roll_opposite_to_the_lean():
 def test_a_packet_takes_two_thirds_of_a_millisecond_on_the_line():
     imu = Imu()
     command(imu, 0xC2)
-    heard = listen(imu, 80)[-31:]
-    assert heard[-1][0] - heard[0][0] == 30 * BYTE_NS
+    received = listen(imu, 80)[-31:]
+    assert received[-1][0] - received[0][0] == 30 * BYTE_NS
     assert 31 * BYTE_NS == pytest.approx(673_000, rel=0.01)
     times = [time for time, _ in listen(imu, 80, start=80)]
     assert times == sorted(times)
@@ -149,8 +151,8 @@ def test_the_device_stops_when_another_mode_is_asked():
     command(imu, 0xCF)
     listen(imu, 80)
     command(imu, 0x00, time=80 * STEP)
-    heard = listen(imu, 80, start=80)
-    assert packets(heard, 0xCF) == []
+    received = listen(imu, 80, start=80)
+    assert packets(received, 0xCF) == []
 
 
 def test_noise_on_the_command_line_is_survived():

@@ -89,7 +89,7 @@ def test_what_was_not_measured_is_null():
     assert not any(isinstance(value, float) and math.isinf(value) for value in figures.values())
 
 
-def test_the_report_tells_pulls_as_the_summary_has_them():
+def test_the_report_has_the_same_pulls_as_the_summary():
     figures = oddities(RangerPlant()) | {"tensile_strikes": 3, "tensile_impulse_min_Ns": -0.456, "slides": 2}
     values = {tile["name"]: tile["value"] for tile in contact(figures | {"slip_s": 0.013, "normal_force_min_N": -7.25})}
     assert values["strikes that pull"] == "3 (to -0.46 N s)"

@@ -12,7 +12,7 @@ PAGE = pathlib.Path(__file__).resolve().parents[3] / "docs/faults.md"
 PARAMETER = re.compile(r"`(\w+)`([^`()]*)\((\S+) to (\S+?)(?: [^()]*)?\)")
 
 
-def told():
+def reported():
     """(place, mode, [(parameter, default or None, low, high)]) of every row of the page's tables."""
     text = PAGE.read_text(encoding="utf-8")
     found = []
@@ -32,7 +32,7 @@ def told():
 def test_every_parameter_of_every_fault_has_the_limits_and_the_default_of_the_page():
     CATALOGUE.load()
     compared = 0
-    for place, mode, rows in told():
+    for place, mode, rows in reported():
         kind = CATALOGUE.modes_of(CATALOGUE.find(place))[mode]
         declared = {each.name: each for each in kind.parameters}
         for name, default, low, high in rows:

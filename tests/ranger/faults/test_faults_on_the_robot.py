@@ -63,7 +63,7 @@ def test_an_offset_of_the_absolute_encoder_is_reached_at_the_limiters_pace_and_r
     assert board.encoder.counts == true
 
 
-def test_an_offset_of_the_motor_current_is_so_many_amperes_in_the_firmware(robot):
+def test_an_offset_of_the_motor_current_is_the_same_in_the_firmware_in_amperes(robot):
     board, motor = robot.board("MCH"), robot.plant.hip
     fault = robot.inject("MCH.motor_current", "offset", until="310 ms", offset=-0.5)
     differences = []
@@ -157,7 +157,7 @@ def test_a_gain_of_the_external_converter_is_seen_in_its_results(robot, factor, 
 
 @pytest.mark.parametrize("offset", [300, -300])
 @pytest.mark.parametrize("place", ["MCH.adc_internal", "CSR.adc_internal"])
-def test_an_offset_of_an_internal_converter_is_so_many_counts(robot, place, offset):
+def test_an_offset_of_an_internal_converter_is_its_number_of_counts(robot, place, offset):
     fault = robot.inject(place, "offset", until="310 ms", offset=offset)
     board = robot.board(place[: place.index(".")])
     before = board.adc_internal.result if place.startswith("MCH") else board.adc.DR(1)
@@ -223,8 +223,8 @@ def test_a_late_conversion_of_the_internal_converter_is_reported_when_it_comes_a
     before = noted(board, "ADCI_DNF")
     fault = robot.inject("MCH.adc_internal", "late_conversion", until="310 ms", late_us=600)
     robot.run_for(0.009)
-    told = noted(board, "ADCI_DNF") - before
-    assert told >= 8  # of 18 slots: a conversion of more than a slot is still busy in every other one at least
+    reported = noted(board, "ADCI_DNF") - before
+    assert reported >= 8  # of 18 slots: a conversion of more than a slot is still busy in every other one at least
     assert fault.acted and fault.largest_difference == 600
     robot.run_for(0.002)
     before = noted(board, "ADCI_DNF")
@@ -283,7 +283,7 @@ def test_conversions_that_are_a_little_late_act_too(robot):
     assert fault.cleared_ns > 0
 
 
-def test_a_late_conversion_where_nobody_waits_is_refused(robot):
+def test_a_late_conversion_without_a_waiting_program_is_refused(robot):
     with pytest.raises(UserError, match="burst mode"):
         robot.inject("CSR.adc_internal", "late_conversion")
 
@@ -319,7 +319,7 @@ def test_the_same_faults_give_the_same_bytes_and_each_changes_them():
 
 @pytest.mark.skipif(not loading.RUNS_COMPILED, reason="nothing is compiled here: there is nothing to compare with")
 def test_the_same_faults_give_the_same_bytes_interpreted():
-    def told(interpreted):
+    def reported(interpreted):
         arguments = [
             option
             for place, mode, at, until, more in SEVERAL
@@ -340,7 +340,7 @@ def test_the_same_faults_give_the_same_bytes_interpreted():
         summary = json.loads(done.stdout)
         return summary["compiled"], summary["trace_digest"], summary["faults"]
 
-    compiled, interpreted = told(interpreted=False), told(interpreted=True)
+    compiled, interpreted = reported(interpreted=False), reported(interpreted=True)
     assert (compiled[0], interpreted[0]) == (True, False)
     assert compiled[1:] == interpreted[1:]
     assert sum(fault["acted"] for fault in compiled[2]) >= 7

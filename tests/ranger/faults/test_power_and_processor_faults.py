@@ -161,7 +161,7 @@ def test_a_full_receive_ring_kills_the_board_where_it_does_so_on_the_robot(kills
             assert fault.cleared_ns > fault.ended_ns and not fault.permanent
 
 
-def test_a_ring_that_is_no_satellites_is_refused(robot):
+def test_the_ring_of_a_board_that_is_not_a_satellite_is_refused(robot):
     with pytest.raises(UserError, match="no ring of a satellite"):
         robot.inject("CSR.processor", "full_ring")
 
@@ -240,7 +240,7 @@ def test_a_second_fault_of_what_the_first_one_has_is_refused_and_may_come_when_t
     assert later.activated_ns > one.cleared_ns
 
 
-def test_what_is_apart_at_one_place_may_be_at_fault_side_by_side(robot):
+def test_separate_parts_of_one_place_may_be_at_fault_side_by_side(robot):
     faults = [
         robot.inject("MCH.processor", "extra_cycles", "10 ms", "20 ms", task="MCH_ANGLE"),
         robot.inject("MCH.processor", "extra_cycles", "10 ms", "20 ms", task="motor_encoder_rezero"),

@@ -90,7 +90,7 @@ def test_every_kind_of_sensor_takes_every_mode_or_says_what_is_missing():
 
 @pytest.mark.parametrize("place", [place.name for place in HERE if place.kind == places.WORD])
 @pytest.mark.parametrize("offset", [100.0, -100.0, 4096.0])
-def test_an_offset_of_a_word_is_so_many_counts_in_the_joints_sense(place, offset):
+def test_an_offset_of_a_word_is_its_number_of_counts_in_the_joints_sense(place, offset):
     bench = PlantBench()
     fault = bench.inject(place, "offset", "20 ms", "40 ms", offset=offset)
     bench.step(LAST)
@@ -185,7 +185,7 @@ def rates(seen, first, last):
 
 @pytest.mark.parametrize(("mode", "name"), [("gyro_bias", "rate"), ("drift", "rate"), ("spike", "height")])
 @pytest.mark.parametrize("size", [0.5, -0.5])
-def test_what_the_inertial_unit_tells_is_off_by_the_fault_and_its_sums_fit(mode, name, size):
+def test_values_of_the_inertial_unit_are_off_by_the_fault_and_its_sums_fit(mode, name, size):
     bench = PlantBench()
     more = {"length_ms": 100.0} if mode == "spike" else {}
     fault = bench.inject("UI.imu", mode, "20 ms", "40 ms", **{name: size}, **more)

@@ -140,11 +140,11 @@ SCALE = next(each for each in imu.mode_classes(imu.SignalInPacket, "imu", imu.RA
 ACKNOWLEDGED = [SET_MODE, *range(1, 8)]
 
 
-def test_the_rate_stands_in_four_bytes_and_the_sum_follows_it():
+def test_the_rate_is_in_four_bytes_and_the_sum_follows_it():
     values = [5, 6, *packet(0.25)]
     assert imu.rate_of(values, 2) == 0.25 and imu.rate_of(packet(-1.5)) == -1.5
     for rate in (-1.5, 3.0e-5, 0.0):
-        imu.tell_rate(values, 2, rate)
+        imu.write_rate(values, 2, rate)
         assert values == [5, 6, *packet(rate)]
 
 
@@ -186,20 +186,20 @@ def test_a_bias_is_added_to_the_usual_one_and_taken_away_again():
 
 
 @pytest.mark.parametrize(
-    ("told", "clear"), [(-0.76, False), (-0.7499, True), (-0.25, True), (0.2499, True), (0.26, False)]
+    ("reported", "clear"), [(-0.76, False), (-0.7499, True), (-0.25, True), (0.2499, True), (0.26, False)]
 )
-def test_a_unit_is_clear_when_its_last_packet_tells_a_rate_that_the_legs_had_in_the_step(told, clear):
+def test_a_unit_is_clear_when_its_last_packet_has_a_rate_that_the_legs_had_in_the_step(reported, clear):
     unit = Unit(imu.GyroBias, packet(9.0), outer_rate=0.5, rate=0.0)
     unit.imu.bias_rad_s, unit.imu.rate_scale = 0.25, 2.0
     unit.body.outer.rate = 0.0  # 0.25 - 2 x 0.5 at the begin, 0.25 at the end
-    unit.send([*packet(9.0), *packet(told)])
+    unit.send([*packet(9.0), *packet(reported)])
     assert unit.fault.is_clear(0, 1) is clear
     assert unit.fault.lean_rate == 0.0
 
 
 def test_a_unit_is_clear_within_six_deviations_of_its_noise_and_by_its_own_rate_where_it_remembers():
-    for told, clear in ((0.84, True), (0.86, False), (-0.34, True), (-0.36, False)):
-        unit = Unit(imu.GyroBias, packet(told), rate=0.0)
+    for reported, clear in ((0.84, True), (0.86, False), (-0.34, True), (-0.36, False)):
+        unit = Unit(imu.GyroBias, packet(reported), rate=0.0)
         unit.imu.noise_rad_s = 0.1
         assert unit.fault.is_clear(0, 1) is clear
     for memory in ({"lag_s": 0.1}, {"filter_samples": 2}, {"cross_x_from_z": 0.1}):

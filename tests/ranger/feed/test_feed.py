@@ -13,7 +13,7 @@ from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_CYCLES, CO
 from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.processes.apart import Apart
+from ranger_sim.harness.processes.apart import RemoteBoards
 from ranger_sim.ranger.feed import FeedServer
 
 SECONDS = 0.1
@@ -28,7 +28,7 @@ class Viewer:
         self.socket.setblocking(False)
         self.buffer = bytearray()
 
-    def heard(self):
+    def received(self):
         """Every record that has come."""
         found = []
         while True:
@@ -74,7 +74,7 @@ def watched(robot, viewer, seconds=SECONDS):
     found = []
     for _ in range(round(seconds / 0.02)):
         robot.run_for(0.02)
-        found += viewer.heard()
+        found += viewer.received()
     return found
 
 
@@ -84,7 +84,7 @@ def test_a_viewer_sees_frames_body_and_variables_as_the_log_keeps_them(shown):
     found = watched(robot, viewer)
     robot.run_for(0.001)
     feed.poll(robot.loop.time)
-    found += viewer.heard()
+    found += viewer.received()
     kind, body = found[0]
     hello = json.loads(body)
     assert kind == records.HELLO and hello["version"] == 1 and hello["seed"] == 3
@@ -111,7 +111,7 @@ def test_the_panel_shows_what_the_user_interface_board_drives(shown):
     assert panel[22] == board.buzzer.hertz and panel[23] == board.sync_light.lit
 
 
-def test_whoever_looks_changes_nothing():
+def test_a_viewer_changes_nothing():
     digests = []
     for looks in (False, True):
         robot = Ranger(Scenario(seed=5))
@@ -128,7 +128,7 @@ def test_whoever_looks_changes_nothing():
     robot.close()
 
 
-def test_a_viewer_that_takes_nothing_misses_rows_and_is_told_how_many(shown):
+def test_a_viewer_that_takes_nothing_misses_rows_and_receives_their_number(shown):
     robot, feed, look = shown
     viewer = look()
     robot.run_for(0.04)
@@ -139,13 +139,13 @@ def test_a_viewer_that_takes_nothing_misses_rows_and_is_told_how_many(shown):
     missed = feed.totals["rows_left_out"]
     found = []
     for _ in range(40):
-        found += viewer.heard()
+        found += viewer.received()
         robot.run_for(0.02)
-    told = [json.loads(body) for kind, body in found if kind == records.GAP]
-    assert sum(sum(each.values()) for each in told) == feed.totals["rows_left_out"] >= missed
+    reported = [json.loads(body) for kind, body in found if kind == records.GAP]
+    assert sum(sum(each.values()) for each in reported) == feed.totals["rows_left_out"] >= missed
 
 
-def test_of_viewers_that_have_all_places_one_that_has_missed_something_makes_room(shown):
+def test_when_viewers_have_all_places_one_that_has_missed_rows_gives_up_its_place(shown):
     robot, feed, look = shown
     for _ in range(LIMITS["feed"].peers):
         look()
@@ -153,14 +153,14 @@ def test_of_viewers_that_have_all_places_one_that_has_missed_something_makes_roo
     late = look()
     robot.run_for(0.04)
     assert feed.sent_away == {"full": 1}  # all of them take what they are shown
-    assert [kind for kind, _ in late.heard()] == [records.HELLO]
+    assert [kind for kind, _ in late.received()] == [records.HELLO]
     slow = feed.peers[1]
     slow.outgoing += bytes(LIMITS["feed"].backlog)
     robot.run_for(0.02)
     later = look()
     robot.run_for(0.04)
     assert feed.sent_away == {"full": 1, "idle": 1} and slow not in feed.peers
-    assert later.heard()[0][0] == records.HELLO
+    assert later.received()[0][0] == records.HELLO
 
 
 def test_a_viewer_that_speaks_is_sent_away(shown):
@@ -170,10 +170,10 @@ def test_a_viewer_that_speaks_is_sent_away(shown):
     viewer.socket.send(b"x")
     robot.run_for(0.04)
     assert feed.sent_away["malformed"] == 1 and len(feed.peers) == 1
-    assert other.heard()
+    assert other.received()
 
 
-def test_a_robot_that_keeps_no_log_has_variables_only_while_somebody_looks():
+def test_a_robot_that_keeps_no_log_has_variables_only_while_a_viewer_is_connected():
     robot = Ranger(Scenario())
     robot.attach(FeedServer(robot, "feed-without-a-log"))
     robot.run_for(0.02)
@@ -188,14 +188,14 @@ def test_a_robot_that_keeps_no_log_has_variables_only_while_somebody_looks():
     robot.close()
 
 
-def test_a_name_that_is_taken_is_told(shown):
+def test_a_name_that_is_taken_is_reported(shown):
     robot, _, _ = shown
     with pytest.raises(UserError, match="a robot named feed-of-a-test is already running"):
         FeedServer(robot, "feed-of-a-test")
 
 
 @pytest.mark.parametrize("head", [b"\x00\x00\x00\x00\x01", b"\xff\xff\xff\xff\x01"])
-def test_what_is_no_record_is_refused(head):
+def test_bytes_that_are_not_a_record_are_refused(head):
     with pytest.raises(ValueError, match="a record of"):
         list(records.taken(bytearray(head)))
 
@@ -209,7 +209,7 @@ def test_half_a_record_waits_for_the_rest():
     assert not buffer
 
 
-def test_a_viewer_sees_the_slots_of_boards_with_a_process_of_their_own():
+def test_a_viewer_sees_the_slots_of_boards_in_their_own_processes():
     """Held against the log that a board in this process keeps of itself."""
     names = ("MCH", "UI")
     ended = {}
@@ -225,7 +225,7 @@ def test_a_viewer_sees_the_slots_of_boards_with_a_process_of_their_own():
     with contextlib.closing(Ranger(Scenario(seed=3))) as robot:
         feed = FeedServer(robot, "feed-of-slots")
         robot.attach(feed)
-        apart = Apart(robot, names)
+        apart = RemoteBoards(robot, names)
         try:
             viewer = Viewer("feed-of-slots")
             found = watched(robot, viewer, 0.3)

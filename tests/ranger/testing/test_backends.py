@@ -30,7 +30,7 @@ def without_sent(counters):
     return {name: replace(board, can=[replace(end, sent=0) for end in board.can]) for name, board in counters.items()}
 
 
-def test_a_robot_of_processes_has_the_bytes_of_one_in_this_process_however_it_is_looked_at():
+def test_a_robot_of_processes_has_the_bytes_of_one_in_this_process_however_it_is_inspected():
     found = []
     for backend in ("sim", "processes"):
         with contextlib.closing(new_robot(seed=3, backend=backend)) as robot:
@@ -46,7 +46,7 @@ def test_a_robot_of_processes_has_the_bytes_of_one_in_this_process_however_it_is
     assert found[0] == found[1]
 
 
-def test_what_is_in_another_process_is_out_of_reach_and_said_so():
+def test_state_in_another_process_is_reported_out_of_reach():
     with contextlib.closing(new_robot(backend="processes")) as robot:
         assert robot.board("MCH").name == "MCH"  # before time passes it is here
         robot.run_for(0.001)
@@ -101,7 +101,7 @@ def test_time_on_interfaces_outside_is_released_by_the_wall_clock(tmp_path):
         assert_healthy(robot)
 
 
-def test_a_machine_without_vcan_is_told_what_it_lacks(monkeypatch):
+def test_a_machine_without_vcan_names_what_it_lacks(monkeypatch):
     monkeypatch.setattr("ranger_sim.ranger.testing.outside_robot.Path.exists", lambda path: path.name == "vcan1")
     with pytest.raises(MissingError, match="backend vcan: this machine has no vcan0, vcan2, vcan3 .`ranger-sim vm"):
         vcan_buses()

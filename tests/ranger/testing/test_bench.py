@@ -63,7 +63,7 @@ def test_a_voltage_reaches_the_converter():
     assert board.can(3).received("MCFO_BATT_VOLTAGE")[-1].value < high - 1.0
 
 
-def test_a_key_is_in_the_frame_that_tells_of_keys():
+def test_a_key_is_in_the_frame_that_reports_keys():
     board = BoardAlone("UI")
     board.run_for("50 ms")
     assert board.can(2).received("UI_BUTTONS")[-1].value == 0
@@ -94,7 +94,7 @@ def test_the_router_passes_a_frame_on_between_bus_and_link():
     assert all(len(board.can(bus).received("TIMESTAMP")) == 9 for bus in (1, 2, 3, 4))
 
 
-def test_the_main_brain_alone_hears_and_speaks_over_the_link():
+def test_the_main_brain_alone_receives_and_sends_over_the_link():
     board = BoardAlone("MB")
     board.run_for("1 ms")
     board.link.send("MCH_ANGLE", 0.25)
@@ -133,7 +133,7 @@ def test_periods_of_a_board_alone_are_asserted_as_those_of_a_robot():
     assert board.figures[0].name == "period of MCH_ANGLE on can1"
 
 
-def test_waiting_for_a_frame_ends_with_it_or_says_that_it_did_not_come():
+def test_waiting_for_a_frame_ends_with_it_or_reports_that_it_did_not_arrive():
     board = BoardAlone("MCH")
     first = board.can().wait_for("MCH_ANGLE")
     second = board.can().wait_for("MCH_ANGLE")
@@ -178,7 +178,7 @@ def test_how_time_is_cut_changes_nothing():
     assert frames[0] == frames[1] and len(frames[0]) > 10
 
 
-def test_what_a_board_has_not_is_told_with_what_it_has():
+def test_a_part_that_a_board_lacks_is_reported_with_those_it_has():
     with pytest.raises(UserError, match="unknown board 'MCX' .available: MCH, MCFO"):
         BoardAlone("MCX")
     board = BoardAlone("MCSI")
@@ -192,7 +192,7 @@ def test_what_a_board_has_not_is_told_with_what_it_has():
         board.can(1)
 
 
-def test_nodes_of_a_bus_alone_hear_each_other_to_the_bit():
+def test_nodes_of_a_bus_alone_receive_each_other_to_the_bit():
     bus = BusAlone(bit_rate=500_000)
     one, other = bus.node("one"), bus.node("other")
     one.send("MCH_ANGLE", 0.5, stamp_ms=7, at="100 us")

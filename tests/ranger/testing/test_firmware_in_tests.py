@@ -62,7 +62,7 @@ def test_a_crash_and_an_endless_loop_fail_their_test_with_function_and_line_and_
     assert f"MCH: its program let no time pass in control() at small.c:{line}" in done.text
 
 
-def test_in_a_process_of_its_own_a_crash_is_told_by_the_health_of_the_robot(tmp_path):
+def test_in_its_own_process_a_crash_is_reported_by_the_health_of_the_robot(tmp_path):
     crash = folder(tmp_path / "crash", more=CRASH)
     write(
         tmp_path,

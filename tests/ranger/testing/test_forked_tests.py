@@ -157,7 +157,7 @@ def test_a_failure_comes_with_its_output_and_with_how_it_comes_again(done):
     assert "once more: pytest test_many.py::test_fails_with_output --ranger-seed 5 --ranger-backend sim" in done.text
 
 
-def test_a_branch_that_dies_is_a_failed_test_that_says_of_what(done):
+def test_a_branch_that_dies_is_a_failed_test_with_the_cause(done):
     assert "the process of the test was killed by signal 6 (SIGABRT)" in done.reason("test_dies")
     assert "its last words" in done.text
     assert "the process of the test ended with code 3 before the test did" in done.reason("test_leaves")
@@ -170,13 +170,13 @@ def test_what_else_a_test_can_be(done):
     assert "ZeroDivisionError" in done.reason("test_tears_down_badly")
 
 
-def test_a_wrong_order_is_told_in_a_line(done):
+def test_a_wrong_order_is_reported_in_one_line(done):
     assert "ranger(colour=...): what can be asked for is controller, body, seed" in done.reason("test_wrong_order")
     assert "hip has no state 'NOWHERE'" in done.reason("test_wrong_warm_up")
     assert "Traceback" not in done.reason("test_wrong_order") + done.reason("test_wrong_warm_up")
 
 
-def test_a_wrong_mark_or_call_is_told_where_it_is_made_and_the_other_tests_go_on(done):
+def test_a_wrong_mark_or_call_is_reported_where_it_is_made_and_the_other_tests_go_on(done):
     assert "seed is 'three', a whole number from 0 on is expected" in done.reason("test_wrong_seed")
     assert "did you mean 'AE_SPIKE'" in done.reason("test_wrong_error")
     assert "expects(overrun=...): what can be expected is overruns" in done.reason("test_wrong_expectation")
@@ -226,7 +226,7 @@ def test_of_its_own(ranger):
     assert done.code == 4 and "--ranger-scope is 'planet', allowed are function, class" in done.text
 
 
-def test_a_robot_of_a_wider_scope_is_shared_and_looked_at_after_each_test(tmp_path):
+def test_a_robot_of_a_wider_scope_is_shared_and_checked_after_each_test(tmp_path):
     write(
         tmp_path,
         test_module="""

@@ -342,7 +342,7 @@ def test_an_exception_that_cannot_be_sent_is_reported_all_the_same(done):
     assert done.outcome("test_expected_of_another_class") == "failure"
 
 
-def test_the_end_of_a_process_is_seen_also_while_a_child_of_its_own_goes_on(done):
+def test_the_end_of_a_process_is_seen_also_while_its_own_child_goes_on(done):
     assert "ended with code 5 before the test did" in done.reason("test_leaves_a_process")
 
 

@@ -77,7 +77,7 @@ def test_the_same_test_on_processes_passes_and_fails_alike(project):
     assert "TypeError: unsupported operand" in done.reason(NAME) and "hip_law.py" in done.reason(NAME)
 
 
-def test_without_the_plugin_there_is_no_fixture(project):
+def test_without_the_plugin_the_fixture_does_not_exist(project):
     done = pytest_in(project, "-p", "no:ranger_sim", plugin=False)
     assert done.code == 1
     assert "fixture 'ranger' not found" in done.text

@@ -57,7 +57,7 @@ def test_formats_of_python_can_are_read(recorded, tmp_path):
         assert all(abs(a.time_ns - b.time_ns - offset) <= 2000 for a, b in zip(found, chosen, strict=True)), suffix
 
 
-def test_what_others_sent_comes_again_at_its_instants_and_the_board_answers_anew(recorded):
+def test_frames_of_others_are_replayed_at_their_times_and_the_board_answers_anew(recorded):
     board = BoardAlone("MCH", network_time=False)
     given = board.replay(recorded)
     others = [f for f in recorded if f.bus == "can1" and f.identifier not in board.chip.table.SEND]
@@ -82,7 +82,7 @@ def test_the_same_recording_gives_the_same_answers(recorded):
     assert answers[0] == answers[1] and answers[0]
 
 
-def test_what_cannot_be_replayed_is_told(recorded, tmp_path):
+def test_recordings_that_cannot_be_replayed_are_reported(recorded, tmp_path):
     board = BoardAlone("MCH")
     with pytest.raises(UserError, match=r"channel 'vcan0' is not a bus of MCH: read_log\(path, bus='can1'\)"):
         board.replay([Frame(0, "vcan0", 14, 8, 0, 0)])

@@ -61,7 +61,7 @@ def test_arrows_are_numbered_on_and_a_pair_without_an_end_has_none():
     assert one.flow_ends.tolist() == [0, 0, 0] and other.flow_ends.tolist() == [1, 1, 1] and book.last == 3
 
 
-def test_the_slice_that_goes_on_at_an_instant_has_both_its_ends():
+def test_the_slice_that_goes_on_at_a_time_has_both_its_ends():
     found = flows.containing(slices((10, 20), (30, 40)), numbers(9, 10, 20, 21, 29, 30, 40, 41))
     assert found.tolist() == [-1, 0, 0, -1, -1, 1, 1, -1]
     assert flows.containing(slices(), numbers(1, 2)).tolist() == [-1, -1]
@@ -100,11 +100,11 @@ def test_a_request_is_a_tasks_at_its_start_else_the_interrupts_or_the_turns_then
         ([10, 20, 30], [30, 41, 42], [1, 2, 0]),
     ],
 )
-def test_an_interrupt_is_for_the_frame_heard_then_or_for_the_latest_one_left(came, asked, found):
+def test_an_interrupt_is_for_the_frame_received_then_or_for_the_latest_one_left(came, asked, found):
     assert flows.paired(numbers(*came), numbers(*asked), 100).tolist() == found
 
 
-def test_the_next_start_is_behind_the_instant():
+def test_the_next_start_is_behind_the_time():
     found = flows.next_start(numbers(4, 7, 9), numbers(10, 20, 30), numbers(0, 10, 19, 20, 29, 30))
     assert found.tolist() == [4, 7, 7, 9, 9, -1]
 
@@ -131,7 +131,7 @@ def test_a_passing_frame_is_the_first_of_the_same_content_that_is_not_earlier():
     assert flows.first_after(passing((a, 1)), np.zeros((0, 3), dtype=np.int64), numbers()).tolist() == [-1]
 
 
-def test_a_number_stands_for_all_three_words_of_a_frame():
+def test_a_number_represents_all_three_words_of_a_frame():
     top = 0xFFFFFFFF
     rows = [
         (1, 0, 0),
@@ -183,7 +183,7 @@ ANGLE = next(number for number, kind in all_variables.TYPES.items() if kind == "
 COUNT = next(number for number, kind in all_variables.TYPES.items() if kind == "i32")
 
 
-def test_frames_are_in_order_with_who_sent_them_and_what_they_say():
+def test_frames_are_in_order_with_their_senders_and_contents():
     made = frames(
         (9000, 8000, 9900, COUNT, 1, 3, 0, -2 & 0xFFFFFFFF, 7),
         (5000, 4500, 5900, ANGLE, 0, 1, 0, 0x3FC00000, 8),
@@ -209,7 +209,7 @@ def test_a_frame_without_a_name_has_its_identifier():
     assert frame_name(0x7FF, FLAG_ERROR) == "error frame: 7FF"
 
 
-def test_what_waited_in_each_transmit_buffer_is_a_track_of_its_own():
+def test_the_frames_waiting_in_each_transmit_buffer_are_a_separate_track():
     made = frames(
         (5000, 4000, 5900, ANGLE, 0, 1, 0, 0, 0),
         (6000, 4000, 6900, ANGLE, 0, 3, 0, 0, 0),
@@ -294,7 +294,7 @@ def test_an_empty_processor_has_no_tracks_and_one_with_fast_interrupts_alone_has
     assert fast.tracks() == [fast.services]
 
 
-def test_a_list_without_its_entry_stands_itself():
+def test_a_list_without_its_entry_is_shown_itself():
     made = processor(row(activity.TASK_RAN, 1, 1210, 1230), row(activity.TASK_RAN, 0, 1230, 1240))
     assert made.tasks.name.tolist() == [1, 0]
     other = processor(row(activity.TASK_RAN, 2, 1210, 1220), row(activity.TASK_RAN, 1, 1210, 1230))
@@ -314,7 +314,7 @@ def test_a_slot_that_did_not_end_lasts_until_its_latest_task_and_the_next_begins
     assert made.slots.notes["cycles"].tolist() == [65, 25, 0]  # 130 ns at half a cycle a ns
 
 
-def test_a_slot_that_was_dropped_as_a_whole_is_none_and_each_overrun_says_what_was_dropped():
+def test_a_slot_that_was_dropped_as_a_whole_is_not_shown_and_each_overrun_lists_what_was_dropped():
     made = processor(
         row(activity.SLOT_BEGAN, 1, 1100, 1100, items=2),
         row(activity.TASK_RAN, 0, 1110, 1320, 60),

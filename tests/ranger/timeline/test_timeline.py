@@ -165,7 +165,7 @@ def test_every_frame_is_a_slice_of_its_length_in_bits(run):
             assert later.start_ns - earlier.end_ns > 2.99 * CAN_BIT_NS  # the intermission
 
 
-def test_a_frame_says_who_sent_it_what_and_how_long_it_waited(run):
+def test_a_frame_shows_its_sender_its_content_and_how_long_it_waited(run):
     angles = run.slices("Buses", "can1", "frames", name="MCH_ANGLE")
     # 500 a second from the first slots on, which come within 2.5 ms after power-up
     assert len(angles) in (29, 30)
@@ -273,7 +273,7 @@ def test_a_closed_timeline_leaves_the_robot_as_it_was():
 
 
 @pytest.mark.parametrize("last_s", [0.0, -1.0, float("nan")])
-def test_a_time_that_is_no_time_is_refused(last_s):
+def test_a_text_that_is_not_a_time_is_refused(last_s):
     with contextlib.closing(Ranger(Scenario())) as robot, pytest.raises(UserError, match="last_s"):
         Timeline(robot, last_s=last_s)
 
@@ -284,9 +284,9 @@ def test_a_time_that_is_no_time_is_refused(last_s):
 )
 def test_a_file_that_cannot_be_is_refused_in_one_line(run, tmp_path, name, reason):
     with contextlib.closing(Ranger(Scenario())) as robot:
-        with pytest.raises(UserError, match=reason) as told:
+        with pytest.raises(UserError, match=reason) as reported:
             Timeline(robot).write(tmp_path / name)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(reported.value)
 
 
 # --- arrows where something went wrong ----------------------------------------------------------------------
@@ -320,13 +320,13 @@ def test_lost_frames_have_no_arrow_and_those_behind_them_have_theirs():
         timeline.close()
     frames, interrupts = events.track("Buses", "can1", "frames"), events.track("Boards", "MCH", "interrupts")
     begins, ends = frames.flow_ends == 0, interrupts.flow_ends == 1
-    numbers, sent, heard = np.intersect1d(
+    numbers, sent, received = np.intersect1d(
         frames.flow_id[begins], interrupts.flow_id[ends], assume_unique=True, return_indices=True
     )
     came = np.stack(
         [
             frames.end_ns[frames.flow_at[begins][sent]],
-            interrupts.start_ns[interrupts.flow_at[ends][heard]],
+            interrupts.start_ns[interrupts.flow_at[ends][received]],
         ],
         axis=1,
     )
@@ -340,7 +340,7 @@ def test_lost_frames_have_no_arrow_and_those_behind_them_have_theirs():
     assert (came[:, 0] > 30.3e6).sum() > 60
 
 
-def test_a_disk_that_fills_up_while_the_file_is_written_is_told_in_one_line_and_leaves_nothing(
+def test_a_disk_that_fills_up_while_the_file_is_written_is_reported_in_one_line_and_leaves_nothing(
     run, tmp_path, monkeypatch
 ):
     def full(events, file, title):

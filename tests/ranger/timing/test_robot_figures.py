@@ -27,7 +27,7 @@ ROWS = {
 }
 
 
-def told(row, board):
+def reported(row, board):
     """Least and most instructions in T2; None where it has none."""
     text = ROBOT.read_text(encoding="utf-8").split("## T2 ")[1].split("\n## T3")[0]
     cells = next(line for line in text.splitlines() if line.startswith(f"| {row}")).strip("|").split("|")
@@ -38,7 +38,7 @@ def told(row, board):
 @pytest.mark.parametrize("board", COLUMNS)
 def test_least_and_most_of_every_function_are_those_of_the_table(board):
     shown = {name: INSTRUCTIONS[board][name] for name in ROWS if name in INSTRUCTIONS[board]}
-    assert shown == {name: told(row, board) for name, row in ROWS.items() if name in shown}
+    assert shown == {name: reported(row, board) for name, row in ROWS.items() if name in shown}
     assert len(shown) >= 6
 
 
@@ -59,7 +59,7 @@ SENT = {
 
 
 @pytest.mark.parametrize("board", ["MCH", "MCFI"])
-def test_what_a_variable_takes_is_told_in_words_for_its_kind(board):
+def test_the_values_that_a_variable_takes_are_described_for_its_kind(board):
     text = ROBOT.read_text(encoding="utf-8").split("## T2 ")[1].split("\n## T3")[0]
     cells = [
         line.strip("|").split("|")[COLUMNS[board]]
@@ -90,10 +90,10 @@ def test_the_decoders_angle_the_end_of_a_slot_and_the_rezeroing_are_those_of_the
 
 
 def test_the_steering_boards_own_are_those_of_the_table():
-    assert INSTRUCTIONS["MCSI"]["MCSI_STATUS"] == (156, 156) and INSTRUCTIONS["MCSI"]["can_tx2"] == told(
+    assert INSTRUCTIONS["MCSI"]["MCSI_STATUS"] == (156, 156) and INSTRUCTIONS["MCSI"]["can_tx2"] == reported(
         "can_tx1", "MCSI"
     )
-    assert INSTRUCTIONS["MCFI"]["can_tx2"] == told("can_tx1", "MCFI")
+    assert INSTRUCTIONS["MCFI"]["can_tx2"] == reported("can_tx1", "MCFI")
     assert INSTRUCTIONS["MCSI"]["execution_time_record"] == (22, 22)  # as on the other motor boards
 
 

@@ -45,21 +45,21 @@ def printed(capsys, *arguments):
     return code, capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("told", "rate"), [(10, 10_000), (125, 125_000), (9_999, 9_999_000), (10_000, 10_000)])
-def test_a_bit_rate_below_any_bus_s_is_in_kbit_s(dbc, told, rate):
-    dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {told};'), encoding="utf-8")
+@pytest.mark.parametrize(("reported", "rate"), [(10, 10_000), (125, 125_000), (9_999, 9_999_000), (10_000, 10_000)])
+def test_a_bit_rate_below_any_bus_s_is_in_kbit_s(dbc, reported, rate):
+    dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {reported};'), encoding="utf-8")
     assert read_messages(dbc, None)[1] == rate
     assert read_messages(dbc, 500_000)[1] == 500_000  # what is asked for comes first
 
 
-@pytest.mark.parametrize("told", [0, -1])
-def test_a_bit_rate_of_nothing_is_none(dbc, told):
-    dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {told};'), encoding="utf-8")
+@pytest.mark.parametrize("reported", [0, -1])
+def test_a_bit_rate_of_nothing_is_none(dbc, reported):
+    dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {reported};'), encoding="utf-8")
     with pytest.raises(UserError, match="--bit-rate"):
         read_messages(dbc, None)
 
 
-def test_messages_without_a_cycle_time_are_told_apart(dbc):
+def test_messages_without_a_cycle_time_are_distinguished(dbc):
     messages, _, silent = read_messages(dbc, None)
     assert [(one.name, one.period_ns, one.deadline_ns) for one in messages] == [
         ("First", 4_000_000, 4_000_000),
@@ -69,7 +69,7 @@ def test_messages_without_a_cycle_time_are_told_apart(dbc):
     assert silent == ["Silent"]
 
 
-def test_the_robots_own_buses_are_met_and_told_as_tables(capsys):
+def test_the_robots_own_buses_meet_their_bounds_and_are_printed_as_tables(capsys):
     code, text = printed(capsys, "can-bounds")
     assert code == 0
     for bus in ("can1", "can2", "can3", "can4"):
@@ -164,7 +164,7 @@ def test_a_walk_needs_every_board(capsys, tmp_path):
     assert "UI absent" in capsys.readouterr().err
 
 
-def test_check_bus_tells_what_mends_a_missing_interface(capsys, tmp_path, monkeypatch):
+def test_check_bus_prints_what_mends_a_missing_interface(capsys, tmp_path, monkeypatch):
     from ranger_sim.can_bus.edge import check_bus
 
     def nothing(_):

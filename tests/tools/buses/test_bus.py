@@ -80,8 +80,8 @@ def test_a_mistake_is_one_line(arguments, words, capsys):
     except SystemExit as left:
         code = left.code
     assert code == 2
-    told = capsys.readouterr().err.strip().splitlines()
-    assert len(told) == 1 and words in told[0]
+    reported = capsys.readouterr().err.strip().splitlines()
+    assert len(reported) == 1 and words in reported[0]
 
 
 def test_a_taken_port_is_one_line_and_the_name_is_free_again(capsys):

@@ -28,7 +28,7 @@ from ranger_sim.tools.cli import main
         ("walk --fault MCH.joint_encoder:stuck@5s..300ms", "it ends at '300ms', which is not after its start, '5s'"),
     ],
 )
-def test_a_mistake_is_one_line_with_what_was_meant(command, wanted, capsys):
+def test_a_mistake_is_one_line_with_a_suggestion(command, wanted, capsys):
     try:
         code = main(command.split())
     except SystemExit as end:  # argparse leaves so

@@ -12,7 +12,7 @@ from ranger_sim.tools.command_line import terminal
 
 
 @pytest.mark.parametrize(
-    ("words", "whole", "told"),
+    ("words", "whole", "reported"),
     [
         (["can-bounds"], "14  MCH_ANGLE", ""),
         (["slots", "MCH", "--static"], "qdc_cap01_rate", "too narrow for robot's image"),
@@ -20,12 +20,12 @@ from ranger_sim.tools.command_line import terminal
         (["body", "show", "ranger"], "total_mass_kg", ""),
     ],
 )
-def test_a_table_in_80_columns_has_one_line_for_each_row(capsys, monkeypatch, words, whole, told):
+def test_a_table_in_80_columns_has_one_line_for_each_row(capsys, monkeypatch, words, whole, reported):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert cli.main(words) == 0
     printed = capsys.readouterr().out
-    assert whole in printed and told in printed and "…" not in printed
+    assert whole in printed and reported in printed and "…" not in printed
 
 
 @pytest.mark.parametrize("words", [["bench", "--help"], ["can-bounds"], ["table", "list"], ["up", "--help"]])
@@ -37,7 +37,7 @@ def test_in_80_columns_no_line_is_longer_in_a_pipe_either(capsys, monkeypatch, w
     assert len(lines) > 5 and max(map(len, lines)) <= 80
 
 
-def test_columns_are_given_up_in_their_order_and_only_for_want_of_room():
+def test_columns_are_left_out_in_their_order_and_only_for_want_of_space():
     def printed(width):
         table = Table("name", "one\n(ms)", "two", box=None, pad_edge=False)
         table.add_row("a" * 20, "b" * 20, "c" * 20)

@@ -5,7 +5,7 @@ import io
 from ranger_sim.tools.command_line import terminal
 
 
-def test_a_line_in_a_file_is_long_unless_somebody_says_how_long(monkeypatch):
+def test_a_line_in_a_file_is_long_unless_a_width_is_given(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
     assert terminal.console(file=io.StringIO()).width == terminal.FILE_COLUMNS
     monkeypatch.setenv("COLUMNS", "70")

@@ -56,7 +56,7 @@ def test_a_value_is_read(kind, text, value):
         (word("a file"), "", "a file is expected"),
     ],
 )
-def test_what_is_no_such_value_is_refused_with_its_limit(kind, text, complaint):
+def test_a_value_beyond_its_limit_is_refused_with_the_limit(kind, text, complaint):
     with pytest.raises(argparse.ArgumentTypeError) as refused:
         kind(text)
     assert complaint in str(refused.value) and len(str(refused.value)) < 150
@@ -80,5 +80,5 @@ def test_what_can_be_shown_is_left_as_it_is():
 
 
 @pytest.mark.parametrize("text", ["-1s", "-.5", "-3 mm", "-inf", "-1e300"])
-def test_a_negative_value_is_no_option(text):
+def test_a_negative_value_is_not_an_option(text):
     assert NEGATIVE_VALUE.match(text) and not NEGATIVE_VALUE.match(f"-{text}") and not NEGATIVE_VALUE.match("-h")

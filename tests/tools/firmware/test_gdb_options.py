@@ -12,7 +12,7 @@ import sys
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.firmware.debuggers import open_doors
+from ranger_sim.harness.firmware.debuggers import open_servers
 from tests.firmware_sim.gdb.client import Client
 from tests.firmware_sim.gdb.machine import Machine
 from tests.firmware_sim.lpc2194.programs import content, words_of
@@ -77,9 +77,9 @@ def looks(client):
         assert client.ask("c") == "T05thread:1;"
         assert client.register(15) == IRQ_VECTOR
         client.ask("s")
-    told = client.monitor("time")
+    reported = client.monitor("time")
     assert client.ask("D") == "OK"
-    return told
+    return reported
 
 
 @pytest.fixture(scope="module")
@@ -93,10 +93,10 @@ def digest(image):
 def test_a_debugger_that_looks_at_a_board_of_the_robot_leaves_the_digest(image, digest, command):
     run = started(command, "--image", f"MCH={image}", "--gdb", "MCH=0", "--time", "20ms", "--seed", "1")
     with contextlib.closing(connected(port_of(run))) as client:
-        told = looks(client)
+        reported = looks(client)
     said = ended(run)
     assert run.returncode == 0, said
-    assert re.fullmatch(r"MCH: 0\.00\d{7} s, \d+ cycles, \d+ instructions\n", told)
+    assert re.fullmatch(r"MCH: 0\.00\d{7} s, \d+ cycles, \d+ instructions\n", reported)
     assert re.search(r"trace ([0-9a-f]{16})", said)[1] == digest
 
 
@@ -126,10 +126,10 @@ def test_ctrl_c_at_the_robots_terminal_ends_a_run_that_a_debugger_holds_and_fini
         (("MCH=0.0.0.0:0",), "gdb for TINY on 0.0.0.0:0: 0.0.0.0 is reached from beyond this machine, by anybody"),
     ],
 )
-def test_what_is_wrong_with_a_door_is_told_and_no_door_stays_open(wanted, line):
+def test_a_fault_of_an_endpoint_is_reported_and_no_endpoint_stays_open(wanted, line):
     machine = Machine()
     with pytest.raises(UserError, match=re.escape(line)):
-        open_doors({"MCH": machine, "UI": object()}, wanted)
+        open_servers({"MCH": machine, "UI": object()}, wanted)
     assert machine.core.debugger is None
 
 
@@ -141,7 +141,7 @@ def test_what_is_wrong_with_a_door_is_told_and_no_door_stays_open(wanted, line):
         (("walk", "--allow-network"), "--allow-network: nothing would listen there"),
     ],
 )
-def test_the_command_line_tells_it_before_anything_walks(tmp_path, words, line):
+def test_the_command_line_reports_it_before_anything_walks(tmp_path, words, line):
     run = started(*words, "--time", "10ms", "--out", str(tmp_path / "it"))
     said = ended(run)
     assert run.returncode == 2, said

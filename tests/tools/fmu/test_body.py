@@ -58,13 +58,13 @@ def test_the_inputs_start_as_a_bridge_does_at_power_up():
     assert {"sensor.imu_roll_rad", "sensor.imu_rate_x_rad_s", "sensor.hip_absolute"} <= set(body.quantities)
 
 
-def test_a_bridge_is_told_only_what_has_changed():
+def test_a_bridge_gets_only_what_has_changed():
     body = body_of(SCENARIO)
-    told = []
+    reported = []
 
     class Bridge:
         def __getattr__(self, name):
-            return lambda *values: told.append((name, *values))
+            return lambda *values: reported.append((name, *values))
 
     plant = body.plant
     body.set("hip.match_2", 7)
@@ -80,7 +80,7 @@ def test_a_bridge_is_told_only_what_has_changed():
     body.set("hip.low_side_6", False)
     body.set("hip.watchdog", True)
     body._act(Plant)
-    assert told == [
+    assert reported == [
         ("write_pwm", 1_003_000, 7, 0, 600),
         ("low_side", 1_000_000, True, False),
         ("watchdog_edge", 1_000_000),
@@ -122,7 +122,7 @@ def test_several_steps_at_once_are_those_one_by_one():
     assert together.values == alone.values and together.get("state.hip_A") != 0.0
 
 
-def test_the_bridge_loses_its_power_when_the_watchdog_line_stands_still():
+def test_the_bridge_loses_its_power_when_the_watchdog_line_stays_still():
     body = body_of(SCENARIO)
     body.set("hip.match_2", 300)
     body.set("hip.watchdog", True)
@@ -153,7 +153,7 @@ def test_a_communication_step_is_whole_steps_of_the_plant(time_s, length_s, coun
 
 
 @pytest.mark.parametrize(
-    ("time_s", "length_s", "told"),
+    ("time_s", "length_s", "reported"),
     [
         (0.0, 0.0001, "100 us.*steps of 250 us"),
         (0.0, 0.0003, "300 us"),
@@ -164,13 +164,13 @@ def test_a_communication_step_is_whole_steps_of_the_plant(time_s, length_s, coun
         (0.0, float("inf"), "inf us"),
     ],
 )
-def test_another_step_or_another_time_is_refused(time_s, length_s, told):
-    with pytest.raises(UserError, match=told):
+def test_another_step_or_another_time_is_refused(time_s, length_s, reported):
+    with pytest.raises(UserError, match=reported):
         body_of(SCENARIO).steps_in(time_s, length_s, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "told"),
+    ("name", "value", "reported"),
     [
         ("body.total_mass_kg", 0.0, r"body.total_mass_kg is 0.0, allowed are 0.1 to 1000 kg"),
         ("body.total_mass_kg", float("nan"), "nan"),
@@ -181,13 +181,13 @@ def test_another_step_or_another_time_is_refused(time_s, length_s, told):
         ("seed", -1, "seed is -1"),
     ],
 )
-def test_a_number_beyond_its_limits_is_refused(name, value, told):
-    with pytest.raises(UserError, match=told):
+def test_a_number_beyond_its_limits_is_refused(name, value, reported):
+    with pytest.raises(UserError, match=reported):
         body_of(SCENARIO).set(name, value)
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "told"),
+    ("name", "value", "reported"),
     [
         ("held.stance", "left", "held.stance is 'left', allowed are 'outer' and 'inner'|outer and inner"),
         ("body.contact", "glue", "contact"),
@@ -195,10 +195,10 @@ def test_a_number_beyond_its_limits_is_refused(name, value, told):
         ("battery.charge", 0.0, "battery_charge"),
     ],
 )
-def test_parameters_that_make_no_body_are_told_when_it_begins(name, value, told):
+def test_parameters_that_make_no_body_are_reported_when_it_begins(name, value, reported):
     body = body_of(SCENARIO)
     body.set(name, value)
-    with pytest.raises(UserError, match=told):
+    with pytest.raises(UserError, match=reported):
         body.advance(1)
 
 
@@ -219,6 +219,6 @@ def test_units_are_powers_of_si_base_units(unit, found):
     assert exponents(unit) == found
 
 
-def test_a_unit_that_nobody_knows_is_told():
+def test_an_unknown_unit_is_reported():
     with pytest.raises(UserError, match="'furlong'"):
         exponents("m/furlong")

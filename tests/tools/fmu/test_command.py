@@ -7,7 +7,7 @@ import pytest
 from ranger_sim.tools import cli
 
 
-def told(capsys, *arguments):
+def reported(capsys, *arguments):
     try:
         code = cli.main(["fmu", *arguments])
     except SystemExit as ended:
@@ -34,5 +34,5 @@ def test_a_mistake_is_one_line(arguments, expected, tmp_path, monkeypatch, capsy
     (tmp_path / "none").mkdir()
     (tmp_path / "none" / "all.fmu").write_bytes(b"")
     (tmp_path / "none" / "at").mkdir()
-    assert expected in told(capsys, *arguments)
+    assert expected in reported(capsys, *arguments)
     assert [each for each in os.listdir(tmp_path) if each.startswith("body")] == []

@@ -78,7 +78,7 @@ def test_driven_with_the_inputs_of_a_walk_it_shows_the_walk_bit_for_bit(unit, tm
     assert found.tobytes() == wanted.tobytes()
 
 
-def test_coarser_steps_see_the_same_body_when_the_inputs_stand(unit, tmp_path):
+def test_coarser_steps_see_the_same_body_when_the_inputs_are_constant(unit, tmp_path):
     held = {"held.now": True, "hip.match_2": 200, "hip.watchdog": True}
     free = {"held.now": False, "hip.match_2": 0, "hip.watchdog": True}
     inputs = [held] * 400 + [free] * 400
@@ -88,7 +88,7 @@ def test_coarser_steps_see_the_same_body_when_the_inputs_stand(unit, tmp_path):
     assert coarse[49, 1] > 1.0 and coarse[-1, 0] != coarse[50, 0] and coarse[-1, 3] == 800 * 0.00025
 
 
-def test_a_step_that_is_no_multiple_is_refused_with_its_reason(unit):
+def test_a_step_that_is_not_a_multiple_is_refused_with_its_reason(unit):
     program = "import sys, fmpy\nfmpy.simulate_fmu(sys.argv[1], stop_time=0.01, step_size=1e-4, output_interval=1e-4)\n"
     done = subprocess.run([sys.executable, "-c", program, unit], capture_output=True, text=True, check=False)
     said = done.stdout + done.stderr
@@ -108,7 +108,7 @@ def called(unit, program):
     )
 
 
-def test_a_number_beyond_its_limits_is_told_and_the_importer_lives(unit):
+def test_a_number_beyond_its_limits_is_reported_and_the_importer_goes_on(unit):
     done = called(
         unit,
         "try:\n    fmu.setFloat64([variables['body.total_mass_kg'].valueReference], [0.0])\n"
@@ -119,7 +119,7 @@ def test_a_number_beyond_its_limits_is_told_and_the_importer_lives(unit):
 
 
 @pytest.mark.parametrize(
-    ("file", "before", "after", "told"),
+    ("file", "before", "after", "reported"),
     [
         ("resources/given.json", b'"made_by": "', b'"made_by": "x', "other variables than those of ranger-sim"),
         ("resources/given.json", b"{", b"[", "Expecting"),
@@ -131,7 +131,9 @@ def test_a_number_beyond_its_limits_is_told_and_the_importer_lives(unit):
         ),
     ],
 )
-def test_a_unit_that_cannot_be_used_says_why_and_the_importer_lives(unit, tmp_path, file, before, after, told):
+def test_a_unit_that_cannot_be_used_gives_the_reason_and_the_importer_goes_on(
+    unit, tmp_path, file, before, after, reported
+):
     broken = tmp_path / "broken.fmu"
     with zipfile.ZipFile(unit) as source, zipfile.ZipFile(broken, "w") as target:
         for name in source.namelist():
@@ -141,7 +143,7 @@ def test_a_unit_that_cannot_be_used_says_why_and_the_importer_lives(unit, tmp_pa
         # after a status `fatal` FMI allows no further call
         done = called(broken, f"try:\n    {call}\nexcept Exception as error:\n    print('refused', error)\n")
         assert done.returncode == 0 and "refused" in done.stdout and "fatal" in done.stdout, done.stderr
-        assert (done.stdout + done.stderr).count(told) == 1
+        assert (done.stdout + done.stderr).count(reported) == 1
 
 
 def test_the_same_body_gives_the_same_bytes_and_no_more_than_it_needs(unit, tmp_path):

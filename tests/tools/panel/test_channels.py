@@ -31,7 +31,7 @@ def test_few_samples_are_shown_as_they_are():
     assert list(trace.low) == list(range(4, 16))  # and one more at each edge, where the line goes on
 
 
-def test_buckets_stand_still_when_the_window_moves():
+def test_buckets_do_not_move_with_the_window():
     rng = np.sin(np.arange(5000) * 0.37).astype(np.float32)
     first = thinned(grid(5000), rng, 0.0, 8.0, 400, PERIOD)
     second = thinned(grid(5000), rng, 0.1, 8.1, 400, PERIOD)
@@ -42,7 +42,7 @@ def test_buckets_stand_still_when_the_window_moves():
 
 
 @pytest.mark.parametrize("points", [5000, 100])
-def test_where_nothing_came_there_is_no_line(points):
+def test_gaps_without_data_have_no_line(points):
     times = np.concatenate([grid(1000), grid(1000, first=3.0)])
     trace = thinned(times, np.ones(2000, np.float32), 0.0, 5.0, points, PERIOD)
     in_gap = (trace.x > 2.1) & (trace.x < 2.9)
@@ -52,7 +52,7 @@ def test_where_nothing_came_there_is_no_line(points):
     assert not np.isnan(trace.low[(trace.x > 0.1) & (trace.x < 1.9)]).any()
 
 
-def test_a_quantity_that_is_told_when_it_changes_stands_until_then():
+def test_a_quantity_that_is_sent_when_it_changes_holds_its_value_between():
     times, values = np.array([0.0, 2.0, 5.0]), np.array([1.0, 4.0, 2.0], np.float32)
     trace = thinned(times, values, 1.0, 6.0, 100, None)
     shown = dict(zip(trace.x.tolist(), trace.low.tolist(), strict=True))
@@ -61,7 +61,7 @@ def test_a_quantity_that_is_told_when_it_changes_stands_until_then():
     assert (np.diff(trace.x) > 0).all()  # a plot has one point at an instant
 
 
-def test_of_several_values_at_one_instant_the_last_one_stands():
+def test_of_several_values_at_one_time_the_last_one_counts():
     trace = thinned(np.array([0.0, 2.0, 2.0]), np.array([1.0, 9.0, 4.0], np.float32), 0.0, 3.0, 100, None)
     assert np.interp([1.0, 2.0, 3.0], trace.x, trace.low).tolist() == [1.0, 4.0, 4.0]
     assert (np.diff(trace.x) > 0).all()
@@ -142,7 +142,7 @@ def test_another_robot_begins_a_new_memory():
     assert times.tolist() == [0.5] and values[0, 0] == 4.0
 
 
-def test_the_row_at_an_instant_is_the_last_one_before_it():
+def test_the_row_at_a_time_is_the_last_one_before_it():
     memory = filled(3.0)
     time, values = memory.row(2.0011)
     assert time == pytest.approx(2.0) and values[0] == pytest.approx(2.0)

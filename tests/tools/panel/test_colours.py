@@ -56,7 +56,7 @@ def test_no_two_colours_are_alike_to_anybody(sight, names):
 
 
 @sights
-def test_a_full_meter_and_the_latest_slot_are_told_from_the_others(sight):
+def test_a_full_meter_and_the_latest_slot_differ_from_the_others(sight):
     of = colours(sight)
     assert min(closest([of["focus"], of[other]])[0] for other in ("bad", "warn")) >= LEAST
 
@@ -93,7 +93,7 @@ def test_no_two_dashes_are_alike_wherever_they_begin():
 
 
 @pytest.mark.skipif(browser.BROWSER is None, reason="no browser here")
-def test_what_a_colour_says_is_said_by_a_shape_or_a_dash_too(tmp_path):
+def test_the_meaning_of_a_colour_is_shown_by_a_shape_or_a_dash_too(tmp_path):
     names = [f"level_{k}" for k in range(12)]
     log = tmp_path / "log.csv"
     rows = (f"{t / 100}," + ",".join(map(str, range(12))) for t in range(300))

@@ -78,7 +78,7 @@ def test_a_page_that_says_nothing_loses_its_place_and_is_cut_off():
     on_a_panel(test)
 
 
-def test_a_page_that_goes_on_wishing_and_never_reads_loses_its_place_too():
+def test_a_page_that_goes_on_requesting_and_never_reads_loses_its_place_too():
     async def test(panel):
         panel.good.close()
         page = await panel.page()
@@ -99,7 +99,7 @@ def test_a_page_that_goes_on_wishing_and_never_reads_loses_its_place_too():
     on_a_panel(test)
 
 
-def test_of_too_many_connections_the_oldest_that_is_no_page_makes_room():
+def test_of_too_many_connections_the_oldest_that_is_not_a_page_is_closed():
     async def test(panel):
         page = await panel.page()
         await panel.turns()
@@ -119,7 +119,7 @@ def test_of_too_many_connections_the_oldest_that_is_no_page_makes_room():
     on_a_panel(test)
 
 
-def test_who_was_refused_and_never_closes_is_cut_off():
+def test_a_refused_client_that_never_closes_is_cut_off():
     async def test(panel):
         page = panel.program(handshake(panel.port, "guess"))
         await panel.turns()
@@ -131,7 +131,7 @@ def test_who_was_refused_and_never_closes_is_cut_off():
     on_a_panel(test)
 
 
-def test_shown_is_a_wish_like_others_where_nothing_was_to_be_shown():
+def test_shown_is_a_request_like_others_where_nothing_was_to_be_shown():
     async def test(panel):
         page = await panel.page(frame(b'{"do": "shown"}') * (int(server.BURST) + 50))
         await panel.turns(2000)

@@ -74,7 +74,7 @@ def test_channels_go_from_plot_to_plot_and_out_again_by_keys_alone(tmp_path, rec
         assert page.value("document.activeElement.closest('.plot') !== null")
 
 
-def test_cursor_window_mark_and_notes_are_moved_by_keys_and_what_stands_there_is_said(tmp_path, recording):
+def test_cursor_window_mark_and_notes_are_moved_by_keys_and_their_values_are_announced(tmp_path, recording):
     with served(str(recording)) as (address, _), page_of(address, tmp_path) as page:
         press(page, "ArrowRight", SHIFT)
         press(page, "ArrowRight")

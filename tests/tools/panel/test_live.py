@@ -84,7 +84,7 @@ def test_another_parameter_gives_another_gait_and_the_plots_show_it(walking):
     walking.until(f"!{field}.closest('tr').classList.contains('changed') && Number({field}.value) === {OF_RECORD}")
 
 
-def test_slots_and_their_lateness_stand_at_the_mark_as_the_plots_have_them(walking):
+def test_slots_and_their_lateness_at_the_mark_are_those_of_the_plots(walking):
     hand = Hand(walking)
     hand.view("plots")
     walking.until("window.rangerPanel.span()[1] > 3")

@@ -218,7 +218,7 @@ def test_a_recording_is_scrubbed_and_nothing_is_wider_than_the_window(tmp_path, 
         assert saved.startswith("time_s,channel,unit,value") and saved.count("hip_rad") > 1000
 
 
-def test_inside_of_a_recording_stands_at_the_instant_to_which_it_is_scrubbed(tmp_path):
+def test_the_inside_view_of_a_recording_is_at_the_time_to_which_it_is_scrubbed(tmp_path):
     """Frames and loads on the page against those that the robot of the same walk had at that time."""
     from ranger_sim.tools import cli
 

@@ -73,19 +73,19 @@ def test_axe_finds_nothing_in_any_view_of_a_robot_and_everything_has_a_name(page
     looked_through(page, ["plots", "parameters", "errors", "inside", "faults", "help"])
     for view in ("plots", "inside"):
         Hand(page).view(view)
-        told = named(page)
-        for role in NAMED & told.keys():
-            assert all(name.strip() for name in told[role]), (view, role, told[role])
-        assert any(re.match(r"light 1: \w+", name) for name in told["image"] if "light" in name), told["image"]
-        assert any(name.startswith("display: ") for name in told["image"])
+        reported = named(page)
+        for role in NAMED & reported.keys():
+            assert all(name.strip() for name in reported[role]), (view, role, reported[role])
+        assert any(re.match(r"light 1: \w+", name) for name in reported["image"] if "light" in name), reported["image"]
+        assert any(name.startswith("display: ") for name in reported["image"])
         if view == "plots":
             plot = r"plot 1, -?\d+\.\d to \d+\.\d s\. hip_rad, rad: -?0\.\d+, between -?\d.* and \d"
-            assert any(re.match(plot, name) for name in told["image"])
+            assert any(re.match(plot, name) for name in reported["image"])
         else:
-            assert {"slots of the boards", "loads of the buses", "newest frames"} <= {*told["table"]}
+            assert {"slots of the boards", "loads of the buses", "newest frames"} <= {*reported["table"]}
 
 
-def test_axe_finds_nothing_in_the_view_of_a_data_link_and_plots_have_no_line_in_the_gaps_that_it_tells(tmp_path):
+def test_axe_finds_nothing_in_the_view_of_a_data_link_and_plots_have_no_line_in_its_gaps(tmp_path):
     command = [sys.executable, "-m", "ranger_sim", "up", "--daq-port", "pty", "--daq-dropouts"]
     command += ["--name", f"linked-{os.getpid()}"]
     robot = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
@@ -100,8 +100,8 @@ def test_axe_finds_nothing_in_the_view_of_a_data_link_and_plots_have_no_line_in_
             newest = "state.link.chosen.find((row) => row.name === 'MCH_ANGLE')?.last_s"
             hand.sees(f"({newest} ?? -Infinity) > state.time_s - 4")
             rows = "[...document.querySelectorAll('#link-chosen tbody tr')].map((row) => row.innerText.split(/[\\s]+/))"
-            told = next(row for row in page.value(rows) if row[0] == "MCH_ANGLE")
-            last_s = float(told[-2])  # when it came again, and "s"
+            reported = next(row for row in page.value(rows) if row[0] == "MCH_ANGLE")
+            last_s = float(reported[-2])  # when it came again, and "s"
             hand.view("plots")
             hand.click("#freeze", "Hold")
             plot = "window.rangerPanel.plots.all()[0]"

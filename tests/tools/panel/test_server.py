@@ -70,17 +70,17 @@ class Ramp(Source):
 @pytest.fixture
 def panel():
     """(server, its address, what it printed)."""
-    told = []
+    reported = []
     with listening("127.0.0.1", 0) as listener:
         port = listener.getsockname()[1]
-        it = PanelServer(Ramp(), TOKEN, ("127.0.0.1", "localhost"), told.append)
+        it = PanelServer(Ramp(), TOKEN, ("127.0.0.1", "localhost"), reported.append)
         config = uvicorn.Config(it.app, log_level="critical", ws="websockets-sansio", timeout_graceful_shutdown=1)
         served = uvicorn.Server(config)
         served.install_signal_handlers = lambda: None
         thread = threading.Thread(target=lambda: asyncio.run(served.serve(sockets=[listener])))
         thread.start()
         try:
-            yield it, f"127.0.0.1:{port}", told
+            yield it, f"127.0.0.1:{port}", reported
         finally:
             served.should_exit = True
             thread.join(PATIENCE_S)
@@ -106,7 +106,7 @@ def parts(message):
     return found
 
 
-def heard(socket, wanted):
+def received(socket, wanted):
     """The first message for which wanted(kind, body) is true, also of those in a picture; pictures are taken."""
     while True:
         message = socket.recv(PATIENCE_S)
@@ -122,7 +122,7 @@ def heard(socket, wanted):
 def answer(socket, **wish):
     """What the server answers to a request."""
     socket.send(json.dumps({**wish, "number": 7}))
-    return heard(socket, lambda kind, body: kind == messages.TEXT and body.get("answer") == 7)
+    return received(socket, lambda kind, body: kind == messages.TEXT and body.get("answer") == 7)
 
 
 def get(address, path, **headers):
@@ -150,15 +150,15 @@ def test_a_small_message_does_not_wait_for_the_one_before_to_be_acknowledged():
         with listening("127.0.0.1", 0) as listener:
             async with await asyncio.start_server(came, sock=listener):
                 _, writer = await asyncio.open_connection(*listener.getsockname())
-                told = await asyncio.wait_for(found, PATIENCE_S)
+                reported = await asyncio.wait_for(found, PATIENCE_S)
                 writer.close()
                 await writer.wait_closed()
-        return told
+        return reported
 
     assert asyncio.run(delays()) != 0
 
 
-def test_the_page_is_served_to_who_has_the_token_and_leaves_it_in_a_cookie(panel):
+def test_the_page_is_served_to_clients_with_the_token_and_leaves_it_in_a_cookie(panel):
     _, address, _ = panel
     status, headers, body = get(address, f"/?token={TOKEN}")
     assert status == 200 and b"<title>" in body
@@ -180,14 +180,14 @@ def test_the_page_is_served_to_who_has_the_token_and_leaves_it_in_a_cookie(panel
         (f"/?token={TOKEN}", {"Origin": "http://[::1"}, "a page of another site"),
     ],
 )
-def test_who_has_no_token_or_comes_from_elsewhere_is_refused_with_a_reason(panel, path, headers, reason):
-    it, address, told = panel
+def test_clients_without_the_token_or_from_elsewhere_are_refused_with_a_reason(panel, path, headers, reason):
+    it, address, reported = panel
     status, _, body = get(address, path, **headers)
     assert status == 403 and body.startswith(reason.encode())
-    assert it.refused == {reason: 1} and reason in told[0]
+    assert it.refused == {reason: 1} and reason in reported[0]
 
 
-def test_a_page_with_a_wrong_token_is_told_why(panel):
+def test_a_page_with_a_wrong_token_gets_the_reason(panel):
     _, address, _ = panel
     with pytest.raises(ConnectionClosed) as closed, page(address, "wrong") as socket:
         socket.recv(PATIENCE_S)
@@ -197,18 +197,18 @@ def test_a_page_with_a_wrong_token_is_told_why(panel):
 def test_a_page_sees_its_plots_the_robot_and_the_state(panel):
     _, address, _ = panel
     with page(address) as socket:
-        hello = heard(socket, lambda kind, body: kind == messages.TEXT and "hello" in body)["hello"]
+        hello = received(socket, lambda kind, body: kind == messages.TEXT and "hello" in body)["hello"]
         assert hello["channels"][0]["name"] == "RAMP" and hello["title"] == "a ramp"
         socket.send('{"do": "look", "plots": [{"channels": [0], "span": 2, "points": 5}]}')
-        data = heard(socket, lambda kind, body: kind == messages.TRACES)
+        data = received(socket, lambda kind, body: kind == messages.TRACES)
         assert messages.HEAD.unpack_from(data) == (3, messages.TRACES, 0, 1, messages.FOLLOWS | messages.ANEW, 5, 0)
         assert messages.WINDOW.unpack_from(data, 16) == (10.0, 2.0)
         assert messages.TRACE_HEAD.unpack_from(data, 32) == (0, 0, 5, 0)
         assert np.frombuffer(data, "<f8", 5, 48).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
         assert np.frombuffer(data, "<f4", 5, 88).tolist() == [8.0, 8.5, 9.0, 9.5, 10.0]
-        pose = heard(socket, lambda kind, body: kind == messages.POSE)
+        pose = received(socket, lambda kind, body: kind == messages.POSE)
         assert np.frombuffer(pose, "<f8", 1, 16)[0] == 10.0 and np.frombuffer(pose, "<f4", 1, 24)[0] == 0.25
-        assert heard(socket, lambda kind, body: kind == messages.TEXT and "state" in body)["state"]["time_s"] == 10.0
+        assert received(socket, lambda kind, body: kind == messages.TEXT and "state" in body)["state"]["time_s"] == 10.0
 
 
 def test_a_picture_is_one_message_of_parts_that_begin_at_multiples_of_8():
@@ -232,14 +232,14 @@ def test_of_what_goes_on_a_page_gets_what_is_new_and_a_little_of_what_it_has():
     assert held.next(20.0, 0.25) == held.next(20.0, 0.25) == (2.0, 100, messages.Window(5.0, 3.0, 100, 0))
 
 
-def test_a_page_that_looks_at_the_same_again_has_what_it_has(panel):
+def test_a_page_that_requests_the_same_again_keeps_what_it_has(panel):
     _, address, _ = panel
     looks = '{"do": "look", "plots": [{"channels": [0], "span": %s, "points": 5}], "at": %s}'
     with page(address) as socket:
         flags = []
         for span, at in ((2, "null"), (2, 9.5), (2, 9.0), (3, 9.0), (2, 9.0)):
             socket.send(looks % (span, at))
-            data = heard(
+            data = received(
                 socket,
                 lambda kind, body, span=span: (
                     kind == messages.TRACES and messages.WINDOW.unpack_from(body, 16)[1] == span
@@ -276,7 +276,7 @@ def test_requests_reach_the_robot_and_what_it_refuses_is_answered(panel):
         ({"do": None}, "is not a request"),
     ],
 )
-def test_a_wish_that_cannot_be_is_answered_with_its_fault(panel, wish, words):
+def test_an_impossible_request_is_answered_with_its_fault(panel, wish, words):
     _, address, _ = panel
     with page(address) as socket:
         assert words in answer(socket, **wish)["error"]
@@ -292,25 +292,25 @@ def test_a_wish_that_cannot_be_is_answered_with_its_fault(panel, wish, words):
         ("[]", "not a JSON object"),
     ],
 )
-def test_who_does_not_speak_json_is_sent_away_with_a_reason(panel, text, reason):
+def test_a_client_that_does_not_send_json_is_sent_away_with_a_reason(panel, text, reason):
     it, address, _ = panel
     with pytest.raises(ConnectionClosed) as closed, page(address) as socket:
         socket.send(text)
-        heard(socket, lambda kind, body: False)
+        received(socket, lambda kind, body: False)
     assert closed.value.rcvd.code == 1008 and reason in closed.value.rcvd.reason
     assert sum(it.refused.values()) == 1
 
 
-def test_who_asks_without_end_is_sent_away(panel):
+def test_a_client_with_endless_requests_is_sent_away(panel):
     _, address, _ = panel
     with pytest.raises(ConnectionClosed) as closed, page(address) as socket:
         for _ in range(int(BURST) + 100):
             socket.send('{"do": "key", "key": 1}')
-        heard(socket, lambda kind, body: False)
+        received(socket, lambda kind, body: False)
     assert closed.value.rcvd.reason == "too many requests"
 
 
-def test_when_all_places_are_taken_one_more_is_told_and_pages_that_never_read_keep_nobody_waiting(panel):
+def test_when_all_places_are_taken_one_more_gets_the_reason_and_pages_that_never_read_delay_no_other(panel):
     it, address, _ = panel
     with contextlib.ExitStack() as stack:
         pages = [stack.enter_context(page(address)) for _ in range(PLACES)]
@@ -330,7 +330,7 @@ def test_a_page_gets_two_pictures_ahead_of_what_it_has_shown_and_no_third(panel)
     def seen_beside():
         """The dead page's pictures, while the other one is shown ten."""
         for _ in range(10):
-            heard(lively, lambda kind, body: kind == messages.TEXT and "picture" in body)
+            received(lively, lambda kind, body: kind == messages.TEXT and "picture" in body)
         dead.send('{"do": "look", "plots": [], "number": 7}')
         pictures, answered = 0, False
         while not answered:
@@ -362,7 +362,7 @@ def test_what_the_plots_show_stays_wanted_while_another_view_hides_them(panel):
         assert it.source.wants == [[0], []]
 
 
-def test_a_selection_is_saved_as_it_came(panel, tmp_path):
+def test_a_selection_is_saved_as_it_arrived(panel, tmp_path):
     _, address, _ = panel
     status, headers, body = exported(address, "channels=0&begin=1&end=1.5")
     assert status == 200 and 'filename="selection.csv"' in headers["content-disposition"]
@@ -389,13 +389,13 @@ def test_a_selection_is_saved_as_it_came(panel, tmp_path):
         ("channels=0&begin=50&end=60", "mf4", "there are no samples"),
     ],
 )
-def test_a_selection_that_cannot_be_is_told(panel, query, kind, words):
+def test_an_impossible_selection_is_reported(panel, query, kind, words):
     _, address, _ = panel
     status, _, body = exported(address, query, kind)
     assert status == 400 and words in body.decode()
 
 
-def test_a_selection_is_for_who_has_the_token(panel):
+def test_a_selection_is_for_clients_with_the_token(panel):
     _, address, _ = panel
     status, _, body = get(address, "/export/csv?channels=0&begin=0&end=1")
     assert status == 403 and b"a wrong token" in body

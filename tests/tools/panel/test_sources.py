@@ -133,7 +133,7 @@ def test_the_load_at_the_cursor_is_that_of_the_buss_own_meter(walked, bus):
     assert trace.low.max() == pytest.approx(100 * max(meter[1:]), abs=1e-4)
 
 
-def test_so_many_frames_came_in_the_second_before(walked):
+def test_the_number_of_frames_in_the_second_before_is_shown(walked):
     kept, source = walked
     times = kept["frames"]["time_ns"][kept["frames"]["bus"] == 3]
     bus = next(bus for bus in source.buses if bus.name == "can4")
@@ -141,7 +141,7 @@ def test_so_many_frames_came_in_the_second_before(walked):
     assert bus.content(0.3, SECONDS)["frames_per_s"] is None  # it is not there for a second yet
 
 
-def test_the_robot_stands_at_an_instant_as_its_body_did(walked):
+def test_the_robot_is_shown_as_its_body_was_at_that_time(walked):
     kept, source = walked
     time, values = source.pose(0.2)
     row = kept["samples"][np.searchsorted(kept["samples"][:, 0], 0.2, "right") - 1]
@@ -152,19 +152,19 @@ def test_the_robot_stands_at_an_instant_as_its_body_did(walked):
     )
 
 
-def test_what_nobody_may_wish_is_refused(walked):
+def test_requests_that_are_not_allowed_are_refused(walked):
     _, source = walked
     with pytest.raises(UserError, match="'stop' is not a request"):
         asyncio.run(source.request({"do": "stop"}))
     assert source.lost == "the robot panel-of-a-test has ended"
 
 
-def test_a_name_that_nobody_has_is_told():
+def test_a_name_without_a_robot_is_reported():
     with pytest.raises(UserError, match="no robot named nobody-here is running"):
         RobotSource("nobody-here")
 
 
-def test_a_robot_that_says_nothing_is_told(monkeypatch):
+def test_a_silent_robot_is_reported(monkeypatch):
     """It listens, but never looks at who has come. A panel that starts a robot then asks again."""
     monkeypatch.setattr("ranger_sim.tools.panel.robot.CONNECT_S", 0.1)
     robot = Ranger()
@@ -175,7 +175,7 @@ def test_a_robot_that_says_nothing_is_told(monkeypatch):
     robot.close()
 
 
-def test_errors_are_counted_by_board_and_code_and_those_of_a_healthy_walk_stand_apart():
+def test_errors_are_counted_by_board_and_code_and_those_of_a_healthy_walk_are_separate():
     errors = ErrorList()
     code = next(code for code, boards in all_normal().items() if "MCH" in boards)
     for time, count in ((1.0, 1), (2.5, 3)):
@@ -222,7 +222,7 @@ def test_a_runs_folder_is_shown_with_its_body_and_its_variables(folder):
     source.close()
 
 
-def test_states_have_their_names_also_where_the_source_tells_numbers_only(folder):
+def test_states_have_their_names_also_where_the_source_has_numbers_only(folder):
     link = LinkSource("loop://")
     recording = RecordingSource([str(folder)])
     for source in (recording, link):
@@ -314,7 +314,7 @@ def test_frames_with_their_dbc_file_are_shown_by_it_and_their_load_is_not_known(
     assert source.can == {"play"}
 
 
-def test_what_a_recording_of_variables_or_a_link_does_not_keep_is_said(folder):
+def test_parts_that_a_recording_of_variables_or_a_link_lacks_are_reported(folder):
     with contextlib.closing(RecordingSource([str(folder / "variables.mf4")])) as source:
         state = source.state(1.0)
     assert state["buses"] == {} and "keeps no frames" in state["missing"]["buses"]
@@ -336,13 +336,13 @@ def test_a_second_recording_lies_over_the_first_moved_in_time(folder):
 
 
 @pytest.mark.parametrize(("path", "words"), [("nowhere.mf4", "there is no such file"), (".", "not a folder of a walk")])
-def test_what_is_no_recording_is_told(tmp_path, monkeypatch, path, words):
+def test_a_file_that_is_not_a_recording_is_reported(tmp_path, monkeypatch, path, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=words):
         RecordingSource([path])
 
 
-def test_a_port_that_is_not_there_is_told():
+def test_a_port_that_is_not_there_is_reported():
     with pytest.raises(UserError, match="serial port"):
         LinkSource("/dev/no-such-port")
 
@@ -352,7 +352,7 @@ def test_the_links_silences_are_gaps_and_never_lines_before_its_lists_are_known(
     source = LinkSource("loop://")
     number = all_variables.ID_OF["MCH_ANGLE"]
     for ms in [*range(0, 400, 2), *range(700, 1000, 2)]:
-        source._hear(Point(number, 0x3F800000, 5000 + ms))
+        source._on_point(Point(number, 0x3F800000, 5000 + ms))
     channel = number_of(source, "MCH_ANGLE")
     trace = source.trace(channel, 0.0, 1.0, 2000)
     (place,) = np.flatnonzero(np.isnan(trace.low))
@@ -390,7 +390,7 @@ def test_bytes_that_are_lost_on_the_line_are_a_gap_in_the_plot(linked, points):
     assert np.sum(np.diff(there) > 0.05) == 1
 
 
-def test_what_is_written_now_and_then_stands_in_between_on_the_link(linked):
+def test_a_value_that_is_written_now_and_then_is_held_between_on_the_link(linked):
     """The hip's state: whole numbers, never a slope from one to the next."""
     source, begin, _ = linked
     trace = source.trace(number_of(source, "FSM_HIP"), 0.5, begin, 4000)
@@ -400,13 +400,13 @@ def test_what_is_written_now_and_then_stands_in_between_on_the_link(linked):
     assert (np.diff(trace.x[~np.isnan(trace.low)])[steps] < 2e-3).all()
 
 
-def test_a_parameter_of_the_link_has_a_line_although_nobody_writes_it(linked):
+def test_a_parameter_of_the_link_has_a_line_although_it_is_not_written(linked):
     source, begin, _ = linked
     trace = source.trace(number_of(source, "P_H_PM_TIME"), 0.0, begin, 4000)
     assert set(trace.low.tolist()) == {300.0} and trace.x[-1] - trace.x[0] > 1.0
 
 
-def test_the_page_is_told_the_lists_of_the_link(linked):
+def test_the_page_receives_the_lists_of_the_link(linked):
     source, begin, end = linked
 
     async def state():
@@ -501,6 +501,6 @@ def test_two_recordings_are_laid_over_each_other_by_an_event(stepped):
         ("nothing = 1", "unknown channel 'nothing'"),
     ],
 )
-def test_an_event_that_never_comes_is_told(stepped, event, words):
+def test_an_event_that_never_comes_is_reported(stepped, event, words):
     with pytest.raises(UserError, match=words):
         RecordingSource(stepped, align=Event.typed(event))

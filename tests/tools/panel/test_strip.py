@@ -85,11 +85,11 @@ def test_what_is_painted_piece_by_piece_is_what_would_be_painted_at_once(tmp_pat
     with served(str(log)) as (address, _), page_of(address, tmp_path) as page:
         page.value("void import('/strip.js').then((found) => { window.strip = found; })")
         page.until("window.strip !== undefined")
-        told = json.loads(page.value(PROGRAM))
-    assert told["different"] == [] and told["painted"] > 10
-    assert told["gap"] == [0, 0, 0] and min(told["before"]) > 0
-    assert told["extremes"] == [-5, 9]
-    assert told["later"] == [[1, 3], 9]  # what is no longer seen does not stretch the axis
+        reported = json.loads(page.value(PROGRAM))
+    assert reported["different"] == [] and reported["painted"] > 10
+    assert reported["gap"] == [0, 0, 0] and min(reported["before"]) > 0
+    assert reported["extremes"] == [-5, 9]
+    assert reported["later"] == [[1, 3], 9]  # what is no longer seen does not stretch the axis
 
 
 # Level lines, each in a row of its own, of every pen of a plot: held they are uPlot's, while they go on the strip's. Of
@@ -131,7 +131,7 @@ def test_a_dash_is_the_same_while_a_plot_goes_on_and_while_it_is_held(tmp_path):
     log.write_text("\n".join([",".join(["time_s", *names]), *rows]) + "\n", encoding="utf-8")
     with served(str(log)) as (address, _), page_of(f"{address}#plots={','.join(names)}", tmp_path) as page:
         page.until("window.rangerPanel.plots.wanted()[0]?.drawn > 0")
-        told = json.loads(page.value(DASHES))
-    assert told["strip"] == told["uplot"]
-    assert len(set(told["strip"])) == 6 and set(told["strip"][0]) == {"-"}
-    assert all(len(set(told["strip"][k : k + 8])) == 1 for k in range(0, 48, 8))  # eight colours, one dash
+        reported = json.loads(page.value(DASHES))
+    assert reported["strip"] == reported["uplot"]
+    assert len(set(reported["strip"])) == 6 and set(reported["strip"][0]) == {"-"}
+    assert all(len(set(reported["strip"][k : k + 8])) == 1 for k in range(0, 48, 8))  # eight colours, one dash

@@ -64,7 +64,7 @@ def test_a_writer_that_was_killed_leaves_every_row_that_it_flushed(tmp_path):
 
 
 @pytest.mark.parametrize("room", [100, 140, 700])
-def test_a_full_disk_leaves_the_rows_that_found_room(tmp_path, monkeypatch, room):
+def test_a_full_disk_leaves_the_rows_that_fitted(tmp_path, monkeypatch, room):
     """Wherever the disk ends: within compressed rows, within the block that lists them, or in a later one."""
     path = tmp_path / "a.mf4"
     writer = MdfWriter(path, [BODY, FLAG], {})

@@ -71,7 +71,7 @@ def test_each_list_brings_what_it_promises(walking):
     assert [row["gaps"] for row in (fast, medium, rest)] == [0, 0, 0]
 
 
-def test_bytes_lost_on_the_line_are_a_gap_of_what_had_to_come_meanwhile(walking):
+def test_bytes_lost_on_the_line_are_a_gap_of_the_values_due_meanwhile(walking):
     line, session, rates = walking
     line.pass_on(session, 2.0)
     begun_ms = session.clock_ms
@@ -93,21 +93,21 @@ def test_a_silence_of_seconds_is_a_gap_of_everything(walking):
     assert {row["gaps"] for row in rates.rows(list(range(1, VARIABLES)))} == {1}
 
 
-def told(session, **channels):
+def reported(session, **channels):
     """As the slow list brings the values of channels."""
     for name, value in channels.items():
         session._take(Point(ID[name], word_of_float(float(value)), 0))
 
 
-def test_who_moves_to_a_faster_list_has_no_gap_by_that():
+def test_a_variable_that_moves_to_a_faster_list_has_no_gap_by_that():
     session = Session(lambda point: rates.take(point))
     rates = Rates(session)
     number = ID["MCH_ANGLE"]
     session._take(Point(ID["TIMESTAMP"], 0, 1000))
-    told(session, LV_CH_0=0)
+    reported(session, LV_CH_0=0)
     session._take(Point(number, 0, 1000))
     session._take(Point(number, 0, 1400))  # the slow list comes round in 0.19 s then
-    told(session, LV_CH_0=number + FAST)
+    reported(session, LV_CH_0=number + FAST)
     session._take(Point(number, 0, 2400))  # later than any list allows, but on another one than before
     assert of(rates, "MCH_ANGLE")["gaps"] == 0 and of(rates, "MCH_ANGLE")["list"] == "fast"
     session._take(Point(number, 0, 2440))  # below what the robot's logs count as a gap

@@ -177,7 +177,7 @@ def test_a_value_that_comes_before_the_packet_was_sent_confirms_nothing():
         ("CTRL_HIP_KP", 1e39, "does not fit into its type, f32"),
     ],
 )
-def test_what_is_no_parameter_or_outside_its_limits_is_refused_before_anything_is_sent(name, value, words):
+def test_values_that_are_not_parameters_or_outside_their_limits_are_refused_before_anything_is_sent(name, value, words):
     session = Session()
     with pytest.raises(UserError, match=words):
         session.write(name, value)
@@ -233,8 +233,8 @@ def test_the_robots_time_may_wrap_and_a_new_start_of_the_robot_writes_the_channe
 
 def test_the_text_log_has_names_and_numbers_first_and_then_a_row_per_point(tmp_path):
     log = logs.open_log(str(tmp_path / "log.txt"))
-    log.hear(Point(14, word_of_float(0.1), 1234))
-    log.hear(Point(ID["FSM_HIP"], 0xFFFFFFFF, 1236))
+    log.on_point(Point(14, word_of_float(0.1), 1234))
+    log.on_point(Point(ID["FSM_HIP"], 0xFFFFFFFF, 1236))
     log.close()
     lines = (tmp_path / "log.txt").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "TIMESTAMP\t0\t" and lines[14] == "MCH_ANGLE\t14\t"
@@ -246,7 +246,7 @@ def test_the_measurement_log_is_read_back_by_asammdf(tmp_path):
     mdf = pytest.importorskip("asammdf")
     log = logs.open_log(str(tmp_path / "log.mf4"))
     for stamp, value in ((0, 9.0), (10, 0.5), (10, 0.5), (12, 0.75), (11, 7.0)):  # never written; again; backwards
-        log.hear(Point(14, word_of_float(value), stamp))
+        log.on_point(Point(14, word_of_float(value), stamp))
     log.close()
     with mdf.MDF(tmp_path / "log.mf4") as file:
         signal = file.get("MCH_ANGLE")

@@ -103,21 +103,21 @@ def test_a_file_that_the_machine_could_not_finish_is_named_with_its_cause(tmp_pa
             path.write_text("all")
         folder.finish(SUMMARY)
     assert names(tmp_path) == ["report.html", "summary.json", "variables.partial.mf4"]
-    told = record(tmp_path, "summary.json")
-    assert told["complete"] is False and told["files"]["variables.mf4"] == f"incomplete: {cause}"
+    reported = record(tmp_path, "summary.json")
+    assert reported["complete"] is False and reported["files"]["variables.mf4"] == f"incomplete: {cause}"
     assert len(lines) == 1 and "variables.partial.mf4" in lines[0] and cause in lines[0]
 
 
-def test_a_run_that_breaks_off_says_why(tmp_path, lines):
+def test_a_run_that_breaks_off_gives_the_reason(tmp_path, lines):
     with pytest.raises(KeyboardInterrupt), RunFolder(tmp_path, "", lines.append) as folder:
         folder.begin("can1.log").write_text("")
         raise KeyboardInterrupt
-    told = record(tmp_path)
-    assert told["complete"] is False and told["ended"].startswith("KeyboardInterrupt")
-    assert told["files"] == {"can1.log": "incomplete"}
+    reported = record(tmp_path)
+    assert reported["complete"] is False and reported["ended"].startswith("KeyboardInterrupt")
+    assert reported["files"] == {"can1.log": "incomplete"}
 
 
-def test_a_summary_finds_room_on_a_disk_that_is_full(tmp_path, lines, monkeypatch):
+def test_a_summary_finds_space_on_a_disk_that_is_full(tmp_path, lines, monkeypatch):
     """Nothing but the bytes that were reserved at the start may be written at the end."""
     with RunFolder(tmp_path, "", lines.append) as folder:
         reserved, real = (tmp_path / "incomplete.json").stat().st_size, os.pwrite

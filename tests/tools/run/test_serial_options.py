@@ -29,26 +29,26 @@ def no_waiting(monkeypatch):
 )
 def test_a_mistake_gets_one_line(capsys, arguments, words):
     assert cli.main(["walk", "--time", "0.1s", *arguments]) == 2
-    told = capsys.readouterr()
-    assert told.out == "" and words in told.err and len(told.err.splitlines()) == 1
+    reported = capsys.readouterr()
+    assert reported.out == "" and words in reported.err and len(reported.err.splitlines()) == 1
 
 
-def test_the_name_of_the_pseudo_terminal_is_told_and_the_walk_keeps_to_the_clock(capsys, no_waiting):
+def test_the_name_of_the_pseudo_terminal_is_printed_and_the_walk_keeps_to_the_clock(capsys, no_waiting):
     assert cli.main(["walk", "--time", "0.1s", "--daq-port", "pty", "--daq-dropouts", "--imu-offer", "pty"]) == 0
-    told = capsys.readouterr().err
-    assert re.search(r"data link: ranger-sim daq --port /dev/pts/\d+\n", told)
-    assert re.search(r"emulated inertial unit: /dev/pts/\d+\n", told)
-    assert "daq: no traffic" in told  # the rate controller has only begun
-    assert re.search(r"imu-offer: bytes out \d+", told)
-    assert "cannot be repeated" not in told
+    reported = capsys.readouterr().err
+    assert re.search(r"data link: ranger-sim daq --port /dev/pts/\d+\n", reported)
+    assert re.search(r"emulated inertial unit: /dev/pts/\d+\n", reported)
+    assert "daq: no traffic" in reported  # the rate controller has only begun
+    assert re.search(r"imu-offer: bytes out \d+", reported)
+    assert "cannot be repeated" not in reported
     assert no_waiting and max(no_waiting) <= 0.1
 
 
-def test_beside_json_the_name_still_comes_on_standard_error(capsys):
+def test_with_json_the_name_still_comes_on_standard_error(capsys):
     assert cli.main(["walk", "--time", "0.05s", "--daq-port", "pty", "--json", "-"]) == 0
-    told = capsys.readouterr()
-    assert json.loads(told.out)["fell"] is False
-    assert told.err.startswith("data link: ranger-sim daq --port /dev/pts/")
+    reported = capsys.readouterr()
+    assert json.loads(reported.out)["fell"] is False
+    assert reported.err.startswith("data link: ranger-sim daq --port /dev/pts/")
 
 
 def test_the_walk_is_the_same_with_a_listener_as_without(capsys):

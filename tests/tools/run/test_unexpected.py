@@ -22,14 +22,14 @@ def healthy():
     return found
 
 
-def told(summary, change):
+def reported(summary, change):
     changed = copy.deepcopy(summary)
     change(changed)
     return [*unexpected.ending(changed), *unexpected.lines(changed, MU)]
 
 
 def test_a_healthy_walk_has_no_line(healthy):
-    assert told(healthy, lambda s: s["errors"].update(MCH={"MC_TCURR_OOB": 3})) == []
+    assert reported(healthy, lambda s: s["errors"].update(MCH={"MC_TCURR_OOB": 3})) == []
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,8 @@ def test_a_healthy_walk_has_no_line(healthy):
     ],
 )
 def test_each_thing_that_a_healthy_walk_has_not_is_one_line(healthy, change, line):
-    assert told(healthy, change) == [line]
+    assert reported(healthy, change) == [line]
 
 
 def test_friction_at_the_limit_of_a_contact_that_limits_it_is_expected(healthy):
-    assert told(healthy, lambda s: s["oddities"].update(friction_ratio_max=math.nextafter(MU, 1.0))) == []
+    assert reported(healthy, lambda s: s["oddities"].update(friction_ratio_max=math.nextafter(MU, 1.0))) == []

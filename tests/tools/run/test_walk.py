@@ -54,7 +54,7 @@ def test_what_an_emptied_battery_gave_is_its_capacity(emptied):
     assert energy["total"] > 0.7 * battery["delivered_Wh"]
 
 
-def test_powers_and_energies_tell_the_same(emptied):
+def test_powers_and_energies_agree(emptied):
     hours = emptied["walked_h"]
     assert emptied["energy_Wh"]["total"] == pytest.approx(emptied["total_power_W"] * hours, rel=1e-9)
     assert emptied["energy_Wh"]["electronics"] == pytest.approx(5.15 * hours, rel=1e-9)
@@ -106,9 +106,9 @@ def test_a_mistake_gets_one_line(capsys, arguments, words):
         code = cli.main(["walk", *arguments])
     except SystemExit as left:
         code = left.code
-    told = capsys.readouterr()
-    assert code == 2 and told.out == "" and len(told.err.splitlines()) == 1
-    assert all(word in told.err for word in words), told.err
+    reported = capsys.readouterr()
+    assert code == 2 and reported.out == "" and len(reported.err.splitlines()) == 1
+    assert all(word in reported.err for word in words), reported.err
 
 
 def test_distance_in_kilometres_and_charge_in_per_cent_reach_the_robot(capsys):
@@ -124,7 +124,7 @@ def test_distance_in_kilometres_and_charge_in_per_cent_reach_the_robot(capsys):
     assert "--battery 0.65 --battery-capacity 493.0Wh --off left-outer-ankle" in summary["command"]
 
 
-def test_what_was_walked_before_ctrl_c_is_told(capsys, monkeypatch):
+def test_the_walk_before_ctrl_c_is_reported(capsys, monkeypatch):
     monkeypatch.setattr(walk, "SLICE_S", 2.0)
 
     @contextlib.contextmanager
@@ -133,9 +133,9 @@ def test_what_was_walked_before_ctrl_c_is_told(capsys, monkeypatch):
 
     monkeypatch.setattr(interrupts, "noted", already)
     assert cli.main(["walk", "--distance", "65km"]) == 130
-    told = " ".join(capsys.readouterr().err.split())
-    assert "in 2.0 s, interrupted, on its feet;" in told
-    assert "Wh since it was let go: hip" in told and "batteries 100.0 % of 469 Wh" in told
+    reported = " ".join(capsys.readouterr().err.split())
+    assert "in 2.0 s, interrupted, on its feet;" in reported
+    assert "Wh since it was let go: hip" in reported and "batteries 100.0 % of 469 Wh" in reported
 
 
 class Walked:
@@ -152,10 +152,10 @@ class Walked:
         return self.distance_m / stop.distance_m
 
 
-def test_progress_tells_distance_time_left_and_charge():
+def test_progress_shows_distance_time_left_and_charge():
     # a quarter of 65 km in half an hour of the wall clock: three times as long is left
-    told = walk.progress_text(Walked(), StopRule(distance_m=65_000.0), 1800.0)
-    assert told == "16.250 km, 46519 steps, 1:30:00 left; 7:40:00 at 0.59 m/s, 15.3 x real time, battery 75 %"
+    reported = walk.progress_text(Walked(), StopRule(distance_m=65_000.0), 1800.0)
+    assert reported == "16.250 km, 46519 steps, 1:30:00 left; 7:40:00 at 0.59 m/s, 15.3 x real time, battery 75 %"
     assert "? left" in walk.progress_text(
         type("Standing", (Walked,), {"distance_m": 0.0})(), StopRule(distance_m=1.0), 1.0
     )
@@ -183,7 +183,7 @@ def test_where_no_screen_is_progress_comes_as_lines(monkeypatch):
 @pytest.mark.parametrize(
     ("seconds", "text"), [(59.94, "59.9 s"), (3600.0, "3600.0 s (1 h 00 min)"), (110_942.0, "110942.0 s (30 h 49 min)")]
 )
-def test_long_times_are_told_in_hours_too(seconds, text):
+def test_long_times_are_given_in_hours_too(seconds, text):
     assert duration_text(seconds) == text
 
 
@@ -195,7 +195,7 @@ def digest_and_command(capsys, *words):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_command_that_a_run_tells_walks_the_same_again(capsys, seed):
+def test_the_command_that_a_run_prints_walks_the_same_again(capsys, seed):
     """Options at random; half of the walk the robot is held (1.5 s), then it steps on the rough floor."""
     drawn = random_arrays.generator(seed, "options of a walk")
     chosen = {
@@ -228,10 +228,10 @@ def test_a_walk_that_fell_short_has_no_mean_step(capsys):
 
 def test_a_walk_without_a_folder_says_where_results_would_go(capsys):
     assert cli.main(["walk", "--time", "0.1s", "--log", "full"]) == 0
-    told = capsys.readouterr().err.splitlines()
-    assert told[0] == "--log full is ignored: there is no folder for logs (--out DIR)"
-    assert "step none, none" in told[1]
-    assert told[-1] == "nothing was kept: --out runs/NAME keeps summary, logs and report there"
+    reported = capsys.readouterr().err.splitlines()
+    assert reported[0] == "--log full is ignored: there is no folder for logs (--out DIR)"
+    assert "step none, none" in reported[1]
+    assert reported[-1] == "nothing was kept: --out runs/NAME keeps summary, logs and report there"
 
 
 def test_errors_of_a_healthy_walk_are_counted_in_one_line():
@@ -242,7 +242,7 @@ def test_errors_of_a_healthy_walk_are_counted_in_one_line():
     assert walk.usual_lines({"MB": {}}, 60.0) == []
 
 
-def test_the_last_lines_have_the_motors_power_beside_that_of_everything(emptied):
+def test_the_last_lines_have_the_motors_power_next_to_that_of_everything(emptied):
     out = io.StringIO()
     walk.print_summary(emptied, 0.8, Console(file=out, width=1000))
     total, motors = emptied["total_power_W"], emptied["motor_power_W"]
@@ -250,6 +250,6 @@ def test_the_last_lines_have_the_motors_power_beside_that_of_everything(emptied)
     assert f"{total:.1f} W (motors {motors:.1f} W), TCOT" in out.getvalue()
 
 
-@pytest.mark.parametrize(("distance_m", "told"), [(50.0, "500 mWh, 10.00 Wh/km"), (0.0, "500 mWh")])
-def test_energy_is_told_for_each_kilometre_where_there_is_some(distance_m, told):
-    assert page.energy_used({"energy_Wh": {"total": 0.5}, "distance_m": distance_m}) == told
+@pytest.mark.parametrize(("distance_m", "reported"), [(50.0, "500 mWh, 10.00 Wh/km"), (0.0, "500 mWh")])
+def test_energy_is_reported_per_kilometre_where_the_robot_walked(distance_m, reported):
+    assert page.energy_used({"energy_Wh": {"total": 0.5}, "distance_m": distance_m}) == reported

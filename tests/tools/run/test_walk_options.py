@@ -47,7 +47,7 @@ def walk_parser():
 PARSER = walk_parser()
 
 
-def test_every_option_of_walk_stands_in_the_table():
+def test_every_option_of_walk_is_in_the_table():
     parsed = {text for action in PARSER._actions for text in action.option_strings} - {"-h", "--help"}
     assert parsed == {option.name for option in WALK}
     assert set(VALUES) == {option.key for option in WALK if option.of_run}
@@ -76,7 +76,7 @@ def test_a_walk_that_was_interrupted_is_repeated_up_to_that_nanosecond():
         assert round(PARSER.parse_args(words[2:]).time * 1e9) == time_ns
 
 
-def test_what_only_says_what_is_kept_is_not_of_the_run():
+def test_options_that_only_choose_what_is_kept_are_not_of_the_run():
     kept = [
         "--out",
         "a",

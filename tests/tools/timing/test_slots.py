@@ -19,7 +19,7 @@ MCH_MOTOR_VELOCITY motor_encoder_rezero MCH_EXECUTION_TIME MCH_MAX_EXECUTION_TIM
 CLOSING = ["can_transmit", "execution_time_record"]
 
 
-def told(capsys, *arguments):
+def reported(capsys, *arguments):
     code = cli.main(["slots", *arguments])
     captured = capsys.readouterr()
     return code, captured.out, captured.err
@@ -31,7 +31,7 @@ def wide(monkeypatch):
 
 
 def test_the_table_of_a_board_is_the_firmwares_line_by_line(capsys, wide):
-    code, out, _ = told(capsys, "MCH", "--static")
+    code, out, _ = reported(capsys, "MCH", "--static")
     lines = [line.split()[0] for line in out.splitlines() if line]
     first = lines.index("adcx_convert_all")
     assert lines[first : first + 31] == [*EVERY_SLOT, *ROWS, *OCCASIONAL, *CLOSING]
@@ -39,8 +39,8 @@ def test_the_table_of_a_board_is_the_firmwares_line_by_line(capsys, wide):
     assert re.search(r"motor_encoder_rezero +row 3, in turn +7,460 +10,000 +10,000 +7,080 - 7,520", out)
 
 
-def test_what_was_seen_stands_beside_what_is_possible(capsys):
-    code, out, _ = told(capsys, "MCFI", "--time", "0.3", "--json", "-")
+def test_the_worst_measured_is_listed_next_to_the_worst_possible(capsys):
+    code, out, _ = reported(capsys, "MCFI", "--time", "0.3", "--json", "-")
     (board,) = json.loads(out)["boards"]
     assert code == 0
     assert json.loads(out)["run"] == {"seed": 1, "time_s": 0.3, "steps": 0, "ended": ""}
@@ -54,7 +54,7 @@ def test_what_was_seen_stands_beside_what_is_possible(capsys):
 
 
 def test_without_a_board_the_rows_of_all_are_shown(capsys, wide):
-    code, out, _ = told(capsys, "--static")
+    code, out, _ = reported(capsys, "--static")
     assert code == 0
     assert [line.split(",")[0] for line in out.splitlines() if "slots of" in line] == [
         "MCH",
@@ -70,11 +70,11 @@ def test_without_a_board_the_rows_of_all_are_shown(capsys, wide):
 
 def test_a_file_gets_the_json_and_the_terminal_the_table(capsys, tmp_path, wide):
     file = tmp_path / "slots.json"
-    _, out, _ = told(capsys, "MCSI", "--static", "--json", str(file))
+    _, out, _ = reported(capsys, "MCSI", "--static", "--json", str(file))
     assert json.loads(file.read_text())["run"] is None and out.startswith("MCSI, 500 us slots of 30,000 cycles, 4 rows")
 
 
-def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch, wide):
+def test_an_overrun_of_the_run_is_reported_and_sets_the_exit_code(capsys, monkeypatch, wide):
     run = slots.seen
 
     def with_a_slow_function(robot, names, options):
@@ -82,7 +82,7 @@ def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch,
         return run(robot, names, options)
 
     monkeypatch.setattr(slots, "seen", with_a_slow_function)
-    code, out, _ = told(capsys, "MCH", "--time", "0.15")
+    code, out, _ = reported(capsys, "MCH", "--time", "0.15")
     assert code == slots.EXIT_OVERRAN == 1
     assert re.search(r"Seen in \d+ slots from 0.10 to 0.15 s, 0 steps, seed 1: [1-9]\d+ overran", out)
 
@@ -94,8 +94,8 @@ def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch,
         (["MCH", "--time", "0.1"], "--time 0.1: the first 0.1 s do not count, so more are needed"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(capsys, arguments, complaint):
-    code, out, error = told(capsys, *arguments)
+def test_a_mistake_is_reported_in_one_line(capsys, arguments, complaint):
+    code, out, error = reported(capsys, *arguments)
     assert code == cli.EXIT_MISUSE and out == ""
     assert complaint in error and error.count("\n") == 1
 

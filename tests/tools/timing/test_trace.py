@@ -31,7 +31,7 @@ def file(tmp_path_factory):
     return path
 
 
-def told(capsys, *arguments):
+def reported(capsys, *arguments):
     """(exit code, standard error) of a command."""
     code = cli.main(list(arguments))
     return code, capsys.readouterr().err
@@ -67,17 +67,17 @@ def test_only_the_last_part_is_written_where_that_is_asked_for(tmp_path, capsys)
         (["--trace-last", "10s"], "--trace-last needs --trace"),
     ],
 )
-def test_what_cannot_be_written_is_told_in_one_line_before_anything_runs(
+def test_a_file_that_cannot_be_written_is_reported_in_one_line_before_anything_runs(
     arguments, reason, capsys, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    code, text = told(capsys, "walk", "--steps", "100000", *arguments)
+    code, text = reported(capsys, "walk", "--steps", "100000", *arguments)
     assert code == 2 and reason in text and text.count("\n") == 1
 
 
-def test_a_library_that_is_missing_is_told_before_anything_runs(capsys, tmp_path, monkeypatch):
+def test_a_library_that_is_missing_is_reported_before_anything_runs(capsys, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "vcd", None)  # what an environment without it looks like
-    code, text = told(capsys, "walk", "--steps", "100000", "--trace", str(tmp_path / "run.vcd"))
+    code, text = reported(capsys, "walk", "--steps", "100000", "--trace", str(tmp_path / "run.vcd"))
     assert code == 2 and "walk needs the library pyvcd, which is not installed" in text and text.count("\n") == 1
 
 
@@ -95,7 +95,7 @@ def test_a_fault_is_on_the_timeline_with_its_stamps(file):
     assert names[:2] == ["armed: MCH.joint_encoder:stuck@20 ms", "activated: MCH.joint_encoder:stuck@20 ms"]
 
 
-def test_the_instant_shown_is_where_the_fault_came_unless_another_is_asked_for(file):
+def test_the_time_shown_is_that_of_the_fault_unless_another_is_requested(file):
     moment = moments.find(file, None)
     assert moment.text.startswith(("acted: MCH", "activated: MCH")) and 19_000_000 < moment.time_ns < 50_000_000
     assert moments.find(file, 30_000_000).time_ns == 30_000_000
@@ -115,8 +115,8 @@ def test_a_run_without_a_fault_shows_its_last_step_or_else_its_middle(tmp_path, 
         (["--offline", "--out", "missing/page.html"], "its folder is missing"),
     ],
 )
-def test_what_cannot_be_shown_is_told_in_one_line(file, arguments, reason, capsys):
-    code, text = told(capsys, "trace", "open", str(file), "--no-browser", *arguments)
+def test_a_trace_that_cannot_be_shown_is_reported_in_one_line(file, arguments, reason, capsys):
+    code, text = reported(capsys, "trace", "open", str(file), "--no-browser", *arguments)
     assert code == 2 and re.search(reason, text) and text.count("\n") == 1
 
 
@@ -133,18 +133,18 @@ def test_what_cannot_be_shown_is_told_in_one_line(file, arguments, reason, capsy
         ("damaged.pftrace", b"\x0a\x07\x40\x05\x5a\x03\x48\x03\x58", "or it is damaged"),
     ],
 )
-def test_a_file_that_is_no_trace_is_told_in_one_line(name, content, reason, tmp_path, capsys):
+def test_a_file_that_is_not_a_trace_is_reported_in_one_line(name, content, reason, tmp_path, capsys):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
-    code, text = told(capsys, "trace", "open", str(path), "--no-browser")
+    code, text = reported(capsys, "trace", "open", str(path), "--no-browser")
     assert code == 2 and reason in text and text.count("\n") == 1
 
 
 # --- in Perfetto's viewer ---------------------------------------------------------------------------------
 
 
-def test_the_address_tells_the_viewer_where_the_trace_is_and_what_to_show():
+def test_the_address_gives_the_viewer_the_place_of_the_trace_and_what_to_show():
     assert trace.address("my run.pftrace", 1_000, 21_000) == (
         "https://ui.perfetto.dev/#!/?url=http%3A%2F%2F127.0.0.1%3A9001%2Fmy%2520run.pftrace&visStart=1000&visEnd=21000"
     )
@@ -221,7 +221,7 @@ def visit(server, said=b""):
     return client
 
 
-def test_connections_that_say_nothing_keep_nobody_waiting_and_floods_are_bounded(tmp_path):
+def test_silent_connections_delay_no_other_client_and_floods_are_bounded(tmp_path):
     """A browser opens some in advance; one that sent nothing once kept all others waiting for ever."""
     file = tmp_path / "a.pftrace"
     file.write_bytes(bytes(5_000_000))
@@ -240,18 +240,18 @@ def test_connections_that_say_nothing_keep_nobody_waiting_and_floods_are_bounded
             server.turn(1.0)
         reader = visit(server, get)
         clients.callback(reader.close)
-        heard = 0
+        received = 0
         while not server.served:
             server.turn(1.0)
             assert all(len(peer.outgoing) <= limits.write_bytes + 1000 for peer in server.peers)
             with contextlib.suppress(BlockingIOError):
-                heard += len(reader.recv(1 << 20))
+                received += len(reader.recv(1 << 20))
         while piece := reader.recv(1 << 20):
-            heard += len(piece)
-        assert heard > 5_000_000
+            received += len(piece)
+        assert received > 5_000_000
 
 
-def test_who_takes_nothing_of_the_trace_loses_its_place(tmp_path):
+def test_a_client_that_takes_nothing_of_the_trace_loses_its_place(tmp_path):
     file = tmp_path / "a.pftrace"
     file.touch()
     os.truncate(file, 50_000_000)  # more than the kernel keeps for a connection; no disk
@@ -263,10 +263,10 @@ def test_who_takes_nothing_of_the_trace_loses_its_place(tmp_path):
             while before != (before := server.peers[0].left):
                 server.turn(0.0)
             now[0] = 59.0
-            server.look(0)
+            server.receive(0)
             assert server.peers
             now[0] = 130.0
-            server.look(0)
+            server.receive(0)
             assert not server.peers and not server.served
 
 

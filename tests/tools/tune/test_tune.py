@@ -144,7 +144,7 @@ def test_default_steps_are_of_parameters_that_the_program_reads():
     assert set(tune.DEFAULT_STEPS) == set(programs.PROGRAMS)
 
 
-def test_candidates_walk_the_same_in_processes_of_their_own(tmp_path):
+def test_candidates_walk_the_same_in_their_own_processes(tmp_path):
     task = tune.Task("robust", 6, (1, 2), (0.0,), aim="energy")
     candidates = [{}, {"P_F_PP_F_TANG": 0.22}, {}]
     found = []

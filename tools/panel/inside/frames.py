@@ -131,6 +131,6 @@ def of_the_robot(number: int, flags: int, data: bytes) -> tuple[str, float | str
     return all_variables.NAMES[number], value if np.isfinite(value) else None
 
 
-def of_nobody(number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
+def unknown_source(number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
     """Decode a frame of an unknown bus: no name, no value."""
     return "", None

@@ -23,7 +23,7 @@ from ranger_sim.tools.panel.inside.logs import LogFrames
 from ranger_sim.tools.run.folder import BUS_LOGS
 
 NO_SLOTS = "A recording keeps no slots one by one."
-TOLD_SLOTS = (
+REPORTED_SLOTS = (
     "The boards report their own in the channels …_EXECUTION_TIME and …_MAX_EXECUTION_TIME; "
     "a running robot shows every one (ranger-sim panel --name)."
 )

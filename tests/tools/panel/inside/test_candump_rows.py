@@ -34,7 +34,7 @@ def test_lines_of_every_form_are_read_as_line_by_line(tmp_path, name):
     np.testing.assert_array_equal(rows_of(text.encode()), np.array(single, np.int64))
 
 
-def test_a_last_line_without_an_end_and_empty_lines_are_no_fault():
+def test_a_last_line_without_an_end_and_empty_lines_are_not_faults():
     rows = rows_of(b"\n(0000000012.345678) can1 0A1#0102030405060708\n\n(0000000012.345679) can1 0A1#0102030405060708")
     assert rows[:, 0].tolist() == [12_345_678_000, 12_345_679_000] and len(rows_of(b"")) == 0
 

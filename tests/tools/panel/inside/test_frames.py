@@ -6,7 +6,7 @@ import pytest
 from ranger_sim.can_bus.frame import FIELD_DATA
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.tools.panel.inside.frames import ERROR, RecentFrames, listed, of_nobody, of_the_robot
+from ranger_sim.tools.panel.inside.frames import ERROR, RecentFrames, listed, of_the_robot, unknown_source
 
 ANGLE = all_variables.ID_OF["MCH_ANGLE"]
 ONE = 0x3F800000  # 1.0 in single precision
@@ -32,7 +32,7 @@ def frames():
     return found
 
 
-def test_a_variable_is_told_by_its_name_and_value_the_newest_first(frames):
+def test_variables_are_listed_by_name_and_value_the_newest_first(frames):
     first, second, third = shown(frames)
     assert first == {
         "time_s": pytest.approx(2.5),
@@ -43,10 +43,10 @@ def test_a_variable_is_told_by_its_name_and_value_the_newest_first(frames):
         "data": "00 00 80 3f 08 00 00 00",
     }
     assert (second["data"], second["count"], third["count"]) == ("cc bb aa", 1, 2)
-    assert shown(frames, read=of_nobody)[0]["name"] == ""
+    assert shown(frames, read=unknown_source)[0]["name"] == ""
 
 
-def test_at_an_earlier_instant_there_were_fewer(frames):
+def test_at_an_earlier_time_there_were_fewer(frames):
     assert [each["count"] for each in shown(frames, 2_500_000_000)] == [1, 1]
     assert shown(frames, 1_499_999_999) == []
 

@@ -28,7 +28,7 @@ def pair(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("us", [-1, 0, 5, 30, 210, 29_970, 10**9])
-def test_a_log_tells_what_memory_would(pair, us):
+def test_a_log_gives_the_same_as_memory(pair, us):
     log, memory = pair
     np.testing.assert_array_equal(log.until(1000 * us, 40), memory.until(1000 * us, 40))
     assert log.counts(1000 * us, [5, 6, 7, 99]) == memory.counts(1000 * us, [5, 6, 7, 99])
@@ -64,7 +64,7 @@ def test_what_was_not_read_yet_is_not_there(tmp_path, monkeypatch):
     log.close()
 
 
-def test_a_line_that_is_none_is_told_with_its_file(tmp_path):
+def test_a_malformed_line_is_reported_with_its_file(tmp_path):
     (tmp_path / "can1.log").write_text("(0000000012.345678) can1 0A1#0102030405060708\nnonsense\n")
     log = LogFrames(tmp_path / "can1.log")
     with pytest.raises(UserError, match=r"can1\.log: not `\(seconds.*'nonsense'"):

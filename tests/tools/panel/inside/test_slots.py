@@ -46,7 +46,7 @@ def test_of_a_time_before_the_first_slot_nothing_is_known(slots):
     assert slots.content(-0.1) is None and BoardSlots("MCH", HZ).content(None) is None
 
 
-def test_without_a_pace_there_is_no_lateness_and_a_slot_that_never_ended_took_no_time():
+def test_without_a_pace_lateness_is_absent_and_a_slot_that_never_ended_took_no_time():
     board = BoardSlots("UI", HZ)
     board.take(rows((0, 6_000, -1), (2, 0, -1)), START_NS)
     found = board.content(None)

@@ -1,0 +1,22 @@
+"""Old names of methods."""
+
+import pytest
+
+from ranger_sim.firmware_sim.board import Board
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
+from ranger_sim.foundation.events import NEVER
+
+
+def test_old_names_of_a_board_do_what_the_new_ones_do_and_warn_at_the_caller():
+    board = Board("TEST")
+    board.next_time = 8
+    with pytest.warns(DeprecationWarning, match=r"^Board.edges_came is now note_edges; the old name ends") as warned:
+        assert board.edges_came() == NEVER
+    assert warned[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match=r"^Board.speaks_from is now earliest_transmit_ns"):
+        assert board.speaks_from() == 8
+    with (
+        pytest.warns(DeprecationWarning, match=r"^Board.listen_to_edges is now connect_edges"),
+        pytest.raises(NotImplementedError, match="no pins for an encoder"),
+    ):
+        board.listen_to_edges(EdgeBuffer(), 22, 27)
