@@ -300,7 +300,7 @@ def load(
     reader = _Reader(str(path), faults)
     content = reader.content(path)
     if content is None:
-        raise ProfileError(faults)
+        raise FaultyProfileError(faults)
     buses_known: tuple[str, ...] = BUSES
     if table is None:
         table = robots_table()

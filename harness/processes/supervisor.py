@@ -438,8 +438,8 @@ class Supervisor:
         """Find processes that keep their turn, or are stopped, too long, and show the state."""
         now = wallclock.monotonic_s()
         passed_s, self.polled_s = min(now - self.polled_s, MOST_POLL_S), now
-        for child in self.children.values():
-            self.look_at_stopped(child, passed_s)
+        for each in self.children.values():
+            self.check_stopped(each, passed_s)
         for name, block in self.blocks.items():
             child = self.children.get(name)
             if child is None or child.state != RUNNING:
@@ -475,7 +475,7 @@ class Supervisor:
         if not self.ending:
             self.view.show(self.state())
 
-    def look_at_stopped(self, child: Child, passed_s: float) -> None:
+    def check_stopped(self, child: Child, passed_s: float) -> None:
         """End the run when a process that is stopped has owed a reply for the deadline.
 
         The body's process finishes the files; when it is itself the stopped one, none are finished.
