@@ -76,10 +76,11 @@ def test_a_hundred_frames_wait_and_the_next_is_lost(node):
 
 
 class Robot:
-    """What the rest-bus needs of one: its buses and where its time begins."""
+    """What the rest-bus needs of one: its boards, its buses and where its time begins."""
 
     def __init__(self):
         self.start_ns = 50 * MS
+        self.boards = ("MCH", "MCFO", "MCFI", "MCSI", "UI", "CSR", "MB")
         self.buses = [Bus(f"can{number}", 3_000_000) for number in range(1, 5)]
         self.attached = []
         for bus in self.buses:
