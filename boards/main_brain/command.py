@@ -1,4 +1,4 @@
-"""What a machine tells a motor board, and how machines come by the numbers of the data table."""
+"""What a machine sends to a motor board, and the ids of the data table's variables."""
 
 from typing import TYPE_CHECKING
 

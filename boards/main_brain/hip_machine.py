@@ -1,7 +1,7 @@
 """The hip machine: swings the legs, holds them in an emergency, corrects once per step.
 
-Source: robot.md C1.4. In the states' names HI stands for inner legs in the air and outer ones on
-the ground, HO for the reverse.
+Source: robot.md C1.4. In the states' names HI means inner legs in the air and outer ones on
+the ground, HO the reverse.
 The entry current H_TEST1 of the preswing states is not here: it was 0, and the main action of the same
 tick overwrites it before anything is sent. The premid discrete controller (D_H2_ON) is not here either:
 it was off and all its gains were 0.
