@@ -28,19 +28,19 @@ cdef inline object call_anything(PyObject* function, PyObject* nothing):
 cdef inline object call_anything_with(PyObject* function, PyObject* argument):
     return (<object>function)(<object>argument)
 
-# By these two addresses a function of `arguments` (0 or 1) is called: of a method's C function, and of the object that
-# it belongs to; or of a call in the ordinary way, and of what is called. Their owner must keep `function` alive.
-cdef inline long long code_of(object function, int arguments):
+# By these two a function of `arguments` (0 or 1) is called: by the address of a method's C function, and the object that
+# it belongs to; or by the address of a call in the ordinary way, and what is called. The reference to `function` keeps both valid.
+cdef inline void* code_of(object function, int arguments):
     if is_method(function, arguments):
-        return <long long><void*>PyCFunction_GET_FUNCTION(function)
-    return <long long><void*>(call_anything_with if arguments else call_anything)
+        return <void*>PyCFunction_GET_FUNCTION(function)
+    return <void*>(call_anything_with if arguments else call_anything)
 
-cdef inline long long owner_of(object function, int arguments):
-    return <long long><void*>(PyCFunction_GET_SELF(function) if is_method(function, arguments) else <PyObject*>function)
+cdef inline void* owner_of(object function, int arguments):
+    return <void*>(PyCFunction_GET_SELF(function) if is_method(function, arguments) else <PyObject*>function)
 
-cdef inline object call_with(long long code, long long owner, object argument):
-    return (<plain_call><void*>code)(<PyObject*><void*>owner, <PyObject*>argument)
+cdef inline object call_with(void* code, void* owner, object argument):
+    return (<plain_call>code)(<PyObject*>owner, <PyObject*>argument)
 
-cdef inline long long run(long long code, long long owner) except? -1:
-    items = (<plain_call><void*>code)(<PyObject*><void*>owner, NULL)
+cdef inline long long run(void* code, void* owner) except? -1:
+    items = (<plain_call>code)(<PyObject*>owner, NULL)
     return 0 if items is None else items

@@ -28,11 +28,6 @@ from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
 from ranger_sim.firmware_sim.peripheral import Peripheral, Unclaimed
 from ranger_sim.firmware_sim.scheduler import (
-    ENTRY,
-    ENTRY_CALLS,
-    ENTRY_CODE,
-    ENTRY_NS,
-    ENTRY_OWNER,
     OCCASIONAL_TASK,
     WAIT_TASK,
     Occasional,
@@ -336,10 +331,9 @@ class Microcontroller(Chip):
         inbox: EventQueue = self.inbox
         vic: InterruptController = self.vic
         scheduler: SlotScheduler = self.scheduler
-        entry: cython.longlong  # index of the task's entry in the table
+        task: Task
         first: cython.longlong
         own: cython.longlong
-        number: cython.longlong
         usual_ns: cython.longlong
         items: cython.longlong
         self.horizon = until
@@ -376,19 +370,18 @@ class Microcontroller(Chip):
                 if (self.waiting or scheduler.late) and not self._resume():
                     continue
                 while scheduler.position < scheduler.end:
-                    number = scheduler.numbers[scheduler.position]
+                    task = cython.cast(Task, scheduler.placed[scheduler.position])
                     scheduler.position += 1
-                    entry = ENTRY * number
-                    usual_ns = scheduler.table[entry + ENTRY_NS]
+                    usual_ns = task.usual_ns
                     self.now = self.code_time
                     if usual_ns >= 0:
-                        items = run(scheduler.table[entry + ENTRY_CODE], scheduler.table[entry + ENTRY_OWNER])
+                        items = run(task.code, task.owner)
                         if items == 0 and self.extra_cycles == 0:
                             self.code_time += usual_ns
-                            scheduler.table[entry + ENTRY_CALLS] += 1
+                            task.usual_calls += 1
                         else:
-                            self._spent(cython.cast(Task, scheduler.tasks[number]), items)
-                    elif not self._special_task(cython.cast(Task, scheduler.tasks[number])):
+                            self._spent(task, items)
+                    elif not self._special_task(task):
                         break
                     if self.code_time >= self.stop_time or vic.pending != 0:
                         break

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is a place, a row or a number of a table that `layout` has laid down)
+# (every index below is a place, a row or a task's number, all set by `layout`)
 """The cooperative slot scheduler: what runs when, what it costs, and what an overrun drops.
 
 A timer tick starts a slot and steps to the next row of the table. A slot runs the every-slot tasks, the
@@ -26,12 +26,6 @@ NORMAL_TASK: Final = 0
 OCCASIONAL_TASK: Final = 1
 WAIT_TASK: Final = 2
 HISTOGRAM_BINS: Final = 21  # twenty of 5 % of a slot, the last for overruns
-# the table laid out: numbers per task, and which is which
-ENTRY: Final = 4
-ENTRY_CODE: Final = 0  # the two addresses by which its function is called
-ENTRY_OWNER: Final = 1
-ENTRY_NS: Final = 2  # of a call without items, or -1: every call must be checked individually
-ENTRY_CALLS: Final = 3  # calls that took that
 
 
 @cython.cclass
@@ -43,6 +37,11 @@ class Task:
     (calls over the limit), `last_cycles`, `max_cycles`, `total_cycles` (interrupts not included).
     """
 
+    # the fields that the event loop reads come first
+    usual_ns: cython.longlong
+    code: cython.p_void
+    owner: cython.p_void
+    usual_calls: cython.longlong
     kind: cython.longlong
     base_cycles: cython.longlong
     per_item: cython.longlong
@@ -67,16 +66,18 @@ class Task:
         for what, value in (("cost", cost), ("limit", limit), ("per_item", per_item)):
             if not isinstance(value, int) or value < 0:
                 raise FirmwareError(f"task {title}: {what} {value!r} must be a whole number of cycles, 0 or more")
-        self.routine = function
+        self.set_routine(function)
+        self.usual_ns = -1  # duration of a call without items; -1: every call is checked (SlotScheduler.set_duration)
+        self.usual_calls = 0  # calls that took exactly `cost`, since that was last changed
         self.base_cycles = cost
         self.most_cycles = limit
         self.per_item = per_item
         self.kind = NORMAL_TASK
         self.name = title
         self.item = item
-        self.speaks = True  # may put something on a bus; a Schedule knows better, but not of a user's function
+        self.speaks = True  # may send on a bus; a Schedule says otherwise, but not of a user's function
         self.hits = 0
-        # calls that cost `base_cycles` are counted in the scheduler; these keep the others
+        # these count all other calls
         self.noted_calls = 0
         self.noted_cycles = 0
         self.noted_most = 0
@@ -84,6 +85,12 @@ class Task:
         self.noted_when = 0  # usual calls before the latest noted one
         self.scheduler = None
         self.number = -1
+
+    def set_routine(self, function) -> None:
+        """Call `function` from now on."""
+        self.routine = function
+        self.code = code_of(function, 0)
+        self.owner = owner_of(function, 0)
 
     @cython.cfunc
     @cython.final
@@ -94,20 +101,14 @@ class Task:
         if cycles > self.noted_most:
             self.noted_most = cycles
         self.noted_last = cycles
-        self.noted_when = self.scheduler.table[ENTRY * self.number + ENTRY_CALLS]
-
-    @cython.ccall
-    def usual_calls(self) -> cython.longlong:
-        """Calls that took exactly `cost`, since that was last changed."""
-        return 0 if self.scheduler is None else self.scheduler.table[ENTRY * self.number + ENTRY_CALLS]
+        self.noted_when = self.usual_calls
 
     def settle(self) -> None:
         """Note the usual calls so far: their cost or their scheduler is about to change."""
         calls, total, most, last = self.calls, self.total_cycles, self.max_cycles, self.last_cycles
         self.noted_calls, self.noted_cycles, self.noted_most = calls, total, most
         self.noted_last, self.noted_when = last, 0
-        if self.scheduler is not None:
-            self.scheduler.table[ENTRY * self.number + ENTRY_CALLS] = 0
+        self.usual_calls = 0
 
     @property
     def function(self):
@@ -116,10 +117,10 @@ class Task:
 
     @function.setter
     def function(self, function) -> None:
-        self.routine = function
+        self.set_routine(function)
         self.speaks = True
         if self.scheduler is not None:
-            self.scheduler.lay(self)
+            self.scheduler.set_duration(self)
 
     @property
     def cost(self) -> int:
@@ -131,7 +132,7 @@ class Task:
         self.settle()
         self.base_cycles = cycles
         if self.scheduler is not None:
-            self.scheduler.lay(self)
+            self.scheduler.set_duration(self)
 
     @property
     def limit(self) -> int:
@@ -142,27 +143,27 @@ class Task:
     def limit(self, cycles) -> None:
         self.most_cycles = cycles
         if self.scheduler is not None:
-            self.scheduler.lay(self)
+            self.scheduler.set_duration(self)
 
     @property
     def calls(self) -> int:
         """Calls since power-up."""
-        return self.noted_calls + self.usual_calls()
+        return self.noted_calls + self.usual_calls
 
     @property
     def total_cycles(self) -> int:
         """Cycles of all calls, interrupts not included."""
-        return self.noted_cycles + self.usual_calls() * self.base_cycles
+        return self.noted_cycles + self.usual_calls * self.base_cycles
 
     @property
     def max_cycles(self) -> int:
         """Cycles of the longest call."""
-        return max(self.noted_most, self.base_cycles if self.usual_calls() else 0)
+        return max(self.noted_most, self.base_cycles if self.usual_calls else 0)
 
     @property
     def last_cycles(self) -> int:
         """Cycles of the latest call."""
-        return self.noted_last if self.noted_when == self.usual_calls() else self.base_cycles
+        return self.noted_last if self.noted_when == self.usual_calls else self.base_cycles
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name}, cost={self.cost}, limit={self.limit})"
@@ -235,7 +236,7 @@ class Schedule:
     runner keeps no DONE flag, so an overrun drops tasks without a report (main-brain scheduler).
     `speakers`: names of those tasks in `every` and `last` that may put something on a bus (None: any of them);
     tasks of rows and of the occasional list always may. To be named only where no interrupt handler and no main loop
-    sends. It lets the rest of the robot run ahead of a board that has nothing to say, and changes no result.
+    sends. It lets the rest of the robot run ahead of a board that sends nothing, and changes no result.
     `tick_slot`: VIC slot of the timer interrupt (or FIQ); `tick_cost`: its cycles.
     """
 
@@ -328,23 +329,21 @@ class SlotScheduler:
     end of the row, interrupts included), `histogram` of that in 21 bins of 5 % of a slot (the last: more
     than the slot), `near_limits` (more than 90 % but finished). `listed_tasks` = run_tasks + dropped_tasks +
     what the present row still has to run. More than 40 fields, because a task's end touches position and records alike:
-    apart they would cost every task a second look-up.
+    in two objects they would cost every task a second look-up.
     """
 
-    # Fields that a slot touches come first, close together; a memoryview has its address in its first bytes.
+    # fields that a slot touches come first, close together
     position: cython.longlong
     end: cython.longlong
     done: cython.bint
     late: cython.bint
     recording: cython.bint
     started: cython.bint
-    table: cython.p_longlong
-    leads: cython.p_longlong
     row: cython.longlong
     row_count: cython.longlong
     announces: cython.bint
     tasks: list
-    numbers: Annotated[cython.uchar[::1], "readonly"]
+    placed: list
     divider_count: cython.longlong
     divider: cython.longlong
     row_start: cython.longlong
@@ -362,9 +361,7 @@ class SlotScheduler:
     max_slot_cycles: cython.longlong
     row_starts: cython.longlong[::1]
     histogram: cython.longlong[21]
-    # what the two addresses lead into
-    table_kept: Annotated[cython.longlong[::1], "readonly"]
-    leads_kept: Annotated[cython.longlong[::1], "readonly"]
+    leads: Annotated[cython.longlong[::1], "readonly"]
     schedule: Schedule
     ns_per_cycle: cython.double
     slot_ns: cython.longlong
@@ -416,64 +413,49 @@ class SlotScheduler:
     def layout(self) -> None:
         """The schedule as flat lists; row r has the places from row_starts[r] on, and one more that is its end.
 
-        `numbers`: of the task at each place, among `tasks`. `table` has ENTRY numbers for each
-        task: the two addresses by which its function is called when compiled, usual_ns, and how many calls took that.
-        usual_ns: what a call without items takes (ns), or -1 when every call must be looked at more closely.
-        `leads`: ns from the start of the task at a place to that of the first one from there that may speak, at least;
+        `placed`: the task at each place, None at the end of a row.
+        `leads`: ns from the start of the task at a place to that of the first one from there that may send, at least;
         NEVER where none follows in its row.
         """
         schedule = self.schedule
         self.row_count = len(schedule.rows)
         self.tasks = schedule.all_tasks()
-        if len(self.tasks) > 256:
-            raise FirmwareError(f"schedule: {len(self.tasks)} different tasks; at most 256 are possible")
         self.row_starts = integers(self.row_count + 1)
-        places: list = []
+        self.placed = []
         for row in range(self.row_count):
-            places += [self.tasks.index(task) for task in schedule.row_tasks(row)] + [0]
-            self.row_starts[row + 1] = len(places)
-        self.numbers = bytearray(places)
-        self.leads_kept = integers(len(places), NEVER)
-        self.table_kept = integers(ENTRY * max(len(self.tasks), 1))
-        if cython.compiled:
-            self.leads = cython.address(self.leads_kept[0])
-            self.table = cython.address(self.table_kept[0])
-        else:
-            self.leads = self.leads_kept
-            self.table = self.table_kept
+            self.placed += [*schedule.row_tasks(row), None]
+            self.row_starts[row + 1] = len(self.placed)
+        self.leads = integers(len(self.placed), NEVER)
         for number, task in enumerate(self.tasks):
             task.settle()
             task.scheduler = self
             task.number = number
-            self.lay(task)
+            self.set_duration(task)
 
     def retune(self, ns_per_cycle) -> None:
         """The processor's cycles last so long from now on."""
         self.ns_per_cycle = ns_per_cycle
         for task in self.tasks:
-            self.lay(task)
+            self.set_duration(task)
 
-    def lay(self, task: Task) -> None:
-        """Lay down what the event loop needs of `task`."""
-        at: cython.longlong = ENTRY * task.number
+    def set_duration(self, task: Task) -> None:
+        """Work out how long a call of `task` usually takes, or that every call of it must be checked."""
         within = task.base_cycles <= task.most_cycles or task.most_cycles == 0
         plain = task.kind == NORMAL_TASK and within and not self.recording
-        self.table[at + ENTRY_CODE] = code_of(task.routine, 0)
-        self.table[at + ENTRY_OWNER] = owner_of(task.routine, 0)
-        self.table[at + ENTRY_NS] = int(task.base_cycles * self.ns_per_cycle) if plain else -1
-        self.lay_leads()
+        task.usual_ns = int(task.base_cycles * self.ns_per_cycle) if plain else -1
+        self.set_leads()
 
-    def lay_leads(self) -> None:
-        """From the end of each row back to its start: how long a place is ahead of the row's next speaker."""
+    def set_leads(self) -> None:
+        """From the end of each row back to its start: how long a place is ahead of the row's next task that may send."""
         for row in range(self.row_count):
             lead = NEVER
             for place in range(self.row_starts[row + 1] - 2, self.row_starts[row] - 1, -1):
-                task = self.tasks[self.numbers[place]]
+                task = self.placed[place]
                 if task.speaks:
                     lead = 0
                 elif lead < NEVER:
                     lead += int(task.base_cycles * self.ns_per_cycle)
-                self.leads_kept[place] = lead
+                self.leads[place] = lead
 
     @cython.ccall
     def earliest_transmit_ns(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
@@ -571,7 +553,7 @@ class SlotScheduler:
         self.log = log
         self.recording = log is not None
         for task in self.schedule.all_tasks():
-            self.lay(task)
+            self.set_duration(task)
 
     @cython.ccall
     def log_begin(self) -> None:
@@ -586,7 +568,7 @@ class SlotScheduler:
         log: ActivityLog = self.log
         place: cython.longlong
         for place in range(self.position, self.end):
-            log.put(TASK_DROPPED, self.numbers[place], time, time, 0, 0, self.row, 0)
+            log.put(TASK_DROPPED, cython.cast(Task, self.placed[place]).number, time, time, 0, 0, self.row, 0)
         place = self.end - self.position
         log.put(SLOT_OVERRAN, self.slot_count, self.slot_time, time, 0, 0, self.row, place)
 

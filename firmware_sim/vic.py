@@ -67,8 +67,8 @@ class InterruptSource:
 
     # In both classes the fields that every request and every service touches come first, close together.
     bit: cython.longlong
-    code: cython.longlong
-    owner: cython.longlong
+    code: cython.p_void
+    owner: cython.p_void
     latency_ns: cython.longlong
     base_ns: cython.longlong
     base_cycles: cython.longlong
@@ -108,10 +108,7 @@ class InterruptSource:
         self.requested = 0  # time (ns) of the request that is or was served
         self.name = LINES.get(kind, f"line {kind}/{{}}").format(index)
         self.handler = None
-        self.service = None  # what is called: the handler, or before it what gives it the message
-        # the two addresses by which compiled code calls `service`
-        self.code = 0
-        self.owner = 0
+        self.serve_by(None)
         self.cost = 0
         self.per_item = 0
         self.latency = 0
@@ -162,7 +159,7 @@ class InterruptSource:
         return max(self.noted_most, self.base_cycles if self.served > self.noted else 0)
 
     def serve_by(self, service) -> None:
-        """Call `service` when it is served."""
+        """Call `service` when it is served: the handler, or before it what gives it the message."""
         self.service = service
         self.code = code_of(service, 1)
         self.owner = owner_of(service, 1)

@@ -1,4 +1,4 @@
-"""A machine's commands to a motor board, and the look-up of numbers of the data table."""
+"""What a machine sends to a motor board, and the ids of the data table's variables."""
 
 from typing import TYPE_CHECKING
 

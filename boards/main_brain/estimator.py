@@ -13,10 +13,11 @@ from typing import Final
 import cython
 from cython.cimports.libc.math import cos
 
-from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.command import variables_of
 from ranger_sim.boards.main_brain.filters import ButterworthFilter
 from ranger_sim.boards.main_brain.geometry import FloorGeometry
 from ranger_sim.datatable.generated import errors
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
 
 # Stages of the strike detector.
@@ -32,69 +33,6 @@ _NEWEST: cython.longlong = 2147483647
 # Counts of a pair's two sensors that mean contact. The robot's of 2016 is 850, where both together have 700 in swing
 # (robot.md C3.2); the emulated sensors have 700 each (plant/sensors/foot_sensor.py), so it is twice as much here.
 CONTACT_SUM = 1700.0
-
-READS = (
-    "TIMESTAMP",
-    "MCH_ANGLE",
-    "MCH_ANG_RATE",
-    "MCH_MOTOR_VELOCITY",
-    "MCFO_RIGHT_ANKLE_ANGLE",
-    "MCFI_MID_ANKLE_ANGLE",
-    "MCFO_LEFT_HEEL_SENSE",
-    "MCFO_RIGHT_HEEL_SENSE",
-    "MCFI_LEFT_HEEL_SENSE",
-    "MCFI_RIGHT_HEEL_SENSE",
-    "UI_ANG_RATE_X",
-    "UI_ROLL",
-    "MCH_BATT_POWER",
-    "MCFO_BATT_POWER",
-    "MCFI_BATT_POWER",
-    "MCSI_BATT_POWER",
-    "CSR_MCU_POWER",
-    "FSM_RESET",
-    "P_E_GYRO_BIAS",
-    "P_E_ROLL_BIAS",
-    "P_E_RESET",
-    "P_E_HS_THRESHOLD",
-    "P_E_HS_BASE_LIMIT",
-    "P_E_HS_TICKS",
-    "P_E_HS_H_ANG",
-    "P_E_HS_F_ANG",
-    "P_E_MIN_STEP_TIME",
-    "P_E_FALL_ANG",
-)
-WRITES = (
-    "E_MCH_ANG_RATE",
-    "E_H_MOTOR_RATE",
-    "E_LO_ANGLE",
-    "E_LI_ANGLE",
-    "E_LO_RATE",
-    "E_LI_RATE",
-    "E_FO_ABSANG",
-    "E_FI_ABSANG",
-    "E_SWING_LEG",
-    "E_T_AFTER_HS",
-    "E_HS_TIME",
-    "E_STEP_COUNT",
-    "E_DISTANCE",
-    "E_ANKLE_HEIGHT",
-    "E_SWING_HEIGHT",
-    "E_LO_ERROR",
-    "E_HEEL_BASE_LEFT",
-    "E_HEEL_BASE_RIGHT",
-    "E_HEEL_STAGE",
-    "EST_CONTACT_OUTER",
-    "EST_CONTACT_INNER",
-    "EST_LAST_STEP_LENGTH",
-    "EST_LAST_STEP_ANGLE",
-    "EST_LAST_STEP_DURATION",
-    "EST_TOTAL_BATT_POWER",
-    "EST_ENERGY_MCH",
-    "EST_ENERGY_MCFO",
-    "EST_ENERGY_MCFI",
-    "EST_ENERGY_MCSI",
-    "EST_ENERGY_OVERHEAD",
-)
 
 
 @cython.cclass
@@ -280,8 +218,64 @@ class Estimator:
         self.code_time_violation = errors.EST_FILTER_TIME_VIOLATION
         self.code_stutter = errors.EST_STUTTER_STEP
         self.code_fall = errors.EST_ROBOT_FALL
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.TIMESTAMP = table.TIMESTAMP
+        self.MCH_ANGLE = table.MCH_ANGLE
+        self.MCH_ANG_RATE = table.MCH_ANG_RATE
+        self.MCH_MOTOR_VELOCITY = table.MCH_MOTOR_VELOCITY
+        self.MCFO_RIGHT_ANKLE_ANGLE = table.MCFO_RIGHT_ANKLE_ANGLE
+        self.MCFI_MID_ANKLE_ANGLE = table.MCFI_MID_ANKLE_ANGLE
+        self.MCFO_LEFT_HEEL_SENSE = table.MCFO_LEFT_HEEL_SENSE
+        self.MCFO_RIGHT_HEEL_SENSE = table.MCFO_RIGHT_HEEL_SENSE
+        self.MCFI_LEFT_HEEL_SENSE = table.MCFI_LEFT_HEEL_SENSE
+        self.MCFI_RIGHT_HEEL_SENSE = table.MCFI_RIGHT_HEEL_SENSE
+        self.UI_ANG_RATE_X = table.UI_ANG_RATE_X
+        self.UI_ROLL = table.UI_ROLL
+        self.MCH_BATT_POWER = table.MCH_BATT_POWER
+        self.MCFO_BATT_POWER = table.MCFO_BATT_POWER
+        self.MCFI_BATT_POWER = table.MCFI_BATT_POWER
+        self.MCSI_BATT_POWER = table.MCSI_BATT_POWER
+        self.CSR_MCU_POWER = table.CSR_MCU_POWER
+        self.FSM_RESET = table.FSM_RESET
+        self.P_E_GYRO_BIAS = table.P_E_GYRO_BIAS
+        self.P_E_ROLL_BIAS = table.P_E_ROLL_BIAS
+        self.P_E_RESET = table.P_E_RESET
+        self.P_E_HS_THRESHOLD = table.P_E_HS_THRESHOLD
+        self.P_E_HS_BASE_LIMIT = table.P_E_HS_BASE_LIMIT
+        self.P_E_HS_TICKS = table.P_E_HS_TICKS
+        self.P_E_HS_H_ANG = table.P_E_HS_H_ANG
+        self.P_E_HS_F_ANG = table.P_E_HS_F_ANG
+        self.P_E_MIN_STEP_TIME = table.P_E_MIN_STEP_TIME
+        self.P_E_FALL_ANG = table.P_E_FALL_ANG
+        self.E_MCH_ANG_RATE = table.E_MCH_ANG_RATE
+        self.E_H_MOTOR_RATE = table.E_H_MOTOR_RATE
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.E_LI_ANGLE = table.E_LI_ANGLE
+        self.E_LO_RATE = table.E_LO_RATE
+        self.E_LI_RATE = table.E_LI_RATE
+        self.E_FO_ABSANG = table.E_FO_ABSANG
+        self.E_FI_ABSANG = table.E_FI_ABSANG
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_T_AFTER_HS = table.E_T_AFTER_HS
+        self.E_HS_TIME = table.E_HS_TIME
+        self.E_STEP_COUNT = table.E_STEP_COUNT
+        self.E_DISTANCE = table.E_DISTANCE
+        self.E_ANKLE_HEIGHT = table.E_ANKLE_HEIGHT
+        self.E_SWING_HEIGHT = table.E_SWING_HEIGHT
+        self.E_LO_ERROR = table.E_LO_ERROR
+        self.E_HEEL_BASE_LEFT = table.E_HEEL_BASE_LEFT
+        self.E_HEEL_BASE_RIGHT = table.E_HEEL_BASE_RIGHT
+        self.E_HEEL_STAGE = table.E_HEEL_STAGE
+        self.EST_CONTACT_OUTER = table.EST_CONTACT_OUTER
+        self.EST_CONTACT_INNER = table.EST_CONTACT_INNER
+        self.EST_LAST_STEP_LENGTH = table.EST_LAST_STEP_LENGTH
+        self.EST_LAST_STEP_ANGLE = table.EST_LAST_STEP_ANGLE
+        self.EST_LAST_STEP_DURATION = table.EST_LAST_STEP_DURATION
+        self.EST_TOTAL_BATT_POWER = table.EST_TOTAL_BATT_POWER
+        self.EST_ENERGY_MCH = table.EST_ENERGY_MCH
+        self.EST_ENERGY_MCFO = table.EST_ENERGY_MCFO
+        self.EST_ENERGY_MCFI = table.EST_ENERGY_MCFI
+        self.EST_ENERGY_MCSI = table.EST_ENERGY_MCSI
+        self.EST_ENERGY_OVERHEAD = table.EST_ENERGY_OVERHEAD
         self.per_tick_filter = quirks.rate_filter == "20_hz"
         self.use_filtered_sum = quirks.heel_strike == "filtered_sum"
         self.use_imu_roll = quirks.leg_angle == "imu_roll"
@@ -610,3 +604,6 @@ class Estimator:
         if lo > limit or lo < -limit or li > limit or li < -limit:
             self.fallen = True
             self.report(self.code_fall)
+
+
+READS = variables_of(Estimator)

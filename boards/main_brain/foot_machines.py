@@ -7,42 +7,11 @@ the inner feet start flipped down in the air, the outer ones start standing, and
 
 import cython
 
-from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id, variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
 
-COMMON = (
-    "MCH_ANGLE",
-    "E_SWING_LEG",
-    "E_ANKLE_HEIGHT",
-    "E_AM_L_ABSRATE",
-    "FSM_RESET",
-    "C_F_ST_F_ANG",
-    "C_F_ST_F_RATE",
-    "P_F_ST_F_TANG",
-    "C_F_PP_F_ANG",
-    "C_F_PP_F_RATE",
-    "P_F_PP_F_TANG",
-    "P_F_PP_FRAC_ANG",
-    "P_F_PP_F_ABSANG",
-    "C_F_FU_F_ANG",
-    "C_F_FU_F_RATE",
-    "P_F_FU_F_TANG",
-    "P_F_FU_H_ANG",
-    "P_F_FU_F_CABL_STRETCH",
-    "C_F_FD_F_ANG",
-    "C_F_FD_F_RATE",
-    "P_F_FD_F_TANG",
-    "C_F_SST_F_ANG",
-    "C_F_SST_F_RATE",
-    "P_F_SST_F_TANG",
-    "P_F_AP_TIME",
-    "D_F_ON",
-    "DP_F_PP_L_ABSRATE",
-    "DP_H_AM_L_ABSRATE",
-    "DC_F_PP_L_ABSRATE",
-    "DC_F_PP_L_ABSRATE2",
-)
 # Parameters that are separate for each pair.
 OF_ONE_PAIR = ("P_FO_PP_THEIGHT", "P_FI_PP_THEIGHT")
 
@@ -119,8 +88,36 @@ class FootMachine:
         self.wait_for_strike = quirks.push_correction_after_strike
         self.hip_sign = 1.0 if inner else -1.0
         self.own_swing = 1 if inner else 0  # value of E_SWING_LEG while the own legs swing
-        for name in COMMON:
-            setattr(self, name, table_id(name))
+        self.MCH_ANGLE = table.MCH_ANGLE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_ANKLE_HEIGHT = table.E_ANKLE_HEIGHT
+        self.E_AM_L_ABSRATE = table.E_AM_L_ABSRATE
+        self.FSM_RESET = table.FSM_RESET
+        self.C_F_ST_F_ANG = table.C_F_ST_F_ANG
+        self.C_F_ST_F_RATE = table.C_F_ST_F_RATE
+        self.P_F_ST_F_TANG = table.P_F_ST_F_TANG
+        self.C_F_PP_F_ANG = table.C_F_PP_F_ANG
+        self.C_F_PP_F_RATE = table.C_F_PP_F_RATE
+        self.P_F_PP_F_TANG = table.P_F_PP_F_TANG
+        self.P_F_PP_FRAC_ANG = table.P_F_PP_FRAC_ANG
+        self.P_F_PP_F_ABSANG = table.P_F_PP_F_ABSANG
+        self.C_F_FU_F_ANG = table.C_F_FU_F_ANG
+        self.C_F_FU_F_RATE = table.C_F_FU_F_RATE
+        self.P_F_FU_F_TANG = table.P_F_FU_F_TANG
+        self.P_F_FU_H_ANG = table.P_F_FU_H_ANG
+        self.P_F_FU_F_CABL_STRETCH = table.P_F_FU_F_CABL_STRETCH
+        self.C_F_FD_F_ANG = table.C_F_FD_F_ANG
+        self.C_F_FD_F_RATE = table.C_F_FD_F_RATE
+        self.P_F_FD_F_TANG = table.P_F_FD_F_TANG
+        self.C_F_SST_F_ANG = table.C_F_SST_F_ANG
+        self.C_F_SST_F_RATE = table.C_F_SST_F_RATE
+        self.P_F_SST_F_TANG = table.P_F_SST_F_TANG
+        self.P_F_AP_TIME = table.P_F_AP_TIME
+        self.D_F_ON = table.D_F_ON
+        self.DP_F_PP_L_ABSRATE = table.DP_F_PP_L_ABSRATE
+        self.DP_H_AM_L_ABSRATE = table.DP_H_AM_L_ABSRATE
+        self.DC_F_PP_L_ABSRATE = table.DC_F_PP_L_ABSRATE
+        self.DC_F_PP_L_ABSRATE2 = table.DC_F_PP_L_ABSRATE2
         self.motor_position = table_id(f"{board}_MOTOR_POSITION")
         self.ankle_angle = table_id(ankle)
         self.own_absolute = table_id(f"E_{own}_ABSANG")
@@ -341,3 +338,6 @@ class FootMachine:
     def own_leg_is_ahead(self) -> cython.bint:
         store: DataStore = self.store
         return self.hip_sign * store.get_float(self.MCH_ANGLE) > store.get_float(self.P_F_FU_H_ANG)
+
+
+READS = variables_of(FootMachine) + OF_ONE_PAIR

@@ -15,45 +15,14 @@ Leans are the estimator's, positive forward (robot.md C1.1); the firmware's angl
 import cython
 from cython.cimports.libc.math import sin
 
-from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id, variables_of
 from ranger_sim.boards.main_brain.head_walk import FLIGHT, INNER_PUSH, INNER_SWING, OUTER_PUSH, OUTER_SWING
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
 
 HIP_NM_PER_A = 1.188  # 0.018 N m/A times 66 (robot.md C2.2)
 ANKLE_NM_PER_A = 0.612  # 0.018 N m/A times 34
-
-HIP_READS = (
-    "E_LO_ANGLE",
-    "E_LI_ANGLE",
-    "E_LO_RATE",
-    "E_LI_RATE",
-    "FSM_LEG",
-    "FSM_RESET",
-    "CTRL_HIP_KP",
-    "CTRL_HIP_KD",
-    "CTRL_WALK_SCISSOR_GAIN",
-    "CTRL_WALK_SCISSOR_OFFSET",
-    "HD_H_HOLD",
-    "HD_H_SPRING",
-    "HD_H_GRAVITY",
-)
-ANKLE_READS = (
-    "FSM_LEG",
-    "FSM_RESET",
-    "CTRL_ANK_PUSH_KP",
-    "CTRL_ANK_PUSH_KD",
-    "CTRL_ANK_STANCE_KP",
-    "CTRL_ANK_STANCE_KD",
-    "CTRL_ANK_SWING_KP",
-    "CTRL_ANK_SWING_KD",
-    "HD_F_SPRING",
-    "HD_F_ZERO",
-    "HD_F_HOLD",
-    "HD_F_PUSH",
-    "HD_F_FLIP",
-)
-READS = HIP_READS + ANKLE_READS
 
 
 @cython.cclass
@@ -81,8 +50,19 @@ class HeadHip:
 
     def __init__(self, store) -> None:
         self.store = store
-        for name in HIP_READS:
-            setattr(self, name, table_id(name))
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.E_LI_ANGLE = table.E_LI_ANGLE
+        self.E_LO_RATE = table.E_LO_RATE
+        self.E_LI_RATE = table.E_LI_RATE
+        self.FSM_LEG = table.FSM_LEG
+        self.FSM_RESET = table.FSM_RESET
+        self.CTRL_HIP_KP = table.CTRL_HIP_KP
+        self.CTRL_HIP_KD = table.CTRL_HIP_KD
+        self.CTRL_WALK_SCISSOR_GAIN = table.CTRL_WALK_SCISSOR_GAIN
+        self.CTRL_WALK_SCISSOR_OFFSET = table.CTRL_WALK_SCISSOR_OFFSET
+        self.HD_H_HOLD = table.HD_H_HOLD
+        self.HD_H_SPRING = table.HD_H_SPRING
+        self.HD_H_GRAVITY = table.HD_H_GRAVITY
         self.state_number = table_id("FSM_HIP")
         motor: object = MotorCommand(store, "MCH")  # untyped, so that its methods are plain ones
         self.motor = motor
@@ -177,8 +157,19 @@ class HeadAnkle:
 
     def __init__(self, store, inner) -> None:
         self.store = store
-        for name in ANKLE_READS:
-            setattr(self, name, table_id(name))
+        self.FSM_LEG = table.FSM_LEG
+        self.FSM_RESET = table.FSM_RESET
+        self.CTRL_ANK_PUSH_KP = table.CTRL_ANK_PUSH_KP
+        self.CTRL_ANK_PUSH_KD = table.CTRL_ANK_PUSH_KD
+        self.CTRL_ANK_STANCE_KP = table.CTRL_ANK_STANCE_KP
+        self.CTRL_ANK_STANCE_KD = table.CTRL_ANK_STANCE_KD
+        self.CTRL_ANK_SWING_KP = table.CTRL_ANK_SWING_KP
+        self.CTRL_ANK_SWING_KD = table.CTRL_ANK_SWING_KD
+        self.HD_F_SPRING = table.HD_F_SPRING
+        self.HD_F_ZERO = table.HD_F_ZERO
+        self.HD_F_HOLD = table.HD_F_HOLD
+        self.HD_F_PUSH = table.HD_F_PUSH
+        self.HD_F_FLIP = table.HD_F_FLIP
         own = "FI" if inner else "FO"
         self.own_swing = INNER_SWING if inner else OUTER_SWING
         self.own_push = INNER_PUSH if inner else OUTER_PUSH
@@ -243,3 +234,6 @@ class HeadAnkle:
             stiffness,
             dampness,
         )
+
+
+READS = variables_of(HeadHip) + variables_of(HeadAnkle)

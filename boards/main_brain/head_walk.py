@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Final
 
 import cython
 
-from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.command import variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 
 if TYPE_CHECKING:
     from ranger_sim.datatable.store import DataStore
@@ -29,18 +30,6 @@ INNER_PUSH: Final = 4
 FLIGHT: Final = 5
 
 TICK_MS: Final = 2
-
-READS = (
-    "E_LO_ANGLE",
-    "EST_CONTACT_OUTER",
-    "EST_CONTACT_INNER",
-    "FSM_RESET",
-    "HD_TRANS_ANG",
-    "HD_CONTACT",
-    "HD_FLIGHT_TICKS",
-    "HD_SETUP_TIME",
-)
-WRITES = ("FSM_LEG",)
 
 
 @cython.cclass
@@ -64,8 +53,15 @@ class HeadWalkMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.EST_CONTACT_OUTER = table.EST_CONTACT_OUTER
+        self.EST_CONTACT_INNER = table.EST_CONTACT_INNER
+        self.FSM_RESET = table.FSM_RESET
+        self.HD_TRANS_ANG = table.HD_TRANS_ANG
+        self.HD_CONTACT = table.HD_CONTACT
+        self.HD_FLIGHT_TICKS = table.HD_FLIGHT_TICKS
+        self.HD_SETUP_TIME = table.HD_SETUP_TIME
+        self.FSM_LEG = table.FSM_LEG
         self.setup_ms = 0
         self.ticks_in_the_air = 0
         swing_states = ("inner_swing", "outer_push", "outer_swing", "inner_push")
@@ -156,3 +152,6 @@ class HeadWalkMachine:
     def outer_leg_leans_back(self) -> cython.bint:
         """th0 > trans."""
         return self.store.get_float(self.E_LO_ANGLE) < -self.store.get_float(self.HD_TRANS_ANG)
+
+
+READS = variables_of(HeadWalkMachine)

@@ -11,34 +11,10 @@ machine in premid until the stance leg is next upright.
 
 import cython
 
-from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.command import variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
-
-READS = (
-    "E_LO_ANGLE",
-    "E_LI_ANGLE",
-    "E_SWING_LEG",
-    "E_T_AFTER_HS",
-    "MCH_ANGLE",
-    "MCFO_RIGHT_ANKLE_RATE",
-    "MCFI_ANKLE_RATE",
-    "FSM_RESET",
-    "P_H_PM_F_RATE",
-    "P_L_START_ABSRATE",
-    "P_L_START_H_RATE",
-)
-WRITES = (
-    "E_AM_L_ABSRATE",
-    "E_AM_H_ANG",
-    "E_AM_H_RATE",
-    "E_AM_TIME",
-    "E_AM_TIMER",
-    "E_PS_TIME",
-    "E_SS_L_ANG",
-    "E_SS_L_ABSRATE",
-    "FSM_LEG",
-)
 
 
 @cython.cclass
@@ -187,8 +163,26 @@ class LegMachine:
 
     def __init__(self, store, quirks) -> None:
         self.store = store
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.E_LI_ANGLE = table.E_LI_ANGLE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_T_AFTER_HS = table.E_T_AFTER_HS
+        self.MCH_ANGLE = table.MCH_ANGLE
+        self.MCFO_RIGHT_ANKLE_RATE = table.MCFO_RIGHT_ANKLE_RATE
+        self.MCFI_ANKLE_RATE = table.MCFI_ANKLE_RATE
+        self.FSM_RESET = table.FSM_RESET
+        self.P_H_PM_F_RATE = table.P_H_PM_F_RATE
+        self.P_L_START_ABSRATE = table.P_L_START_ABSRATE
+        self.P_L_START_H_RATE = table.P_L_START_H_RATE
+        self.E_AM_L_ABSRATE = table.E_AM_L_ABSRATE
+        self.E_AM_H_ANG = table.E_AM_H_ANG
+        self.E_AM_H_RATE = table.E_AM_H_RATE
+        self.E_AM_TIME = table.E_AM_TIME
+        self.E_AM_TIMER = table.E_AM_TIMER
+        self.E_PS_TIME = table.E_PS_TIME
+        self.E_SS_L_ANG = table.E_SS_L_ANG
+        self.E_SS_L_ABSRATE = table.E_SS_L_ABSRATE
+        self.FSM_LEG = table.FSM_LEG
         outer: object = StanceLeg(self, self.E_LO_ANGLE, 1.0)  # untyped, so that its methods are plain ones
         inner: object = StanceLeg(self, self.E_LI_ANGLE, -1.0)
         self.outer = outer
@@ -286,3 +280,6 @@ class LegMachine:
     @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1
+
+
+READS = variables_of(LegMachine)

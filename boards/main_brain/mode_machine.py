@@ -14,6 +14,7 @@ from ranger_sim.boards.main_brain import programs
 from ranger_sim.boards.main_brain.command import table_id
 from ranger_sim.boards.main_brain.state_machine import State, StateMachine
 from ranger_sim.boards.main_brain.steering_machine import SteeringMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
 from ranger_sim.foundation.numbers import elapsed_u32
 
@@ -26,31 +27,6 @@ KEY_1: Final = 2
 KEY_2: Final = 4
 PAGES: Final = 3  # of the display while walking
 
-READS = (
-    "TIMESTAMP",
-    "UI_BUTTONS",
-    "MCH_BATT_VOLTAGE",
-    "E_STEP_COUNT",
-    "E_DISTANCE",
-    "E_SWING_LEG",
-    "E_FO_PP2HS_TIME",
-    "E_FI_PP2HS_TIME",
-    "P_UI_LCD_TIME",
-    "P_UI_SONG_STEPS",
-    "P_UI_PP2HS_TTIME",
-    "D_UI_STOP_ON_FALL",
-)
-WRITES = (
-    "FSM_UI",
-    "FSM_RESET",
-    "EST_UI_FSM_MODE",
-    "UI_SET_LED_1",
-    "UI_SET_LED_3",
-    "UI_EMPTY_TX2",
-    "MCSI_COMMAND_CURRENT",
-    "MCSI_STIFFNESS",
-    "MCSI_DAMPNESS",
-)
 LCD_QUADS = ("UI_SET_LCD_QUAD_1", "UI_SET_LCD_QUAD_2", "UI_SET_LCD_QUAD_3", "UI_SET_LCD_QUAD_4")
 
 # Colour words: red in the lowest byte, then green, then blue (robot.md N4.11, N6.4).
@@ -117,8 +93,27 @@ class ModeMachine:
     def __init__(self, store, quirks, estimator, program="record") -> None:
         self.store = store
         self.estimator = estimator
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.TIMESTAMP = table.TIMESTAMP
+        self.UI_BUTTONS = table.UI_BUTTONS
+        self.MCH_BATT_VOLTAGE = table.MCH_BATT_VOLTAGE
+        self.E_STEP_COUNT = table.E_STEP_COUNT
+        self.E_DISTANCE = table.E_DISTANCE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_FO_PP2HS_TIME = table.E_FO_PP2HS_TIME
+        self.E_FI_PP2HS_TIME = table.E_FI_PP2HS_TIME
+        self.P_UI_LCD_TIME = table.P_UI_LCD_TIME
+        self.P_UI_SONG_STEPS = table.P_UI_SONG_STEPS
+        self.P_UI_PP2HS_TTIME = table.P_UI_PP2HS_TTIME
+        self.D_UI_STOP_ON_FALL = table.D_UI_STOP_ON_FALL
+        self.FSM_UI = table.FSM_UI
+        self.FSM_RESET = table.FSM_RESET
+        self.EST_UI_FSM_MODE = table.EST_UI_FSM_MODE
+        self.UI_SET_LED_1 = table.UI_SET_LED_1
+        self.UI_SET_LED_3 = table.UI_SET_LED_3
+        self.UI_EMPTY_TX2 = table.UI_EMPTY_TX2
+        self.MCSI_COMMAND_CURRENT = table.MCSI_COMMAND_CURRENT
+        self.MCSI_STIFFNESS = table.MCSI_STIFFNESS
+        self.MCSI_DAMPNESS = table.MCSI_DAMPNESS
         self.leg, self.hip, self.inner_foot, self.outer_foot = programs.program(program).build(store, quirks)
         self.steering = SteeringMachine(store)
         walk_machines = (

@@ -4,7 +4,8 @@ A controller file says which one it is for (`program = "reflex"`), and has to gi
 what all share: estimator, steering, display. To add a program of your own:
 
 1. a module with its machines next to reflex_hip.py: tables of states and transitions (state_machine.py), and `READS`,
-   the variables that it reads. Without `import cython` it runs interpreted, together with compiled ones;
+   names of variables that it reads, its parameters among them (`variables_of` its class). Without `import cython` it
+   runs interpreted, next to compiled ones;
 2. its parameters as rows of datatable/master/variables.csv, published by PC for MB, then `ranger-sim table generate`;
 3. a function that builds its machines, and a line in PROGRAMS;
 4. a set in parameters/, or a file of your own: program, parameters, operator.
@@ -113,7 +114,7 @@ PROGRAMS = {
         Program(
             "record",
             "the machines of the 65 km walk of May 2011",
-            leg_machine.READS + hip_machine.READS + foot_machines.COMMON + foot_machines.OF_ONE_PAIR,
+            leg_machine.READS + hip_machine.READS + foot_machines.READS,
             record_machines,
         ),
         Program(

@@ -10,39 +10,10 @@ the inner ones come down as in a flip-down.
 
 import cython
 
-from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.command import MotorCommand, table_id, variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
-
-READS = (
-    "MCH_ANGLE",
-    "E_SWING_LEG",
-    "E_R_DW",
-    "FSM_RESET",
-    "C_F_SST_F_ANG",
-    "C_F_SST_F_RATE",
-    "P_F_SST_F_TANG",
-    "R_F_ST_I0",
-    "R_F_ST_KP",
-    "R_F_ST_KV",
-    "R_F_PP_PHI",
-    "R_F_PP_I0",
-    "R_F_PP_DW",
-    "R_F_PP_KV",
-    "R_F_PU_I0",
-    "R_F_PU_DW",
-    "R_F_PU_KV",
-    "R_F_PU_ANG",
-    "R_F_PU_TIME",
-    "R_F_FU_I0",
-    "R_F_FU_KP",
-    "R_F_FU_KV",
-    "R_F_FD_PHI",
-    "R_F_FD_Q3",
-    "R_F_FD_I0",
-    "R_F_FD_KP",
-    "R_F_FD_KV",
-)
 
 
 @cython.cclass
@@ -103,8 +74,33 @@ class ReflexFootMachine:
         self.hip_sign = 1.0 if inner else -1.0  # of the hip angle, positive while the own legs are ahead
         self.own_swing = 1 if inner else 0  # value of E_SWING_LEG while the own legs swing
         self.zero = 1.68  # rad (robot.md C1.1)
-        for name in READS:
-            setattr(self, name, table_id(name))
+        self.MCH_ANGLE = table.MCH_ANGLE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_R_DW = table.E_R_DW
+        self.FSM_RESET = table.FSM_RESET
+        self.C_F_SST_F_ANG = table.C_F_SST_F_ANG
+        self.C_F_SST_F_RATE = table.C_F_SST_F_RATE
+        self.P_F_SST_F_TANG = table.P_F_SST_F_TANG
+        self.R_F_ST_I0 = table.R_F_ST_I0
+        self.R_F_ST_KP = table.R_F_ST_KP
+        self.R_F_ST_KV = table.R_F_ST_KV
+        self.R_F_PP_PHI = table.R_F_PP_PHI
+        self.R_F_PP_I0 = table.R_F_PP_I0
+        self.R_F_PP_DW = table.R_F_PP_DW
+        self.R_F_PP_KV = table.R_F_PP_KV
+        self.R_F_PU_I0 = table.R_F_PU_I0
+        self.R_F_PU_DW = table.R_F_PU_DW
+        self.R_F_PU_KV = table.R_F_PU_KV
+        self.R_F_PU_ANG = table.R_F_PU_ANG
+        self.R_F_PU_TIME = table.R_F_PU_TIME
+        self.R_F_FU_I0 = table.R_F_FU_I0
+        self.R_F_FU_KP = table.R_F_FU_KP
+        self.R_F_FU_KV = table.R_F_FU_KV
+        self.R_F_FD_PHI = table.R_F_FD_PHI
+        self.R_F_FD_Q3 = table.R_F_FD_Q3
+        self.R_F_FD_I0 = table.R_F_FD_I0
+        self.R_F_FD_KP = table.R_F_FD_KP
+        self.R_F_FD_KV = table.R_F_FD_KV
         self.motor_position = table_id(f"{board}_MOTOR_POSITION")
         self.own_angle = table_id("E_LI_ANGLE" if inner else "E_LO_ANGLE")
         self.other_angle = table_id("E_LO_ANGLE" if inner else "E_LI_ANGLE")
@@ -257,3 +253,6 @@ class ReflexFootMachine:
         return -store.get_float(self.other_angle) < store.get_float(self.R_F_FD_PHI) and (
             -self.hip_sign * store.get_float(self.MCH_ANGLE) < store.get_float(self.R_F_FD_Q3)
         )
+
+
+READS = variables_of(ReflexFootMachine)

@@ -8,28 +8,10 @@ So K = -Kp and D = -Kv for either leg, and I0 changes its sign.
 
 import cython
 
-from ranger_sim.boards.main_brain.command import MotorCommand, table_id
+from ranger_sim.boards.main_brain.command import MotorCommand, variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 from ranger_sim.datatable.store import DataStore
-
-READS = (
-    "E_LO_ANGLE",
-    "E_LI_ANGLE",
-    "E_SWING_LEG",
-    "E_R_DW",
-    "FSM_RESET",
-    "C_HI_SH_H_ANG",
-    "C_HI_SH_H_RATE",
-    "P_HI_SH_H_TANG",
-    "R_H_SW_I0",
-    "R_H_SW_DW",
-    "R_H_PL_PHI",
-    "R_H_PL_I0",
-    "R_H_PL_DW",
-    "R_H_PL_KP",
-    "R_H_PL_KV",
-)
-WRITES = ("FSM_HIP",)
 
 
 @cython.cclass
@@ -59,8 +41,22 @@ class ReflexHipMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.E_LI_ANGLE = table.E_LI_ANGLE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.E_R_DW = table.E_R_DW
+        self.FSM_RESET = table.FSM_RESET
+        self.C_HI_SH_H_ANG = table.C_HI_SH_H_ANG
+        self.C_HI_SH_H_RATE = table.C_HI_SH_H_RATE
+        self.P_HI_SH_H_TANG = table.P_HI_SH_H_TANG
+        self.R_H_SW_I0 = table.R_H_SW_I0
+        self.R_H_SW_DW = table.R_H_SW_DW
+        self.R_H_PL_PHI = table.R_H_PL_PHI
+        self.R_H_PL_I0 = table.R_H_PL_I0
+        self.R_H_PL_DW = table.R_H_PL_DW
+        self.R_H_PL_KP = table.R_H_PL_KP
+        self.R_H_PL_KV = table.R_H_PL_KV
+        self.FSM_HIP = table.FSM_HIP
         motor: object = MotorCommand(store, "MCH")  # untyped, so that its methods are plain ones
         self.motor = motor
         self.machine = StateMachine(
@@ -156,3 +152,6 @@ class ReflexHipMachine:
     @cython.ccall
     def inner_stance_far_enough(self) -> cython.bint:
         return -self.store.get_float(self.E_LI_ANGLE) < self.store.get_float(self.R_H_PL_PHI)
+
+
+READS = variables_of(ReflexHipMachine)

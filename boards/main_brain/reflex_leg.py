@@ -12,23 +12,12 @@ from typing import TYPE_CHECKING
 
 import cython
 
-from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.command import variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 
 if TYPE_CHECKING:
     from ranger_sim.datatable.store import DataStore
-
-READS = (
-    "E_LO_ANGLE",
-    "E_LI_ANGLE",
-    "E_LO_RATE",
-    "E_LI_RATE",
-    "E_SWING_LEG",
-    "FSM_RESET",
-    "R_W_REF",
-    "R_DW_MAX",
-)
-WRITES = ("E_AM_L_ABSRATE", "E_R_DW", "FSM_LEG")
 
 
 @cython.cclass
@@ -52,8 +41,17 @@ class ReflexLegMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.E_LO_ANGLE = table.E_LO_ANGLE
+        self.E_LI_ANGLE = table.E_LI_ANGLE
+        self.E_LO_RATE = table.E_LO_RATE
+        self.E_LI_RATE = table.E_LI_RATE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.FSM_RESET = table.FSM_RESET
+        self.R_W_REF = table.R_W_REF
+        self.R_DW_MAX = table.R_DW_MAX
+        self.E_AM_L_ABSRATE = table.E_AM_L_ABSRATE
+        self.E_R_DW = table.E_R_DW
+        self.FSM_LEG = table.FSM_LEG
         self.machine = StateMachine(
             "leg",
             states=(
@@ -128,3 +126,6 @@ class ReflexLegMachine:
     @cython.ccall
     def outer_struck(self) -> cython.bint:
         return self.store.get_int(self.E_SWING_LEG) == 1
+
+
+READS = variables_of(ReflexLegMachine)

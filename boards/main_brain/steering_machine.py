@@ -9,25 +9,12 @@ from typing import TYPE_CHECKING
 
 import cython
 
-from ranger_sim.boards.main_brain.command import table_id
+from ranger_sim.boards.main_brain.command import variables_of
 from ranger_sim.boards.main_brain.state_machine import ANY, State, StateMachine
+from ranger_sim.datatable.generated import mb as table
 
 if TYPE_CHECKING:
     from ranger_sim.datatable.store import DataStore
-
-READS = (
-    "MCH_ANGLE",
-    "E_SWING_LEG",
-    "UI_RC_0",
-    "FSM_RESET",
-    "P_S_NULL_H_TANG",
-    "P_S_MAX_CUR",
-    "P_S_ILST_TWITCH_FRAC",
-    "P_S_ILST_TWITCH_TIME",
-    "P_S_RC_DEADBAND",
-    "D_S_SHUT_DOWN",
-)
-WRITES = ("MCSI_COMMAND_CURRENT", "MCSI_STIFFNESS", "MCSI_DAMPNESS", "MCSI_SHUTDOWN", "E_RC_STEER", "FSM_STEER")
 
 
 @cython.cclass
@@ -61,8 +48,22 @@ class SteeringMachine:
 
     def __init__(self, store) -> None:
         self.store = store
-        for name in READS + WRITES:
-            setattr(self, name, table_id(name))
+        self.MCH_ANGLE = table.MCH_ANGLE
+        self.E_SWING_LEG = table.E_SWING_LEG
+        self.UI_RC_0 = table.UI_RC_0
+        self.FSM_RESET = table.FSM_RESET
+        self.P_S_NULL_H_TANG = table.P_S_NULL_H_TANG
+        self.P_S_MAX_CUR = table.P_S_MAX_CUR
+        self.P_S_ILST_TWITCH_FRAC = table.P_S_ILST_TWITCH_FRAC
+        self.P_S_ILST_TWITCH_TIME = table.P_S_ILST_TWITCH_TIME
+        self.P_S_RC_DEADBAND = table.P_S_RC_DEADBAND
+        self.D_S_SHUT_DOWN = table.D_S_SHUT_DOWN
+        self.MCSI_COMMAND_CURRENT = table.MCSI_COMMAND_CURRENT
+        self.MCSI_STIFFNESS = table.MCSI_STIFFNESS
+        self.MCSI_DAMPNESS = table.MCSI_DAMPNESS
+        self.MCSI_SHUTDOWN = table.MCSI_SHUTDOWN
+        self.E_RC_STEER = table.E_RC_STEER
+        self.FSM_STEER = table.FSM_STEER
         self.twist = 0.0  # S, PWM counts
         self.ramp_start = 0.0
         self.ramp_change = 0.0
@@ -186,3 +187,6 @@ class SteeringMachine:
     @cython.ccall
     def inner_comes_forward(self) -> cython.bint:
         return self.store.get_float(self.MCH_ANGLE) > -self.store.get_float(self.P_S_NULL_H_TANG)
+
+
+READS = variables_of(SteeringMachine)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ranger_sim.boards.main_brain import hip_machine
+from ranger_sim.boards.main_brain.command import variables_of
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.generated import mb as table
 from tests.boards.main_brain_bench import Bench
@@ -161,11 +161,20 @@ def test_mid_stance_in_a_stopped_clock_does_not_divide_by_zero(bench):
 # --- hip machine ----------------------------------------------------------------------------------------
 
 
-def test_each_variable_of_the_hip_machine_has_the_id_of_its_name(bench):
-    names = hip_machine.READS
+@pytest.mark.parametrize("controller", ["record-2011", "reflex", "head-2015"])
+def test_each_variable_of_a_machine_has_the_id_of_its_name(controller):
+    bench = Bench(controller)
+    modes = bench.modes
+    for machine in (bench.estimator, modes, modes.leg, modes.hip, modes.inner_foot, modes.steering):
+        names = variables_of(type(machine))
+        assert names
+        assert {name: getattr(machine, name) for name in names} == {name: getattr(table, name) for name in names}
+
+
+def test_the_variables_of_the_hip_machine_are_its_48_fields_in_capitals(bench):
+    names = variables_of(type(bench.modes.hip))
     assert len(names) == 48
     assert {"MCH_ANGLE", "DC3_H_AM_H_RATE2", "FSM_HIP"} <= set(names)
-    assert {name: getattr(bench.modes.hip, name) for name in names} == {name: getattr(table, name) for name in names}
 
 
 def test_the_start_hold_keeps_the_inner_legs_ahead(bench):

@@ -115,7 +115,7 @@ def test_a_task_that_sends_though_its_schedule_says_it_does_not_is_named_as_a_mi
     robot = Ranger(Scenario())
     beat = chatty(robot.boards["MCH"])
     beat.speaks = False
-    robot.boards["MCH"].scheduler.lay(beat)
+    robot.boards["MCH"].scheduler.set_duration(beat)
     with pytest.raises(UserError, match="MCH: a frame was sent at [0-9]+ ns, but by its schedule's `speakers` none"):
         robot.run(StopRule(time_s=0.02), 1.0)
 
