@@ -24,7 +24,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "check-bus",
-        help="whether the CAN interfaces of a profile are ready",
         description="Interfaces there, up, bit rate as in the profile, state and error counters, traffic. Each failure "
         "comes with the command that mends it. Exit code 1 when there is one.",
     )

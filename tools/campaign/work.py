@@ -19,10 +19,10 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
-from ranger_sim.tools.command_line import interrupts, terminal
-from ranger_sim.tools.command_line.files import replace_file, writable_folder
+from ranger_sim.tools.command_line import interrupts, streams, terminal
+from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 
-TELL_EVERY_S = 10.0  # where there is no terminal for a progress bar
+PROGRESS_EVERY_S = 10.0  # where there is no terminal for a progress bar
 TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"
 TABLES_END = "<!-- end -->\n"
 ENCRYPTED = "tls://"
@@ -33,8 +33,13 @@ EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 
 def run(options: argparse.Namespace) -> int:
     """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
-    console = terminal.console(stderr=True)
+    console = terminal.for_progress(options)
+    json_file = json_target(options.json)
+    if options.replay and options.json:
+        raise UserError("--json: --replay prints one run; its result is in results.jsonl of the folder")
     wanted = plan.load(options.file)
+    if options.seed is not None:
+        wanted = wanted.with_seed(options.seed)
     check_scheduler(options)
     folder = writable_folder(options.out or pathlib.Path("runs") / "campaigns" / wanted.name)
     campaign = engine.Campaign(wanted, folder)
@@ -61,6 +66,10 @@ def run(options: argparse.Namespace) -> int:
         write(told, folder)
         if options.document:
             into_document(pathlib.Path(options.document), told)
+        if options.json == "-":
+            streams.print_result(text_of(told))
+        elif json_file is not None:
+            replace_file(json_file, (text_of(told) + "\n").encode())
         show(told, console)
         console.print(f"page: {folder / 'index.html'}", soft_wrap=True, highlight=False)
         return EXIT_UNSURE if any(told["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
@@ -88,11 +97,11 @@ def check_scheduler(options: argparse.Namespace) -> None:
             raise UserError(f"{option} {file}: no such file")
 
 
-def pool_of(options: argparse.Namespace, console: Console) -> Any:
+def pool_of(options: argparse.Namespace) -> Any:
     """Who does the runs: processes of this machine unless Dask is asked for."""
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.scheduler and not options.scheduler.startswith(ENCRYPTED):
-        console.print(
+        terminal.console(stderr=True).print(  # with --quiet as well
             f"warning: the Dask scheduler at {options.scheduler} is used without TLS: everyone who can reach it can "
             "run code on its workers and on this computer",
             highlight=False,
@@ -105,10 +114,10 @@ def pool_of(options: argparse.Namespace, console: Console) -> Any:
 
 
 def work(campaign: engine.Campaign, options: argparse.Namespace, console: Console) -> None:
-    """Run what is missing, with a progress bar, or a line every ten seconds where there is no terminal."""
+    """Run what is missing, with a progress bar, or lines where there is no terminal."""
     campaign.take_known()
     total, before = campaign.foreseen, len(campaign.cases)
-    pool = pool_of(options, console)
+    pool = pool_of(options)
     console.print(
         f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.told}"
         + (f"; {before} of them are there already" if before else ""),
@@ -116,7 +125,8 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
         soft_wrap=True,
     )
     begun = wallclock.monotonic_s()
-    tell_at = [begun + TELL_EVERY_S]
+    every_s = terminal.progress_every_s(options, PROGRESS_EVERY_S)
+    line_at = [begun + every_s]
     since: list[tuple[int, float]] = []  # (runs done, when) as the first result of a run came: healthy walks go before
     with Progress(
         BarColumn(bar_width=20),
@@ -135,8 +145,8 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
                 since.append((done, wallclock.monotonic_s()))
             progress.update(task, completed=done, latest=latest)
             now = wallclock.monotonic_s()
-            if not console.is_terminal and now >= tell_at[0]:
-                tell_at[0] = now + TELL_EVERY_S
+            if not console.is_terminal and now >= line_at[0]:
+                line_at[0] = now + every_s
                 left = ""
                 if since and done > since[0][0]:
                     left = f", {(total - done) * (now - since[0][1]) / (done - since[0][0]) / 60.0:.1f} min left"
@@ -148,10 +158,15 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
             pool.close()
 
 
+def text_of(told: dict[str, Any]) -> str:
+    """The summary as JSON."""
+    return json.dumps(told, indent=1)
+
+
 def write(told: dict[str, Any], folder: pathlib.Path) -> None:
     """Summary as JSON and Markdown, the runs as CSV, and the page."""
     rows = told["rows"]
-    replace_file(folder / "summary.json", (json.dumps(told, indent=1) + "\n").encode())
+    replace_file(folder / "summary.json", (text_of(told) + "\n").encode())
     columns: dict[str, None] = {}
     for row in rows:
         columns.update(dict.fromkeys(row))

@@ -13,7 +13,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "completion",
-        help="a script by which bash, zsh or fish finish commands, options and file names",
         description="Prints the script; docs/reference/commands.md says where each shell looks for it.",
     )
     command.add_argument("shell", choices=SHELLS, metavar="{" + ",".join(SHELLS) + "}", help="whose script")
