@@ -18,7 +18,7 @@ WIDE = 120  # columns of a window wide enough for descriptions
 
 def register(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the `table` command; each action sets `run`, a function of the arguments giving the exit code."""
-    parser = subparsers.add_parser("table", help="the master table of variables: generate code, look things up")
+    parser = subparsers.add_parser("table")
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
 
     generate = actions.add_parser("generate", help="write everything that is generated from the master table")

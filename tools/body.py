@@ -14,7 +14,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "body",
-        help="list the bodies, or show every number of one",
         description="A body is a .toml file: title, description, base, [parameters] and [sources].",
     )
     parts = command.add_subparsers(dest="part", required=True, metavar="list|show")

@@ -1,4 +1,4 @@
-"""The command `ranger-sim`: every subcommand is a module of this package (or the `cli` of another package)."""
+"""The command `ranger-sim`: its parser, made of the table of commands (commands.py), and what ends every command."""
 
 import argparse
 import contextlib
@@ -9,17 +9,22 @@ from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError, did_you_mean, printable
 from ranger_sim.tools.command_line import interrupts, libraries, streams
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
+from ranger_sim.tools.commands import COMMANDS, NAMED
 
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
 EXIT_MISUSE = 2
+EPILOG = (
+    "ranger-sim help COMMAND has the options of a command and examples.\n"
+    f"For developers: {', '.join(each.name for each in COMMANDS if each.is_for_developers)}."
+)
 
 
 class OneLineParser(argparse.ArgumentParser):
     """An argument parser with one-line errors; accepts `-1s` as a value, and options only by their full names."""
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:
-        super().__init__(*arguments, **{"allow_abbrev": False, **settings})
+        super().__init__(*arguments, **{"allow_abbrev": False, "formatter_class": HelpText, **settings})
         self._negative_number_matcher = NEGATIVE_VALUE  # argparse's own matches -1 and -0.5, not -1s
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -44,64 +49,45 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(EXIT_MISUSE, f"{self.prog}: {printable(message)} (see {self.prog} --help)\n")
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
-    from ranger_sim.datatable import cli as table_command
-    from ranger_sim.tools import body, faults, info
-    from ranger_sim.tools.bench import command as bench
-    from ranger_sim.tools.buses import bus, can_bounds, check_bus
-    from ranger_sim.tools.campaign import command as campaign
-    from ranger_sim.tools.command_line import completion
-    from ranger_sim.tools.compare_walk import command as compare_walk
-    from ranger_sim.tools.diagnose import causes
-    from ranger_sim.tools.diagnose import command as diagnose
-    from ranger_sim.tools.figures import command as figures
-    from ranger_sim.tools.firmware import command as firmware
-    from ranger_sim.tools.fmu import command as fmu
-    from ranger_sim.tools.identify import command as identify
-    from ranger_sim.tools.new import command as new
-    from ranger_sim.tools.panel import command as panel
-    from ranger_sim.tools.robodaq import command as daq
-    from ranger_sim.tools.run import ctl, summary_schema, up, walk
-    from ranger_sim.tools.timing import slots, trace
-    from ranger_sim.tools.tune import command as tune
-    from ranger_sim.tools.vm import command as vm
+class HelpText(argparse.HelpFormatter):
+    """As argparse's, but lines that begin with two spaces stay as they are: examples are copied whole."""
 
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        lines = text.splitlines()
+        return "\n".join(
+            each if each.startswith("  ") else super(HelpText, self)._fill_text(each, width, indent) for each in lines
+        )
+
+
+class CommandParsers(argparse._SubParsersAction):
+    """Parsers of the commands; help and examples come from the table of commands."""
+
+    def add_parser(self, name: str, **settings: Any) -> Any:
+        """Add the parser of a command of the table."""
+        command = NAMED[name]
+        if not command.is_for_developers:
+            settings["help"] = command.help
+        settings.setdefault("description", command.help)
+        if command.examples:
+            examples = "\n".join(f"  {line}" for line in ("examples:", *command.examples)).removeprefix("  ")
+            settings["epilog"] = "\n\n".join(filter(None, (settings.get("epilog"), examples)))
+        return super().add_parser(name, **settings)
+
+
+def parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The whole command line; with `command`, the options of that one, and only name and help of the others (quick)."""
     top = OneLineParser(
         prog="ranger-sim",
         description="The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one body.",
+        epilog=EPILOG,
     )
     top.add_argument("--version", action="version", version=f"ranger-sim {__version__}")
-    commands: Any = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    commands.add_parser("help", help="options of a command: ranger-sim help COMMAND")
-    walk.register(commands)
-    info.register(commands)
-    table_command.register(commands)
-    bench.register(commands)
-    trace.register(commands)
-    tune.register(commands)
-    up.register(commands)
-    ctl.register(commands)
-    body.register(commands)
-    bus.register(commands)
-    can_bounds.register(commands)
-    check_bus.register(commands)
-    daq.register(commands)
-    panel.register(commands)
-    vm.register(commands)
-    faults.register(commands)
-    firmware.register(commands)
-    new.register(commands)
-    slots.register(commands)
-    summary_schema.register(commands)
-    campaign.register(commands)
-    causes.register(commands)
-    diagnose.register(commands)
-    figures.register(commands)
-    fmu.register(commands)
-    identify.register(commands)
-    compare_walk.register(commands)
-    completion.register(commands, parser)
+    commands: Any = top.add_subparsers(dest="command", required=True, metavar="COMMAND", action=CommandParsers)
+    for each in COMMANDS:
+        if command is None or command == each.name:
+            each.register(commands)
+        else:
+            commands.add_parser(each.name)
     return top
 
 
@@ -113,11 +99,15 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return run(words)
     except ModuleNotFoundError as error:
-        command = next((word for word in words if not word.startswith("-")), "")
-        text = libraries.missing(error, command or "the command line")
+        text = libraries.missing(error, command_in(words) or "the command line")
         if text is None:
             raise
         return misuse(text)
+
+
+def command_in(words: list[str]) -> str:
+    """The command among the words; "" if there is none."""
+    return next((word for word in words if not word.startswith("-")), "")
 
 
 def run(arguments: list[str]) -> int:
@@ -126,8 +116,8 @@ def run(arguments: list[str]) -> int:
     if is_own_process:
         interrupts.end_in_order()
     try:
-        options = parser().parse_args(arguments)
-        options.arguments = arguments
+        options = parser(command_in(arguments)).parse_args(arguments)
+        options.arguments, options.parser = arguments, parser
         alone = streams.results_alone() if getattr(options, "json", None) == "-" else contextlib.nullcontext()
         with alone:
             code: int = options.run(options)

@@ -45,9 +45,7 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "faults",
-        help="list what can be made to fail, where, with which parameters",
         description="Without PLACE, all places and the modes of each; with PLACE, its modes and their parameters.",
-        epilog='ranger-sim walk --fault "MCH.joint_encoder:stuck@step 12..step 14" lets one act.',
     )
     command.add_argument("place", nargs="?", metavar="PLACE", help="a place, as MCH.joint_encoder")
     command.add_argument("--json", action="store_true", help="print JSON instead of tables")

@@ -15,7 +15,7 @@ from ranger_sim.tools.command_line import terminal
 
 def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
-    command = commands.add_parser("info", help="version, whether compiled, CAN interfaces, hash of the data table")
+    command = commands.add_parser("info")
     command.add_argument("--json", action="store_true", help="print JSON instead of a table")
     command.set_defaults(run=run)
 

@@ -156,6 +156,14 @@ class Plan:
         """census, sample or search."""
         return "sample" if self.sample else "search" if self.search else "census"
 
+    def with_seed(self, seed: int) -> "Plan":
+        """The plan whose sample or search draws with another seed. UserError for a census, which draws nothing."""
+        if self.sample is not None:
+            return dataclasses.replace(self, sample=dataclasses.replace(self.sample, seed=seed))
+        if self.search is not None:
+            return dataclasses.replace(self, search=dataclasses.replace(self.search, seed=seed))
+        raise UserError(f"--seed {seed}: {self.path} has neither [sample] nor [search]; a census draws nothing")
+
     def watch_key(self) -> dict[str, Any]:
         """The settings of monitoring that affect results."""
         found = self.watch.as_dict()

@@ -395,3 +395,15 @@ def refused(path, folder, *more):
     )
     assert done.returncode == 2 and "Traceback" not in done.stderr
     return done
+
+
+def test_json_prints_the_summary_of_the_folder_alone_and_a_census_takes_no_seed(few, tmp_path):
+    printed = run(few, tmp_path / "all", "--report", "--json", "-")
+    assert json.loads(printed.stdout) == json.loads((tmp_path / "all" / "summary.json").read_text(encoding="utf-8"))
+    assert printed.stderr == ""
+    run(few, tmp_path / "all", "--report", "--json", str(tmp_path / "all.json"))
+    assert (tmp_path / "all.json").read_bytes() == (tmp_path / "all" / "summary.json").read_bytes()
+    words = campaign_command(few, tmp_path / "all", "--seed", "7")
+    refused = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    assert refused.returncode == 2
+    assert refused.stderr == f"ranger-sim: --seed 7: {few} has neither [sample] nor [search]; a census draws nothing\n"

@@ -101,7 +101,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "bench",
-        help="how fast the whole robot and its parts are, how far it walks",
         description=f"Measurements by name. Without a name:\n{', '.join(TOGETHER)}.\n"
         "These are timed together; the others run alone, when they are named.",
         epilog="parts:\n" + named_lines({name: part.line for name, part in PARTS.items()}, 15),

@@ -22,7 +22,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "bus",
-        help="emulated CAN buses for programs of your own, without a robot",
         description="Emulated CAN buses for programs of your own, which attach by python-can, slcan or socketcand.",
     )
     command.add_argument("channel", nargs="*", default=["can1"], help="names of the buses (default can1)")

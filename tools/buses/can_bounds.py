@@ -27,7 +27,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "can-bounds",
-        help="how late every CAN frame can be: worst-case response times",
         description="Worst-case response times (Davis, Burns, Bril, Lukkien 2007) on the robot's buses, a profile's, "
         "or of the messages of a DBC file. Exit code 1 when something can miss its deadline.",
     )

@@ -24,7 +24,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "check-bus",
-        help="whether the CAN interfaces of a profile are ready",
         description="Checks each interface: present, up, bit rate of the profile, state and error counters, traffic. "
         "Prints a command that mends each failure. Exit code 1 when there is one.",
     )

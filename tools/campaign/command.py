@@ -3,14 +3,14 @@
 import argparse
 from typing import Any
 
-from ranger_sim.tools.command_line.units import whole_number
+from ranger_sim.tools.command_line.options import add_verbosity
+from ranger_sim.tools.command_line.units import whole_number, word
 
 
 def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "campaign",
-        help="run every fault of a plan, a grid or sample of settings, or a search for the worst case",
         description="Runs the cases of the plan that have no result yet, then writes tables and a page. After a "
         "kill, the same command continues.",
         epilog="The plan's form: harness/campaigns/README.md; examples: campaigns/.",
@@ -37,6 +37,16 @@ def register(commands: Any) -> None:
         "--document", metavar="FILE.md", help="also put the tables into this document, between its two marks"
     )
     command.add_argument("--replay", metavar="KEY", help="run one case again, from power-up, and print what happened")
+    command.add_argument(
+        "--seed", type=whole_number(0), metavar="N", help="what [sample] or [search] draws (default: the plan's seed)"
+    )
+    command.add_argument(
+        "--json",
+        type=word("a file or -"),
+        metavar="FILE|-",
+        help="the summary as JSON, as summary.json of the folder; - prints it and nothing else",
+    )
+    add_verbosity(command)
     command.set_defaults(run=run)
 
 

@@ -20,10 +20,10 @@ from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
 from ranger_sim.ranger.walks import REFERENCE
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
-from ranger_sim.tools.command_line import interrupts, terminal
-from ranger_sim.tools.command_line.files import replace_file, writable_folder
+from ranger_sim.tools.command_line import interrupts, streams, terminal
+from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 
-REPORT_EVERY_S = 10.0  # where there is no terminal for a progress bar
+PROGRESS_EVERY_S = 10.0  # where there is no terminal for a progress bar
 TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"
 TABLES_END = "<!-- end -->\n"
 ENCRYPTED = "tls://"
@@ -34,8 +34,13 @@ EXIT_UNSURE = 1  # a run crashed or timed out: its outcome is not known
 
 def run(options: argparse.Namespace) -> int:
     """Run the plan; 0 done, 1 when a run crashed or timed out, 130 interrupted."""
-    console = terminal.console(stderr=True)
+    console = terminal.for_progress(options)
+    json_file = json_target(options.json)
+    if options.replay and options.json:
+        raise UserError("--json: --replay prints one run; its result is in results.jsonl of the folder")
     wanted = plan.load(options.file, REFERENCE)
+    if options.seed is not None:
+        wanted = wanted.with_seed(options.seed)
     check_scheduler(options)
     folder = writable_folder(options.out or pathlib.Path("runs") / "campaigns" / wanted.name)
     campaign = engine.Campaign(wanted, folder)
@@ -62,6 +67,10 @@ def run(options: argparse.Namespace) -> int:
         write(results, folder)
         if options.document:
             into_document(pathlib.Path(options.document), results)
+        if options.json == "-":
+            streams.print_result(text_of(results))
+        elif json_file is not None:
+            replace_file(json_file, (text_of(results) + "\n").encode())
         show(results, console)
         console.print(f"page: {folder / 'index.html'}", soft_wrap=True, highlight=False)
         return EXIT_UNSURE if any(results["outcomes"][name]["count"] for name in ("crashed", "timed out")) else 0
@@ -89,11 +98,11 @@ def check_scheduler(options: argparse.Namespace) -> None:
             raise UserError(f"{option} {file}: no such file")
 
 
-def pool_of(options: argparse.Namespace, console: Console) -> Any:
+def pool_of(options: argparse.Namespace) -> Any:
     """The pool that does the runs: processes of this machine, or Dask on request."""
     jobs = options.jobs or len(os.sched_getaffinity(0))
     if options.scheduler and not options.scheduler.startswith(ENCRYPTED):
-        console.print(
+        terminal.console(stderr=True).print(  # with --quiet as well
             f"warning: the Dask scheduler at {options.scheduler} is used without TLS: any client that reaches it can "
             "run code on its workers and on this computer",
             highlight=False,
@@ -106,10 +115,10 @@ def pool_of(options: argparse.Namespace, console: Console) -> Any:
 
 
 def work(campaign: engine.Campaign, options: argparse.Namespace, console: Console) -> None:
-    """Run what is missing, with a progress bar, or a line every ten seconds where there is no terminal."""
+    """Run what is missing, with a progress bar, or lines where there is no terminal."""
     campaign.take_known()
     total, before = campaign.foreseen, len(campaign.cases)
-    pool = pool_of(options, console)
+    pool = pool_of(options)
     console.print(
         f"{campaign.plan.title}: {campaign.plan.design} of {total} runs on {pool.description}"
         + (f"; {before} of them have results already" if before else ""),
@@ -117,7 +126,8 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
         soft_wrap=True,
     )
     begun = wallclock.monotonic_s()
-    report_at = [begun + REPORT_EVERY_S]
+    every_s = terminal.progress_every_s(options, PROGRESS_EVERY_S)
+    line_at = [begun + every_s]
     since: list[tuple[int, float]] = []  # (runs done, when) as the first result of a run came: healthy walks go before
     with Progress(
         BarColumn(bar_width=20),
@@ -136,8 +146,8 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
                 since.append((done, wallclock.monotonic_s()))
             progress.update(task, completed=done, latest=latest)
             now = wallclock.monotonic_s()
-            if not console.is_terminal and now >= report_at[0]:
-                report_at[0] = now + REPORT_EVERY_S
+            if not console.is_terminal and now >= line_at[0]:
+                line_at[0] = now + every_s
                 left = ""
                 if since and done > since[0][0]:
                     left = f", {(total - done) * (now - since[0][1]) / (done - since[0][0]) / 60.0:.1f} min left"
@@ -149,10 +159,15 @@ def work(campaign: engine.Campaign, options: argparse.Namespace, console: Consol
             pool.close()
 
 
+def text_of(results: dict[str, Any]) -> str:
+    """The summary as JSON."""
+    return json.dumps(results, indent=1)
+
+
 def write(results: dict[str, Any], folder: pathlib.Path) -> None:
     """Summary as JSON and Markdown, the runs as CSV, and the page."""
     rows = results["rows"]
-    replace_file(folder / "summary.json", (json.dumps(results, indent=1) + "\n").encode())
+    replace_file(folder / "summary.json", (text_of(results) + "\n").encode())
     columns: dict[str, None] = {}
     for row in rows:
         columns.update(dict.fromkeys(row))

@@ -60,6 +60,17 @@ class Option:
         return [f"{self.name}={text}"] if text.startswith("-") else [self.name, text]
 
 
+def add_verbosity(command: Any) -> None:
+    """-q and -v, of every command that prints progress."""
+    group = command.add_mutually_exclusive_group()
+    group.add_argument(
+        "-q", "--quiet", action="store_true", help="print no progress and no notes; exit code and files have the result"
+    )
+    group.add_argument(
+        "-v", "--verbose", action="store_true", help="print a line of progress every second where there is no terminal"
+    )
+
+
 def add_all(command: Any, options: Sequence[Option]) -> None:
     """Add a table of options to a parser or a group."""
     for option in options:

@@ -1,5 +1,6 @@
 """The console that commands print on. streams.py has the streams below it."""
 
+import argparse
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +9,10 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
+from ranger_sim.foundation import wallclock
+
 UNLIMITED = 10_000  # columns: more than any table of ours
+VERBOSE_S = 1.0  # between two lines of progress with --verbose
 FILE_COLUMNS = 160  # for lines in a file or a pipe, which have no window width: tables stay whole
 
 
@@ -29,6 +33,31 @@ def console(**settings: Any) -> Console:
     if not made.is_terminal and "COLUMNS" not in os.environ:
         made.width = FILE_COLUMNS
     return made
+
+
+def for_progress(options: argparse.Namespace) -> Console:
+    """The console for progress and notes, on standard error; silent with --quiet and `--json -`."""
+    return console(stderr=True, quiet=options.quiet or options.json == "-")
+
+
+def progress_every_s(options: argparse.Namespace, usual_s: float) -> float:
+    """Seconds between two lines of progress where there is no terminal."""
+    return VERBOSE_S if options.verbose else usual_s
+
+
+class ProgressLines:
+    """Lines of progress where there is no terminal: with --verbose one every second at most, otherwise none."""
+
+    def __init__(self, console: Console, options: argparse.Namespace) -> None:
+        self.console = console
+        self.is_wanted = options.verbose and not console.is_terminal
+        self.next_s = 0.0
+
+    def show(self, text: str) -> None:
+        """Print it if one is due."""
+        if self.is_wanted and wallclock.monotonic_s() >= self.next_s:
+            self.next_s = wallclock.monotonic_s() + VERBOSE_S
+            self.console.print(text, highlight=False, soft_wrap=True)
 
 
 def print_table(console: Console, table: Table, spare: Sequence[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from ranger_sim.tools.command_line.options import add_verbosity
 from ranger_sim.tools.command_line.units import ANGLES, whole_number
 from ranger_sim.tools.recordings import datasets
 from ranger_sim.tools.run.walk_options import of_scenario
@@ -14,7 +15,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "compare-walk",
-        help="a walk that the robot logged, compared with the emulated robot's under the same controller",
         description="Takes the strides of a logged walk of the controller of 2015 (hip angle, outer leg's lean, state "
         "of the walk machine), lets the emulated robot walk, and reports what differs, with intervals from their "
         "scatter. With --causes it names the wrong numbers that would explain it, and what they gain on strides held "
@@ -45,6 +45,7 @@ def register(commands: Any) -> None:
     command.add_argument("--out", metavar="DIR", help="folder for the plot, the answer, and the extended files")
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
     datasets.add_options(command)
+    add_verbosity(command)
     command.set_defaults(run=run)
 
 

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare; 0 alike, 1 different."""
     folder = writable_folder(options.out) if options.out else None
     json_file = json_target(options.json)
-    console = terminal.console(stderr=True, quiet=options.json == "-")
+    console = terminal.for_progress(options)
     scenario = Scenario(
         controller=options.controller,
         body=options.body,
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     )
     measured, findings = read(options)
     emulator = emulate.Emulator(scenario, options.steps)
-    with progress_of(console) as progress:
+    with shown(terminal.ProgressLines(console, options)) as progress:
         answer = compare(options.log, measured, emulator, options.causes, progress)
     answer["data_findings"] = [sanity.as_json(each) for each in findings]
     if folder is not None:
@@ -82,12 +82,12 @@ def read(options: argparse.Namespace) -> tuple[gait.Walk, list[Finding]]:
 
 
 @contextlib.contextmanager
-def progress_of(console: Console) -> Iterator[Any]:
-    """A line that names the present walk, on a terminal."""
-    if not console.is_terminal:
-        yield lambda text: None
+def shown(lines: terminal.ProgressLines) -> Iterator[Any]:
+    """Shows which walk is walked: in one place of a screen, or in lines."""
+    if not lines.console.is_terminal:
+        yield lambda text: lines.show(f"walking: {text}")
         return
-    with console.status("walking ...") as status:
+    with lines.console.status("walking ...") as status:
         yield lambda text: status.update(f"walking: {text}")
 
 

@@ -26,10 +26,8 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "causes",
-        help="list what can make a simulation differ from a machine, and what given channels can show of it",
         description="Without --experiment the catalogue of causes. With it: which causes its channels can show and "
         "distinguish, before any data are taken.",
-        epilog="ranger-sim causes --experiment motor-bench --channels voltage_V current_A speed_rad_per_s",
     )
     command.add_argument("cause", nargs="?", metavar="CAUSE", help="everything about one cause")
     command.add_argument("--experiment", metavar="NAME", help=f"one of {', '.join(channels.EXPERIMENTS)}")

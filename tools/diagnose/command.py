@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.tools.command_line.options import add_verbosity
 from ranger_sim.tools.command_line.units import number, whole_number
 from ranger_sim.tools.recordings import datasets
 
@@ -14,11 +15,9 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "diagnose",
-        help="what the simulation gets wrong about measured data",
         description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
         "says that it cannot, and measures what the extended model gains on held-out data. Exit code 0: nothing was "
         "found; 1: something was; 2: a mistake, or data that contradict their own description.",
-        epilog="ranger-sim diagnose run1.csv --holdout run2.csv --experiment motor-bench --out found",
     )
     command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
     command.add_argument(
@@ -58,6 +57,7 @@ def register(commands: Any) -> None:
     )
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
     datasets.add_options(command)
+    add_verbosity(command)
     command.set_defaults(run=run)
 
 

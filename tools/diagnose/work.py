@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
     """The command."""
     target = json_target(options.json)
     folder = writable_folder(options.out) if options.out else None
-    screen = terminal.console(stderr=True)
+    screen = terminal.for_progress(options)
+    lines = terminal.ProgressLines(screen, options)
     bar = Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
@@ -47,7 +48,12 @@ def run(options: argparse.Namespace) -> int:
     )
     with bar:
         task = bar.add_task("recordings", total=1.0)
-        found = of_options(options, lambda what, share: bar.update(task, description=what, completed=share))
+
+        def progress(what: str, share: float) -> None:
+            bar.update(task, description=what, completed=share)
+            lines.show(f"{what}, {share:.0%}")
+
+        found = of_options(options, progress)
         if folder is not None:
             bar.update(task, description="report")
             write(found, folder, printable(shlex.join(["ranger-sim", *sys.argv[1:]])))

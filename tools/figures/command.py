@@ -3,6 +3,7 @@
 import argparse
 from typing import Any
 
+from ranger_sim.tools.command_line.options import add_verbosity
 from ranger_sim.tools.command_line.units import whole_number
 
 
@@ -10,7 +11,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "diagnose-figures",
-        help="which number of the simulated robot is wrong, from a few published or measured figures",
         description="Walks the emulated robot with each number of the file changed, finds which of them explain the "
         "measured figures, with values and intervals, what ties, and which further measurement would decide. Exit "
         "code 1 when something was found.",
@@ -50,6 +50,7 @@ def register(commands: Any) -> None:
         "--out", metavar="DIR", help="folder for the answer, the corrected body, and the walks: it goes on from those"
     )
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
+    add_verbosity(command)
     command.set_defaults(run=run)
 
 

@@ -34,16 +34,17 @@ def run(options: argparse.Namespace) -> int:
     target = json_target(options.json)
     folder = writable_folder(options.out) if options.out else None
     setup, question = asked(options)
-    console = terminal.console(stderr=True)
-    if not loading.RUNS_COMPILED and options.json != "-":
+    console = terminal.for_progress(options)
+    lines = terminal.ProgressLines(console, options)
+    if not loading.RUNS_COMPILED:
         console.print(f"running interpreted, slowly: {loading.RUNS_INTERPRETED_BECAUSE}", soft_wrap=True)
     walks = Walks(setup, question.candidates, options.jobs, folder)
     rounds = ROUNDS if options.rounds is None else options.rounds
     if options.hide:
-        answer: dict[str, Any] = {"blind": [blind(walks, question, each, rounds, console) for each in options.hide]}
+        answer: dict[str, Any] = {"blind": [blind(walks, question, each, rounds, lines) for each in options.hide]}
         detected = any(each["answer"]["detected"] for each in answer["blind"])
     else:
-        found = with_progress(walks, question, rounds, console, question.title)
+        found = with_progress(walks, question, rounds, lines, question.title)
         answer, detected = found.answer, found.answer["detected"]
         if folder is not None and answer["causes"]:
             answer["model_file"] = corrected(folder, walks, values_of(answer))
@@ -110,21 +111,24 @@ def _within(key: body_files.Key, number: float) -> bool:
     return bool(low <= number <= high)
 
 
-def with_progress(walks: Walks, question: Question, rounds: int, console: Console, title: str) -> Diagnosis:
-    """The diagnosis, with a bar on the screen."""
+def with_progress(
+    walks: Walks, question: Question, rounds: int, lines: terminal.ProgressLines, title: str
+) -> Diagnosis:
+    """The diagnosis, with a bar on the screen or lines."""
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TextColumn("walks"),
         TimeElapsedColumn(),
-        console=console,
-        disable=not console.is_terminal,
+        console=lines.console,
+        disable=not lines.console.is_terminal,
     ) as progress:
         task = progress.add_task(title, total=None)
 
         def report(done: int, foreseen: int, what: str) -> None:
             progress.update(task, completed=done, total=foreseen, description=f"{title}: {what}")
+            lines.show(f"{title}: {what}, {done} of {foreseen} walks")
 
         seeds = range(1, walks.setup.seeds + 1)
         return note_starts(diagnose(question, walks, seeds, report, rounds))
@@ -142,7 +146,7 @@ def note_starts(found: Diagnosis) -> Diagnosis:
     return found
 
 
-def blind(walks: Walks, question: Question, text: str, rounds: int, console: Console) -> dict[str, Any]:
+def blind(walks: Walks, question: Question, text: str, rounds: int, lines: terminal.ProgressLines) -> dict[str, Any]:
     """Blind check: a wrong number hidden in the body that walks, and the diagnosis from the figures of that walk.
 
     The figures keep the errors of their measurement. The simulator errs nowhere else here, so model_sd is left out; the
@@ -165,7 +169,7 @@ def blind(walks: Walks, question: Question, text: str, rounds: int, console: Con
         figures.append(
             dataclasses.replace(each, value=float(np.mean(values)), model_sd=scatter, source=f"of a robot with {text}")
         )
-    found = with_progress(walks, dataclasses.replace(question, figures=tuple(figures)), rounds, console, text)
+    found = with_progress(walks, dataclasses.replace(question, figures=tuple(figures)), rounds, lines, text)
     return {"hidden": text, "candidate": name, "truth": value, "answer": found.answer}
 
 

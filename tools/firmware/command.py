@@ -62,7 +62,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "firmware",
-        help="compile a board's firmware from C for this computer or for the chip",
         description="Firmware in C against the header ranger_sim/firmware.h; walk or up --firmware BOARD=DIR runs it.",
     )
     parts = command.add_subparsers(dest="part", required=True, metavar="build|include")

@@ -28,7 +28,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "fmu",
-        help="write the body as a unit for co-simulation (FMI 3.0)",
         description="The body with motors, drives, battery and sensors as a functional mock-up unit: its inputs are "
         "what the boards put out, its outputs what the sensors see. The options give its parameters' start values.",
     )

@@ -28,7 +28,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "identify",
-        help="a bench's recording: motor and body parameters with confidence intervals",
         description="Benches: " + "; ".join(f"{name}: {meaning}" for name, meaning in BENCHES.items()),
     )
     command.add_argument("bench", metavar="BENCH", help=f"{', '.join(BENCHES)}, or all: tables 2 and 3")

@@ -36,7 +36,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "new",
-        help="write a project for a machine of your own to start from",
         description="Two boards in C, a body, a master table, tests and a campaign. `pytest` in DIR passes at once.",
         epilog="docs/how-to/machine.md goes through it; examples/servo is a larger one.",
     )

@@ -33,7 +33,6 @@ def register(commands: Any) -> None:
     """Add the subcommand."""
     command = commands.add_parser(
         "panel",
-        help="RoboDAQ and the robot's front panel in a browser: a running robot, a data link, recordings",
         description="Without RECORDING: the robot that `up` runs (--name), a new one (--walk), or a serial port "
         "with the data link (--port). A second RECORDING is laid over the first.",
     )

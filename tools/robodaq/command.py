@@ -46,7 +46,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "daq",
-        help="log a robot over its serial line, read and write its parameters",
         description="The computer's end of the robot's data link. Without --time it ends when every request is "
         "done, or with Ctrl-C.",
     )

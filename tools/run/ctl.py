@@ -26,7 +26,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     ctl = commands.add_parser(
         "ctl",
-        help="look at, pause, resume or change a robot that `up` runs",
         description="status, pause, resume; restart BOARD; key N: press a key for 0.2 s (1: walk; 2: stop, and a "
         "walking robot falls); set NAME VALUE: write a parameter, within its limits (ranger-sim table show NAME); "
         "fault PLACE:MODE: arm a fault, as --fault of `up` has it; clear N: end the fault that was armed as number N, "

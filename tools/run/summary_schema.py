@@ -17,9 +17,7 @@ TABLE_END = "<!-- written by python -m ranger_sim.tools.run.summary_schema: end 
 
 def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
-    command = commands.add_parser(
-        "summary-schema", help="JSON Schema of summary.json: type, unit and meaning of every figure"
-    )
+    command = commands.add_parser("summary-schema")
     command.set_defaults(run=run)
 
 

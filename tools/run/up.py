@@ -34,7 +34,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     up = commands.add_parser(
         "up",
-        help="let Ranger walk in real time, each board a process of its own",
         description="One process for each board and one for the body. Without an end it walks until Ctrl-C.",
     )
     walk_options.add_run_options(up)
@@ -115,5 +114,5 @@ def run(options: argparse.Namespace) -> int:
     plan = plan_of(options)
     if options.out:
         writable_folder(options.out)
-    console = terminal.console(stderr=True, quiet=options.json == "-")
+    console = terminal.for_progress(options)
     return Execution(plan, options, json_target(options.json), console).run()

@@ -26,14 +26,14 @@ from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.timeline import Timeline
 from ranger_sim.tools import faults
 from ranger_sim.tools.buses import bus
-from ranger_sim.tools.command_line import interrupts
+from ranger_sim.tools.command_line import interrupts, terminal
 from ranger_sim.tools.firmware import gdb_options
 from ranger_sim.tools.firmware.images import images_of
 from ranger_sim.tools.run import serial_options, walk, walk_options
 from ranger_sim.tools.run.folder import RunFolder
 from ranger_sim.tools.run.logs import PrintedFiles, RunLogs
 from ranger_sim.tools.run.up_plan import OutsideBus, Plan
-from ranger_sim.tools.run.up_view import LiveView, PlainView, print_processes
+from ranger_sim.tools.run.up_view import PLAIN_S, LiveView, PlainView, print_processes
 from ranger_sim.tools.timing import trace
 
 
@@ -47,7 +47,9 @@ class Execution:
         self.options = options
         self.json_file = json_file
         self.console = console
-        self.view = LiveView(console) if console.is_terminal else PlainView(console)
+        every_s = terminal.progress_every_s(options, PLAIN_S)
+        is_drawn = console.is_terminal and not console.quiet
+        self.view = LiveView(console) if is_drawn else PlainView(console, every_s)
         # opened before the processes start
         self.printed: Printed | None = None
         self.folder: RunFolder | None = None

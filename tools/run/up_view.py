@@ -53,8 +53,9 @@ def lateness_table(lateness: dict) -> Table:
 class PlainView(View):
     """Lines for where there is no terminal."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, every_s: float = PLAIN_S) -> None:
         self.console = console
+        self.every_s = every_s
         self.next_s = 0.0
 
     def show(self, state: dict) -> None:
@@ -62,7 +63,7 @@ class PlainView(View):
         now = wallclock.monotonic_s()
         if now < self.next_s or "time_s" not in state:
             return
-        self.next_s = now + PLAIN_S
+        self.next_s = now + self.every_s
         loads = " ".join(f"{100.0 * each['load']:.0f}" for each in state["buses"].values())
         late = max((each["lateness"]["p99_us"] or 0.0) for each in state["boards"].values())
         expected = (RUNNING, ELSEWHERE)

@@ -50,7 +50,7 @@ __all__ = ["walk", "write_frames"]
 DEFAULT_STEPS = 100
 EXIT_INCOMPLETE = 2  # a requested file is not whole: the disk is full
 SLICE_S = 0.05  # virtual seconds between two checks of the screen and of Ctrl-C
-REPORT_EVERY_S = 60.0  # of the wall clock: a line of progress if there is no screen to draw it on (chosen by us)
+PROGRESS_EVERY_S = 60.0  # of the wall clock: a line of progress if there is no screen to draw it on (chosen by us)
 PACED_SLICE_S = 0.005  # the same when a serial port is connected: the longest time that a byte waits
 
 
@@ -58,7 +58,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "walk",
-        help="let Ranger walk in virtual time, as fast as it goes",
         description="All seven boards, four buses and the body in virtual time. Without an end it walks 100 steps.",
     )
     add_walk_options(command)
@@ -102,8 +101,7 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
     if options.out:
         writable_folder(options.out)
     json_file = json_target(options.json)
-    quiet = options.json == "-"
-    console = terminal.console(stderr=True, quiet=quiet)
+    console = terminal.for_progress(options)
     if options.log and not options.out:
         console.print(f"--log {options.log} is ignored: there is no folder for logs (--out DIR)", soft_wrap=True)
     quirks = serial_options.quirks_of(options)
@@ -141,7 +139,8 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
             logs = logs_of(robot, options, folder)
             if servers:
                 servers[0].wait_for_debugger()
-            walk(robot, stop, console, interrupted, paced=bool(ends))
+            every_s = terminal.progress_every_s(options, PROGRESS_EVERY_S)
+            walk(robot, stop, console, interrupted, paced=bool(ends), every_s=every_s)
             for line in serial_options.report(ends):
                 console.print(line, highlight=False, soft_wrap=True)
             summary = {**robot.summary(), "interrupted": bool(interrupted)}
@@ -281,35 +280,43 @@ def finish(
     return folder.is_complete
 
 
-def walk(robot: Ranger, stop: StopRule, console: Console, interrupted: list[bool], paced: bool = False) -> None:
+def walk(
+    robot: Ranger,
+    stop: StopRule,
+    console: Console,
+    interrupted: list[bool],
+    paced: bool = False,
+    every_s: float = PROGRESS_EVERY_S,
+) -> None:
     """Run until the stop rule, a fall, empty batteries, or Ctrl-C (at least one slice, so that files have something).
 
-    paced: not faster than the wall clock, because an external program takes part.
+    paced: not faster than the wall clock, because an external program takes part. every_s: of the wall clock between
+    two lines of progress where there is no terminal.
     """
     started = wallclock.monotonic_s()
     with Progress(
         SpinnerColumn(),
         BarColumn(bar_width=20),
-        TextColumn("{task.fields[shown]}"),
+        TextColumn("{task.fields[progress]}"),
         console=console,
         transient=False,
         disable=not console.is_terminal,
     ) as progress:
-        task = progress.add_task("walk", total=1.0, shown="")
-        report_at = started + REPORT_EVERY_S
-        done, shown = False, 0
+        task = progress.add_task("walk", total=1.0, progress="")
+        line_at = started + every_s
+        done, reported = False, 0
         while not done:
             done = robot.run(stop, PACED_SLICE_S if paced else SLICE_S) or bool(interrupted)
-            for death in robot.deaths[shown:]:
-                shown += 1
+            for death in robot.deaths[reported:]:
+                reported += 1
                 console.print(loss_text(death), highlight=False, soft_wrap=True)
             wall = wallclock.monotonic_s() - started
             if paced and not done and robot.time_s > wall:
                 wallclock.sleep_s(robot.time_s - wall)
             if console.is_terminal:
-                progress.update(task, completed=robot.fraction_done(stop), shown=progress_text(robot, stop, wall))
-            elif started + wall >= report_at:
-                report_at += REPORT_EVERY_S
+                progress.update(task, completed=robot.fraction_done(stop), progress=progress_text(robot, stop, wall))
+            elif started + wall >= line_at:
+                line_at += every_s
                 console.print(progress_text(robot, stop, wall), highlight=False, soft_wrap=True)
 
 

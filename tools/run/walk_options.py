@@ -8,7 +8,7 @@ from ranger_sim.harness.stop_rule import MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_
 from ranger_sim.plant.electrics.electronics import SWITCHES
 from ranger_sim.ranger.scenario import LIMITS, Scenario
 from ranger_sim.tools import faults
-from ranger_sim.tools.command_line.options import Option, add_all
+from ranger_sim.tools.command_line.options import Option, add_all, add_verbosity
 from ranger_sim.tools.command_line.units import (
     ANGLES,
     ENERGIES_WH,
@@ -153,6 +153,7 @@ WALK = (
 def add_run_options(command: Any) -> None:
     """The options of every command that lets the robot walk: which end, which scenario, which files."""
     add_all(command, RUN)
+    add_verbosity(command)
     serial_options.add_options(command)
 
 

@@ -32,7 +32,6 @@ def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "slots",
-        help="slot timing of the boards: costs, limits, worst seen and worst possible",
         description="The schedule of a board, line by line, in cycles: what each function costs, may cost, cost at "
         "most in a run of the robot, and can cost at most; then rows with their margins, and interrupts. The robot's "
         "own figures are next to them (docs/robot.md T). Exit code 1 when a slot of the run overran.",

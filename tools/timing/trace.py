@@ -92,7 +92,7 @@ def write(timeline: Timeline | None, given: argparse.Namespace, console: Console
 
 def register(commands: Any) -> None:
     """Add the subcommand to the command line."""
-    command = commands.add_parser("trace", help="show a timeline that `walk --trace FILE` has written")
+    command = commands.add_parser("trace")
     actions = command.add_subparsers(dest="action", required=True, metavar="ACTION")
     opening = actions.add_parser(
         "open",

@@ -120,7 +120,6 @@ def register(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     command = commands.add_parser(
         "tune",
-        help="search for better controller parameters by walking the whole robot",
         description="The best set is written as a .toml file, by `evolution` after each generation.",
     )
     command.add_argument("--method", choices=("pattern", "evolution"), default="pattern", help="default pattern")

@@ -18,7 +18,6 @@ def register(commands: Any) -> None:
     default = machine.Guest()
     command = commands.add_parser(
         "vm",
-        help="run a command in a small virtual machine that has SocketCAN",
         usage="ranger-sim vm [options] -- COMMAND [ARGUMENT ...]",
         description="Boots Debian's kernel under software emulation and runs COMMAND in it, in this folder and among "
         "the files of this machine, with vcan0 ... vcan3 up and two Kvaser adapters on one bus as can0 and can1. "

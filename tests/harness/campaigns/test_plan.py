@@ -226,3 +226,14 @@ def test_the_sensors_campaign_has_every_sensor_and_every_mode_that_it_takes():
         for mode in CATALOGUE.modes_of(place)
     }
     assert found == expected and len(found) > 300
+
+
+def test_another_seed_draws_other_runs_of_a_sample_and_of_a_search_and_a_census_refuses_it():
+    roughness = {"floor_roughness": {"low": "0 mm", "high": "4 mm"}}
+    sample = made(vary=roughness, sample={"runs": 5})
+    assert sample.with_seed(1).cases() == sample.cases()  # the plan's own
+    assert sample.with_seed(7).cases() != sample.cases()
+    assert sample.with_seed(7).cases() == made(vary=roughness, sample={"runs": 5, "seed": 7}).cases()
+    assert made(vary=roughness, search={"first": 3}).with_seed(7).search.seed == 7
+    with pytest.raises(UserError, match=r"--seed 7: test.toml has neither \[sample\] nor \[search\]"):
+        made(vary={"seed": [1, 2]}).with_seed(7)

@@ -1,18 +1,45 @@
-"""The command line starts without the libraries that a walk does not need."""
+"""The command line starts without what the requested command does not need."""
 
 import subprocess
 import sys
 
 LARGE = "cantools cffi h11 perfetto plotly elftools vcd scipy shtab starlette uvicorn websockets".split()
+OF_A_WALK = "can numpy rich ranger_sim.harness ranger_sim.plant ranger_sim.boards ranger_sim.datatable".split()
 
-PROGRAM = """
+PARSER = """
 import sys
 from ranger_sim.tools.cli import parser
 parser()
 print(sorted({name.partition(".")[0] for name in sys.modules} & set(sys.argv[1:])))
 """
+LINE = """
+import contextlib, io, sys
+from ranger_sim.tools import cli
+names, words = sys.argv[1].split(), sys.argv[2:]
+nowhere = io.StringIO()
+with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere), contextlib.suppress(SystemExit):
+    cli.main(words)
+sys.__stderr__.write(" ".join(name for name in names if name in sys.modules))
+"""
+
+
+def loaded(names, *words):
+    """Which of these modules a command line loads."""
+    done = subprocess.run([sys.executable, "-c", LINE, " ".join(names), *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stderr
 
 
 def test_the_options_are_known_before_any_large_library_is_loaded():
-    done = subprocess.run([sys.executable, "-c", PROGRAM, *LARGE], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", PARSER, *LARGE], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_version_help_and_a_mistyped_command_load_nothing_of_a_robot():
+    for words in (["--version"], ["--help"], ["help"], ["wlak"]):
+        assert loaded(OF_A_WALK, *words) == "", words
+
+
+def test_the_options_of_a_command_load_no_other_command():
+    others = ["ranger_sim.tools.diagnose.command", "ranger_sim.tools.panel.command", "ranger_sim.tools.run.up"]
+    assert loaded([*others, "ranger_sim.tools.run.walk"], "walk", "--help") == "ranger_sim.tools.run.walk"

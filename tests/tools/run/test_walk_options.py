@@ -44,11 +44,12 @@ def walk_parser():
     return commands.choices["walk"]
 
 
+VERBOSITY = {"-q", "--quiet", "-v", "--verbose"}  # of what is printed, not of the run
 PARSER = walk_parser()
 
 
 def test_every_option_of_walk_is_in_the_table():
-    parsed = {text for action in PARSER._actions for text in action.option_strings} - {"-h", "--help"}
+    parsed = {text for action in PARSER._actions for text in action.option_strings} - {"-h", "--help", *VERBOSITY}
     assert parsed == {option.name for option in WALK}
     assert set(VALUES) == {option.key for option in WALK if option.of_run}
 
