@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import sys
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 from ranger_sim import __version__
@@ -10,6 +11,7 @@ from ranger_sim.foundation.user_error import UserError, did_you_mean, printable
 from ranger_sim.tools.command_line import interrupts, libraries, streams
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 
+PROGRAM = "ranger-sim"
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
 EXIT_MISUSE = 2
@@ -52,10 +54,8 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.buses import bus, can_bounds, check_bus
     from ranger_sim.tools.campaign import command as campaign
     from ranger_sim.tools.command_line import completion
-    from ranger_sim.tools.compare_walk import command as compare_walk
     from ranger_sim.tools.diagnose import causes
     from ranger_sim.tools.diagnose import command as diagnose
-    from ranger_sim.tools.figures import command as figures
     from ranger_sim.tools.firmware import command as firmware
     from ranger_sim.tools.fmu import command as fmu
     from ranger_sim.tools.identify import command as identify
@@ -64,11 +64,9 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.robodaq import command as daq
     from ranger_sim.tools.run import summary_schema, up, walk
     from ranger_sim.tools.timing import slots, trace
-    from ranger_sim.tools.tune import command as tune
-    from ranger_sim.tools.vm import command as vm
 
     top = OneLineParser(
-        prog="ranger-sim",
+        prog=PROGRAM,
         description="The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one body.",
     )
     top.add_argument("--version", action="version", version=f"ranger-sim {__version__}")
@@ -79,7 +77,6 @@ def parser() -> argparse.ArgumentParser:
     table_command.register(commands)
     bench.register(commands)
     trace.register(commands)
-    tune.register(commands)
     up.register(commands)
     body.register(commands)
     bus.register(commands)
@@ -87,7 +84,6 @@ def parser() -> argparse.ArgumentParser:
     check_bus.register(commands)
     daq.register(commands)
     panel.register(commands)
-    vm.register(commands)
     faults.register(commands)
     firmware.register(commands)
     new.register(commands)
@@ -96,36 +92,39 @@ def parser() -> argparse.ArgumentParser:
     campaign.register(commands)
     causes.register(commands)
     diagnose.register(commands)
-    figures.register(commands)
     fmu.register(commands)
     identify.register(commands)
-    compare_walk.register(commands)
     completion.register(commands, parser)
     return top
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns the process's exit code. A missing library is one line and code 2."""
+def main(
+    arguments: list[str] | None = None, make: Callable[[], argparse.ArgumentParser] = parser, program: str = PROGRAM
+) -> int:
+    """Run one command; returns the process's exit code. A missing library is one line and code 2.
+
+    make, program: the parser and the name of another program with the same habits.
+    """
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["help"]:
         words = [*words[1:], "--help"]
     try:
-        return run(words)
+        return run(words, make, program)
     except ModuleNotFoundError as error:
         command = next((word for word in words if not word.startswith("-")), "")
-        text = libraries.missing(error, command or "the command line")
+        text = libraries.missing(error, (command if program == PROGRAM else program) or "the command line")
         if text is None:
             raise
-        return misuse(text)
+        return misuse(text, program)
 
 
-def run(arguments: list[str]) -> int:
+def run(arguments: list[str], make: Callable[[], argparse.ArgumentParser] = parser, program: str = PROGRAM) -> int:
     """As `main`, with every library installed. A user's mistake is one line and code 2."""
     is_own_process = streams.take_over()
     if is_own_process:
         interrupts.end_in_order()
     try:
-        options = parser().parse_args(arguments)
+        options = make().parse_args(arguments)
         options.arguments = arguments
         alone = streams.results_alone() if getattr(options, "json", None) == "-" else contextlib.nullcontext()
         with alone:
@@ -133,22 +132,23 @@ def run(arguments: list[str]) -> int:
         sys.stdout.flush()
         return code
     except UserError as mistake:
-        return misuse(str(mistake))
+        return misuse(str(mistake), program)
     except KeyboardInterrupt:
         if is_own_process:
             interrupts.end_at_once()
-        print("ranger-sim: interrupted", file=sys.stderr)
+        print(f"{program}: interrupted", file=sys.stderr)
         return interrupts.EXIT_INTERRUPTED
     except OSError as error:  # a full disk, a folder that vanished: a failure of the machine, not of the program
         place = error.filename or ("standard output" if streams.is_stuck() else None)
-        return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
+        text = f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"
+        return misuse(printable(text), program)
     except MemoryError:
-        return misuse(f"{options.command}: out of memory")
+        return misuse(f"{options.command}: out of memory" if program == PROGRAM else "out of memory", program)
 
 
-def misuse(text: str) -> int:
+def misuse(text: str, program: str = PROGRAM) -> int:
     """Print an error on standard error."""
-    print(f"ranger-sim: {text}", file=sys.stderr)
+    print(f"{program}: {text}", file=sys.stderr)
     return EXIT_MISUSE
 
 

@@ -55,7 +55,7 @@ def run(cases: int, seed: int = 1) -> dict[str, int]:
             try:
                 profile.load(path, interfaces=lambda: INTERFACES)
                 passed += 1
-            except profile.ProfileError as error:
+            except profile.FaultyProfileError as error:
                 refused += 1
                 faults += len(error.faults)
                 if not error.faults or len(str(error).splitlines()) != len(error.faults):

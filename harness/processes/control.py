@@ -5,8 +5,8 @@ import socket
 from collections.abc import Callable
 from typing import Any
 
+from ranger_sim.can_bus.edge.peers import LIMITS, REASONS, Door, Peer, SocketStream, connected
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import LIMITS, REASONS, Door, Peer, SocketStream, connected
 from ranger_sim.foundation.user_error import RequestError, UserError
 from ranger_sim.harness.processes.requests import Request, admitted
 

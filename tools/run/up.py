@@ -13,9 +13,9 @@ from rich.live import Live
 from rich.table import Table
 
 from ranger_sim import loading
+from ranger_sim.can_bus.edge.peers import told
 from ranger_sim.datatable.addresses import XCP_BUS, XCP_MASTER_ID, XCP_SLAVE_ID
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import told
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
 from ranger_sim.harness.feed.server import FeedServer
