@@ -2,7 +2,7 @@
 # make test-interpreted: the packages' own tests on the plain sources, where compiled modules run in `make test`; and nine
 #   scenarios compiled and interpreted, to the byte.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
-# make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (tools/vm/README.md).
+# make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (dev/vm/README.md).
 PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100

@@ -31,7 +31,7 @@ include_patterns = [
     "plant/EQUATIONS.md",
     "sysid/README.md",
     "tests/blind/README.md",
-    "tools/vm/README.md",
+    "dev/vm/README.md",
 ]
 exclude_patterns = ["**/.*", ".venv", "build"]
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinxarg.ext", "sphinx_copybutton"]

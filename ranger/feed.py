@@ -10,7 +10,7 @@ from collections import Counter
 from typing import Any
 
 from ranger_sim import datatable
-from ranger_sim.foundation.peers import LIMITS, MALFORMED, REASONS, Peer, PeerServer, SocketStream
+from ranger_sim.can_bus.edge.peers import LIMITS, MALFORMED, REASONS, Peer, PeerServer, SocketStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
 from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names

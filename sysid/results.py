@@ -210,7 +210,8 @@ class FittedParameter:
 @dataclasses.dataclass(frozen=True)
 class Separability:
     """What a recording determines. singular_values: of the scaled sensitivities; not_separable: pairs of parameters
-    with |cos|, the worst first; sensitivity: by parameter, root mean square of the residual's change per step of it."""
+    with the size of the cosine, the worst first; sensitivity: by parameter, root mean square of the residual's change
+    per step of it."""
 
     singular_values: tuple[float, ...]
     not_separable: tuple[tuple[str, str, float], ...]

@@ -12,7 +12,7 @@ from ranger_sim.loading import packages
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROBOT = ROOT / "docs" / "robot.md"
-FOLDERS = (*packages(), "dev", "ranger_sim", "profiles", "benchmarks", "tests", "docs")
+FOLDERS = (*packages(), "dev", "studies", "ranger_sim", "profiles", "benchmarks", "tests", "docs")
 READ = {".py", ".pxd", ".md", ".toml", ".csv", ".h", ".dbc", ".js", ".css", ".html", ".sh"}
 
 PARAGRAPH = r"[BNCPWT]\d+(?:\.\d+)?"
@@ -156,7 +156,7 @@ def test_files_that_a_document_names_exist(document):
 
 
 def test_the_figure_of_the_record_walk_is_drawn_out_of_the_walks_that_are_kept():
-    program = runpy.run_path(str(ROOT / "docs" / "record_walk_figure.py"))
+    program = runpy.run_path(str(ROOT / "studies" / "pictures" / "record_walk.py"))
     assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
     level = program["walks"](program["NOW"])
     assert [row["seed"] for row in level] == list(range(1, 21))
@@ -164,12 +164,12 @@ def test_the_figure_of_the_record_walk_is_drawn_out_of_the_walks_that_are_kept()
 
 
 def test_the_figure_of_the_foot_that_is_too_high_is_drawn_from_the_answers_that_are_kept():
-    program = runpy.run_path(str(ROOT / "docs" / "foot_too_high_figure.py"))
+    program = runpy.run_path(str(ROOT / "studies" / "pictures" / "foot_too_high.py"))
     assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
 
 
 def test_the_figure_of_the_timeline_is_drawn_out_of_the_step_that_is_kept():
-    program = runpy.run_path(str(ROOT / "docs" / "timeline_figure.py"))
+    program = runpy.run_path(str(ROOT / "studies" / "pictures" / "timeline.py"))
     assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
     kept = json.loads(program["STEP_FILE"].read_text(encoding="utf-8"))
     order = [kept["stations"][station][0] for station, _, _ in program["WAY"]]
@@ -177,7 +177,7 @@ def test_the_figure_of_the_timeline_is_drawn_out_of_the_step_that_is_kept():
 
 
 def test_the_figure_and_the_table_of_the_walk_of_2015_are_those_of_the_answer_that_is_kept():
-    program = runpy.run_path(str(ROOT / "docs" / "walk_2015_figure.py"))
+    program = runpy.run_path(str(ROOT / "studies" / "pictures" / "walk_2015.py"))
     assert program["FIGURE"].read_text(encoding="utf-8") == program["draw"]()
     answer = json.loads(program["ANSWER"].read_text(encoding="utf-8"))
     page = (ROOT / "docs" / "walk-2015.md").read_text(encoding="utf-8")

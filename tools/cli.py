@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import sys
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 from ranger_sim import __version__
@@ -11,6 +12,7 @@ from ranger_sim.tools.command_line import interrupts, libraries, streams
 from ranger_sim.tools.command_line.units import NEGATIVE_VALUE
 from ranger_sim.tools.commands import COMMANDS, NAMED
 
+PROGRAM = "ranger-sim"
 EXIT_DONE = 0
 EXIT_FELL = 1  # the robot fell or a board failed
 EXIT_MISUSE = 2
@@ -77,7 +79,7 @@ class CommandParsers(argparse._SubParsersAction):
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """The whole command line; with `command`, the options of that one, and only name and help of the others (quick)."""
     top = OneLineParser(
-        prog="ranger-sim",
+        prog=PROGRAM,
         description="The Cornell Ranger biped emulated whole: seven boards' firmware, four CAN buses, one body.",
         epilog=EPILOG,
     )
@@ -91,18 +93,25 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     return top
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns the process's exit code. A missing library is one line and code 2."""
+def main(
+    arguments: list[str] | None = None,
+    make: Callable[[str], argparse.ArgumentParser] = parser,
+    program: str = PROGRAM,
+) -> int:
+    """Run one command; returns the process's exit code. A missing library is one line and code 2.
+
+    make(command), program: the parser and the name of another program with the same habits.
+    """
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["help"]:
         words = [*words[1:], "--help"]
     try:
-        return run(words)
+        return run(words, make, program)
     except ModuleNotFoundError as error:
-        text = libraries.missing(error, command_in(words) or "the command line")
+        text = libraries.missing(error, (command_in(words) if program == PROGRAM else program) or "the command line")
         if text is None:
             raise
-        return misuse(text)
+        return misuse(text, program)
 
 
 def command_in(words: list[str]) -> str:
@@ -110,13 +119,13 @@ def command_in(words: list[str]) -> str:
     return next((word for word in words if not word.startswith("-")), "")
 
 
-def run(arguments: list[str]) -> int:
+def run(arguments: list[str], make: Callable[[str], argparse.ArgumentParser] = parser, program: str = PROGRAM) -> int:
     """As `main`, with every library installed. A user's mistake is one line and code 2."""
     is_own_process = streams.take_over()
     if is_own_process:
         interrupts.end_in_order()
     try:
-        options = parser(command_in(arguments)).parse_args(arguments)
+        options = make(command_in(arguments)).parse_args(arguments)
         options.arguments, options.parser = arguments, parser
         alone = streams.results_alone() if getattr(options, "json", None) == "-" else contextlib.nullcontext()
         with alone:
@@ -124,22 +133,23 @@ def run(arguments: list[str]) -> int:
         sys.stdout.flush()
         return code
     except UserError as mistake:
-        return misuse(str(mistake))
+        return misuse(str(mistake), program)
     except KeyboardInterrupt:
         if is_own_process:
             interrupts.end_at_once()
-        print("ranger-sim: interrupted", file=sys.stderr)
+        print(f"{program}: interrupted", file=sys.stderr)
         return interrupts.EXIT_INTERRUPTED
     except OSError as error:  # a full disk, a folder that vanished: a failure of the machine, not of the program
         place = error.filename or ("standard output" if streams.is_stuck() else None)
-        return misuse(printable(f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"))
+        text = f"{place}: {error.strerror or error}" if place else f"{error.strerror or error}"
+        return misuse(printable(text), program)
     except MemoryError:
-        return misuse(f"{options.command}: out of memory")
+        return misuse(f"{options.command}: out of memory" if program == PROGRAM else "out of memory", program)
 
 
-def misuse(text: str) -> int:
+def misuse(text: str, program: str = PROGRAM) -> int:
     """Print an error on standard error."""
-    print(f"ranger-sim: {text}", file=sys.stderr)
+    print(f"{program}: {text}", file=sys.stderr)
     return EXIT_MISUSE
 
 

@@ -66,13 +66,6 @@ COMMANDS = (
         ("ranger-sim walk --steps 5 --trace walk.pftrace", "ranger-sim trace open walk.pftrace --at 2.5s"),
     ),
     Command(
-        "tune",
-        "tools.tune.command",
-        "search for better controller parameters by walking the whole robot",
-        ("ranger-sim tune --base robust --method evolution --generations 5 --out better.toml",),
-        is_for_developers=True,
-    ),
-    Command(
         "up",
         "tools.run.up",
         "let Ranger walk in real time, each board a process of its own",
@@ -126,13 +119,6 @@ COMMANDS = (
         "tools.panel.command",
         "RoboDAQ and the robot's front panel in a browser: a running robot, a data link, recordings",
         ("ranger-sim panel --walk", "ranger-sim panel runs/before runs/after"),
-    ),
-    Command(
-        "vm",
-        "tools.vm.command",
-        "run a command in a small virtual machine that has SocketCAN",
-        ("ranger-sim vm -- ranger-sim up --bus can1=socketcan:vcan0 --steps 5",),
-        is_for_developers=True,
     ),
     Command(
         "faults",
@@ -189,12 +175,6 @@ COMMANDS = (
         ("ranger-sim diagnose run1.csv --holdout run2.csv --experiment motor-bench --out found",),
     ),
     Command(
-        "diagnose-figures",
-        "tools.figures.command",
-        "which number of the simulated robot is wrong, from a few published or measured figures",
-        ("ranger-sim diagnose-figures figures.toml --steps 60 --out found",),
-    ),
-    Command(
         "fmu",
         "tools.fmu.command",
         "write the body as a unit for co-simulation (FMI 3.0)",
@@ -205,12 +185,6 @@ COMMANDS = (
         "tools.identify.command",
         "a bench's recording: motor and body parameters with confidence intervals",
         ("ranger-sim identify all --out found", "ranger-sim identify motor --data motor.csv --json -"),
-    ),
-    Command(
-        "compare-walk",
-        "tools.compare_walk.command",
-        "a logged walk compared with the emulated robot's, with the same controller",
-        ("ranger-sim compare-walk walk.txt --causes --out found",),
     ),
     Command(
         "completion",

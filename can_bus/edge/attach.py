@@ -1,7 +1,7 @@
 """Server on an abstract unix socket, through which other processes attach to emulated buses.
 
 It has no thread and never blocks: the process that owns the buses polls it. Bad input from a client can only end that
-client's connection; `foundation/peers.py` limits its requests.
+client's connection; `can_bus/edge/peers.py` limits its requests.
 """
 
 import errno
@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, MalformedError
+from ranger_sim.can_bus.edge.peers import FOREIGN, FULL, LIMITS, MALFORMED, REASONS, SocketStream
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import (
     DROPPED,
@@ -23,7 +24,6 @@ from ranger_sim.can_bus.edge.taps import (
     Taps,
     fault_of_frame,
 )
-from ranger_sim.foundation.peers import FOREIGN, FULL, LIMITS, MALFORMED, REASONS, SocketStream
 from ranger_sim.foundation.user_error import BusError
 
 __all__ = ["DEFAULT_NAME", "AttachServer"]

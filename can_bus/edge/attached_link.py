@@ -16,6 +16,7 @@ from ranger_sim.can_bus.edge.links import (
     Link,
     LinkError,
 )
+from ranger_sim.can_bus.edge.peers import connected
 from ranger_sim.can_bus.edge.taps import (
     DROPPED,
     ERROR_ACTIVE,
@@ -28,7 +29,6 @@ from ranger_sim.can_bus.edge.taps import (
     overflow_frame,
 )
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import connected
 from ranger_sim.foundation.user_error import BusError, UserError
 
 HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started, on a slow machine after half a minute

@@ -124,7 +124,7 @@ def hint_for(error: Exception, keywords: dict[str, Any]) -> str:
         channel = keywords.get("channel", "vcan0")
         return f" (`ip link add {channel} type vcan && ip link set {channel} up` makes a virtual one)"
     if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
-        return " (this kernel has no SocketCAN; `ranger-sim vm` has one)"
+        return " (this kernel has no SocketCAN; `python -m dev.vm` has one)"
     return ""
 
 

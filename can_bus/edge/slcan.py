@@ -7,11 +7,11 @@ C (close), t T r R (send), F (status), V v N (version, serial number), Z (stamps
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.can_bus.edge.peers import FULL, Terminal
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.peers import FULL, Terminal
 
 STAMP_WRAP_MS = 60_000  # LAWICEL: stamps of 16 bits run from 0 to 59999 ms
 OK, BELL = b"\r", b"\a"

@@ -1,6 +1,6 @@
 """Common base of the bus servers: peers whose nodes are on buses, polled by the process that owns the buses.
 
-`foundation/peers.py` limits every peer. `attach.py`, `socketcand.py` and `slcan.py` define the protocols.
+`can_bus/edge/peers.py` limits every peer. `attach.py`, `socketcand.py` and `slcan.py` define the protocols.
 """
 
 import math
@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import TypeVar
 
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.edge.peers import ARRIVALS_PER_S, REASONS, Peer, PeerServer, Stream
 from ranger_sim.can_bus.edge.taps import Tap, Taps, taps_of
-from ranger_sim.foundation.peers import ARRIVALS_PER_S, REASONS, Peer, PeerServer, Stream
 
 HELD_ABOVE = 1 << 16  # bytes waiting for a client above which a bus at full speed waits for it
 NEXT_POLL_NS = 1_000_000  # while nothing waits; chosen by us: an external frame then waits 1 ms at most

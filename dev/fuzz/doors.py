@@ -22,11 +22,11 @@ from ranger_sim import datatable
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.peers import PeerServer
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.can_bus.edge.taps import TAP_LIMIT, Taps
 from ranger_sim.foundation.events import STAGE_BUS, EventQueue
-from ranger_sim.foundation.peers import PeerServer
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.processes.control import ControlServer, address
 from ranger_sim.ranger.requests import Request, admitted

@@ -15,8 +15,8 @@ from contextlib import closing, suppress
 from typing import Any
 
 from dev.fuzz import Connection, Finding
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.datatable import parameters
-from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.faults.catalogue import MODES

@@ -13,10 +13,10 @@ import struct
 from typing import Any
 
 from dev.fuzz import Finding
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import BASE, address_of
 from ranger_sim.datatable.packing import value_of_word
-from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.xcp.udp import MAX_CTO, MAX_DTO, POLL_NS, WAITING, XcpUdpServer

@@ -1,4 +1,4 @@
-"""The debugger's endpoint: a TCP port per board, one debugger at a time, under the rule of foundation/peers.py.
+"""The debugger's endpoint: a TCP port per board, one debugger at a time, under the rule of can_bus/edge/peers.py.
 
 A debugger that connects halts the board before its next instruction. While it holds a board, the process that runs the
 robot waits here, and virtual time stops for all boards. When the debugger leaves, its points are removed and the run
@@ -11,11 +11,7 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from ranger_sim.firmware_sim.gdb import packets
-from ranger_sim.firmware_sim.gdb.stub import SIGNAL_BAD_ACCESS, SIGNAL_INTERRUPT, SIGNAL_TRAP, Stub
-from ranger_sim.firmware_sim.gdb.target import Debuggable, Target
-from ranger_sim.foundation import descriptors
-from ranger_sim.foundation.peers import (
+from ranger_sim.can_bus.edge.peers import (
     MALFORMED,
     MS,
     REASONS,
@@ -24,6 +20,10 @@ from ranger_sim.foundation.peers import (
     SocketStream,
     listening_address,
 )
+from ranger_sim.firmware_sim.gdb import packets
+from ranger_sim.firmware_sim.gdb.stub import SIGNAL_BAD_ACCESS, SIGNAL_INTERRUPT, SIGNAL_TRAP, Stub
+from ranger_sim.firmware_sim.gdb.target import Debuggable, Target
+from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 # Chosen by us: how long a held process waits before it asks whether it should end (Ctrl-C at its own terminal).

@@ -16,8 +16,8 @@ import select
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from ranger_sim.can_bus.edge.peers import LIMITS, Terminal, read_ready, write_ready
 from ranger_sim.foundation.events import NEVER, PIN_EDGE, STAGE_PINS, UART_BYTE
-from ranger_sim.foundation.peers import LIMITS, Terminal, read_ready, write_ready
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 

@@ -5,10 +5,10 @@ import sys
 import traceback
 from typing import Any
 
+from ranger_sim.can_bus.edge.peers import reasons_text
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import coverage
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import reasons_text
 from ranger_sim.harness.firmware.fresh_board import first_outputs, fresh_board, pass_on
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block

@@ -5,8 +5,8 @@ import socket
 from collections.abc import Callable
 from typing import Any
 
+from ranger_sim.can_bus.edge.peers import LIMITS, REASONS, Peer, PeerServer, SocketStream, connected
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import LIMITS, REASONS, Peer, PeerServer, SocketStream, connected
 from ranger_sim.foundation.user_error import RequestError, UserError
 
 ANSWER_S = 10.0  # a client waits so long

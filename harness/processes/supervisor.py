@@ -17,10 +17,10 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from ranger_sim.can_bus.edge.peers import REASONS
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, wallclock
-from ranger_sim.foundation.peers import REASONS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown

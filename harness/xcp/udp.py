@@ -1,6 +1,6 @@
 """XCP on UDP: one master over datagrams (ASAM MCD-1 XCP, part 3: length and counter before each packet).
 
-It keeps the rule of `foundation/peers.py` as far as datagrams allow: a poll carries out at most `burst` commands,
+It keeps the rule of `can_bus/edge/peers.py` as far as datagrams allow: a poll carries out at most `burst` commands,
 however they are packed; there is one master, other senders get no answer and are counted by reason, and machines
 other than this one are served only on request. A datagram for which there is no space is dropped, and counted.
 
@@ -18,8 +18,7 @@ from collections import Counter, deque
 from pathlib import Path
 from typing import Any
 
-from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import (
+from ranger_sim.can_bus.edge.peers import (
     ARRIVALS_PER_S,
     FOREIGN,
     FULL,
@@ -30,6 +29,7 @@ from ranger_sim.foundation.peers import (
     loopback,
     trusted,
 )
+from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.xcp.slave import FINE, Slave

@@ -68,7 +68,7 @@ def vcan_buses() -> dict[str, dict[str, Any]]:
     if not hasattr(socket, "AF_CAN") or lacks:
         raise MissingError(
             f"backend vcan: this machine has no {', '.join(lacks) or 'SocketCAN'} "
-            "(`ranger-sim vm -- pytest ...` runs tests on one that has)"
+            "(`python -m dev.vm -- pytest ...` runs tests on one that has)"
         )
     return {f"can{number}": {"interface": "socketcan", "channel": name} for number, name in enumerate(names, start=1)}
 

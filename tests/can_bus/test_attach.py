@@ -16,10 +16,10 @@ from ranger_sim.can_bus.edge import host as host_module
 from ranger_sim.can_bus.edge.attach import AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import PacedBus
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.can_bus.edge.taps import RECEIVED, TRANSMIT_QUEUE
 from ranger_sim.can_bus.node import RESET
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE_SHOT, STAGE_BUS, EventQueue
-from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 

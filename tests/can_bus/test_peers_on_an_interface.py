@@ -487,7 +487,7 @@ def test_without_any_interface_the_ways_to_name_one_are_listed(monkeypatch):
     [
         (OSError(errno.ENODEV, "No such device"), {"channel": "vcan7"}, "virtual:vcan7", "dev vcan7|add vcan7"),
         (OSError(errno.ENODEV, "No such device"), {}, "virtual:(by configuration)", "add vcan0 type vcan"),
-        (OSError(errno.EAFNOSUPPORT, "no family"), {"channel": "vcan7"}, "virtual:vcan7", "ranger-sim vm"),
+        (OSError(errno.EAFNOSUPPORT, "no family"), {"channel": "vcan7"}, "virtual:vcan7", "python -m dev.vm"),
         (ValueError(), {"channel": "c"}, "virtual:c", "ValueError$"),
         (RuntimeError("two\n  lines"), {"channel": "c"}, "virtual:c", "two lines$"),
     ],

@@ -11,12 +11,12 @@ import pytest
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.attach import AttachServer
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.can_bus.edge.taps import DROPPED, RECEIVED, SENT, STATE, TRANSMIT_QUEUE, Taps
 from ranger_sim.can_bus.node import RESET
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE, STAGE_BUS, EventQueue
-from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 
 from .hosting import fresh_name

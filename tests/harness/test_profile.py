@@ -27,7 +27,7 @@ def load(path):
 
 
 def faults_of(folder, text):
-    with pytest.raises(profile.ProfileError) as caught:
+    with pytest.raises(profile.FaultyProfileError) as caught:
         load(written(folder, text))
     return caught.value.faults
 
@@ -153,7 +153,7 @@ def test_a_fault_is_named_with_key_value_and_rule(tmp_path, text, key, value, wo
 
 def test_all_faults_are_named_at_once_with_the_file(tmp_path):
     text = '[boards]\nMB = "external"\nMCX = "x"\n[buses.can1]\nbit_rate = 1\nschedule = "slow"\n[buses.can9]\n'
-    with pytest.raises(profile.ProfileError) as caught:
+    with pytest.raises(profile.FaultyProfileError) as caught:
         load(written(tmp_path, text))
     lines = str(caught.value).splitlines()
     assert len(lines) == len(caught.value.faults) == 5

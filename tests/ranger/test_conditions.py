@@ -27,7 +27,7 @@ def robot():
         ("MCH_ANGEL > 0", "did you mean 'MCH_ANGLE'"),
         ("hip_rat > 0", "did you mean 'hip_rad"),
         ("error MC_TCUR_OOB", "did you mean 'MC_TCURR_OOB'"),
-        ("error MC_TCURR_OOB from MCX", "unknown board 'MCX' (available: MCH, MCFO"),
+        ("error MC_TCURR_OOB from MCX", "unknown board 'MCX' .available: MCH, MCFO"),
     ],
 )
 def test_a_text_that_is_not_a_condition_is_refused_with_a_suggestion(text, what):

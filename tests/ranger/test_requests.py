@@ -8,8 +8,8 @@ import socket
 
 import pytest
 
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.datatable import parameters
-from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.control import ControlServer, address
 from ranger_sim.ranger.requests import Request, admitted

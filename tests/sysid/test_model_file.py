@@ -139,7 +139,7 @@ def cogging(tmp_path_factory):
     recorded = motor_run(seed=1, terms=truth, seconds=6.0)
     found = diagnose(BENCH, [recorded.table(list(recorded.channels))])
     path = tmp_path_factory.mktemp("model") / "extended.toml"
-    path.write_text(model_file.model_text(found), encoding="utf-8")
+    path.write_text(found.result.extended_model, encoding="utf-8")
     return truth, recorded, found, path
 
 
@@ -168,7 +168,7 @@ def test_a_second_diagnosis_that_starts_from_the_file_finds_nothing_more(cogging
     assert not again.answer["detected"]
     assert again.answer["evidence"]["known"][0]["name"] == "cogging"
     # and its own file has the effect still
-    assert 'form = "cogging"' in model_file.model_text(again)
+    assert 'form = "cogging"' in again.result.extended_model
 
 
 def test_the_walk_runs_with_the_written_file(cogging, tmp_path, capsys):

@@ -240,6 +240,6 @@ def test_every_command_says_what_it_does(capsys):
         return capsys.readouterr().out
 
     names = re.findall(r"^    ([a-z][a-z-]*)\b", reported(), re.MULTILINE)
-    assert {"walk", "up", "ctl", "body", "daq", "bench", "can-bounds", "check-bus", "table", "vm"} <= set(names)
+    assert {"walk", "up", "ctl", "body", "daq", "bench", "can-bounds", "check-bus", "table"} <= set(names)
     for name in set(names) - {"help"}:  # `help` shows the help of another command
         assert reported(name).startswith(f"usage: ranger-sim {name} ")

@@ -12,8 +12,8 @@ import uuid
 
 import pytest
 
+from ranger_sim.can_bus.edge.peers import connected
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import connected
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.timeline import perfetto_reader

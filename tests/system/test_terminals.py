@@ -19,8 +19,6 @@ LONG = {
     "campaign": (["campaign", ROOT / "campaigns" / "sensors.toml", "--pool", "local", "--out", "kept"], "0/"),
     "diagnose": (["diagnose", "recording.csv", "--experiment", "motor-bench", "--out", "kept"], "0:00:0"),
     "identify": (["identify", "all", "--coverage", "200"], "/200"),
-    "diagnose-figures": (["diagnose-figures", "record-walk", "--jobs", "2"], "of May"),
-    "tune": (["tune", "--steps", "6", "--jobs", "2", "--out", "tuned.toml"], "falls"),
     "bench": (["bench", "robot", "--seconds", "5", "--runs", "100"], "run 1 of"),
     "panel": (["panel", "--walk", "--http-port", "0"], "token="),
     "bus": (["bus", "--name", "on-a-terminal"], "Ctrl-C ends"),

@@ -16,7 +16,7 @@ def run_by_make_test_vm() -> bool:
 
 
 def in_virtual_machine() -> bool:
-    """True inside `ranger-sim vm`, where network interfaces are ours to change."""
+    """True inside `python -m dev.vm`, where network interfaces are ours to change."""
     return os.environ.get("RANGER_SIM_VM") == "1"
 
 

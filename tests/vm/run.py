@@ -1,7 +1,7 @@
 """`make test-vm`: the tests on real SocketCAN, on this machine's vcan where it has one, else in a virtual machine.
 
-Two runs of pytest: one on this machine, one in the virtual machine (`ranger-sim vm`). Nothing is skipped: what cannot
-run fails and says why. All of it ends within the time limit.
+Two runs of pytest: one on this machine, one in the virtual machine (`python -m dev.vm`). Nothing is skipped: what
+cannot run fails and says why. All of it ends within the time limit.
 """
 
 import os
@@ -15,7 +15,7 @@ from tests.vm import places
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TIME_LIMIT_S = 900.0  # of everything; what makes a merge wait longer is not run
-INSTALL = "tools/vm/install-packages.sh"
+INSTALL = "dev/vm/install-packages.sh"
 
 
 def pytest_call(*selection: str) -> list[str]:
@@ -53,7 +53,7 @@ def main() -> int:
         subprocess.run(pytest_call("-m", here), env={**os.environ, places.PLACE: "host"}).returncode,
         subprocess.run(
             [
-                *(sys.executable, "-m", "ranger_sim", "vm"),
+                *(sys.executable, "-m", "dev.vm"),
                 *("--time-limit", f"{TIME_LIMIT_S - (wallclock.monotonic_s() - started):.0f}s", "--"),
                 *pytest_call("-m", inside),
             ],

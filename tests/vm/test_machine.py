@@ -10,7 +10,7 @@ import sys
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-VM = [sys.executable, "-m", "ranger_sim", "vm"]
+VM = [sys.executable, "-m", "dev.vm"]
 pytestmark = pytest.mark.machine
 
 

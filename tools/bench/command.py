@@ -23,7 +23,7 @@ from ranger_sim.tools.bench.cases import CASES, FRAMES, SIMULATED, YARDSTICK, me
 from ranger_sim.tools.command_line import streams
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.help_text import named_lines
-from ranger_sim.tools.command_line.units import number, whole_number
+from ranger_sim.tools.command_line.units import whole_number
 
 SHOWN = {SIMULATED: "x real time", FRAMES: "frames"}
 EXIT_EXCEEDED = 1  # a response came later than its bound
@@ -50,14 +50,6 @@ def processes(options: argparse.Namespace, report: Callable[[str], None]) -> lis
     from ranger_sim.tools.bench import processes as part
 
     return part.run(options.seconds, report)
-
-
-def floods(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
-    """The robot under clients that write endlessly and read nothing."""
-    from ranger_sim.tools.bench import floods as part
-
-    kept = None if options.keep is None else pathlib.Path(options.keep)
-    return part.run(options.seconds, report, speed=options.speed, kept=kept)
 
 
 def walks(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
@@ -87,7 +79,6 @@ PARTS = {
         "robot, body and buses from the plain sources", ("robot-interpreted", "plant-interpreted", "bus-interpreted")
     ),
     "processes": Part("the robot with a process for each board: pace, lateness of slots", alone=processes),
-    "floods": Part("the robot at a pace under floods by clients: pace, processor time, memory (minutes)", alone=floods),
     "interfaces": Part(
         "--frames through python-can's interfaces and ours: lost, reordered, frames/s", alone=interfaces
     ),
@@ -115,15 +106,6 @@ def register(commands: Any) -> None:
     )
     command.add_argument(
         "--frames", type=whole_number(3), default=1_000_000, metavar="N", help="of interfaces (default 1000000)"
-    )
-    command.add_argument(
-        "--speed",
-        type=number(above=0.0),
-        metavar="FACTOR",
-        help="times real time of the robot under floods (default: 0.25 to 1 by the number of processors)",
-    )
-    command.add_argument(
-        "--keep", metavar="FILE", help="of floods: rows in FILE are kept, only missing ones are measured"
     )
     command.add_argument("--sets", type=whole_number(1), default=10_000, metavar="N", help="of bounds (default 10000)")
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")

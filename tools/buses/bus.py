@@ -8,10 +8,10 @@ from typing import Any
 from ranger_sim.can_bus.edge.attach import DEFAULT_NAME, AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
+from ranger_sim.can_bus.edge.peers import loopback
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import loopback
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.stop_rule import MOST_TIME_S
 from ranger_sim.tools.buses import server_options

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ranger_sim.foundation.peers import loopback, reasons_text
+from ranger_sim.can_bus.edge.peers import loopback, reasons_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.command_line.options import Option
 from ranger_sim.tools.command_line.units import word

@@ -14,8 +14,8 @@ import tempfile
 from collections.abc import Iterator
 from typing import Any
 
+from ranger_sim.can_bus.edge.peers import listening_address
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import listening_address
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
 from ranger_sim.tools.command_line import terminal

@@ -15,7 +15,7 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 MOST = 64  # chosen by us: 16 pages, and 8 browsers that load one by six connections each
-PATIENCE_S = 2.0  # for a client to read why it is refused; as foundation/peers.py
+PATIENCE_S = 2.0  # for a client to read why it is refused; as can_bus/edge/peers.py
 MADE_ROOM, NO_HTTP = "a connection that was not a page, dropped for a new one", "no HTTP"
 
 Client = tuple[str, int]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ranger_sim import datatable
+from ranger_sim.can_bus.edge import peers
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.foundation import peers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control

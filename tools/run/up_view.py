@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from ranger_sim.can_bus.edge.peers import reasons_text as counts_text
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.peers import reasons_text as counts_text
 from ranger_sim.harness.processes.supervisor import ELSEWHERE, RUNNING, View
 from ranger_sim.tools.run import walk
 

@@ -1,4 +1,4 @@
-"""Serve one trace over HTTP to Perfetto's viewer in a browser of this machine; `foundation/peers.py` has the rule.
+"""Serve one trace over HTTP to Perfetto's viewer in a browser of this machine; `can_bus/edge/peers.py` has the rule.
 
 The server answers one request per connection and closes it. Only the viewer's page may read the trace: the Origin and
 Host that a browser sends must be the viewer and this machine, so that a page of another site, even one whose name
@@ -10,8 +10,8 @@ import socket
 from typing import BinaryIO
 from urllib.parse import unquote
 
+from ranger_sim.can_bus.edge.peers import ARRIVALS_PER_S, FULL, LIMITS, REASONS, Peer, PeerServer, SocketStream
 from ranger_sim.foundation import descriptors
-from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, LIMITS, REASONS, Peer, PeerServer, SocketStream
 
 VIEWER = "https://ui.perfetto.dev"
 # The only port from which Perfetto's viewer may read: its Content-Security-Policy names trace_processor's port.

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.lpc2194 import image as images
 from ranger_sim.foundation.events import CAN_REQUEST, PIN_EDGE, PIN_OUTPUT
+from ranger_sim.foundation.user_error import FirmwareError
 from tests.firmware_sim.lpc2194.programs import ASSEMBLER, Run, board_with, linked, words_of
 
 TICK_NS = 100_000  # 6,000 counts at 60 MHz
@@ -140,7 +141,7 @@ def test_a_board_that_waits_is_not_due_before_its_next_event():
 def test_an_access_to_nothing_ends_the_run_with_one_line():
     #      mov r0, #0xE0000000; ldr r1, [r0, #0x100]
     board = board_with([0xE3A0020E, 0xE5901100])
-    with pytest.raises(images.UserError) as caught:
+    with pytest.raises(FirmwareError) as caught:
         board.advance(1_000_000)
     assert str(caught.value) == (
         "BOARD: the program reads 0xe0000100 as a word at pc 0x00000004: no device is modelled there"

@@ -6,7 +6,7 @@ from types import SimpleNamespace as Made
 
 import pytest
 
-from ranger_sim.foundation.peers import FOREIGN, FULL, LIMITS, MALFORMED, UNKNOWN
+from ranger_sim.can_bus.edge.peers import FOREIGN, FULL, LIMITS, MALFORMED, UNKNOWN
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.xcp import udp
 

@@ -7,9 +7,9 @@ import struct
 
 import pytest
 
+from ranger_sim.can_bus.edge.peers import ARRIVALS_PER_S, FULL, MALFORMED
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.addresses import address_of
-from ranger_sim.foundation.peers import ARRIVALS_PER_S, FULL, MALFORMED
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.xcp import udp
 from ranger_sim.harness.xcp.udp import XcpUdpServer

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ranger_sim import Ranger, Scenario
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
-from ranger_sim.foundation.peers import LIMITS
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes.apart import RemoteBoards

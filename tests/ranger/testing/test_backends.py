@@ -103,7 +103,7 @@ def test_time_on_interfaces_outside_is_released_by_the_wall_clock(tmp_path):
 
 def test_a_machine_without_vcan_names_what_it_lacks(monkeypatch):
     monkeypatch.setattr("ranger_sim.ranger.testing.outside_robot.Path.exists", lambda path: path.name == "vcan1")
-    with pytest.raises(MissingError, match="backend vcan: this machine has no vcan0, vcan2, vcan3 .`ranger-sim vm"):
+    with pytest.raises(MissingError, match="backend vcan: this machine has no vcan0, vcan2, vcan3 .`python -m dev.vm"):
         vcan_buses()
 
 

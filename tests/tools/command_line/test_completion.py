@@ -50,7 +50,7 @@ def test_a_value_is_a_file_where_help_calls_it_one():
     ("words", "answers"),
     [
         ("ranger-sim wa", {"walk"}),
-        ("ranger-sim di", {"diagnose", "diagnose-figures"}),
+        ("ranger-sim di", {"diagnose"}),
         ("ranger-sim walk --floor", {"--floor-roughness"}),
         ("ranger-sim completion ''", set(SHELLS)),
         ("ranger-sim walk --out ru", {"runs"}),

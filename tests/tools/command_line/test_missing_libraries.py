@@ -46,8 +46,6 @@ NEEDED = {
         "diagnose run.csv --experiment motor-bench",
         "identify all --out f",
         "campaign few.toml --out c",
-        "compare-walk run.csv",
-        "diagnose-figures run.csv",
         "causes --experiment motor-bench --channels angle",
     ],
     "serial": ["up --time 50ms --daq-port /dev/nowhere"],

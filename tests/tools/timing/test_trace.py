@@ -12,7 +12,7 @@ import threading
 
 import pytest
 
-from ranger_sim.foundation.peers import LIMITS
+from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.harness.timeline import moments, perfetto_reader, viewer
 from ranger_sim.tools import cli
 from ranger_sim.tools.timing import trace

@@ -1,0 +1,1 @@
+"""Floods: the robot in real time while clients write without end."""

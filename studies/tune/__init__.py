@@ -1,0 +1,1 @@
+"""`python -m studies.tune`: search controller parameters by walking the whole robot."""

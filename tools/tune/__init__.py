@@ -1,1 +1,0 @@
-"""`ranger-sim tune`: search controller parameters by walking the whole robot."""
