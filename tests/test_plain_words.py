@@ -64,7 +64,6 @@ LEFT = {
     ("docstring", "firmware_sim"): 50,
     ("docstring", "harness"): 6,
     ("message", "harness"): 5,
-    ("docstring", "sysid"): 18,
     ("name of a test", "tests"): 735,
     ("docstring", "tools"): 32,
 }

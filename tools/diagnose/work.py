@@ -111,7 +111,7 @@ class Prepared:
 
 
 def _parted(data: Sequence[Prepared], part: float) -> tuple[list[Prepared], list[Prepared]]:
-    """The first and the last part of each recording by time; what is said of its data is said of the first."""
+    """The first and the last part of each recording by time; reports on its data are on the first."""
     if not 0.0 < part < 1.0:
         raise UserError(f"--holdout-part {part:g}: allowed is what lies between 0 and 1")
     first: list[Prepared] = []
