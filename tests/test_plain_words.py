@@ -60,12 +60,11 @@ ALLOWED = {
 # Places that are not in plain words yet, by kind and package. A count may only fall; without a row it is 0.
 LEFT = {
     ("docstring", "boards"): 33,
-    ("name of a test", "examples"): 1,
     ("docstring", "firmware_sim"): 50,
     ("docstring", "harness"): 6,
     ("message", "harness"): 5,
     ("name of a test", "tests"): 735,
-    ("docstring", "tools"): 32,
+    ("docstring", "tools"): 25,
 }
 
 FOUND = re.compile("|".join(rf"\b(?:{word})(?!\w)" for word in PRIVATE), re.IGNORECASE)
