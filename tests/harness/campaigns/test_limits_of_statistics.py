@@ -119,7 +119,7 @@ def test_a_stopping_rule_is_refused_without_a_name_a_share_or_runs_enough():
         (("fall", 0.0, 10), "limit is 0.0"),
         (("fall", 1.0, 10), "limit is 1.0"),
         (("fall", 0.5, 10, 0), "0 analyses of 10 runs"),
-        (("fall", 0.5, 10, 11), "11 looks at 10 runs"),
+        (("fall", 0.5, 10, 11), "11 analyses of 10 runs"),
         (("fall", 0.5, 100, 51), "51 looks at 100 runs"),
     ):
         with pytest.raises(UserError, match=told):
