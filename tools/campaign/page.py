@@ -183,7 +183,7 @@ def markdown(told: dict[str, Any]) -> str:
             told_first = f"{each['first']} | {each['own_board']} | {each['median_ms']:.4g} ms"
             lines.append(f"| {each['code']} | {each['board']} | {told_first} |")
     if told["stopped_at_look"] is not None and told["runs"] < told["foreseen"]:
-        early = f"Stopped early, at analysis {told['stopped_at_look']}: {told['runs']} of {told['foreseen']} runs."
+        early = f"Stopped early, at look {told['stopped_at_look']}: {told['runs']} of {told['foreseen']} runs."
         lines += ["", early]
     for each in told["extremes"]:
         lines += ["", extremes_text(each)]

@@ -69,7 +69,7 @@ def test_how_shares_are_to_be_read_is_told_by_the_design():
         (plan(search=Search()), True, "The runs were chosen to find the worst case"),
         (plan(), True, "A census"),
         (plan(sample=sample), True, "A random sample of the population, with replacement: clopper-pearson intervals"),
-        (plan(sample=looks), True, "A random sample that was analysed up to 3 times: repeated intervals of 95 %"),
+        (plan(sample=looks), True, "A random sample with up to 3 looks: repeated intervals of 95 %"),
     ):
         assert summary.interval_text(made, finished).startswith(expected)
     assert summary.interval_text(plan(sample=sample), True).endswith("of 90 %.")
