@@ -17,11 +17,12 @@ from ranger_sim.tools.command_line.files import replace_file
 PAGE = pathlib.Path(__file__).parent / "reference/causes.md"
 HEAD = """# Causes and unknowns
 
-What `ranger-sim diagnose` can name, what its machines know beforehand, what `ranger-sim identify` finds, and what a
-model file can add. `ranger-sim causes CAUSE` describes one; [diagnose](../diagnose.md) says how a cause is found,
-[identify](../identify.md) how a number is, and [model terms](../how-to/model-term.md) how a form is put into a walk.
+The causes that `ranger-sim diagnose` can name, the known numbers of its machines, the numbers that
+`ranger-sim identify` finds, and the terms of model files. `ranger-sim causes CAUSE` describes one;
+[diagnose](../diagnose.md) explains how a cause is found, [identify](../identify.md) how a number is, and
+[model terms](../how-to/model-term.md) how a term is added to a walk.
 
-`python docs/causes_table.py` writes this page, and a test holds it: no number of these tables changes unseen.
+`python docs/causes_table.py` writes this page, and a test compares it: no number of these tables changes unseen.
 """
 
 

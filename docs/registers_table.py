@@ -12,13 +12,12 @@ from ranger_sim.tools.command_line.files import replace_file
 PAGE = pathlib.Path(__file__).parent / "reference/registers.md"
 HEAD = """# Registers of the LPC2194
 
-What a program in a board's place finds at its addresses (`--image`, [how to](../how-to/firmware-image.md)). Names are
-the data sheet's. An access to an address that is not in this table ends the run with a line that names it; so does one
-that asks a register for something that is not modelled (the module's docstring says what that is). What can only be
-written reads 0; a write to what can only be read does nothing. Bytes and half-words reach a register at its first
-byte, those of fast GPIO at any.
+Registers of a board that runs a firmware image (`--image`, [how to](../how-to/firmware-image.md)). Names are the data
+sheet's. An access to an address that is not in this table ends the run with a line that names it; so does a function of
+a register that is not modelled (the module's docstring lists these). Write-only registers read 0; a write to a
+read-only register does nothing. Bytes and half-words reach a register at its first byte, those of fast GPIO at any.
 
-`python docs/registers_table.py` writes this page from the code, and a test holds both together.
+`python docs/registers_table.py` writes this page from the code, and a test compares both.
 """
 
 

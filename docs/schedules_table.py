@@ -12,8 +12,8 @@ from ranger_sim.tools.command_line.files import replace_file
 PAGE = pathlib.Path(__file__).parent / "reference/schedules.md"
 HEAD = """# Schedules
 
-What every board runs when: each function of its table with the cycles that a call takes (`cost`, and `per item`), and
-those that it may take (`limit`; - is held against nothing). An interrupt's cost is that of one service; its priority is
+Every board's schedule: each function of its table with the cycles of a call (`cost`, and `per item`), and its limit
+(`limit`; -: without one). An interrupt's cost is that of one service; its priority is
 its slot of the vectored interrupt controller, 0 first, or FIQ, before all of them.
 [Slot timing](../slot-timing.md) says where costs and limits come from and what they leave of a slot.
 

@@ -256,7 +256,7 @@ def fit(
     effective_samples: number of independent rows; None: from the residual's correlation, within `runs`. noise: standard
     deviation of a row where it is known; None: estimated from the residual. earlier: fits of other data; their results
     for parameters of the same names are weighed in, with their covariance. physical: returns why these values are
-    impossible, in words, or None. tell: receives the lines of the identifiability before the fit begins.
+    impossible, in words, or None. `tell` receives the lines of the identifiability before the fit begins.
     derivative_step: of the central differences, in each parameter's `step`.
 
     UserError: a parameter does not move the residual, values are not finite, names are repeated, rows are too few.

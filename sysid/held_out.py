@@ -18,7 +18,7 @@ TELLS = 9.0  # chi-square of an effect on held-out data, three deviations: below
 
 @dataclasses.dataclass(frozen=True)
 class Held:
-    """gain: of the effects not refused; tells: False where the data excite none of them and judge nothing."""
+    """gain: of the effects not refused; `tells`: False where the data excite none of them and judge nothing."""
 
     gain: gain.Gain | None
     holdout: str

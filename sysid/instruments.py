@@ -36,7 +36,7 @@ class Instrument:
         return math.hypot(self.noise, self.resolution / math.sqrt(12.0))
 
     def errors(self, seed: int, place: str) -> tuple[float, float]:
-        """Offset and relative gain error of the one instrument that stands at `place`."""
+        """Offset and relative gain error of the one instrument at `place`."""
         random = generator(seed, f"{place}, {self.name}: error")
         return self.offset * float(random.standard_normal()), self.gain * float(random.standard_normal())
 

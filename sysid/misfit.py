@@ -36,7 +36,7 @@ class Test:
 
 @dataclasses.dataclass
 class Misfit:
-    """Results of the tests. p: of the most telling test after Holm's rule; excess: chi-square over its expectation."""
+    """Results of the tests. p: of the most significant test after Holm's rule; excess: chi-square over expectation."""
 
     tests: list[Test]
     p: float
@@ -44,7 +44,7 @@ class Misfit:
 
     @property
     def telling(self) -> Test:
-        """The most telling test."""
+        """The most significant test."""
         return min(self.tests, key=lambda test: (test.p, -test.chi2))
 
 

@@ -83,7 +83,7 @@ def trials(
 
 
 def select(effects: Sequence[Effect], regression: Regression, level: float = LEVEL, most: int = MOST) -> list[Named]:
-    """The effects that the data support, the most telling first."""
+    """The effects that the data support, the most significant first."""
     all_trials = trials(effects, regression)
     taken: list[Named] = []
     count = max(1, len(all_trials))

@@ -109,6 +109,6 @@ def _usual_step(stamps: Array) -> float:
 
 
 def _restarts(steps: Array) -> bool:
-    """True when every stretch without a step back is long enough for a recording of its own."""
+    """True when every stretch without a step back is long enough for a separate recording."""
     ends = np.concatenate(([-1], np.flatnonzero(steps < 0.0), [len(steps)]))
     return bool(np.diff(ends).min() >= SHORTEST_RECORDING)

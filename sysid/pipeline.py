@@ -107,7 +107,7 @@ def _name(
     skews: Sequence[Named],
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[Named], Regression]:
-    """The named effects, the most telling first, and the regression with them."""
+    """The named effects, the most significant first, and the regression with them."""
     named: list[Named] = []
     extended, rest = plain, list(effects)
     for number in range(ROUNDS):

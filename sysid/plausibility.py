@@ -113,7 +113,7 @@ def absurd(known: Known, value: float, error: float) -> bool:
 def explained(regression: Regression, name: str) -> float | None:
     """Share of an equation's balance (its response and its parameters' contributions) that the equation explains.
 
-    None for an equation with fewer than two parameters of its own or few rows, and for a machine given by its
+    None for an equation with fewer than two parameters only in it or few rows, and for a machine given by its
     simulator, whose response is already the simulation's error.
     """
     if _of_a_simulator(regression):

@@ -1,6 +1,6 @@
 """A term without a cause: a balance's misfit, learned from the data as a table over one or two signals.
 
-Where something is wrong and no cause of the catalogue explains it, the most telling general test gives the signals of
+Where an error has no cause in the catalogue that explains it, the most significant general test gives the signals of
 the term. The term is a mean for each of its cells, fitted together with the machine's own parameters by least squares.
 The data are not whitened for it: a table has steps, and whitening would give these the most weight. Outside the
 signals' range in training it is 0, so that the model returns to its base there.
@@ -71,7 +71,7 @@ class ResidualTerm:
 def learn(
     machine: Machine, recordings: Sequence[Recording], regression: Regression, found: Misfit
 ) -> ResidualTerm | None:
-    """The table of the most telling test over signals; None where none is telling: a line, a wave, an entry."""
+    """The table of the most significant test over signals; None where none is significant: a line, a wave, an entry."""
     telling = [
         test
         for test in found.tests

@@ -38,7 +38,7 @@ CSR_MCU_CURRENT = 168
 CSR_EMPTY_RX4 = 169
 CSR_EMPTY_RX5 = 170
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     0, 2, 160, 161, 162, 163, 164, 167, 168, 169, 170,
 )

@@ -497,7 +497,7 @@ HD_CONTACT = 472
 HD_FLIGHT_TICKS = 473
 HD_SETUP_TIME = 474
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     9, 13, 16, 17, 18, 19, 20, 25, 26, 36, 42, 43, 45, 46, 47, 53, 54, 64, 71, 72, 73, 74, 75, 81, 82, 101,
     102, 111, 114, 115, 116, 117, 118, 122, 123, 130, 131, 132, 133, 134, 135, 136, 137, 138, 139, 140, 141,

@@ -58,7 +58,7 @@ MCFI_INNER_HS = 86
 MCFI_ANKLE_RATE = 87
 MCFI_EMPTY_RX3 = 88
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     5, 61, 62, 63, 65, 66, 67, 68, 69, 70, 76, 77, 78, 79, 80, 83, 84, 85, 86, 87, 88,
 )

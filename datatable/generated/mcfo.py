@@ -59,7 +59,7 @@ MCFO_RIGHT_ANKLE_RATE = 59
 MCFO_EMPTY_RX3 = 60
 MCSO_LEFT_ANKLE_ANGLE = 99
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     4, 33, 34, 35, 37, 38, 39, 40, 41, 44, 48, 49, 50, 51, 52, 55, 56, 57, 58, 59, 60,
 )

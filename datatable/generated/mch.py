@@ -52,7 +52,7 @@ MCH_EMPTY_RX1 = 30
 MCH_EMPTY_RX2 = 31
 MCH_EMPTY_RX3 = 32
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     3, 10, 11, 12, 14, 15, 21, 22, 23, 24, 27, 28, 29, 30, 31, 32,
 )

@@ -47,7 +47,7 @@ MCSI_EMPTY_RX1 = 127
 MCSI_EMPTY_RX2 = 128
 MCSI_EMPTY_RX3 = 129
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     7, 110, 112, 113, 119, 120, 121, 124, 125, 126, 127, 128, 129,
 )

@@ -60,7 +60,7 @@ UI_EMPTY_RX4 = 158
 UI_EMPTY_RX5 = 159
 ERROR_LCD = 173
 
-# what the board sends and hears, by id
+# what the board sends and receives, by id
 SEND: tuple[int, ...] = (
     8, 142, 143, 144, 145, 146, 147, 148, 149, 150, 151, 152, 153, 154, 157, 158, 159,
 )

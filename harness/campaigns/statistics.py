@@ -160,7 +160,7 @@ def pocock(looks: int, error: float = 1.0 - CONFIDENCE) -> list[float]:
 
 def _bounds(shape: list[float], error: float) -> list[float]:
     if not 1 <= len(shape) <= 50:
-        raise CampaignError(f"stopping rule: {len(shape)} analyses, allowed are 1 to 50")
+        raise CampaignError(f"stopping rule: {len(shape)} looks, allowed are 1 to 50")
     if not 0.0 < error < 0.5:
         raise CampaignError(f"stopping rule: an error of {error!r}, allowed is above 0 and below 0.5")
     constant = optimize.brentq(
@@ -190,9 +190,7 @@ class Stopping:
         if not 0.0 < self.limit < 1.0:
             raise CampaignError(f"stopping rule: limit is {self.limit!r}, allowed is above 0 and below 1")
         if not 1 <= self.looks <= min(50, self.runs):
-            raise CampaignError(
-                f"stopping rule: {self.looks} analyses of {self.runs} runs, allowed are 1 to 50, one each"
-            )
+            raise CampaignError(f"stopping rule: {self.looks} looks at {self.runs} runs, allowed are 1 to 50, one each")
 
     @functools.cached_property
     def bounds(self) -> list[float]:

@@ -124,8 +124,8 @@ def interval_text(plan: Plan, finished: bool) -> str:
     if plan.sample.stopping:
         rule, looks = plan.sample.stopping.rule, plan.sample.stopping.looks
         return (
-            f"A random sample that was analysed up to {looks} times: repeated intervals of {percent} by the {rule} "
-            "rule, which hold at whichever analysis it stopped."
+            f"A random sample with up to {looks} looks: repeated intervals of {percent} by the {rule} "
+            "rule, which hold at whichever look it stopped."
         )
     return f"A random sample of the population, with replacement: {plan.sample.interval} intervals of {percent}."
 

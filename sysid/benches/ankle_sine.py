@@ -7,7 +7,7 @@ Motor and foot are two inertias with the cable between them; the board's law act
     J_f a'' = k_s (p - a) - k_r (a - a_0)         EQUATIONS 2.3, 2.7
 
 Columns are those of the logs: motor_angle_rad, joint_angle_rad, joint_rate_rad_per_s, target_angle_rad,
-target_rate_rad_per_s, motor_current_A (about 19 Hz, with stamps of its own).
+target_rate_rad_per_s, motor_current_A (about 19 Hz, with separate stamps).
 """
 
 import dataclasses

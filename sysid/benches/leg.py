@@ -4,7 +4,7 @@ The hip drive and its springs are off; the leg turns in its bearings. About the 
 
     J th'' = -g (cm sin th - wm cos th) - b th' - T_b sgn th'
 
-so it hangs at atan(wm / cm). Every recording has both legs, told by the column `inner` (0: outer, 1: inner).
+so it hangs at atan(wm / cm). Every recording has both legs, distinguished by the column `inner` (0: outer, 1: inner).
 
     level      force_N of a scale at the ankle, leg horizontal, at angle_rad from it
     hang       angle_rad by an inclinometer, after some releases from either side

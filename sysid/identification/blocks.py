@@ -1,7 +1,7 @@
 """Pieces of a residual, one for each recording: stacked for a joint fit, alone for a step of the paper's path.
 
 Every row is divided by its own standard deviation, so pieces of different benches weigh as they should. An instrument's
-offset and gain are parameters of their own, known beforehand as well as the instrument says.
+offset and gain are separate parameters, known beforehand as well as the instrument says.
 """
 
 import dataclasses

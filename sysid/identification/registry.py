@@ -17,7 +17,7 @@ from ranger_sim.sysid.identification.coverage import Machine
 
 @dataclasses.dataclass(frozen=True)
 class Bench:
-    """One experiment. columns: of its recording beside the stamps; record: by the virtual bench; blocks: its residual.
+    """One experiment. columns: of its recording without stamps; record: by the virtual bench; blocks: its residual.
 
     finds: the appendix's names of what is asked; known_from: benches whose result this one needs (none: by itself).
     """

@@ -46,7 +46,7 @@ def hip_block(data: Dataset, arm_m: float = HIP_ARM_M) -> Block:
 
 
 def ankle_block(data: Dataset, arm_m: float = ANKLE_ARM_M) -> Block:
-    """The ankle cable's, with the return springs beside it (appendix 7.3)."""
+    """The ankle cable's, in parallel with the return springs (appendix 7.3)."""
     return pull_block("ankle-spring", data, K_S, arm_m, friction=False)
 
 

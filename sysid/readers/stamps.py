@@ -83,7 +83,7 @@ def _day(found: re.Match[str], month_first: bool) -> int | None:
 
 
 def _time_of_day_ns(found: re.Match[str]) -> int | None:
-    """Nanoseconds since midnight, of UTC where the zone is said; None for a time that no clock shows."""
+    """Nanoseconds since midnight, of UTC where the zone is given; None for a time that no clock shows."""
     hour, minute, second = int(found["h"]), int(found["m"]), int(found["s"] or 0)
     half = (found["half"] or "").lower()
     if hour > (12 if half else 24) or minute > 59 or second > 60:

@@ -136,7 +136,7 @@ def test_an_external_router_with_the_main_brain_is_allowed_and_alone_is_not(tmp_
             "'sockets'",
             "python-can; it knows ranger_sim",
         ),
-        (ON_CAN0.replace("1000000", "3000000"), "buses.can1.bit_rate", "3000000", "end at 1000000"),
+        (ON_CAN0.replace("1000000", "3000000"), "buses.can1.bit_rate", "3000000", "at most 1000000"),
         (ON_CAN0.replace("bit_rate = 1000000\n", ""), "buses.can1.bit_rate", "", "is missing, so 3000000"),
         (ON_CAN0 + "[buses.can1.options]\nbitrate = 1\n", "buses.can1.options.bitrate", "1", "own keys"),
         (ON_CAN0 + ON_CAN0.replace("can1", "can2"), "buses.can2.channel", "'can0'", "what can1 uses"),

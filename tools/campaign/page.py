@@ -187,9 +187,7 @@ def markdown(results: dict[str, Any]) -> str:
             told_first = f"{each['first']} | {each['own_board']} | {each['median_ms']:.4g} ms"
             lines.append(f"| {each['code']} | {each['board']} | {told_first} |")
     if results["stopped_at_look"] is not None and results["runs"] < results["foreseen"]:
-        early = (
-            f"Stopped early, at analysis {results['stopped_at_look']}: {results['runs']} of {results['foreseen']} runs."
-        )
+        early = f"Stopped early, at look {results['stopped_at_look']}: {results['runs']} of {results['foreseen']} runs."
         lines += ["", early]
     for each in results["extremes"]:
         lines += ["", extremes_text(each)]

@@ -164,7 +164,7 @@ def print_analysis(told: dict[str, Any]) -> None:
 
 
 def grouped(helps: list[dict[str, Any]]) -> dict[str, list[str]]:
-    """{advice in words: what it is for}, so that one advice is told once."""
+    """{advice in words: what it is for}, so that one advice is printed once."""
     found: dict[str, list[str]] = {}
     for each in helps:
         parts = []

@@ -49,7 +49,7 @@ class Sides:
 
 
 def sides(found: Diagnosis) -> dict[str, Sides]:
-    """Both sides of every equation, the most telling first."""
+    """Both sides of every equation, the most significant first."""
     made = {}
     for name in found.plain.equations:
         part = found.plain.parts[name]
@@ -226,7 +226,7 @@ def candidates(found: Diagnosis, side: Sides) -> dict[str, Array]:
 
 
 def of_equation(generic: Mapping[str, Mapping[str, Array]], name: str) -> dict[str, Array]:
-    """The signals of an equation; of all entries where a machine tells its signals by entry."""
+    """The signals of an equation; of all entries where a machine gives its signals by entry."""
     return dict(generic[name]) if name in generic else {k: v for each in generic.values() for k, v in each.items()}
 
 
@@ -348,7 +348,7 @@ def reach_of(figure: Any) -> list[float]:
 
 
 def finished(figure: Any, title: str, note: str, height: int) -> Figure:
-    """Common look: no background of its own, so that the page's light or dark ground shows."""
+    """Common look: no own background, so that the page's light or dark ground shows."""
     figure.update_layout(
         template="plotly_white",
         height=height,

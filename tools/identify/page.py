@@ -18,7 +18,7 @@ LEAST_SPEED = 0.05  # rad/s, where a curve of figure 31 begins on either side of
 
 
 def render(told: dict[str, Any], recordings: dict[str, Dataset], fits: dict[str, Fit], gear: float) -> str:
-    """The page as text. told: of the command; recordings by bench; fits by title; gear: of the motor's bench."""
+    """The page as text. `told`: of the command; recordings by bench; fits by title; gear: of the motor's bench."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=jinja2.select_autoescape(["j2"]),

@@ -544,7 +544,7 @@ struct mb_data {
     float mcfo_right_heel_sense; /* 50 [counts] outer ankle: right foot contact sensor as converted */
     float mcfo_execution_time; /* 51 [s] outer feet board: longest slot of about the last quarter second */
     float mcfo_max_execution_time; /* 52 [s] outer feet board: longest slot of all */
-    float mcfo_hs_state; /* 53 outer ankle: reserved command that no board hears */
+    float mcfo_hs_state; /* 53 outer ankle: reserved command that no board receives */
     float mcfo_empty_tx2; /* 54 spare to the outer feet board: rename it to add a variable */
     float mcfo_batt_current; /* 55 [A] outer ankle: current the motor stage takes from the battery */
     float mcfo_batt_voltage; /* 56 [V] outer ankle: battery voltage as measured */
@@ -572,7 +572,7 @@ struct mb_data {
     float mcfi_right_heel_sense; /* 78 [counts] inner ankle: right foot contact sensor as converted */
     float mcfi_execution_time; /* 79 [s] inner feet board: longest slot of about the last quarter second */
     float mcfi_max_execution_time; /* 80 [s] inner feet board: longest slot of all */
-    float mcfi_hs_state; /* 81 inner ankle: reserved command that no board hears */
+    float mcfi_hs_state; /* 81 inner ankle: reserved command that no board receives */
     float mcfi_empty_tx2; /* 82 spare to the inner feet board: rename it to add a variable */
     float mcfi_batt_current; /* 83 [A] inner ankle: current the motor stage takes from the battery */
     float mcfi_batt_voltage; /* 84 [V] inner ankle: battery voltage as measured */
@@ -646,7 +646,7 @@ struct mb_data {
     float ui_rc_3; /* 152 [ticks] radio control channel 3: smoothed pulse width in 1/60 us */
     float ui_execution_time; /* 153 [s] user interface board: longest slot of about the last quarter second */
     float ui_max_execution_time; /* 154 [s] user interface board: longest slot of all */
-    float ui_audio; /* 155 reserved sound command that no board hears */
+    float ui_audio; /* 155 reserved sound command that no board receives */
     int32_t ui_empty_tx2; /* 156 any value but 0 plays the tune as well (a renamed spare) */
     float ui_status; /* 157 user interface board alive flag, 1 once it runs */
     float ui_empty_rx4; /* 158 spare from the user interface board: rename it to add a variable */

@@ -70,7 +70,7 @@ struct mcfi_data {
     float mcfi_right_heel_sense; /* 78 [counts] inner ankle: right foot contact sensor as converted */
     float mcfi_execution_time; /* 79 [s] inner feet board: longest slot of about the last quarter second */
     float mcfi_max_execution_time; /* 80 [s] inner feet board: longest slot of all */
-    float mcfi_hs_state; /* 81 inner ankle: reserved command that no board hears */
+    float mcfi_hs_state; /* 81 inner ankle: reserved command that no board receives */
     float mcfi_empty_tx2; /* 82 spare to the inner feet board: rename it to add a variable */
     float mcfi_batt_current; /* 83 [A] inner ankle: current the motor stage takes from the battery */
     float mcfi_batt_voltage; /* 84 [V] inner ankle: battery voltage as measured */

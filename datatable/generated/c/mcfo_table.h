@@ -71,7 +71,7 @@ struct mcfo_data {
     float mcfo_right_heel_sense; /* 50 [counts] outer ankle: right foot contact sensor as converted */
     float mcfo_execution_time; /* 51 [s] outer feet board: longest slot of about the last quarter second */
     float mcfo_max_execution_time; /* 52 [s] outer feet board: longest slot of all */
-    float mcfo_hs_state; /* 53 outer ankle: reserved command that no board hears */
+    float mcfo_hs_state; /* 53 outer ankle: reserved command that no board receives */
     float mcfo_empty_tx2; /* 54 spare to the outer feet board: rename it to add a variable */
     float mcfo_batt_current; /* 55 [A] outer ankle: current the motor stage takes from the battery */
     float mcfo_batt_voltage; /* 56 [V] outer ankle: battery voltage as measured */

@@ -18,7 +18,7 @@
 #define ERR_CAN1_BUS_RX 13 /* CAN controller 1: a frame coming in was faulty */
 #define ERR_CAN1_BUS_TX 14 /* CAN controller 1: a frame going out failed */
 #define ERR_CAN1_LOCKUP 15 /* CAN controller 1: no longer answers */
-#define ERR_CAN1_RX_BUF_OF 16 /* CAN controller 1: frames came faster than the board took them */
+#define ERR_CAN1_RX_BUF_OF 16 /* CAN controller 1: frames arrived faster than the board took them */
 #define ERR_CAN2_TX_BUSOFF 17 /* CAN controller 2: dropped off the bus after too many errors */
 #define ERR_CAN2_ERR_WARN 18 /* CAN controller 2: error warning level crossed */
 #define ERR_CAN2_DATA_OVRN 19 /* CAN controller 2: frame lost in the controller, not read in time */
@@ -26,7 +26,7 @@
 #define ERR_CAN2_BUS_RX 21 /* CAN controller 2: a frame coming in was faulty */
 #define ERR_CAN2_BUS_TX 22 /* CAN controller 2: a frame going out failed */
 #define ERR_CAN2_LOCKUP 23 /* CAN controller 2: no longer answers */
-#define ERR_CAN2_RX_BUF_OF 24 /* CAN controller 2: frames came faster than the board took them */
+#define ERR_CAN2_RX_BUF_OF 24 /* CAN controller 2: frames arrived faster than the board took them */
 #define ERR_CAN3_TX_BUSOFF 25 /* CAN controller 3: dropped off the bus after too many errors */
 #define ERR_CAN3_ERR_WARN 26 /* CAN controller 3: error warning level crossed */
 #define ERR_CAN3_DATA_OVRN 27 /* CAN controller 3: frame lost in the controller, not read in time */
@@ -34,7 +34,7 @@
 #define ERR_CAN3_BUS_RX 29 /* CAN controller 3: a frame coming in was faulty */
 #define ERR_CAN3_BUS_TX 30 /* CAN controller 3: a frame going out failed */
 #define ERR_CAN3_LOCKUP 31 /* CAN controller 3: no longer answers */
-#define ERR_CAN3_RX_BUF_OF 32 /* CAN controller 3: frames came faster than the board took them */
+#define ERR_CAN3_RX_BUF_OF 32 /* CAN controller 3: frames arrived faster than the board took them */
 #define ERR_CAN4_TX_BUSOFF 33 /* CAN controller 4: dropped off the bus after too many errors */
 #define ERR_CAN4_ERR_WARN 34 /* CAN controller 4: error warning level crossed */
 #define ERR_CAN4_DATA_OVRN 35 /* CAN controller 4: frame lost in the controller, not read in time */
@@ -42,7 +42,7 @@
 #define ERR_CAN4_BUS_RX 37 /* CAN controller 4: a frame coming in was faulty */
 #define ERR_CAN4_BUS_TX 38 /* CAN controller 4: a frame going out failed */
 #define ERR_CAN4_LOCKUP 39 /* CAN controller 4: no longer answers */
-#define ERR_CAN4_RX_BUF_OF 40 /* CAN controller 4: frames came faster than the board took them */
+#define ERR_CAN4_RX_BUF_OF 40 /* CAN controller 4: frames arrived faster than the board took them */
 #define ERR_QDC_CH01_GLTCH 41 /* encoder on captures 0 and 1: edge at the wrong level, or a single step back */
 #define ERR_QDC_CH23_GLTCH 42 /* encoder on captures 2 and 3: edge at the wrong level, or a single step back */
 #define ERR_MC_TCURR_OOB 43 /* motor: target current cut to its limits */
@@ -67,7 +67,7 @@
 #define ERR_ASCHED_DNF 62 /* scheduler: slot not finished at the next tick, its remaining work dropped */
 #define ERR_MSIMU_TX_FULL 63 /* inertial sensor: no room to send */
 #define ERR_MSIMU_NUM_BYT 64 /* inertial sensor: message too long for the FIFO */
-#define ERR_MSIMU_RX_OF 65 /* inertial sensor: no room for a byte that came */
+#define ERR_MSIMU_RX_OF 65 /* inertial sensor: no room for a received byte */
 #define ERR_UTIL_DUMMY 66 /* a placeholder function was called */
 #define ERR_STATE_INVALID 67 /* state machine in an unknown state */
 #define ERR_MCFI_ANKL_LS 68 /* inner ankle: an end switch is pressed */
@@ -80,10 +80,10 @@
 #define ERR_MCSI_RIGHT 75 /* steering: right bound reached */
 #define ERR_MB_SSP_TX_FULL 76 /* main brain link: no segment free to send */
 #define ERR_MB_SSP_CHKSUM 77 /* main brain link: segment with a wrong checksum */
-#define ERR_MB_SSP_DMA_JAM 78 /* main brain link: DMA did not stop when told */
+#define ERR_MB_SSP_DMA_JAM 78 /* main brain link: DMA did not stop on command */
 #define ERR_MB_SSP_RX_FULL 79 /* main brain link: no segment free to receive */
-#define ERR_MB_SER_DMA_JAM 80 /* PC line: DMA did not stop when told */
-#define ERR_MB_SER_RX_FULL 81 /* PC line: bytes came faster than they were taken */
+#define ERR_MB_SER_DMA_JAM 80 /* PC line: DMA did not stop on command */
+#define ERR_MB_SER_RX_FULL 81 /* PC line: bytes arrived faster than they were taken */
 #define ERR_MB_SER_DMA_FLL 82 /* PC line: array of received bytes has no room left */
 #define ERR_MB_SER_DMA_OFF 83 /* PC line: receive transfer was not running */
 #define ERR_MB_SER_CHKSUM 84 /* PC line: packet with a wrong checksum */
@@ -121,6 +121,6 @@
 #define ERR_CAN_TX_QUEUE_FULL 116 /* CAN: send ring full, frame dropped */
 #define ERR_MC_SPEED_LIMIT 117 /* motor: drive reduced to keep the speed within its limit */
 #define ERR_MB_UNKNOWN_PARAMETER 118 /* main brain: a parameter was set that the controller does not have */
-#define ERR_MB_PARAMETER_LIMIT 119 /* main brain: a parameter was set beyond its limits, or to what is no number */
+#define ERR_MB_PARAMETER_LIMIT 119 /* main brain: a parameter was set beyond its limits, or to a value that is not a number */
 
 #endif

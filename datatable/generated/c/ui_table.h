@@ -78,7 +78,7 @@ struct ui_data {
     float ui_rc_3; /* 152 [ticks] radio control channel 3: smoothed pulse width in 1/60 us */
     float ui_execution_time; /* 153 [s] user interface board: longest slot of about the last quarter second */
     float ui_max_execution_time; /* 154 [s] user interface board: longest slot of all */
-    float ui_audio; /* 155 reserved sound command that no board hears */
+    float ui_audio; /* 155 reserved sound command that no board receives */
     int32_t ui_empty_tx2; /* 156 any value but 0 plays the tune as well (a renamed spare) */
     float ui_status; /* 157 user interface board alive flag, 1 once it runs */
     float ui_empty_rx4; /* 158 spare from the user interface board: rename it to add a variable */

@@ -70,7 +70,7 @@ def test_a_rule_has_one_to_fifty_looks_and_an_error_below_a_half(make):
     assert len(make(50)) == 50 and len(make(1, 0.49)) == 1
     assert make(1, 0.1)[0] == pytest.approx(stats.norm.ppf(0.95), abs=1e-4)
     for looks in (0, 51):
-        with pytest.raises(UserError, match=f"stopping rule: {looks} analyses, allowed are 1 to 50"):
+        with pytest.raises(UserError, match=f"stopping rule: {looks} looks, allowed are 1 to 50"):
             make(looks)
     for error in (0.0, 0.5, -0.1):
         with pytest.raises(UserError, match="stopping rule: an error of "):
@@ -118,7 +118,7 @@ def test_a_stopping_rule_is_refused_without_a_name_a_share_or_runs_enough():
         (("fall", 0.5, 10, 5, "wald"), "stopping rule 'wald': allowed are obrien-fleming, pocock"),
         (("fall", 0.0, 10), "limit is 0.0"),
         (("fall", 1.0, 10), "limit is 1.0"),
-        (("fall", 0.5, 10, 0), "0 analyses of 10 runs"),
+        (("fall", 0.5, 10, 0), "0 looks at 10 runs"),
         (("fall", 0.5, 10, 11), "11 looks at 10 runs"),
         (("fall", 0.5, 100, 51), "51 looks at 100 runs"),
     ):

@@ -70,7 +70,7 @@ def test_the_design_determines_how_shares_are_read():
         (plan(search=Search()), True, "The runs were chosen to find the worst case"),
         (plan(), True, "A census"),
         (plan(sample=sample), True, "A random sample of the population, with replacement: clopper-pearson intervals"),
-        (plan(sample=looks), True, "A random sample that was analysed up to 3 times: repeated intervals of 95 %"),
+        (plan(sample=looks), True, "A random sample with up to 3 looks: repeated intervals of 95 %"),
     ):
         assert summary.interval_text(made, finished).startswith(expected)
     assert summary.interval_text(plan(sample=sample), True).endswith("of 90 %.")
