@@ -386,6 +386,7 @@ class SimulatedMachine(abc.ABC):
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording
     window_s: float = 2.0  # over which the gain is measured in free simulation
+    noise_by_candidates: bool = True  # `Recording.noise_by_candidates`
 
     @abc.abstractmethod
     def inputs(self, table: Table) -> dict[str, Array]:
@@ -748,6 +749,7 @@ class _Fit:
             ports=machine.ports,
             outputs=tuple(each.channel for each in machine.outputs),
             fit=self,
+            noise_by_candidates=machine.noise_by_candidates,
         )
 
         def entry(port: Port) -> Entry:
