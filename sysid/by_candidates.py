@@ -1,7 +1,7 @@
 """Diagnosis in the noise that all candidates leave: for machines without a noise estimate of their own.
 
-The order: the band (`bands.py`), what can be predicted at all (`predictability.py`), causes by likelihood
-(`likelihood.py`) that held-out data do not refuse, three errors (`three_numbers.py`), and what would not have been seen.
+The order: the band (`bands.py`), what can be predicted at all (`predictability.py`), causes by likelihood that
+held-out data do not refuse (`likelihood.py`), three errors (`three_numbers.py`), what would not have been seen.
 """
 
 import dataclasses
@@ -45,10 +45,10 @@ def diagnose(
     had = [find(each, effects) for each in known]
     effects = [each for each in effects if all(each is not other.effect for other in had)]
     progress("misfit", 0.2)
-    skews = _skews(recordings, effects, had, seed) + had
-    rest = [each for each in effects if all(each is not skew.effect for skew in skews)]
+    skews = list(had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
+        rest = _others(effects, skews)
         base = naming.refit(bands.plain(recordings), skews)
         accepts = Held(held, skews, base.values).accepts if held else likelihood.everything
         return likelihood.select(
@@ -56,6 +56,10 @@ def diagnose(
         )
 
     found = selected(recordings, held, 0.25)
+    stamps = _stamps(found)
+    if stamps:
+        skews += stamps
+        found = selected(recordings, held, 0.25)
     before = predictability.test(found.base, predictor.columns(recordings), seed)
     for number in range(AGAIN if found.named and hasattr(machine, "again") else 0):
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
@@ -102,13 +106,13 @@ def diagnose(
         errors=errors,
         floors=floors(extended),
         by_candidates=True,
-        visible=smallest(rest, extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST),
+        visible=smallest(
+            _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
+        ),
     )
 
 
-def _band(
-    machine: Machine, recordings: Sequence[Recording], seed: int
-) -> tuple[bands.Band, predictability.Predictor]:
+def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple[bands.Band, predictability.Predictor]:
     """The band, of three that suit, in which most of the residual can be predicted; and the predictor in it."""
     best: tuple[float, bands.Band, predictability.Predictor] | None = None
     for band in bands.choose(recordings):
@@ -122,16 +126,15 @@ def _band(
     return best[1], best[2]
 
 
-def _skews(
-    recordings: Sequence[Recording], effects: Sequence[Effect], had: Sequence[Named], seed: int
-) -> list[Named]:
-    """Lags of less than half a sample: stamps, not causes. They are included without a finding."""
-    lags = [each for each in effects if each.cause == "sensor_lag"]
-    if not lags:
-        return []
-    found = likelihood.select(recordings, lags, had, seed, most=2)
-    limit_s = HALF_SAMPLE * recordings[0].table.step_s
-    return [each for each in found.named if abs(found.with_named.values[each.coefficients[0]]) < limit_s]
+def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
+    return [each for each in effects if all(each is not skew.effect for skew in skews)]
+
+
+def _stamps(found: likelihood.Selection) -> list[Named]:
+    """Named lags of less than half a sample: stamps, not causes. They are in the base from then on."""
+    limit_s = HALF_SAMPLE * found.base.recordings[0].table.step_s
+    lags = [each for each in found.named if each.effect.cause == "sensor_lag"]
+    return [each for each in lags if abs(found.with_named.values[each.coefficients[0]]) < limit_s]
 
 
 def _misfit(tests: Sequence[predictability.Predicted]) -> misfit.Misfit:

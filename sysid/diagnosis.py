@@ -15,6 +15,7 @@ from ranger_sim.sysid.regression import Regression
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
 GENERAL_LEVEL = 0.0001
 CONFIRMS = 0.01  # of the error on held-out data, by which a learned term must improve it
+MUCH = 0.3  # of the residual's square: no chance, whatever held-out data with another motion show
 EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not named
 
 
@@ -69,8 +70,8 @@ class Diagnosis:
 
     @property
     def confirmed(self) -> bool:
-        """False when held-out data are predicted no better by what was learned from the residual."""
-        if not self.errors:
+        """False when held-out data are predicted no better by what was learned from little of the residual."""
+        if not self.errors or self.before.excess > MUCH:
             return True
         return any(
             each.black_box is not None and each.black_box < (1.0 - CONFIRMS) * each.before
@@ -90,7 +91,9 @@ class Diagnosis:
         """True when a black box explains much more of the held-out data than the named effects do."""
         if not self.errors:
             return True
-        possible = sum(each.before**2 - min(each.black_box or each.after, each.after) ** 2 for each in self.errors.values())
+        possible = sum(
+            each.before**2 - min(each.black_box or each.after, each.after) ** 2 for each in self.errors.values()
+        )
         won = sum(each.before**2 - each.after**2 for each in self.errors.values())
         return won < EXPLAINED * possible
 

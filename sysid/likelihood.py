@@ -1,7 +1,7 @@
 """Causes by likelihood, in the noise that the model *and all of its candidates* leave.
 
 A residual that contains a slow fault looks like slow noise; noise estimated from it explains the fault away, and the
-larger the fault, the better. What the base and all candidates together leave contains no fault of the catalogue, so that
+larger the fault, the better. What the base and all candidates together leave contains no fault of the catalogue, and
 the score of a cause grows with its size. The score is then held against chance: surrogates of the base's own residual,
 an autoregression without any cause, pass through the same selection.
 """
@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import naming, noise
 from ranger_sim.sysid.bands import least_squares, plain
 from ranger_sim.sysid.dataset import Array
@@ -32,9 +31,10 @@ Accepts = Callable[[Sequence[Named], Named, Regression, Regression], bool]
 
 @dataclasses.dataclass
 class Selection:
-    """named: the causes in the order found; refused: those that held-out data refused; base: regression without them; with_named: with them, in one noise.
+    """named: the causes in the order found; refused: by held-out data; base: the regression without any of them.
 
-    thresholds: of each round's score; best: (effect, score) of the last round, in which nothing was found any more.
+    with_named: in the same noise; thresholds: of each round's score; best: (effect, score) of the last round, in which
+    nothing was found any more.
     """
 
     named: list[Named]
@@ -50,10 +50,8 @@ def everything(named: Sequence[Named], candidate: Named, without: Regression, ex
     return True
 
 
-def noise_of(
-    recordings: Sequence[Recording], effects: Sequence[Effect], fixed: Sequence[Named]
-) -> Noise:
-    """Noise that base, `fixed` effects and all candidates together leave; each candidate at the shape that fits best."""
+def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: Sequence[Named]) -> Noise:
+    """Noise that base, `fixed` effects and all candidates leave together; each candidate at its best shape."""
     base = naming.refit(plain(recordings), fixed)
     candidates = [_columns(effect, base) for effect in effects]
     found: dict[str, Whitening] = {}
@@ -151,10 +149,11 @@ def own_noise(regression: Regression) -> Noise:
 
 def surrogates(regression: Regression, seed: int, count: int = SURROGATES) -> Array:
     """(N, count) recordings without any cause, in the regression's rows: noise as its own residual is."""
-    random = generator(seed, "surrogates of noise")
     out = np.zeros((regression.size, count))
     for name, own in own_noise(regression).whitening.items():
-        raw = noise.surrogates(own.coefficients, own.deviation, len(regression.parts[name].response), count, random)
+        raw = noise.surrogates(
+            own.coefficients, own.deviation, len(regression.parts[name].response), count, seed, f"noise of {name}"
+        )
         out[regression.rows[name]] = regression._scaled(name, raw)[regression.good[name]]
     return out
 
@@ -188,8 +187,8 @@ def select(
 ) -> Selection:
     """The causes that these data support. fixed: effects that are in the base.
 
-    accepts(named, candidate, regression with the named, and with the candidate too): False where held-out data refuse the candidate; naming goes on
-    without it.
+    accepts(named, candidate, without, extended), the last two the regressions without the candidate and with it: False
+    where held-out data refuse the candidate; naming goes on without it.
     """
     known = noise_of(recordings, effects, fixed)
     base = naming.refit(Regression(recordings, noise=known), fixed)
@@ -209,7 +208,9 @@ def select(
         ranking = _ranking(tried, regression)
         chosen = next((each for each in ranking if naming.possible(each[3])), None)
         if chosen is None or chosen[0] <= threshold or len(named) == most:
-            return Selection(named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranking])
+            return Selection(
+                named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranking]
+            )
         bic, chi2, freedom, trial = chosen
         others = [each for each in ranking if each[3].effect is not trial.effect]
         found = Named(

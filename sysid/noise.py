@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Array
 
 MOST = 20  # largest order
@@ -70,7 +71,8 @@ def autocorrelation(coefficients: Array) -> Array:
     return np.concatenate((one_way[last:0:-1], one_way[: last + 1]))
 
 
-def surrogates(coefficients: Array, deviation: float, rows: int, count: int, random: np.random.Generator) -> Array:
-    """(rows, count) samples of the noise; deviation: of its innovations."""
+def surrogates(coefficients: Array, deviation: float, rows: int, count: int, seed: int, name: str) -> Array:
+    """(rows, count) samples of the noise; deviation: of its innovations; name: of the stream of random numbers."""
+    random = generator(seed, name)
     shocks = random.normal(scale=deviation, size=(rows + SETTLE, count))
     return np.asarray(signal.lfilter([1.0], np.concatenate(([1.0], -coefficients)), shocks, axis=0)[SETTLE:])

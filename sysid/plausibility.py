@@ -58,9 +58,7 @@ class Doubts:
     forbid: bool
 
 
-def look(
-    machine: Machine, regression: Regression, named: Sequence[Named] = (), by_candidates: bool = False
-) -> Doubts:
+def look(machine: Machine, regression: Regression, named: Sequence[Named] = (), by_candidates: bool = False) -> Doubts:
     """Implausible values of a fit. regression: with every named cause in it.
 
     by_candidates: the noise is what all candidates leave. Then a slow residual is what a model error looks like, and a

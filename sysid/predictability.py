@@ -2,8 +2,8 @@
 
 Whatever can be predicted from the machine's signals, on rows that had no part in the fit, is an error of the model;
 whatever cannot is noise. The predictor is a ridge over random cosines of the signals (Rahimi and Recht 2007), bounded
-everywhere, so that it cannot run away outside its training; its ridge may be infinite, which predicts nothing. Chance is
-what the same predictor reaches on surrogates of the base's residual: noise of the same memory without any cause.
+everywhere and 0 outside its training; its ridge may be infinite, which predicts nothing. Chance is what the same
+predictor reaches on surrogates of the base's residual: noise of the same memory without any cause.
 """
 
 import dataclasses
@@ -22,6 +22,7 @@ SCALES = (0.3, 0.7, 1.5, 3.0)  # lengths of the cosines, in deviations of a sign
 PER_SIGNAL, PER_PAIR, TOGETHER = 12, 8, 24  # cosines over one signal, over two, over all
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)  # of the mean square of a feature; besides these an infinite one
 BLOCKS = 10
+BEYOND = 0.02  # of a signal's training range, beyond which a row is outside of it
 WORTH = 0.05  # of the residual's square: less is not a reason for another band
 HIDDEN = 1e-4  # of an effect's square: when the base explains all but this, the data do not show it
 SURROGATES = 199  # and as many for every further equation, so that their least chance together stays the same
@@ -55,9 +56,12 @@ class Cosines:
     def __call__(self, signals: Mapping[str, Array]) -> Array:
         """(n, k)."""
         raw = np.column_stack([signals[name] for name in self.names])
-        inside = np.clip(raw, self.low, self.high)  # outside the training's limits nothing new is said
+        inside = np.clip(raw, self.low, self.high)
         scaled = (inside - self.mean) / self.size
-        return np.hstack([np.cos(scaled @ self.turns + self.phases), scaled])
+        far = np.any(np.abs(raw - inside) > BEYOND * (self.high - self.low), axis=1)
+        out = np.hstack([np.cos(scaled @ self.turns + self.phases), scaled])
+        out[far] = 0.0  # nothing is known there
+        return out
 
 
 def cosines(signals: Sequence[Mapping[str, Array]], seed: int) -> Cosines:
@@ -97,17 +101,15 @@ class Predictor:
                     continue
                 raw = features(general[place])
                 seen = recording.entries[place].respond(raw) if place in recording.entries else {place: raw}
-                for name in here:
-                    here[name].append(seen.get(name, np.zeros((len(recording.table), wide))))
-            for name, columns in here.items():
-                if columns:
-                    parts.setdefault(name, []).append(reduced(recording, np.hstack(columns)))
+                for name, columns in here.items():
+                    columns.append(seen.get(name, np.zeros((len(recording.table), wide))))
+            for name, features_here in here.items():
+                if features_here:
+                    parts.setdefault(name, []).append(reduced(recording, np.hstack(features_here)))
         return {name: np.vstack(each) for name, each in parts.items()}
 
 
-def predictor(
-    machine: Machine, recordings: Sequence[Recording], seed: int, without: Collection[str] = ()
-) -> Predictor:
+def predictor(machine: Machine, recordings: Sequence[Recording], seed: int, without: Collection[str] = ()) -> Predictor:
     """The flexible predictor for this machine and these recordings; without: signals that it does not use."""
     general = [
         {
@@ -131,8 +133,7 @@ def test(regression: Regression, features: Mapping[str, Array], seed: int) -> li
         if name not in features or np.count_nonzero(good) < 4 * BLOCKS:
             continue
         own = noises[name]
-        random = generator(seed, f"surrogates of {name}")
-        drawn = noise.surrogates(own.coefficients, own.deviation, len(good), count, random)
+        drawn = noise.surrogates(own.coefficients, own.deviation, len(good), count, seed, f"chance of {name}")
         every = max(1, np.count_nonzero(good) // MOST_ROWS)
         rows = np.flatnonzero(good)[::every]
         residual = (part.response - part.measured @ values)[rows]

@@ -107,8 +107,7 @@ class Held:
         before = self.residual(named, without.values)
         after = self.residual([*named, candidate], extended.values)
         won = sum(
-            _by_block(before[name] ** 2 - after[name] ** 2) / max(1, len(before[name]))
-            for name in self.base.equations
+            _by_block(before[name] ** 2 - after[name] ** 2) / max(1, len(before[name])) for name in self.base.equations
         )
         return float(np.mean(won)) > SURE * float(np.std(won, ddof=1)) / math.sqrt(len(won))
 

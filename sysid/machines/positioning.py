@@ -138,6 +138,7 @@ class Positioning:
             ),
         ]
         places = {"sensor_lag": ("drive", "timing")}
+        forms = {"slide_m": "by the way", "speed_m_per_s": "by the speed"}  # of one cause: only one of them is named
         more_at_rest = {"stribeck": "excess_N", "presliding": "friction_N", "friction_warm_up": "N_per_m"}
 
         def admissible(cause: str) -> Callable[[Mapping[str, float]], bool]:
@@ -145,6 +146,14 @@ class Positioning:
             return lambda found: name is None or found[name] > 0.0
 
         return [
-            Effect(cause, *places.get(cause, ("guide", "mechanical")), names, shapes, columns, admissible(cause))
+            Effect(
+                cause,
+                *places.get(cause, ("guide", "mechanical")),
+                names,
+                shapes,
+                columns,
+                admissible(cause),
+                form=forms.get(next(iter(shapes[0]), ""), "") if cause == "presliding" else "",
+            )
             for cause, names, shapes, columns in made
         ]

@@ -248,7 +248,9 @@ def test_rows_are_kept_from_each_run_s_start_under_a_gaussian_of_their_own():
 
 
 def test_pure_error_is_what_repeats_differ_by():
-    part = regression.Part(*(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.arange(60) // 3, run=np.zeros(60))
+    part = regression.Part(
+        *(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.arange(60) // 3, run=np.zeros(60)
+    )
     part.repeats[57:] = -1
     part.valid[0] = False
     residual = RNG.normal(size=60)
@@ -261,7 +263,9 @@ def test_pure_error_is_what_repeats_differ_by():
     )
     # 20 degrees of freedom are enough, 19 are not
     for pairs, there in ((20, 20), (19, 0)):
-        few = regression.Part(*(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.full(60, -1), run=np.zeros(60))
+        few = regression.Part(
+            *(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.full(60, -1), run=np.zeros(60)
+        )
         few.repeats[: 2 * pairs] = np.arange(2 * pairs) // 2
         assert few.pure_error(residual)[1] == there
         if not there:
