@@ -25,7 +25,7 @@ from ranger_sim.firmware_sim.peripherals.can_controller import (
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import IRQ_LATENCY
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 ALL_CAN_INTERRUPTS = ICR_RI | ICR_ERROR_WARNING | ICR_DOI | ICR_ERROR_PASSIVE | ICR_BUS_ERROR
 # From the tick to the first function of its row, 3 us (robot.md T2): the interrupt's 27 instructions, two cycles each,
@@ -70,7 +70,7 @@ class FirmwareBoard(Microcontroller):
 
     def schedule(self) -> Schedule:
         """The board's table; every room has its own."""
-        raise UserError(f"{self.name}: this board has no schedule")
+        raise FirmwareError(f"{self.name}: this board has no schedule")
 
     @cython.ccall
     def report(self, code: cython.longlong) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Container
 from dataclasses import dataclass, field, fields
 from typing import Any, Self, TypeVar
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ScenarioError
 
 Value = TypeVar("Value", bool, int, str)
 
@@ -168,7 +168,7 @@ class Quirks:
                     if isinstance(allowed, range)
                     else ", ".join(repr(a) for a in allowed)
                 )
-                raise UserError(f"quirk {each.name}: {value!r} is not allowed (allowed: {shown})")
+                raise ScenarioError(f"quirk {each.name}: {value!r} is not allowed (allowed: {shown})")
 
     @classmethod
     def firmware_2016(cls) -> Self:
@@ -181,5 +181,5 @@ class Quirks:
         known = {each.name for each in fields(cls)}
         for name in changes:
             if name not in known:
-                raise UserError(f"quirk {name!r}: no such switch (see boards/QUIRKS.md)")
+                raise ScenarioError(f"quirk {name!r}: no such switch (see boards/QUIRKS.md)")
         return cls(**changes)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.node import JOINING, OPERATING, UNPLUGGED
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 # A rate for which synchronisation compensates is not a fault: bits of ten time quanta with a jump width of two tolerate
 # 1 % at either end (ISO 11898-1, oscillator tolerance), so 2 % between two controllers. The other limit is chosen by
@@ -46,7 +46,7 @@ def check_rate(bus: Any, rate: int, where: str) -> None:
     """Raise UserError, naming `where`, for a rate (bit/s) too close to that of `bus`, or too far from it."""
     off = abs(rate / bus.bitrate - 1.0)
     if not (off >= LEAST_MISMATCH and bus.bitrate <= MOST_TIMES * rate <= MOST_TIMES**2 * bus.bitrate):
-        raise UserError(
+        raise BusError(
             f"{where}: {rate} bit/s must be {LEAST_MISMATCH:.0%} off {bus.bitrate} at least, because synchronisation"
             f" makes up for less, and {MOST_TIMES} times off at most"
         )

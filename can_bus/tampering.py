@@ -50,7 +50,7 @@ from ranger_sim.can_bus.node import (
 from ranger_sim.can_bus.transmit_buffers import BUFFER_SHIFT, FLAGS, HIGH, IDENTIFIER, LOW, NODE_SHIFT
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
 from ranger_sim.foundation.events import CAN_RX, NEVER, STAGE_BUS, EventQueue
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 ERRORS = ("BIT", "BIT_STUFFING", "FORM", "CRC", "ACK", "BROKEN_ERROR_FRAME")
 # Errors that a node cannot see, and why: (error, whether it is the sender)
@@ -245,7 +245,7 @@ class Misreading(Tamper):
     def __init__(self, error: str, node: int, of_sender: bool, identifier: int = -1) -> None:
         Tamper.__init__(self, identifier, sender=node if of_sender else -1, but=-1 if of_sender else node)
         if (error, of_sender) in IMPOSSIBLE:
-            raise UserError(f"{error}: {IMPOSSIBLE[error, of_sender]}")
+            raise BusError(f"{error}: {IMPOSSIBLE[error, of_sender]}")
         self.error = error
         self.node = node
         self.of_sender = of_sender

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def load(folder: str | None = None) -> "Table":
     """The checked master table. `folder`: where the master files are (ours by default).
 
-    Raises datatable.model.TableError, a UserError, that names every fault at once.
+    Raises TableError that names every fault at once.
     """
     from ranger_sim.datatable.loader import load_table
 
@@ -34,13 +34,13 @@ def place_of_generated(ours: list[str]) -> list[str]:
 
     UserError when nothing was generated for the user's own table.
     """
-    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.foundation.user_error import TableError
     from ranger_sim.loading import OWN_TABLE
 
     if OWN_TABLE is None:
         return ours
     if not (OWN_TABLE / "generated" / "__init__.py").is_file():
-        raise UserError(
+        raise TableError(
             f"RANGER_SIM_TABLE: nothing was generated in {OWN_TABLE}: unset RANGER_SIM_TABLE, then "
             f"ranger-sim table generate --master {OWN_TABLE}"
         )
@@ -49,7 +49,7 @@ def place_of_generated(ours: list[str]) -> list[str]:
 
 def check_own_table() -> None:
     """Raise UserError when code was generated from a different state of the user's own table (RANGER_SIM_TABLE)."""
-    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.foundation.user_error import TableError
     from ranger_sim.loading import OWN_TABLE
 
     if OWN_TABLE is None:
@@ -57,7 +57,9 @@ def check_own_table() -> None:
     from ranger_sim.datatable.generated import all_variables
 
     if all_variables.TABLE_HASH != table_hash(str(OWN_TABLE)):
-        raise UserError(f"{OWN_TABLE}: changed since its code was made: ranger-sim table generate --master {OWN_TABLE}")
+        raise TableError(
+            f"{OWN_TABLE}: changed since its code was made: ranger-sim table generate --master {OWN_TABLE}"
+        )
 
 
 def published_schedule(board: str) -> "PublishedSchedule":

@@ -9,7 +9,7 @@ import pathlib
 import sys
 
 from ranger_sim.datatable.model import Table, Variable
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import TableError
 
 EXIT_DONE, EXIT_STALE = 0, 1
 FILE_COLUMNS = 160  # of lines in a file or a pipe
@@ -84,7 +84,7 @@ def run_copy(arguments: argparse.Namespace) -> int:
             if path.suffix in (".csv", ".toml"):
                 shutil.copyfile(path, folder / path.name)
     except OSError as error:
-        raise UserError(f"{error.filename or folder}: {error.strerror}: the copy needs a folder of its own") from error
+        raise TableError(f"{error.filename or folder}: {error.strerror}: the copy needs a folder of its own") from error
     print(f"{folder}: change variables.csv, then ranger-sim table generate --master {folder}")
     print(f"then it is the table of whatever runs with RANGER_SIM_TABLE={folder}")
     return EXIT_DONE

@@ -13,7 +13,7 @@ from ranger_sim.datatable.generate_catalogue import catalogue_text
 from ranger_sim.datatable.generate_dbc import dbc_text
 from ranger_sim.datatable.generate_python import python_files
 from ranger_sim.datatable.model import MAIN_BRAIN, Table
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import TableError
 from ranger_sim.loading import OWN_TABLE
 
 GENERATED_FOLDER = (OWN_TABLE or pathlib.Path(__file__).parent) / "generated"
@@ -62,7 +62,7 @@ def write(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
             else:
                 path.unlink()
     except OSError as error:
-        raise UserError(f"{error.filename or folder}: cannot be written: {error.strerror}") from error
+        raise TableError(f"{error.filename or folder}: cannot be written: {error.strerror}") from error
     return changed
 
 
@@ -73,5 +73,5 @@ def stale(table: Table, folder: pathlib.Path = GENERATED_FOLDER) -> list[str]:
         found = on_disk(folder) if folder.is_dir() else set()
         different = {name for name in found & set(files) if (folder / name).read_bytes() != files[name].encode()}
     except OSError as error:
-        raise UserError(f"{error.filename or folder}: cannot be read: {error.strerror}") from error
+        raise TableError(f"{error.filename or folder}: cannot be read: {error.strerror}") from error
     return sorted(different | (found ^ set(files)))

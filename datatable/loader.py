@@ -29,8 +29,8 @@ from ranger_sim.datatable.model import (
     Board,
     ErrorCode,
     Fault,
+    FaultyTableError,
     Table,
-    TableError,
     Variable,
 )
 from ranger_sim.datatable.routing import unreachable
@@ -634,7 +634,7 @@ def load_table(folder: str | pathlib.Path | None = None) -> Table:
             faults.at(VARIABLES_FILE, 1, "")("", "has no rows")
     if faults.found:
         order = {BOARDS_FILE: 0, VARIABLES_FILE: 1, ERRORS_FILE: 2}
-        raise TableError(sorted(faults.found, key=lambda fault: (order[fault.file], fault.line)))
+        raise FaultyTableError(sorted(faults.found, key=lambda fault: (order[fault.file], fault.line)))
     return Table(
         boards=tuple(sorted(boards.values(), key=lambda board: board.number)),
         variables=tuple(sorted(variables, key=lambda variable: variable.id)),
@@ -652,7 +652,7 @@ def hash_of_master_files(folder: str | pathlib.Path | None = None) -> str:
     for name in (BOARDS_FILE, VARIABLES_FILE, ERRORS_FILE):
         text = read_text(folder_of(folder) / name, faults)
         if text is None:
-            raise TableError(faults.found)
+            raise FaultyTableError(faults.found)
         data = text.replace("\r\n", "\n").encode()
         digest.update(f"{name} {len(data)}\n".encode())
         digest.update(data)

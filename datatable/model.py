@@ -6,7 +6,7 @@ import dataclasses
 from fractions import Fraction
 
 from ranger_sim.foundation.numbers import float32
-from ranger_sim.foundation.user_error import UserError, did_you_mean
+from ranger_sim.foundation.user_error import TableError, unknown
 
 LARGEST_CAN_ID = 2031  # identifiers 2032-2047 are illegal: their first 7 bits are recessive (robot.md N1.5)
 LARGEST_ID = 0xFFFF  # ids have 16 bits (appendix 4.1)
@@ -38,7 +38,7 @@ class Fault:
         return f"{self.file}:{self.line} {what}: {self.rule}" if what else f"{self.file}:{self.line}: {self.rule}"
 
 
-class TableError(UserError):
+class FaultyTableError(TableError):
     """A bad table, with all its faults: `faults` in file order, and one line each as the message."""
 
     def __init__(self, faults: list[Fault]) -> None:
@@ -156,8 +156,7 @@ class Table:
         for board in self.boards:
             if board.name == name:
                 return board
-        known = ", ".join(board.name for board in self.boards)
-        raise UserError(f"no board is called {name!r}; the boards are {known}")
+        raise TableError(unknown("board", name, (board.name for board in self.boards)))
 
     def with_role(self, role: str) -> tuple[Board, ...]:
         """All boards of a role."""
@@ -169,10 +168,8 @@ class Table:
         for variable in self.variables:
             if variable.name == wanted.upper() or str(variable.id) == wanted:
                 return variable
-        hint = did_you_mean(wanted.upper(), (variable.name for variable in self.variables))
-        raise UserError(
-            f"unknown variable {wanted!r}: {f'{hint} ' if hint else ''}`ranger-sim table list` shows them all"
-        )
+        what = unknown("variable", wanted.upper(), (variable.name for variable in self.variables))
+        raise TableError(f"{what}; `ranger-sim table list` shows all")
 
     def published_by(self, board: str) -> tuple[Variable, ...]:
         """Variables that `board` publishes, by id."""

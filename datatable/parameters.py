@@ -6,7 +6,6 @@ same limits to data from its serial link (`all_variables.WRITABLE`, generated fr
 
 from __future__ import annotations
 
-import difflib
 import functools
 import math
 import numbers
@@ -15,7 +14,7 @@ from typing import Any
 from ranger_sim import datatable
 from ranger_sim.datatable.model import COMPUTER, LIMITS, Variable
 from ranger_sim.datatable.packing import word_of_value
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import TableError, unknown
 
 CHANNEL_PREFIX = "LV_"  # the serial link's own variables: channels are chosen, not written
 LONGEST_SHOWN = 60  # characters of a value in a message
@@ -31,8 +30,7 @@ def find(name: str) -> Variable:
     """The variable of this name; UserError with the nearest names for an unknown name."""
     row = rows().get(name)
     if row is None:
-        near = difflib.get_close_matches(name[:LONGEST_SHOWN], rows(), 3)
-        raise UserError(f"{shown(name)}: no such variable" + (f"; did you mean {', '.join(near)}?" if near else ""))
+        raise TableError(unknown("variable", name[:LONGEST_SHOWN], rows()))
     return row
 
 
@@ -51,9 +49,9 @@ def parameter(name: str) -> Variable:
     """The parameter of this name; UserError for any other name."""
     row = find(name)
     if row.name.startswith(CHANNEL_PREFIX):
-        raise UserError(f"{name}: not a parameter; --fast and --medium set the channels of the link")
+        raise TableError(f"{name}: not a parameter; --fast and --medium set the channels of the link")
     if not is_parameter(row):
-        raise UserError(f"{name}: not a parameter, it is published by {row.publisher}; the robot would refuse it")
+        raise TableError(f"{name}: not a parameter, it is published by {row.publisher}; the robot would refuse it")
     return row
 
 
@@ -62,14 +60,14 @@ def checked_word(row: Variable, value: Any, place: str = "") -> int:
     what = f"{place}: {row.name}" if place else row.name
     number = number_of(value)
     if number is None:
-        raise UserError(f"{what} = {shown(value)}: a number is expected")
+        raise TableError(f"{what} = {shown(value)}: a number is expected")
     low, high = row.minimum, row.maximum
     if (low is not None and number < low) or (high is not None and number > high):
         allowed = " to ".join("no limit" if each is None else f"{each:g}" for each in (low, high))
-        raise UserError(f"{what} = {number:g} is outside {allowed}{' ' + row.unit if row.unit else ''}")
+        raise TableError(f"{what} = {number:g} is outside {allowed}{' ' + row.unit if row.unit else ''}")
     low, high = LIMITS[row.type]
     if not low <= number <= high or (row.type != "f32" and number != int(number)):
-        raise UserError(f"{what} = {number:g} does not fit into its type, {row.type}")
+        raise TableError(f"{what} = {number:g} does not fit into its type, {row.type}")
     return word_of_value(row.type, number)
 
 

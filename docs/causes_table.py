@@ -57,8 +57,8 @@ def page() -> str:
     for name, (value, deviation) in base.PRIORS.items():
         lines.append(f"| {name} | {value:.6g} | {deviation:.6g} |")
     for name in ("motor", "springs", "ankle"):
-        module = importlib.import_module(f"ranger_sim.sysid.identify.{name}")
-        lines += ["", f"## Unknowns of identify/{name}.py", "", "| | unit | start | limits | known to | source |"]
+        module = importlib.import_module(f"ranger_sim.sysid.identification.{name}")
+        lines += ["", f"## Unknowns of identification/{name}.py", "", "| | unit | start | limits | known to | source |"]
         lines.append("|---|---|---|---|---|---|")
         for unknown in (each for each in vars(module).values() if isinstance(each, Parameter)):
             limits = f"{unknown.low:g} to {unknown.high:g}"

@@ -5,7 +5,7 @@
 
 import cython
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 PINS = 32
 
@@ -58,7 +58,7 @@ class AnalogPins:
 
     def _check(self, index) -> None:
         if not 0 <= index < PINS:
-            raise UserError(f"analog pin {index} is not 0 ... {PINS - 1}")
+            raise FirmwareError(f"analog pin {index} is not 0 ... {PINS - 1}")
 
     @cython.ccall
     def set_pair(

@@ -9,7 +9,7 @@ from ranger_sim.firmware_sim.clock import Crystal, TickTrain
 from ranger_sim.firmware_sim.vic import SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 PINS: Final = 64  # P0.0 ... P0.31 are 0 ... 31, P1.0 ... P1.31 are 32 ... 63
 ALARMS: Final = 16  # of peripherals
@@ -54,7 +54,7 @@ class Chip(Board):
 
     def __init__(self, name, hz, crystal=None) -> None:
         if hz <= 0:
-            raise UserError(f"{name}: hz {hz} must be above 0")
+            raise FirmwareError(f"{name}: hz {hz} must be above 0")
         Board.__init__(self, name)
         self.hz = hz
         self.crystal = crystal if crystal is not None else Crystal()

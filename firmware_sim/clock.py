@@ -7,7 +7,7 @@ nine seconds. Results are rounded down, always from absolute counts, so no error
 
 import cython
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 # chosen by us: a crystal outside this is broken, and the remainders below still fit into 63 bits
 LARGEST_PPB = 100_000_000
@@ -23,9 +23,9 @@ class Crystal:
 
     def __init__(self, nominal_hz=10_000_000, ppb=0) -> None:
         if nominal_hz <= 0:
-            raise UserError(f"crystal: nominal_hz {nominal_hz} must be above 0")
+            raise FirmwareError(f"crystal: nominal_hz {nominal_hz} must be above 0")
         if abs(ppb) > LARGEST_PPB:
-            raise UserError(f"crystal: {ppb} ppb is outside +/-{LARGEST_PPB} ppb")
+            raise FirmwareError(f"crystal: {ppb} ppb is outside +/-{LARGEST_PPB} ppb")
         self.nominal_hz = nominal_hz
         self.ppb = ppb
 

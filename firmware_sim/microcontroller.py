@@ -44,7 +44,7 @@ from ranger_sim.firmware_sim.scheduler import (
 from ranger_sim.firmware_sim.vic import FIQ, FIRST_FIQ, SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import CAN_TX_DONE, NEVER, PIN_EDGE, EventQueue
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 MESSAGE_KINDS: Final = 32  # to a board
 INDICES_PER_KIND: Final = 16
@@ -119,19 +119,19 @@ class Microcontroller(Chip):
     def _check_peripheral(self, peripheral) -> None:
         """The compiled loop assumes that what is claimed is a Peripheral and does not check again."""
         if not isinstance(peripheral, Peripheral):
-            raise UserError(f"{self.name}: {peripheral!r} is no Peripheral, so nothing can be delivered to it")
+            raise FirmwareError(f"{self.name}: {peripheral!r} is no Peripheral, so nothing can be delivered to it")
 
     def claim(self, kind, index, peripheral) -> None:
         """Route messages of `kind` whose field a is `index` (0 ... 15) to `peripheral.on_message`."""
         self._check_peripheral(peripheral)
         if not (0 <= kind < MESSAGE_KINDS and 0 <= index < INDICES_PER_KIND):
-            raise UserError(
+            raise FirmwareError(
                 f"{self.name}: kind {kind} is not 0 ... {MESSAGE_KINDS - 1}"
                 f" or index {index} not 0 ... {INDICES_PER_KIND - 1}"
             )
         place = index * MESSAGE_KINDS + kind
         if self.message_table[place] is not self.others:
-            raise UserError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
+            raise FirmwareError(f"{self.name}: messages of kind {kind}, index {index} are claimed twice")
         self.message_table[place] = peripheral
 
     def claim_pin(self, pin, channel, peripheral, source=None) -> InterruptSource:
@@ -141,9 +141,9 @@ class Microcontroller(Chip):
         """
         self._check_peripheral(peripheral)
         if not 0 <= pin < PINS:
-            raise UserError(f"{self.name}: pin {pin} is not 0 ... {PINS - 1}")
+            raise FirmwareError(f"{self.name}: pin {pin} is not 0 ... {PINS - 1}")
         if self.pin_owners[pin] is not None:
-            raise UserError(f"{self.name}: pin {pin} is claimed twice")
+            raise FirmwareError(f"{self.name}: pin {pin} is claimed twice")
         self.pin_owners[pin] = peripheral
         self.pin_channels[pin] = channel
         self.pin_sources[pin] = source if source is not None else self.vic.source(PIN_EDGE, pin)
@@ -156,14 +156,14 @@ class Microcontroller(Chip):
         Two encoders can be connected this way; the edges of further ones must arrive as messages.
         """
         if not 0 <= pin < PINS or self.pin_owners[pin] is None:
-            raise UserError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
+            raise FirmwareError(f"{self.name}: no peripheral has claimed pin {pin}, so edges there would be lost")
         line = EdgeLine(buffer, pin, partner_pin, self.pin_owners[pin], self.pin_channels[pin], self.pin_sources[pin])
         if self.first_line.peripheral is None:
             self.first_line = line
         elif self.second_line.peripheral is None:
             self.second_line = line
         else:
-            raise UserError(f"{self.name}: pin {pin} would be the third with the edges of an encoder")
+            raise FirmwareError(f"{self.name}: pin {pin} would be the third with the edges of an encoder")
 
     def edges_came(self) -> cython.longlong:
         """Note that the buffers of the edge lines may hold new edges; returns the first edge's time.
@@ -241,7 +241,7 @@ class Microcontroller(Chip):
         """A new alarm; when due, it calls `peripheral.on_alarm(number, time)`."""
         self._check_peripheral(peripheral)
         if None not in self.alarms:
-            raise UserError(f"{self.name}: more than {ALARMS} peripheral alarms")
+            raise FirmwareError(f"{self.name}: more than {ALARMS} peripheral alarms")
         place = self.alarms.index(None)
         self.alarms[place] = Alarm(self, peripheral, number, place)
         return self.alarms[place]

@@ -20,7 +20,7 @@ from ranger_sim.firmware_sim.calls import code_of, owner_of
 from ranger_sim.firmware_sim.counters import SlotCounters
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 NORMAL_TASK: Final = 0
 OCCASIONAL_TASK: Final = 1
@@ -63,10 +63,10 @@ class Task:
     def __init__(self, function, cost=0, limit=0, per_item=0, item="", name=None) -> None:
         title = name if name is not None else getattr(function, "__name__", type(function).__name__)
         if not callable(function):
-            raise UserError(f"task {title}: function {function!r} cannot be called")
+            raise FirmwareError(f"task {title}: function {function!r} cannot be called")
         for what, value in (("cost", cost), ("limit", limit), ("per_item", per_item)):
             if not isinstance(value, int) or value < 0:
-                raise UserError(f"task {title}: {what} {value!r} must be a whole number of cycles, 0 or more")
+                raise FirmwareError(f"task {title}: {what} {value!r} must be a whole number of cycles, 0 or more")
         self.routine = function
         self.base_cycles = cost
         self.most_cycles = limit
@@ -208,7 +208,7 @@ class Occasional(Task):
         self.extra_idle_call = extra_idle_call
         for task in self.tasks:
             if not isinstance(task, Task) or task.kind != NORMAL_TASK:
-                raise UserError(f"occasional list {name}: {task!r} is not a plain Task")
+                raise FirmwareError(f"occasional list {name}: {task!r} is not a plain Task")
 
     @cython.ccall
     def next_task(self) -> Task:
@@ -277,25 +277,27 @@ class Schedule:
         self.tick_slot = tick_slot
         self.tick_latency = -1 if tick_latency is None else tick_latency
         if self.slot_ns <= 0 or divider <= 0 or self.slot_ns % divider:
-            raise UserError(f"schedule: slot of {self.slot_ns} ns does not divide into {divider} timer ticks")
+            raise FirmwareError(f"schedule: slot of {self.slot_ns} ns does not divide into {divider} timer ticks")
         if not self.rows:
-            raise UserError("schedule: at least one row is needed (it may be empty)")
+            raise FirmwareError("schedule: at least one row is needed (it may be empty)")
         if occasional is not None:
             if not 0 <= occasional_row < len(self.rows):
-                raise UserError(f"schedule: occasional_row {occasional_row} is not one of the {len(self.rows)} rows")
+                raise FirmwareError(
+                    f"schedule: occasional_row {occasional_row} is not one of the {len(self.rows)} rows"
+                )
             if not isinstance(occasional, Occasional):
                 occasional = Occasional(occasional, extra_idle_call=extra_idle_call)
             self.rows[occasional_row].append(occasional)
         for task in self.every + self.last + [task for row in self.rows for task in row]:
             if not isinstance(task, Task):
-                raise UserError(f"schedule: {task!r} is not a Task")
+                raise FirmwareError(f"schedule: {task!r} is not a Task")
         self.announces = speakers is not None
         if speakers is not None:
             names = [task.name for task in self.every + self.last]
             for name in speakers:
                 if name not in names:
                     there = ", ".join(names)
-                    raise UserError(f"schedule: speaker {name!r} is no task of every slot; there are {there}")
+                    raise FirmwareError(f"schedule: speaker {name!r} is no task of every slot; there are {there}")
             for task in self.every + self.last:
                 task.speaks = task.name in speakers
 
@@ -424,7 +426,7 @@ class SlotScheduler:
         self.row_count = len(schedule.rows)
         self.tasks = schedule.all_tasks()
         if len(self.tasks) > 256:
-            raise UserError(f"schedule: {len(self.tasks)} different tasks; at most 256 are possible")
+            raise FirmwareError(f"schedule: {len(self.tasks)} different tasks; at most 256 are possible")
         self.row_starts = integers(self.row_count + 1)
         places: list = []
         for row in range(self.row_count):
@@ -603,9 +605,9 @@ class SlotScheduler:
         found = [task for task in tasks if task is name or task.name == name]
         if not found:
             names = ", ".join(sorted({task.name for task in tasks}))
-            raise UserError(f"schedule: no task named {name!r}; there are {names}")
+            raise FirmwareError(f"schedule: no task named {name!r}; there are {names}")
         if len(found) > 1:
-            raise UserError(f"schedule: {len(found)} tasks are named {name!r}; give the Task itself")
+            raise FirmwareError(f"schedule: {len(found)} tasks are named {name!r}; give the Task itself")
         return found[0]
 
     def replace(self, name, function, cost=None, limit=None, per_item=None):
@@ -615,9 +617,9 @@ class SlotScheduler:
         """
         task = self.find(name)
         if not callable(function):
-            raise UserError(f"task {name}: function {function!r} cannot be called")
+            raise FirmwareError(f"task {name}: function {function!r} cannot be called")
         if task.kind == OCCASIONAL_TASK:
-            raise UserError(f"task {task.name}: an occasional list has entries, replace one of those")
+            raise FirmwareError(f"task {task.name}: an occasional list has entries, replace one of those")
         checked = Task(
             function,
             cost=task.cost if cost is None else cost,

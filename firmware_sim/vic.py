@@ -12,7 +12,7 @@ import cython
 
 from ranger_sim.firmware_sim.calls import code_of, owner_of
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, CAN_TX_DONE, PIN_EDGE, SSP_SEGMENT, UART_BYTE, EventQueue
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 FIQ: Final = -1
 IRQ_SLOTS: Final = 16
@@ -256,13 +256,13 @@ class InterruptController:
         """
         source = self.source(kind, index)
         if not callable(handler):
-            raise UserError(f"interrupt {kind}/{index}: handler {handler!r} cannot be called")
+            raise FirmwareError(f"interrupt {kind}/{index}: handler {handler!r} cannot be called")
         if slot != FIQ and not 0 <= slot < IRQ_SLOTS:
-            raise UserError(f"interrupt {kind}/{index}: slot {slot} is neither FIQ (-1) nor 0 ... 15")
+            raise FirmwareError(f"interrupt {kind}/{index}: slot {slot} is neither FIQ (-1) nor 0 ... 15")
         if cost < 0 or per_item < 0:
-            raise UserError(f"interrupt {kind}/{index}: cost {cost} and per_item {per_item} must not be negative")
+            raise FirmwareError(f"interrupt {kind}/{index}: cost {cost} and per_item {per_item} must not be negative")
         if slot != FIQ and self.irq_list[slot] not in (None, source):
-            raise UserError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
+            raise FirmwareError(f"interrupt {kind}/{index}: slot {slot} is taken by {self.irq_list[slot].name}")
         self.detach(source)
         source.settle()
         source.handler = handler
@@ -277,7 +277,7 @@ class InterruptController:
         source.latency_ns = int(source.latency * self.ns_per_cycle)
         if slot == FIQ:
             if len(self.fiq_list) >= MOST_FIQ_SOURCES:
-                raise UserError(f"interrupt {kind}/{index}: more than {MOST_FIQ_SOURCES} sources on the FIQ")
+                raise FirmwareError(f"interrupt {kind}/{index}: more than {MOST_FIQ_SOURCES} sources on the FIQ")
             source.bit = FIRST_FIQ << len(self.fiq_list)
             self.fiq_list.append(source)
         else:

@@ -1,4 +1,4 @@
-"""The only exception for mistakes of a user."""
+"""The exceptions for mistakes of a user: `UserError`, and a class of it for each kind of thing that is wrong."""
 
 import difflib
 from collections.abc import Iterable
@@ -6,6 +6,7 @@ from collections.abc import Iterable
 LONGEST_NAME = 100  # letters of a name that is compared with others
 LEAST_ALIKE = 0.7  # of 1, as difflib measures it: two letters swapped in a word of four are 0.75
 MOST_NAMED = 2
+FEW, MOST_LISTED = 12, 100  # names that are always listed; that are listed where none is close
 
 
 def printable(text: str) -> str:
@@ -30,6 +31,46 @@ class UserError(Exception):
         return "\n".join(self.args)
 
 
+class TableError(UserError):
+    """The data table: its files, variables, errors, boards, or what is generated from it."""
+
+
+class ProfileError(UserError):
+    """A profile: boards, buses and their interfaces."""
+
+
+class ScenarioError(UserError):
+    """A scenario: its numbers, controller, parameters, quirks or conditions."""
+
+
+class ModelError(UserError):
+    """What is simulated: a body, a motor, a sensor, a floor, a model file, or a machine that is diagnosed."""
+
+
+class DataError(UserError):
+    """Measured data: a recording that cannot be read, or from which nothing can be concluded."""
+
+
+class FaultError(UserError):
+    """A fault that is injected: its place, mode, size or time."""
+
+
+class CampaignError(UserError):
+    """A campaign: its plan, runs or results."""
+
+
+class BusError(UserError):
+    """A CAN bus: its bits, frames and databases, interfaces and connections."""
+
+
+class FirmwareError(UserError):
+    """Firmware: its schedule, its chip, its source in C or its image."""
+
+
+class RequestError(UserError):
+    """A request to a running robot."""
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """`did you mean 'walk'?`, the known names that begin with a mistyped one or are close to it; empty if there are
     none."""
@@ -37,3 +78,16 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     begun = [each for each in names if name and each.startswith(name)][:MOST_NAMED]
     near = begun or difflib.get_close_matches(name[:LONGEST_NAME], names, MOST_NAMED, LEAST_ALIKE)
     return f"did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> str:
+    """`unknown board 'MHC' (available: MCH, MB)`; of more than FEW names `unknown frame 'MCH_ANGEL'; did you mean ...?`.
+
+    Without any of them where nothing is close and there are more than MOST_LISTED.
+    """
+    names = list(known)
+    near = did_you_mean(name, names) if len(names) > FEW else ""
+    if near:
+        return f"unknown {what} {name!r}; {near}"
+    listed = f" (available: {', '.join(names) or 'none'})" if len(names) <= MOST_LISTED else ""
+    return f"unknown {what} {name!r}{listed}"

@@ -17,8 +17,7 @@ from typing import Any
 
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.names import meant
+from ranger_sim.foundation.user_error import ScenarioError, unknown
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.waiting import (
     COMPARED,
@@ -80,7 +79,7 @@ class State(Condition):
     def __init__(self, text: str, machine: str, state: str) -> None:
         Condition.__init__(self, text)
         if machine not in STATE_VARIABLES:
-            raise UserError(f"condition {text!r}: machine {machine!r} is none of {', '.join(STATE_VARIABLES)}")
+            raise ScenarioError(f"condition {text!r}: machine {machine!r} is none of {', '.join(STATE_VARIABLES)}")
         self.machine = machine
         self.state = state
         self.place = all_variables.ID_OF[STATE_VARIABLES[machine]]
@@ -95,7 +94,7 @@ class State(Condition):
         numbers = [number for number, name in self.names.items() if name == self.state]
         if not numbers:
             there = ", ".join(self.names.values())
-            raise UserError(f"condition {self.text!r}: {self.machine} has no state {self.state!r}, but {there}")
+            raise ScenarioError(f"condition {self.text!r}: {self.machine} has no state {self.state!r}, but {there}")
         self.number = numbers[0]
         self.seen = set()
 
@@ -116,10 +115,8 @@ class Quantity(Comparison):
         Comparison.__init__(self, text, name, sign, value, SAMPLES)
         self.variable = all_variables.ID_OF.get(name)
         if self.variable is None and self.column < 0:
-            raise UserError(
-                f"condition {text!r}: {name!r} is neither a variable of the table nor a quantity of the body"
-                + meant(name, [*all_variables.ID_OF, *SAMPLES])
-            )
+            known = [*all_variables.ID_OF, *SAMPLES]
+            raise ScenarioError(f"condition {text!r}: {unknown('variable or quantity of the body', name, known)}")
 
     def now(self) -> float:
         if self.variable is None:
@@ -150,7 +147,7 @@ def condition(wanted: str | Condition | Callable[[Any], Any]) -> Condition:
         return Quantity(text, match.group(1), match.group(2), float(match.group(3)))
     if (at := instant(text)) is not None:
         return at
-    raise UserError(
+    raise ScenarioError(
         f"condition {wanted!r}: it reads like 12.3 s, step 12, hip in HI_premid, MCH_ANGLE > 0.3, hip_rad < -0.2, "
         f"error MC_TCURR_OOB from MCH, or fell"
     )

@@ -21,7 +21,7 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER, STAGE_BUS
 from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness import lockstep, waiting
 from ranger_sim.harness.faults import network_places
 from ranger_sim.harness.faults.catalogue import Catalogue
@@ -134,7 +134,7 @@ class Machine:
     def _wired(self, name: str) -> Any:
         """A board that the wiring names."""
         if name not in self.boards:
-            raise UserError(f"wiring: there is no board {name!r}, but {', '.join(self.boards)}")
+            raise UserError(f"wiring: {unknown('board', name, self.boards)}")
         return self.boards[name]
 
     def _part(self, kind: str, number: int) -> Any:
@@ -252,7 +252,7 @@ class Machine:
     def board(self, name: str) -> Any:
         """The board of this name. UserError for any other."""
         if name not in self.boards:
-            raise UserError(f"board {name!r}: there is none of this name, but {', '.join(self.boards)}")
+            raise UserError(unknown("board", name, self.boards))
         return self.boards[name]
 
     def quantities(self) -> dict[str, float]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ranger_sim.datatable.packing import parts_of_error_word, value_of_word
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 
 if TYPE_CHECKING:
     from ranger_sim.datatable.model import Table
@@ -56,7 +55,7 @@ class Names:
             return name
         number = self.ids.get(name)
         if number is None:
-            raise UserError(f"frame {name!r}: no variable of the table has this name{meant(name, self.ids)}")
+            raise UserError(unknown("frame", name, self.ids))
         return number
 
     def name(self, identifier: int) -> str:
@@ -81,9 +80,3 @@ class Names:
         """Whether the error of an error word is one that a healthy machine's board records."""
         code, board, _ = parts_of_error_word(word)
         return self.boards.get(board) in self.normal_per_s.get(code, {})
-
-
-def meant(name: str, known: Iterable[str]) -> str:
-    """Suggestions for a wrong name, as the end of a message."""
-    near = difflib.get_close_matches(name, list(known), 3)
-    return f"; meant was perhaps {' or '.join(near)}" if near else ""

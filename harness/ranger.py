@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import os
 import pathlib
 import tempfile
@@ -35,7 +34,7 @@ from ranger_sim.firmware_sim.native import coverage, crash
 from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.quantities import Duration
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.conditions import STATE_VARIABLES, Condition, ErrorNoted, condition
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.faults.error_watch import ErrorWatch
@@ -388,12 +387,7 @@ class Ranger(Machine):
 
         number = all_variables.ID_OF.get(name)
         if number is None:
-            near = difflib.get_close_matches(name, all_variables.ID_OF, 3)
-            instead = f"meant was perhaps {' or '.join(near)}; " if near else ""
-            raise UserError(
-                f"variable {name!r}: none of the table's {len(all_variables.ID_OF)} has this name; "
-                f"{instead}`ranger-sim table list` shows them"
-            )
+            raise UserError(f"{unknown('variable', name, all_variables.ID_OF)}; `ranger-sim table list` shows all")
         return value_of_word(all_variables.TYPES[number], self.loop.board("MB").memory[number])
 
     def replace(

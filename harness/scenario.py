@@ -4,7 +4,7 @@ import dataclasses
 import math
 import os
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ScenarioError
 from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.plant.electrics.battery import BatteryParameters
 from ranger_sim.plant.electrics.electrics import ElectricsParameters
@@ -50,16 +50,16 @@ class Scenario:
         for name, (low, high, unit) in LIMITS.items():
             value = getattr(self, name)
             if not (isinstance(value, int | float) and math.isfinite(value) and low <= value <= high):
-                raise UserError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
+                raise ScenarioError(f"scenario: {name} is {value!r}, allowed are {low} to {high} {unit}")
         if not isinstance(self.seed, int) or isinstance(self.seed, bool) or self.seed < 0:
-            raise UserError(f"scenario: seed is {self.seed!r}, a whole number from 0 on is expected")
+            raise ScenarioError(f"scenario: seed is {self.seed!r}, a whole number from 0 on is expected")
         for name in ("controller", "body", "model_file"):
             value = getattr(self, name)
             if not isinstance(value, str | os.PathLike) and (name, value) != ("model_file", None):
-                raise UserError(f"scenario: {name} is {value!r}, a name or the path of a .toml file is expected")
+                raise ScenarioError(f"scenario: {name} is {value!r}, a name or the path of a .toml file is expected")
         for name in self.electronics_off:
             if name not in SWITCHES:
-                raise UserError(f"scenario: electronics_off {name!r}: what can be off is {', '.join(SWITCHES)}")
+                raise ScenarioError(f"scenario: electronics_off {name!r}: what can be off is {', '.join(SWITCHES)}")
 
     def electrics(self, body: ElectricsParameters) -> ElectricsParameters:
         """Motors and sensors of the body with this walk's batteries and electronics."""

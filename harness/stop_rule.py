@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ScenarioError
 
 # Of a walk's end: 31 years of virtual time, and as many steps and metres. Time is a 64-bit number of nanoseconds, which
 # ends after 292 years, and network time one of 32-bit milliseconds that wraps. Chosen by us.
@@ -24,6 +24,6 @@ class StopRule:
         for name, most in limits.items():
             value = getattr(self, name)
             if value is not None and not 0 < value <= most:
-                raise UserError(f"{name} is {value!r}, it must be above 0 and at most {most:g}")
+                raise ScenarioError(f"{name} is {value!r}, it must be above 0 and at most {most:g}")
         if self.steps is None and self.time_s is None and self.distance_m is None:
-            raise UserError("give steps, time or distance: a walk needs an end")
+            raise ScenarioError("give steps, time or distance: a walk needs an end")

@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ranger_sim.foundation.quantities import NUMBER, TIMES, duration_text, in_base_units
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.names import Names, meant
+from ranger_sim.foundation.user_error import UserError, unknown
+from ranger_sim.harness.names import Names
 from ranger_sim.harness.step_watch import StepWatch
 
 COMPARISONS: dict[str, Callable[[Any, Any], bool]] = {
@@ -120,9 +120,9 @@ class ErrorNoted(Condition):
     def __init__(self, text: str, error: str, board: str | None, names: Names, boards: Sequence[str]) -> None:
         Condition.__init__(self, text)
         if error not in names.codes:
-            raise UserError(f"condition {text!r}: the table has no error {error!r}{meant(error, names.codes)}")
+            raise UserError(f"condition {text!r}: {unknown('error', error, names.codes)}")
         if board is not None and board not in boards:
-            raise UserError(f"condition {text!r}: board {board!r} is none of {', '.join(boards)}")
+            raise UserError(f"condition {text!r}: {unknown('board', board, boards)}")
         self.code = names.codes[error]
         self.error = error
         self.boards = (board,) if board is not None else tuple(boards)
@@ -188,10 +188,7 @@ def condition(
     if match := re.fullmatch(COMPARED, text):
         name, sign, value = match.groups()
         if name not in quantities:
-            told = ", ".join(quantities) or "none"
-            raise UserError(
-                f"condition {text!r}: {name!r} is no quantity of the body, but {told}{meant(name, quantities)}"
-            )
+            raise UserError(f"condition {text!r}: {unknown('quantity of the body', name, quantities)}")
         return Comparison(text, name, sign, float(value), quantities)
     if match := re.fullmatch(NOTED, text):
         return ErrorNoted(text, match.group(1), match.group(2), names if names is not None else Names(), boards)

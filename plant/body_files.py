@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError, UserError, unknown
 from ranger_sim.plant.electrics.electrics import ElectricsParameters
 from ranger_sim.plant.electrics.motor_parameters import MotorParameters
 from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
@@ -126,14 +126,14 @@ def load(name: str | pathlib.Path) -> BodyFile:
 def _load(name: str, users: tuple[str, ...]) -> BodyFile:
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not name.endswith(".toml") and name not in available():
-        raise UserError(f"body {name!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+        raise ModelError(f"{unknown('body', str(name), available())}, or give a .toml file")
     data = toml_file.load(path, "body file")
     base_name = data.get("base")
     if isinstance(base_name, str) and (base_name in users or base_name == path.stem):
-        raise UserError(f"{path}: base {base_name!r} leads back to this body")
+        raise ModelError(f"{path}: base {base_name!r} leads back to this body")
     wrong = list(_faults(data))
     if wrong:
-        raise UserError(f"{path}: " + "; ".join(wrong))
+        raise ModelError(f"{path}: " + "; ".join(wrong))
     base = _load(base_name, (*users, path.stem)) if base_name is not None else None
     changes = {
         key: float(value) if isinstance(keys()[key].default, float) else value
@@ -147,7 +147,7 @@ def _load(name: str, users: tuple[str, ...]) -> BodyFile:
     try:
         parameters = BodyParameters(**{name: value for name, value in values.items() if name in names})
     except UserError as error:  # values that contradict each other
-        raise UserError(f"{path}: {error}") from None
+        raise ModelError(f"{path}: {error}") from None
     return BodyFile(
         path.stem,
         str(path),

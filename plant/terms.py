@@ -22,7 +22,7 @@ from typing import Any
 
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.numbers import reals
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError, unknown
 from ranger_sim.plant.mechanics import term_torques as torques
 from ranger_sim.plant.mechanics.leg import INNER, OUTER
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, WORD_NAMES
@@ -310,30 +310,30 @@ def describe() -> str:
 def _check(place: str, table: object) -> Term:
     """One table of a file as a Term; `place` starts every error."""
     if not isinstance(table, dict):
-        raise UserError(f"{place}: a term is a table, not {table!r}")
+        raise ModelError(f"{place}: a term is a table, not {table!r}")
     name = table.get("form")
     if not isinstance(name, str) or name not in FORMS:
-        raise UserError(f"{place}: form is {name!r}; there are: {', '.join(FORMS)}")
+        raise ModelError(f"{place}: {unknown('form', str(name), FORMS)}")
     form = FORMS[name]
     at = table.get("at")
     place = f"{place} ({name})"
     if at not in form.places:
-        raise UserError(f"{place}: at is {at!r}; this form can stand at: {', '.join(form.places)}")
+        raise ModelError(f"{place}: at is {at!r}; this form can stand at: {', '.join(form.places)}")
     known = {p.name for p in form.parameters}
     for key in table:
         if key not in known and key not in ("form", "at"):
-            raise UserError(f"{place}: {key} is no parameter of this form; it has: {', '.join(sorted(known))}")
+            raise ModelError(f"{place}: {key} is no parameter of this form; it has: {', '.join(sorted(known))}")
     values = {}
     for p in form.parameters:
         value = table.get(p.name, p.default)
         if value is None:
-            raise UserError(f"{place}: {p.name} is missing, a number from {p.low:g} to {p.high:g} {p.unit}")
+            raise ModelError(f"{place}: {p.name} is missing, a number from {p.low:g} to {p.high:g} {p.unit}")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise UserError(
+            raise ModelError(
                 f"{place}: {p.name} is {value!r}, it must be a number from {p.low:g} to {p.high:g} {p.unit}"
             )
         if not p.low <= value <= p.high:
-            raise UserError(f"{place}: {p.name} is {value!r}, allowed are {p.low:g} to {p.high:g} {p.unit}")
+            raise ModelError(f"{place}: {p.name} is {value!r}, allowed are {p.low:g} to {p.high:g} {p.unit}")
         values[p.name] = float(value)
     return Term(form, at, values)
 
@@ -365,7 +365,7 @@ class Model:
                 _apply_electric(unit, term)
                 ohm = unit.winding_ohm + unit.series_ohm
                 if ohm <= 0.0 or unit.contact_drop_V < 0.0:
-                    raise UserError(
+                    raise ModelError(
                         f"{self.source}: the terms at {term.at} together leave {ohm:g} ohm "
                         f"and {unit.contact_drop_V:g} V at the brushes; both must stay above 0"
                     )
@@ -389,7 +389,7 @@ class Model:
                 sums[term.at] = sums.get(term.at, 0.0) + term.values["fraction"]
         for at, total in sums.items():
             if total >= 1.0:
-                raise UserError(
+                raise ModelError(
                     f"{self.source}: the commutation ripples at {at} together are {total:g} of its torque constant; "
                     "allowed is what lies below 1"
                 )
@@ -477,7 +477,7 @@ def load(path: str | pathlib.Path) -> Model:
         if isinstance(effect, dict) and "no_form" in effect:
             name = f"{effect.get('cause')} at {effect.get('at')}"
             if effect.get("left_out") is not True:
-                raise UserError(
+                raise ModelError(
                     f"{path}: {name} cannot be simulated: {effect['no_form']}; "
                     "with left_out = true in its table the simulator runs without it"
                 )
@@ -491,22 +491,22 @@ def content_of(path: str | pathlib.Path) -> dict[str, Any]:
     content = toml_file.load(path)
     unknown = [key for key in content if key not in ("term", "title", "diagnosis")]
     if unknown:
-        raise UserError(
+        raise ModelError(
             f"{path}: {unknown[0]} is not known here; a model file holds [[term]] tables, a title, and [diagnosis]"
         )
     if not isinstance(content.get("term", []), list):
-        raise UserError(f"{path}: term is written [[term]], once per term")
+        raise ModelError(f"{path}: term is written [[term]], once per term")
     told = content.get("diagnosis", {})
     if not isinstance(told, dict) or not isinstance(told.get("effect", []), list):
-        raise UserError(f"{path}: [diagnosis] is a table, its effects are written [[diagnosis.effect]]")
+        raise ModelError(f"{path}: [diagnosis] is a table, its effects are written [[diagnosis.effect]]")
     parameters = told.get("parameters", {})
     if not isinstance(parameters, dict) or not all(map(is_number, parameters.values())):
-        raise UserError(f"{path}: [diagnosis.parameters] holds numbers")
+        raise ModelError(f"{path}: [diagnosis.parameters] holds numbers")
     if not isinstance(told.get("experiment", ""), str):
-        raise UserError(f"{path}: diagnosis.experiment is {told['experiment']!r}, a name is expected")
+        raise ModelError(f"{path}: diagnosis.experiment is {told['experiment']!r}, a name is expected")
     gear = told.get("gear", 1.0)
     if not is_number(gear) or gear <= 0.0:
-        raise UserError(f"{path}: diagnosis.gear is {gear!r}, a number above 0 is expected")
+        raise ModelError(f"{path}: diagnosis.gear is {gear!r}, a number above 0 is expected")
     return content
 
 

@@ -13,7 +13,10 @@ The public names:
     StopRule    when a walk is done: steps, time or distance
     Quirks      where the firmware follows the one of 2016 instead of the appendix
     Profile     which boards and buses are real, bit rates and schedules of the buses; `load_profile` reads one
-    UserError   a mistake of the user, reported in one line
+    diagnose    the errors of a simulation by measured data: a `DiagnosisResult`
+    identify    parameters from the recording of a bench: an `IdentificationResult`
+    UserError   a mistake of the user, reported in one line; by what is wrong a TableError, ProfileError, ScenarioError,
+                ModelError, DataError, FaultError, CampaignError, BusError, FirmwareError or RequestError
 
 Everything else is internal and changes without notice; CAN programs find the interface `ranger_sim` by python-can.
 
@@ -29,22 +32,62 @@ from ranger_sim import loading  # noqa: F401  (first: it finds the packages)
 
 if TYPE_CHECKING:
     from ranger_sim.boards.quirks import Quirks
-    from ranger_sim.foundation.user_error import UserError
+    from ranger_sim.foundation.user_error import (
+        BusError,
+        CampaignError,
+        DataError,
+        FaultError,
+        FirmwareError,
+        ModelError,
+        ProfileError,
+        RequestError,
+        ScenarioError,
+        TableError,
+        UserError,
+    )
     from ranger_sim.harness.outside.profile import Profile
     from ranger_sim.harness.outside.profile import load as load_profile
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.scenario import Scenario, StopRule
+    from ranger_sim.sysid.api import diagnose, identify
+    from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
 
-__all__ = ["Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "load_profile"]
+__all__ = [
+    "BusError",
+    "CampaignError",
+    "DataError",
+    "DiagnosisResult",
+    "FaultError",
+    "FirmwareError",
+    "IdentificationResult",
+    "ModelError",
+    "Profile",
+    "ProfileError",
+    "Quirks",
+    "Ranger",
+    "RequestError",
+    "Scenario",
+    "ScenarioError",
+    "StopRule",
+    "TableError",
+    "UserError",
+    "diagnose",
+    "identify",
+    "load_profile",
+]
 __version__ = "0.1.0"
 
 _PLACES = {
+    "DiagnosisResult": ("sysid.results", "DiagnosisResult"),
+    "IdentificationResult": ("sysid.results", "IdentificationResult"),
     "Profile": ("harness.outside.profile", "Profile"),
     "Quirks": ("boards.quirks", "Quirks"),
     "Ranger": ("harness.ranger", "Ranger"),
     "Scenario": ("harness.scenario", "Scenario"),
     "StopRule": ("harness.scenario", "StopRule"),
-    "UserError": ("foundation.user_error", "UserError"),
+    **{name: ("foundation.user_error", name) for name in __all__ if name.endswith("Error")},
+    "diagnose": ("sysid.api", "diagnose"),
+    "identify": ("sysid.api", "identify"),
     "load_profile": ("harness.outside.profile", "load"),
 }
 

@@ -1,17 +1,33 @@
-"""The findings of a diagnosis as the dictionary that `ranger-sim diagnose --json` writes."""
+"""The one place that makes the result of a diagnosis: values, intervals and findings as `results.DiagnosisResult`."""
 
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from ranger_sim.sysid import predicted_ties
+from ranger_sim.sysid import by_candidates, model_file, predicted_ties, repairs
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
+from ranger_sim.sysid.held_out import Held
 from ranger_sim.sysid.machine import Recording
+from ranger_sim.sysid.machines import ROBOT
 from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.preparation import Prepared
 from ranger_sim.sysid.regression import Regression, kept_rows
+from ranger_sim.sysid.results import (
+    Cause,
+    CauseEvidence,
+    ChannelMisfit,
+    DiagnosisEvidence,
+    DiagnosisResult,
+    KnownCause,
+    KnownValue,
+    LearnedTerm,
+    RecordingFinding,
+    RecordingRepair,
+    Value,
+    WithoutForm,
+)
 
 RIVALS = 6  # that an answer lists
 NEXT = {
@@ -24,72 +40,113 @@ NEXT = {
 }
 
 
-def of(found: Diagnosis, findings: Sequence[dict]) -> dict[str, Any]:
-    """Everything except the result of held-out data. findings: additional ones about the data."""
-    extended, doubtful, impossible = found.extended, found.doubtful, _impossible(found)
+def of(
+    found: Diagnosis, final: Diagnosis, held: Held | None, term: LearnedTerm | None, prepared: Sequence[Prepared]
+) -> DiagnosisResult:
+    """The result. final: `found` without the effects that held-out data refuse; prepared: every recording."""
+    doubtful, refused = found.doubtful, len(final.named) < len(found.named)
+    abstained = not final.named if refused else doubtful
+    evidence = _evidence(found, held, term)
+    if found.by_candidates:
+        evidence = by_candidates.evidence(found, evidence)
+    return DiagnosisResult(
+        detected=bool(found.detected),
+        misfit=tuple(_channels(found)),
+        subsystem=_subsystem(found) if found.detected else None,
+        causes=tuple(_cause(final, each) for each in final.named) if found.detected and not doubtful else (),
+        abstained=bool(abstained),
+        gain=held.result if held is not None else None,
+        next_experiment=tuple(_next(found.named)),
+        model_file=None,
+        data_findings=tuple(_findings(found, prepared)),
+        evidence=evidence,
+        data_repairs=tuple(
+            RecordingRepair(**dataclasses.asdict(repair), recording=each.table.name)
+            for each in prepared
+            for repair in each.repairs
+            if repair.kind in repairs.KINDS
+        ),
+        data_ledger={each.table.name: each.ledger for each in prepared if each.ledger},
+        extended_model=model_file.model_text(final, evidence)
+        if (final.named or evidence.known) and not abstained
+        else "",
+    )
+
+
+def written(found: Diagnosis, path: str) -> DiagnosisResult:
+    """The result with the path of its model file, and with the causes for which that file has no term."""
+    without = tuple(
+        WithoutForm(each.known.cause, each.known.at, each.no_form)
+        for each in model_file.effects_found(found, found.result.evidence.known)
+        if each.term is None and found.machine.name in ROBOT  # other machines have their own simulators
+    )
+    evidence = dataclasses.replace(found.result.evidence, without_form=without or None)
+    return dataclasses.replace(found.result, model_file=path, evidence=evidence)
+
+
+def _evidence(found: Diagnosis, held: Held | None, term: LearnedTerm | None) -> DiagnosisEvidence:
+    extended, impossible = found.extended, _impossible(found)
     step_s = found.recordings[0].table.step_s
-    together = ", ".join(each.table.name for each in found.recordings)
-    return {
-        "detected": bool(found.detected),
-        "misfit": _channels(found),
-        "subsystem": _subsystem(found) if found.detected else None,
-        "causes": [cause(found, each) for each in found.named] if found.detected and not doubtful else [],
-        "abstained": bool(doubtful),
-        "gain": None,
-        "next_experiment": _next(found.named),
-        "model_file": None,
-        "data_findings": [
-            *findings,
-            *({**dataclasses.asdict(each), "recording": together} for each in found.doubts.findings),
-            *({**dataclasses.asdict(each), "recording": r.table.name} for r in found.recordings for each in r.findings),
-        ],
-        "evidence": {
-            "p_general": found.before.p,
-            "p_general_after": found.after.p,
-            "explained": found.explained,
-            "suspects": [each.effect.name for each in found.named] if doubtful else [],
-            "parameters": {name: _value(extended, name) for name in extended.values if "@" not in name},
-            "parameters_are_physical": not doubtful and not impossible,
-            "impossible": impossible,
-            "skew_samples": {
-                each.effect.at: extended.values[each.coefficients[0]] / step_s
-                for each in found.skews
-                if all(each is not other for other in found.had)
-            },
-            "known": [_known(each, was, extended) for each, was in zip(found.had, found.known, strict=True)],
+    return DiagnosisEvidence(
+        p_general=found.before.p,
+        p_general_after=found.after.p,
+        explained=found.explained,
+        suspects=tuple(each.effect.name for each in found.named) if found.doubtful else (),
+        parameters={name: _value(extended, name) for name in extended.values if "@" not in name},
+        parameters_are_physical=not found.doubtful and not impossible,
+        impossible=tuple(impossible),
+        skew_samples={
+            each.effect.at: extended.values[each.coefficients[0]] / step_s
+            for each in found.skews
+            if all(each is not other for other in found.had)
         },
-    }
+        known=tuple(_known(each, was, extended) for each, was in zip(found.had, found.known, strict=True)),
+        residual_term=term,
+        refused_by_holdout=tuple(each.effect.name for each in held.refused) if held is not None else None,
+        holdout_excites_it=held.tells if held is not None else None,
+    )
 
 
-def cause(found: Diagnosis, each: Named) -> dict[str, Any]:
+def _findings(found: Diagnosis, prepared: Sequence[Prepared]) -> list[RecordingFinding]:
+    """Findings about the data, about all recordings together, and of the machine about each of them."""
+    together = ", ".join(each.table.name for each in found.recordings)
+    pairs = [
+        *((each.table.name, finding) for each in prepared for finding in each.findings),
+        *((together, finding) for finding in found.doubts.findings),
+        *((each.table.name, finding) for each in found.recordings for finding in each.findings),
+    ]
+    return [RecordingFinding(**dataclasses.asdict(finding), recording=name) for name, finding in pairs]
+
+
+def _cause(found: Diagnosis, each: Named) -> Cause:
     """A named effect with its parameters, their intervals, and the evidence for it and against it."""
-    machine, extended = found.machine, found.extended
+    extended = found.extended
     parameters = {
         name: _value(extended, full) for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
     }
-    parameters |= {name: {"value": value, "ci95": [value, value]} for name, value in each.shape.items()}
+    parameters |= {name: Value(value, (value, value)) for name, value in each.shape.items()}
     for name, (low, high) in found.intervals[each.effect.name].items():
-        near = parameters[name]["ci95"]
-        parameters[name]["ci95"] = [min(low, near[0]), max(high, near[1])]
-    return {
-        "name": each.effect.cause,
-        "at": each.effect.at,
-        **({"form": each.effect.form} if each.effect.form else {}),
-        "balance": _letters(each, extended.recordings),
-        "parameters": parameters,
-        "tied_with": list(dict.fromkeys(tie.cause for tie in each.tied if tie.cause != each.effect.cause)),
-        "evidence": {
-            "chi2": each.chi2,
-            "p": each.p,
-            "bic": each.bic,
-            "ties": [tie.name for tie in each.tied],
-            "behind": {effect.name: behind for effect, behind in each.rivals[:RIVALS]},
-            "predicted": predicted_ties.of(machine, extended.recordings, each),
-        },
-    }
+        near = parameters[name].ci95
+        parameters[name] = dataclasses.replace(parameters[name], ci95=(min(low, near[0]), max(high, near[1])))
+    return Cause(
+        name=each.effect.cause,
+        at=each.effect.at,
+        form=each.effect.form or None,
+        balance=_letters(each, extended.recordings),
+        parameters=parameters,
+        tied_with=tuple(dict.fromkeys(tie.cause for tie in each.tied if tie.cause != each.effect.cause)),
+        evidence=CauseEvidence(
+            chi2=each.chi2,
+            p=each.p,
+            bic=each.bic,
+            ties=tuple(tie.name for tie in each.tied),
+            behind={effect.name: behind for effect, behind in each.rivals[:RIVALS]},
+            predicted=predicted_ties.of(found.machine, extended.recordings, each),
+        ),
+    )
 
 
-def _channels(found: Diagnosis) -> list[dict[str, Any]]:
+def _channels(found: Diagnosis) -> list[ChannelMisfit]:
     """Misfit of each equation, in total and in each regime: rms of the residual over its noise, both in deviations."""
     plain, extended, recordings = found.plain, found.extended, found.recordings
     out = []
@@ -113,15 +170,7 @@ def _channels(found: Diagnosis) -> list[dict[str, Any]]:
                 continue
             rms = float(np.sqrt(np.mean(before**2)))
             repeatable = max(0.0, 1.0 - float(np.mean(after**2)) / max(rms * rms, 1e-300))
-            out.append(
-                {
-                    "channel": equation,
-                    "regime": name,
-                    "rms": rms * scale,
-                    "noise": noise * scale,
-                    "repeatable_fraction": repeatable,
-                }
-            )
+            out.append(ChannelMisfit(equation, name, rms * scale, noise * scale, repeatable))
     return out
 
 
@@ -147,22 +196,18 @@ def _impossible(found: Diagnosis) -> list[str]:
     return out
 
 
-def _known(had: Named, was: KnownEffect, extended: Regression) -> dict[str, Any]:
+def _known(had: Named, was: KnownEffect, extended: Regression) -> KnownCause:
     """The model's known effects, and their values by these data."""
-    return {
-        "name": was.cause,
-        "at": was.at,
-        "parameters": {
-            name: {"model": was.coefficients[name], **_value(extended, full)}
-            for name, full in zip(had.effect.coefficients, had.coefficients, strict=True)
-        },
-        "shape": dict(was.shape),
-    }
+    parameters = {}
+    for name, full in zip(had.effect.coefficients, had.coefficients, strict=True):
+        found = _value(extended, full)
+        parameters[name] = KnownValue(was.coefficients[name], found.value, found.ci95)
+    return KnownCause(was.cause, was.at, parameters, dict(was.shape))
 
 
-def _value(regression: Regression, name: str) -> dict[str, Any]:
+def _value(regression: Regression, name: str) -> Value:
     value, reach = regression.values[name], 1.96 * _error(regression, name)
-    return {"value": value, "ci95": [value - reach, value + reach]}
+    return Value(value, (value - reach, value + reach))
 
 
 def _error(regression: Regression, name: str) -> float:

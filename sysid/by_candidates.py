@@ -10,14 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ranger_sim.sysid import bands, held_out, intervals, likelihood, misfit, naming, plausibility, predictability
+from ranger_sim.sysid import bands, gain, held_out, intervals, likelihood, misfit, naming, plausibility, predictability
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
-from ranger_sim.sysid.three_numbers import Errors, Held
+from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
+from ranger_sim.sysid.three_numbers import Held
 
 AGAIN = 2  # simulations with the named effects, at most
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
@@ -224,24 +225,29 @@ def unexplained(found: Diagnosis) -> list[str]:
     return [name for name, (left, own) in found.floors.items() if left > FAR * own]
 
 
-def complete(found: Diagnosis, holdout: Sequence[str]) -> None:
-    """Add to the answer: gain and errors on held-out data, the noise floor, and what would not have been seen."""
-    errors = found.errors or {}
-    answer, evidence = found.answer, found.answer["evidence"]
-    if errors and answer["causes"]:
-        answer["gain"] = _gain(errors, ", ".join(holdout))
-    evidence |= {
-        "band_hz": found.band_hz,
-        "held_out_errors": {name: dataclasses.asdict(each) for name, each in errors.items()} or None,
-        "refused_by_holdout": [each.effect.name for each in found.refused],
-        "noise_floor": {name: {"left": left, "channel": own} for name, (left, own) in found.floors.items()},
-        "above_noise_floor": unexplained(found),
-        "smallest_visible": {each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
-        "cannot_be_seen": [each.effect.name for each in found.visible if each.sizes is None],
-    }
+def held(found: Diagnosis, holdout: Sequence[str]) -> held_out.Held | None:
+    """The judgement by held-out data, for the result; None without any."""
+    if found.errors is None:
+        return None
+    named = bool(found.named) and found.detected and not found.doubtful
+    names = ", ".join(holdout)
+    return held_out.Held(_gain(found.errors, names) if named else None, names, found.refused, True)
 
 
-def _gain(errors: Mapping[str, Errors], holdout: str) -> dict[str, object]:
+def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence with errors on held-out data, the noise floor, and what would not have been seen."""
+    return dataclasses.replace(
+        made,
+        band_hz=found.band_hz,
+        held_out_errors=found.errors,
+        noise_floor={name: NoiseFloor(left, own) for name, (left, own) in found.floors.items()},
+        above_noise_floor=tuple(unexplained(found)),
+        smallest_visible={each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
+        cannot_be_seen=tuple(each.effect.name for each in found.visible if each.sizes is None),
+    )
+
+
+def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:
     """Share of what can be explained at all that the named causes explain on held-out data, in squares of the error."""
     possible = won = 0.0
     ends = np.zeros(2)
@@ -251,9 +257,6 @@ def _gain(errors: Mapping[str, Errors], holdout: str) -> dict[str, object]:
         won += each.before**2 - each.after**2
         ends += each.before**2 * (1.0 - np.square(each.ratio95[::-1]))
     scale = max(possible, won, 1e-12 * sum(each.before**2 for each in errors.values()), 1e-300)
-    return {
-        "fraction_of_achievable": won / scale,
-        "ci95": [float(ends[0]) / scale, min(1.0, float(ends[1]) / scale)],
-        "holdout": holdout,
-        "worse": won < 0.0,
-    }
+    before = math.sqrt(sum(each.before**2 for each in errors.values()))
+    after = math.sqrt(sum(each.after**2 for each in errors.values()))
+    return gain.Gain(won / scale, (float(ends[0]) / scale, min(1.0, float(ends[1]) / scale)), before, after, holdout)

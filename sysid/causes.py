@@ -8,7 +8,7 @@ at the current, the gyro, an angle): `at` names the place, and `key` distinguish
 import dataclasses
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 
 BALANCES = {
     "E": "electrics of a motor: voltage against resistance, drops and speed",
@@ -147,7 +147,7 @@ def find(name: str) -> Cause:
     same = [cause.key for cause in _ALL if cause.identifier == name]
     if same:
         raise UserError(f"{name}: this cause has several places: {', '.join(same)}")
-    raise UserError(f"{name!r}: no such cause; there are {', '.join(CAUSES)}")
+    raise UserError(unknown("cause", name, CAUSES))
 
 
 def rivals(cause: Cause) -> list[str]:

@@ -6,7 +6,7 @@ by hand otherwise (`--map old=new`).
 
 import dataclasses
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError, unknown
 from ranger_sim.sysid.dataset import Dataset, Repair
 
 WRITTEN_SAMPLES = 3  # the robot's log has a first and a last sample of what no board ever wrote
@@ -38,8 +38,7 @@ class Experiment:
         for channel in self.channels:
             if channel.name == name:
                 return channel
-        there = ", ".join(channel.name for channel in self.channels)
-        raise UserError(f"{name}: no channel of the experiment {self.name}; it has {there}")
+        raise DataError(f"{self.name}: {unknown('channel', name, (channel.name for channel in self.channels))}")
 
 
 def _leg_names() -> tuple[Name, ...]:
@@ -137,7 +136,7 @@ EXPERIMENTS = {experiment.name: experiment for experiment in _ALL}
 def experiment(name: str) -> Experiment:
     """The experiment of this name; UserError with all names when there is none."""
     if name not in EXPERIMENTS:
-        raise UserError(f"{name!r}: no such experiment; there are {', '.join(EXPERIMENTS)}")
+        raise DataError(unknown("experiment", name, EXPERIMENTS))
     return EXPERIMENTS[name]
 
 
@@ -156,14 +155,14 @@ def named_for(dataset: Dataset, name: str) -> Dataset:
         if source is None:
             if expected.needed:
                 there = ", ".join(dataset.channels) or "none"
-                raise UserError(
+                raise DataError(
                     f"{dataset.name}: {wanted.name} needs {expected.name} ({expected.meaning}); there are {there}; "
                     f"--map NAME={expected.name} names it"
                 )
             continue
         channel = dataset[source.removeprefix("-")]
         if channel.unit and channel.unit.replace(" ", "") != expected.unit.replace(" ", ""):
-            raise UserError(f"{dataset.name}: {source} is in {channel.unit}, {expected.name} is in {expected.unit}")
+            raise DataError(f"{dataset.name}: {source} is in {channel.unit}, {expected.name} is in {expected.unit}")
         value = channel.value
         if source.startswith("-"):
             value = -value

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError, printable
+from ranger_sim.foundation.user_error import DataError, printable, unknown
 
 Array = NDArray[np.float64]
 # Why samples are left out. Of the second kind nothing is lost: the same was there already, never was, or is not wanted.
@@ -72,7 +72,7 @@ class Channel:
 
     def __post_init__(self) -> None:
         if self.time_s.shape != self.value.shape or self.time_s.ndim != 1:
-            raise UserError(
+            raise DataError(
                 f"channel {self.name}: {self.time_s.shape} stamps and {self.value.shape} values, "
                 "both must be one row of the same length"
             )
@@ -182,8 +182,7 @@ class Dataset:
         try:
             return self.channels[name]
         except KeyError:
-            there = ", ".join(self.channels) or "none"
-            raise UserError(f"{self.name}: there is no channel {name}; there are {there}") from None
+            raise DataError(f"{self.name}: {unknown('channel', name, self.channels)}") from None
 
     def __contains__(self, name: str) -> bool:
         return name in self.channels
@@ -210,10 +209,10 @@ class Dataset:
         """
         chosen = [self[name] for name in names]
         if not chosen:
-            raise UserError(f"{self.name}: no channel asked for")
+            raise DataError(f"{self.name}: no channel asked for")
         base = max(chosen, key=lambda channel: len(channel.time_s))
         if len(base.time_s) < 2:
-            raise UserError(f"{self.name}: {base.name} has {len(base.time_s)} samples, at least 2 are needed")
+            raise DataError(f"{self.name}: {base.name} has {len(base.time_s)} samples, at least 2 are needed")
         time_s = base.time_s
         inside = np.ones(len(time_s), dtype=bool)
         cuts = np.zeros(len(time_s), dtype=bool)  # a run ends before these
@@ -229,7 +228,7 @@ class Dataset:
                 cuts[min(np.searchsorted(time_s, high), len(time_s) - 1)] = True
         kept = np.flatnonzero(inside)
         if len(kept) < 2:
-            raise UserError(f"{self.name}: {', '.join(columns)} have no time in common")
+            raise DataError(f"{self.name}: {', '.join(columns)} have no time in common")
         begins = cuts[kept] | (np.diff(kept, prepend=-2) != 1)
         begins[0] = True
         starts = [int(number) for number in np.flatnonzero(begins)]

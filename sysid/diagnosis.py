@@ -1,4 +1,4 @@
-"""The result of a diagnosis, before it is printed (`answer.py`) or drawn."""
+"""The workings of a diagnosis: regressions and named effects, from which `answer.py` makes its result."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.sysid import intervals, misfit, plausibility, three_numbers
+from ranger_sim.sysid import intervals, misfit, plausibility
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
 
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
@@ -40,7 +41,7 @@ class Visible:
 
 @dataclasses.dataclass
 class Diagnosis:
-    """All results, for the report; `answer` is the printed part."""
+    """What a diagnosis works with, for the report; `result` is what it returns."""
 
     machine: Machine
     recordings: list[Recording]
@@ -54,14 +55,19 @@ class Diagnosis:
     before: misfit.Misfit
     after: misfit.Misfit
     doubts: plausibility.Doubts
-    answer: dict[str, Any] = dataclasses.field(default_factory=dict)
     level: float = GENERAL_LEVEL  # of the tests without a cause in mind
     band_hz: float | None = None  # edge of the band of the equations; None: as recorded
     refused: list[Named] = dataclasses.field(default_factory=list)  # by held-out data, while causes were sought
-    errors: dict[str, three_numbers.Errors] | None = None  # on held-out data, by equation
+    errors: dict[str, HeldOutError] | None = None  # on held-out data, by equation
     floors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     visible: list[Visible] = dataclasses.field(default_factory=list)
     by_candidates: bool = False  # found with the noise that all candidates leave
+    result: DiagnosisResult = dataclasses.field(init=False)  # made last, by answer.py alone
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """The result as plain data."""
+        return self.result.to_dict()
 
     @property
     def detected(self) -> bool:

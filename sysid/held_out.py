@@ -3,13 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from ranger_sim.sysid import gain, misfit, naming
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.results import Gain
 
 HOLDS_OUT = 0.0  # chi-square that a further effect must gain on held-out data
 REFUSES = 2.33  # deviations, 1 % on one side, below the expected gain: held-out data that refuse an effect
@@ -25,16 +25,12 @@ class Held:
     refused: list[Named]
     tells: bool
 
-    def told(self) -> dict[str, Any] | None:
-        """Entry of the JSON; None where no gain was measured."""
+    @property
+    def result(self) -> Gain | None:
+        """The gain of the result; None where none was measured."""
         if self.gain is None or not self.tells:
             return None
-        return {
-            "fraction_of_achievable": self.gain.fraction,
-            "ci95": list(self.gain.ci95),
-            "holdout": self.holdout,
-            "worse": self.gain.worse,
-        }
+        return Gain(self.gain.fraction, self.gain.ci95, self.holdout, self.gain.worse)
 
 
 def judged(

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, diags, hstack, vstack
 from scipy.sparse.linalg import splu
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.experiment_models import MODELS, SAMPLES, Equation, Model
 from ranger_sim.sysid.structure import isolable, overdetermined
@@ -100,7 +100,7 @@ MOTIONS = {
 def model_of(experiment: str) -> Model:
     """The equations of an experiment. UserError with all names for an unknown one."""
     if experiment not in MODELS:
-        raise UserError(f"{experiment!r}: no such experiment; there are {', '.join(MODELS)}")
+        raise UserError(unknown("experiment", experiment, MODELS))
     return MODELS[experiment]()
 
 
@@ -111,7 +111,7 @@ def measured(model: Model, channels: Iterable[str] | None) -> tuple[str, ...]:
     given = list(channels)
     for channel in given:
         if channel not in model.channels:
-            raise UserError(f"{channel}: {model.name} has no such channel; it has {', '.join(model.channels)}")
+            raise UserError(f"{model.name}: {unknown('channel', channel, model.channels)}")
     return tuple(channel for channel in model.channels if channel in given)
 
 
@@ -217,11 +217,11 @@ class Signatures:
         dynamic = any(order for _, _, order in equation.terms)
         count = SAMPLES - 1 if dynamic else SAMPLES
         rows = csc_matrix((count, SAMPLES * len(self.place)))
-        for unknown, coefficient, order in equation.terms:
+        for name, coefficient, order in equation.terms:
             weight = diags(coefficient) if not dynamic else _means() @ diags(coefficient)
             if order:
                 weight = diags(0.5 * (coefficient[1:] + coefficient[:-1])) @ _differences() / self.step_s
-            start = self.place[unknown] * SAMPLES
+            start = self.place[name] * SAMPLES
             left = csc_matrix((count, start))
             right = csc_matrix((count, SAMPLES * len(self.place) - start - SAMPLES))
             rows = rows + hstack([left, csc_matrix(weight), right]).tocsc()

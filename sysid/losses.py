@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import LOSSES, Dataset, Loss
 
 ACCEPTED = 0.01  # of a channel's samples; radio links lose less (docs/robot.md, C6.2)
@@ -16,7 +16,7 @@ def stop_if_too_many(dataset: Dataset, names: Iterable[str], accepted: float = A
         _refuse(dataset, "", lost, dataset.rows, dataset.losses, accepted)
     for name in names:
         if name not in dataset:
-            raise UserError(f"{dataset.name}: {name}: too few sound samples are left; nothing is concluded without it")
+            raise DataError(f"{dataset.name}: {name}: too few sound samples are left; nothing is concluded without it")
         channel = dataset[name]
         if channel.lost_share > accepted:
             lost = sum(loss.count for loss in channel.losses if loss.reason in LOSSES)
@@ -28,7 +28,7 @@ def _refuse(dataset: Dataset, name: str, lost: int, read: int, losses: Iterable[
     reasons = "; ".join(loss.text for loss in losses if loss.reason in LOSSES)
     share = 100.0 * lost / read
     place = f"{dataset.name}: {name}: {lost} of {read} samples" if name else f"{dataset.name}: {lost} of {read} {what}"
-    raise UserError(
+    raise DataError(
         f"{place} are lost, {share:.3g} % where {100.0 * accepted:.3g} % are accepted: {reasons}; nothing is concluded "
         f"from the rest (--accept-loss {min(math.ceil(share), 100)}% does)"
     )

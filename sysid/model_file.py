@@ -12,13 +12,15 @@ A file by hand may have terms only.
 import dataclasses
 import json
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import terms
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.model_terms import NoFormError, effects_of, parameter_terms, term_of
+from ranger_sim.sysid.results import DiagnosisEvidence, KnownCause
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,17 +44,12 @@ class ModelFile:
     model: terms.Model
 
 
-def effects_found(found: Diagnosis) -> list[FoundEffect]:
-    """What the model had and what was named, each with its term."""
+def effects_found(found: Diagnosis, had: Sequence[KnownCause]) -> list[FoundEffect]:
+    """What the model had, by these data, and what was named, each with its term."""
     values = {name: value for name, value in found.extended.values.items() if "@" not in name}
     known = [
-        KnownEffect(
-            each["name"],
-            each["at"],
-            {name: value["value"] for name, value in each["parameters"].items()},
-            each["shape"],
-        )
-        for each in found.answer["evidence"]["known"]
+        KnownEffect(each.name, each.at, {name: value.value for name, value in each.parameters.items()}, each.shape)
+        for each in had
     ]
     for each in found.named:
         numbers = zip(each.effect.coefficients, each.coefficients, strict=True)
@@ -69,15 +66,14 @@ def effects_found(found: Diagnosis) -> list[FoundEffect]:
     return made
 
 
-def model_text(found: Diagnosis) -> str:
+def model_text(found: Diagnosis, evidence: DiagnosisEvidence) -> str:
     """The file's text."""
-    evidence = found.answer["evidence"]
-    values = {name: each["value"] for name, each in evidence["parameters"].items()}
-    intervals = {name: tuple(each["ci95"]) for name, each in evidence["parameters"].items()}
-    effects = effects_found(found)
+    values = {name: each.value for name, each in evidence.parameters.items()}
+    intervals = {name: each.ci95 for name, each in evidence.parameters.items()}
+    effects = effects_found(found, evidence.known)
     names = [recording.table.name for recording in found.recordings]
     tables = [each.term for each in effects if each.term is not None]
-    if evidence["parameters_are_physical"]:
+    if evidence.parameters_are_physical:
         tables += parameter_terms(found.machine, values, intervals)
     lines = [f"title = {_quoted('found in ' + ', '.join(names))}"]
     for table in tables:
@@ -118,7 +114,7 @@ def read(path: str | pathlib.Path, machine: Machine) -> ModelFile:
         gear = told.get("gear")
         own = getattr(machine, "gear", None)
         if gear is not None and own is not None and abs(gear / own - 1.0) > 1e-9:
-            raise UserError(f"{path}: it was found at a gear of {gear:g}, not {own:g} (--gear)")
+            raise ModelError(f"{path}: it was found at a gear of {gear:g}, not {own:g} (--gear)")
         effects = [_effect(str(path), number, each) for number, each in enumerate(told.get("effect", []), 1)]
         parameters = {name: float(value) for name, value in told.get("parameters", {}).items()}
         return ModelFile(str(path), machine.name, gear, effects, parameters, model)
@@ -127,7 +123,7 @@ def read(path: str | pathlib.Path, machine: Machine) -> ModelFile:
         try:
             effects += [KnownEffect(*each) for each in effects_of(machine, term)]
         except NoFormError as reason:
-            raise UserError(f"{path}: {term.form.name} at {term.at}: {reason}") from None
+            raise ModelError(f"{path}: {term.form.name} at {term.at}: {reason}") from None
     return ModelFile(str(path), str(told.get("experiment", "")), None, effects, {}, model)
 
 
@@ -135,13 +131,13 @@ def _effect(path: str, number: int, table: Any) -> KnownEffect:
     """One [[diagnosis.effect]]."""
     place = f"{path}: diagnosis.effect {number}"
     if not isinstance(table, dict):
-        raise UserError(f"{place}: an effect is a table, not {table!r}")
+        raise ModelError(f"{place}: an effect is a table, not {table!r}")
     texts = [table.get(name) for name in ("cause", "at")]
     numbers = [table.get(name, {}) for name in ("coefficients", "shape")]
     if not all(isinstance(text, str) for text in texts):
-        raise UserError(f"{place}: cause and at are texts")
+        raise ModelError(f"{place}: cause and at are texts")
     for each in numbers:
         if not isinstance(each, dict) or not all(map(terms.is_number, each.values())):
-            raise UserError(f"{place}: coefficients and shape are tables of numbers")
+            raise ModelError(f"{place}: coefficients and shape are tables of numbers")
     made = [{name: float(value) for name, value in each.items()} for each in numbers]
     return KnownEffect(str(texts[0]), str(texts[1]), made[0], made[1])

@@ -13,7 +13,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import order, sanity, units, wraps
 from ranger_sim.sysid.dataset import LOSSES, NOTHING_LOST, Channel, Dataset, Finding, Repair
 
@@ -62,7 +62,7 @@ def mend(dataset: Dataset, findings: list[Finding] | None = None, inputs: Collec
             channel = _without_bits(_unwrapped(channel, wrapped, repairs), flipped, repairs)
         channels[channel.name] = channel
     if not channels:
-        raise UserError(f"{dataset.name}: no channel has {FEWEST} sound samples")
+        raise DataError(f"{dataset.name}: no channel has {FEWEST} sound samples")
     findings = [*findings, *kept_as_is]
     return dataclasses.replace(dataset, channels=channels, findings=findings, repairs=repairs)
 
@@ -137,7 +137,7 @@ def converted(dataset: Dataset, name: str, unit: str) -> Dataset:
     channel = dataset[name]
     true = units.unit_of(unit)
     if true is None or not unit.strip():
-        raise UserError(f"{dataset.name}: {unit!r} is no unit that is known here")
+        raise DataError(f"{dataset.name}: {unit!r} is no unit that is known here")
     value = channel.value * true.factor + true.offset
     text = f"the values are in {unit}: times {true.factor:.10g}, now in {true.text}"
     return _with(dataset, dataclasses.replace(channel, value=value, unit=true.text), "converted", len(value), text)
@@ -166,7 +166,7 @@ def cut(dataset: Dataset, start_s: float, end_s: float) -> Dataset:
         inside = (channel.time_s >= start_s) & (channel.time_s <= end_s)
         outside = int((~inside).sum())
         if outside < FEWEST:
-            raise UserError(f"{dataset.name}: {name} has {outside} samples outside {start_s:g} to {end_s:g} s")
+            raise DataError(f"{dataset.name}: {name} has {outside} samples outside {start_s:g} to {end_s:g} s")
         left_out += int(inside.sum())
         channels[name] = channel.without(inside, "cut")
     repair = Repair("", "cut", left_out, f"{start_s:g} to {end_s:g} s is left out of all channels")

@@ -16,6 +16,7 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.misfit import Misfit
 from ranger_sim.sysid.regression import Part, Regression, kept_rows, reduced
+from ranger_sim.sysid.results import LearnedTerm
 
 SMALL = 1e-6  # of the largest: directions of the table that the base already spans
 
@@ -42,17 +43,18 @@ class ResidualTerm:
         cell, inside = _cells(signals, self)
         return np.where(inside, self.value.reshape(-1)[cell], 0.0)[:, None]
 
-    def told(self) -> dict:
-        """For the JSON: shape and domain."""
-        return {
-            "equation": self.equation,
-            "unit": self.unit,
-            "over": list(self.over),
-            "domain": [[low, high] for low, high in zip(self.low, self.high, strict=True)],
-            "edges": [edges.tolist() for edges in self.edges],
-            "value": self.value.tolist(),
-            "deviation": self.error.tolist(),
-        }
+    def result(self, holdout_rms: tuple[float, float] | None = None) -> LearnedTerm:
+        """The term as data: shape and domain. holdout_rms: as `left` gives it for held-out data."""
+        return LearnedTerm(
+            self.equation,
+            self.unit,
+            self.over,
+            tuple(zip(self.low, self.high, strict=True)),
+            tuple(tuple(edges.tolist()) for edges in self.edges),
+            tuple(tuple(row) for row in self.value.tolist()),
+            tuple(tuple(row) for row in self.error.tolist()),
+            holdout_rms,
+        )
 
     def left(self, machine: Machine, recordings: Sequence[Recording], regression: Regression) -> tuple[float, float]:
         """(rms without, with the term) of the equation's residual, the machine's parameters fitted again both times."""

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import order, wraps
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
 
@@ -153,7 +153,7 @@ def stop_if_fatal(name: str, findings: list[Finding]) -> None:
     """Raise UserError with the first finding that leaves no usable data."""
     for finding in findings:
         if finding.severity == FATAL:
-            raise UserError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
+            raise DataError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
 
 
 def doubts(findings: list[Finding]) -> list[Finding]:

@@ -6,7 +6,6 @@ effect, and what an effect declares as free, is fitted. The black box is the fle
 or the physics with a flexible rest, whichever is better there: it says how much of the error can be explained at all.
 """
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
@@ -20,24 +19,12 @@ from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.predictability import Predictor, learned
 from ranger_sim.sysid.regression import Regression, reduced
+from ranger_sim.sysid.results import HeldOutError
 
 DRAWS = 400
 BLOCKS = 20  # of the bootstrap: each longer than the memory of most residuals
 SURE = 2.33  # standard errors over the blocks by which an effect must improve the held-out prediction: 1 % on one side
 SHOWS = 1e-3  # of the error's square: an effect below it on the held-out data is not judged by them
-
-
-@dataclasses.dataclass(frozen=True)
-class Errors:
-    """Of one equation, as shares of what was measured: rms over rms of the response, or over a channel's deviation.
-
-    gained: 95 % interval of after over before by a bootstrap of blocks; black_box: None where none was learned.
-    """
-
-    before: float
-    after: float
-    black_box: float | None
-    ratio95: tuple[float, float]
 
 
 class Held:
@@ -118,7 +105,7 @@ class Held:
         without: Regression,
         predictor: Predictor | None,
         seed: int,
-    ) -> dict[str, Errors]:
+    ) -> dict[str, HeldOutError]:
         """By equation. extended, without: the training regressions with the causes and without them."""
         before = self.residual([], {})
         after = self.residual(named, extended.values) if named else before
@@ -134,7 +121,9 @@ class Held:
             if not len(before[name]):
                 continue
             best = min(_rms(each[name]) for each in boxes) if len(boxes) > 1 else None
-            out[name] = Errors(_rms(before[name]), _rms(after[name]), best, _ratio(before[name], after[name], seed))
+            out[name] = HeldOutError(
+                _rms(before[name]), _rms(after[name]), best, _ratio(before[name], after[name], seed)
+            )
         return out
 
 

@@ -101,6 +101,52 @@ def test_arrows_between_rooms_of_a_room_run_one_way(inside):
     assert not faults, "\n".join(faults)
 
 
+def imported_by_module():
+    """{module: modules of ours that it imports, wherever in the file and also for type checkers alone}."""
+    files = {}
+    for path in [*sources(), *(ROOT / "ranger_sim").glob("*.py")]:
+        relative = path.relative_to(ROOT).with_suffix("")
+        parts = relative.parts if relative.parts[0] == "ranger_sim" else ("ranger_sim", *relative.parts)
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    found = {}
+    for module, path in files.items():
+        names = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                inside = {f"{node.module}.{alias.name}" for alias in node.names}
+                names |= {name if name in files else node.module for name in inside}
+        found[module] = {name for name in names if name in files and name != module}
+    return found
+
+
+def circles(imports):
+    """Groups of modules that import each other, directly or not."""
+    reached = {}
+    for module in imports:
+        reached[module], waiting = set(), list(imports[module])
+        while waiting:
+            name = waiting.pop()
+            if name not in reached[module]:
+                reached[module].add(name)
+                waiting += imports[name]
+    groups = {frozenset(b for b in reached[a] if a in reached[b]) for a in imports if a in reached[a]}
+    return sorted(map(sorted, groups))
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    imports = imported_by_module()
+    assert len(imports) > 500 and "ranger_sim.foundation.user_error" in imports["ranger_sim.tools.cli"]
+    assert circles(imports) == []
+
+
+def test_circles_of_two_and_three_modules_are_found():
+    imports = {"a": {"b"}, "b": {"a", "c"}, "c": {"d"}, "d": {"e"}, "e": {"c"}, "f": {"a"}}
+    assert circles(imports) == [["a", "b"], ["c", "d", "e"]]
+    assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+
+
 @pytest.mark.parametrize("library", ONLY_IN)
 def test_a_library_with_one_place_stays_there(library):
     faults = []

@@ -100,7 +100,7 @@ def parser() -> argparse.ArgumentParser:
     fmu.register(commands)
     identify.register(commands)
     compare_walk.register(commands)
-    completion.register(commands)
+    completion.register(commands, parser)
     return top
 
 

@@ -31,7 +31,7 @@ from ranger_sim.firmware_sim.peripherals.uart_hs import HsUart
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import DMA_DONE, FIQ, SOFTWARE
 from ranger_sim.foundation.events import SSP_SEGMENT, EventQueue
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 EXECUTION_TIMER_HZ: Final = 13_000_000  # Timer0 counts the peripheral clock (robot.md N3.8)
 EXECUTION_TIMER_MHZ: Final = 13
@@ -145,7 +145,7 @@ class MainBrainBoard(FirmwareBoard):
         if not isinstance(controller, controllers.Controller):
             controller = controllers.load(controller)
         if controller.program != self.program:
-            raise UserError(
+            raise FirmwareError(
                 f"controller {controller.name}: for program {controller.program!r}, this board runs {self.program!r}"
             )
         self.controller = controller

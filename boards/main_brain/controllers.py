@@ -17,7 +17,7 @@ from ranger_sim.boards.main_brain.programs import parameter_rows
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.generated import mb as table_ids
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ScenarioError, unknown
 
 FOLDER = pathlib.Path(__file__).parent / "parameters"
 DEFAULT_PROGRAM = "record"
@@ -101,11 +101,12 @@ def load(name: str | pathlib.Path) -> Controller:
 def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
     """The set `name`; `users`: the files whose base it is, the nearest one last."""
     path = pathlib.Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
-    asked = f"{users[-1]}: base {name!r}" if users else f"controller {name!r}"
+    place = f"{users[-1]}: " if users else ""
     if not name.endswith(".toml") and name not in available():
-        raise UserError(f"{asked}: unknown; there are {', '.join(available())}, or give a .toml file")
+        what = unknown("base" if users else "controller", name, available())
+        raise ScenarioError(f"{place}{what}, or give a .toml file")
     if path.resolve() in [each.resolve() for each in users]:
-        raise UserError(f"{asked} leads back to this set")
+        raise ScenarioError(f"{place}base {name!r} leads back to this set")
     data = toml_file.load(path, "controller file")
     place = str(path)
     _only(data, ("title", "description", "program", "base", "parameters", "reasons", "operator"), place)
@@ -117,53 +118,53 @@ def _load(name: str, users: tuple[pathlib.Path, ...]) -> Controller:
         base = _load(base_name, (*users, path))
     program = _text(data, "program", place, base.program if base is not None else DEFAULT_PROGRAM)
     if program not in programs.PROGRAMS:
-        raise UserError(f"{place}: program = {program!r}: unknown; there are {', '.join(programs.PROGRAMS)}")
+        raise ScenarioError(f"{place}: {unknown('program', program, programs.PROGRAMS)}")
     needed = programs.program(program).parameters()
     changes = _parameters(_table(data, "parameters", place), place)
     for each in changes:
         if each not in needed:
-            raise UserError(f"{place}: [parameters] {each}: the program {program!r} does not read it")
+            raise ScenarioError(f"{place}: [parameters] {each}: the program {program!r} does not read it")
     values = {each: value for each, value in base.values.items() if each in needed} if base is not None else {}
     differences = [each for each in changes if each in values]
     values.update(changes)
     missing = [each for each in parameter_rows() if each in needed and each not in values]
     if missing:
-        raise UserError(f"{place}: [parameters] lacks {', '.join(missing)}; give them or a base")
+        raise ScenarioError(f"{place}: [parameters] lacks {', '.join(missing)}; give them or a base")
     reasons = _table(data, "reasons", place)
     for each, reason in reasons.items():
         if each not in changes:
-            raise UserError(f"{place}: [reasons] {each}: no such entry in [parameters]")
+            raise ScenarioError(f"{place}: [reasons] {each}: no such entry in [parameters]")
         if not isinstance(reason, str) or not reason.strip():
-            raise UserError(f"{place}: [reasons] {each} = {reason!r}: a sentence is expected")
+            raise ScenarioError(f"{place}: [reasons] {each} = {reason!r}: a sentence is expected")
     unexplained = [each for each in differences if each not in reasons]
     if unexplained:
-        raise UserError(f"{place}: [reasons] lacks {', '.join(unexplained)}: each difference needs a reason")
+        raise ScenarioError(f"{place}: [reasons] lacks {', '.join(unexplained)}: each difference needs a reason")
     if "operator" in data:
         operator = _operator(_table(data, "operator", place), place)
     elif base is not None:
         operator = base.operator
     else:
-        raise UserError(f"{place}: [operator] is missing; give it or a base")
+        raise ScenarioError(f"{place}: [operator] is missing; give it or a base")
     return Controller(path.stem, place, title, description, program, base_name, values, changes, reasons, operator)
 
 
 def _only(data: dict, allowed: tuple, place: str) -> None:
     for key in data:
         if key not in allowed:
-            raise UserError(f"{place}: unknown key {key!r}; allowed are {', '.join(allowed)}")
+            raise ScenarioError(f"{place}: unknown key {key!r}; allowed are {', '.join(allowed)}")
 
 
 def _text(data: dict, key: str, place: str, default: Any) -> Any:
     value = data.get(key, default)
     if value is not default and not isinstance(value, str):
-        raise UserError(f"{place}: {key} = {value!r}: text is expected")
+        raise ScenarioError(f"{place}: {key} = {value!r}: text is expected")
     return value
 
 
 def _table(data: dict, key: str, place: str) -> dict:
     value = data.get(key, {})
     if not isinstance(value, dict):
-        raise UserError(f"{place}: {key} = {value!r}: a table [{key}] is expected")
+        raise ScenarioError(f"{place}: {key} = {value!r}: a table [{key}] is expected")
     return value
 
 
@@ -171,9 +172,9 @@ def _number(value: Any, key: str, limits: tuple, unit: str, place: str) -> float
     """`value` as a float within `limits` (either may be None)."""
     low, high = limits
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise UserError(f"{place}: {key} = {value!r}: a number is expected")
+        raise ScenarioError(f"{place}: {key} = {value!r}: a number is expected")
     if (low is not None and value < low) or (high is not None and value > high):
-        raise UserError(f"{place}: {key} = {value!r} is outside {low} to {high}{' ' + unit if unit else ''}")
+        raise ScenarioError(f"{place}: {key} = {value!r} is outside {low} to {high}{' ' + unit if unit else ''}")
     return float(value)
 
 
@@ -182,7 +183,7 @@ def _parameters(table: dict, place: str) -> dict:
     values = {}
     for name, value in table.items():
         if name not in known:
-            raise UserError(f"{place}: [parameters] {name}: no such parameter (`ranger-sim table list --board PC`)")
+            raise ScenarioError(f"{place}: [parameters] {name}: no such parameter (`ranger-sim table list --board PC`)")
         parameters.checked_word(known[name], value, place)
         values[name] = float(value)
     return values
@@ -193,25 +194,25 @@ def _operator(table: dict, place: str) -> Operator:
     _only(table, names, f"{place}: [operator]")
     for name in names:
         if name not in table:
-            raise UserError(f"{place}: [operator] lacks {name}")
+            raise ScenarioError(f"{place}: [operator] lacks {name}")
     if table["stance"] not in ("outer", "inner"):
-        raise UserError(f'{place}: [operator] stance = {table["stance"]!r}: "outer" or "inner" is expected')
+        raise ScenarioError(f'{place}: [operator] stance = {table["stance"]!r}: "outer" or "inner" is expected')
     numbers = {
         name: _number(table[name], f"[operator] {name}", limits, "", place) for name, limits in OPERATOR_LIMITS.items()
     }
     if not isinstance(table["keys"], list) or not all(isinstance(key, dict) for key in table["keys"]):
-        raise UserError(f"{place}: [operator] keys = {table['keys']!r}: tables [[operator.keys]] are expected")
+        raise ScenarioError(f"{place}: [operator] keys = {table['keys']!r}: tables [[operator.keys]] are expected")
     keys = []
     for press in table["keys"]:
         _only(press, tuple(KEY_LIMITS), f"{place}: [[operator.keys]]")
         for name in KEY_LIMITS:
             if name not in press:
-                raise UserError(f"{place}: [[operator.keys]] lacks {name}")
+                raise ScenarioError(f"{place}: [[operator.keys]] lacks {name}")
         checked = {
             name: _number(press[name], f"[[operator.keys]] {name}", limits, "", place)
             for name, limits in KEY_LIMITS.items()
         }
         if checked["key"] != int(checked["key"]):
-            raise UserError(f"{place}: [[operator.keys]] key = {press['key']!r}: a whole number is expected")
+            raise ScenarioError(f"{place}: [[operator.keys]] key = {press['key']!r}: a whole number is expected")
         keys.append(KeyPress(int(checked["key"]), checked["time_s"], checked["hold_s"]))
     return Operator(stance=table["stance"], keys=tuple(keys), **numbers)

@@ -15,7 +15,7 @@ from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.boards.modules.ssp_link import MainBrainSspLink
 from ranger_sim.datatable.store import DataStore
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 
 @cython.cclass
@@ -52,7 +52,7 @@ class IoData:
     def thin(self, send_ids, dividers, turn_ids, turn_every=1) -> None:
         """Send `send_ids` in every n-th slot only, n in `dividers`; of `turn_ids` one every so many slots, in turn."""
         if len(send_ids) != len(dividers):
-            raise UserError(f"io data: {len(dividers)} dividers for {len(send_ids)} variables")
+            raise FirmwareError(f"io data: {len(dividers)} dividers for {len(send_ids)} variables")
         self.send_ids = array.array("q", self.known(send_ids))
         self.dividers = array.array("q", dividers)
         self.turn_ids = self.known(turn_ids)
@@ -63,7 +63,7 @@ class IoData:
         """`numbers` as an array; UserError for one that is not an id of the table."""
         for number in numbers:
             if not 0 <= number < self.store.size:
-                raise UserError(f"io data: id {number} is not 0 ... {self.store.size - 1}")
+                raise FirmwareError(f"io data: id {number} is not 0 ... {self.store.size - 1}")
         return array.array("q", numbers)
 
     def receive(self) -> object:

@@ -33,7 +33,7 @@ from ranger_sim.boards.main_brain import (
 )
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.datatable.loader import load_table
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ScenarioError, unknown
 
 FIRST_OWN_ID = 314  # ids below are the robot's of 2016
 # What the controller of 2015 reads of the robot's own parameters; the rest belongs to parts that are not emulated.
@@ -152,5 +152,5 @@ def parameter_rows() -> dict:
 def program(name: str) -> Program:
     """The program of this name. UserError for any other."""
     if name not in PROGRAMS:
-        raise UserError(f"program {name!r}: unknown; there are {', '.join(PROGRAMS)}")
+        raise ScenarioError(unknown("program", name, PROGRAMS))
     return PROGRAMS[name]

@@ -22,7 +22,7 @@ from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, RFS_EIGHT_BYTES, CanController
 from ranger_sim.firmware_sim.vic import IRQ_LATENCY
 from ranger_sim.foundation.events import CAN_RX, CAN_STATUS, EventQueue
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 IDENTIFIERS: Final = 2048
 # rings: places are masked; one place stays empty
@@ -148,9 +148,9 @@ class CanLink(Sender):
         The list is searched from its first entry, so later ones cost more.
         """
         if not 0 <= identifier < IDENTIFIERS:
-            raise UserError(f"{self.chip.name}: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
+            raise FirmwareError(f"{self.chip.name}: identifier {identifier} is not 0 ... {IDENTIFIERS - 1}")
         if self.receivers[identifier] is not None:
-            raise UserError(f"{self.chip.name}: identifier {identifier} has two receivers")
+            raise FirmwareError(f"{self.chip.name}: identifier {identifier} has two receivers")
         self.receivers[identifier] = receiver
         receiver.cycles += self.search_cycles
         self.search_cycles += PLACE_CYCLES

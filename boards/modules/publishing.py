@@ -12,7 +12,7 @@ from ranger_sim.boards.modules.sender import Sender
 from ranger_sim.firmware_sim.calls import call
 from ranger_sim.firmware_sim.scheduler import Task
 from ranger_sim.foundation.numbers import word_of_float, word_of_i32
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 
 @cython.final
@@ -108,7 +108,7 @@ def laid_out(table, sender: Sender, lines) -> dict:
     for place in range(max(len(named), len(given))):
         wanted, found = ([*names, "no more"][min(place, len(names))] for names in (named, given))
         if wanted != found:
-            raise UserError(
+            raise FirmwareError(
                 f"{table.BOARD}: line {place + 1} of what is sent is {found} in the board's room; in the master table "
                 f"(datatable/master/boards.toml, then `ranger-sim table generate`) it is {wanted}"
             )

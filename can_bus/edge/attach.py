@@ -24,7 +24,7 @@ from ranger_sim.can_bus.edge.taps import (
     fault_of_frame,
 )
 from ranger_sim.foundation.peers import FOREIGN, FULL, LIMITS, MALFORMED, REASONS, SocketStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 __all__ = ["DEFAULT_NAME", "AttachServer"]
 
@@ -59,7 +59,7 @@ class AttachServer(StreamServer[_Client]):
             listener.listen(LIMITS["attach"].peers)
         except OSError as error:
             listener.close()
-            raise UserError(
+            raise BusError(
                 f"the name {name!r} is taken by another running robot or bus host: stop it, or choose another --name"
                 if error.errno == errno.EADDRINUSE
                 else f"attaching under the name {name!r}: {error.strerror}"

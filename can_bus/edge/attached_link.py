@@ -29,7 +29,7 @@ from ranger_sim.can_bus.edge.taps import (
 )
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import connected
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError, UserError
 
 HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started, on a slow machine after half a minute
 
@@ -240,7 +240,7 @@ def greeted(
     except ConnectionRefusedError:
         raise FileNotFoundError(name) from None
     except OSError as error:
-        raise UserError(f"attaching to {name!r}: {error.strerror or error}") from None
+        raise BusError(f"attaching to {name!r}: {error.strerror or error}") from None
     try:
         hello = wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, options) + channel.encode("utf-8")
         connection.sendall(wire.record(wire.HELLO, hello))
@@ -248,26 +248,26 @@ def greeted(
         while True:
             data = connection.recv(4096)
             if not data:
-                raise UserError(f"{name!r} ended the connection without a word")
+                raise BusError(f"{name!r} ended the connection without a word")
             incoming += data
             for kind, body in wire.records_of(incoming):
                 if kind == wire.REFUSED:
-                    raise UserError(body.decode("utf-8", "replace"))
+                    raise BusError(body.decode("utf-8", "replace"))
                 if kind != wire.WELCOME or len(body) < wire.WELCOME_BODY.size:
-                    raise UserError(f"{name!r} does not speak the attach protocol")
+                    raise BusError(f"{name!r} does not speak the attach protocol")
                 version, window, bitrate, epoch_ns = wire.WELCOME_BODY.unpack_from(body)
                 channels = body[wire.WELCOME_BODY.size :].decode("utf-8", "replace").split("\n")
                 connection.settimeout(None)
                 return connection, (version, window, bitrate, epoch_ns, channels, incoming)
     except TimeoutError:
         connection.close()
-        raise UserError(f"{name!r} is running but has not answered for {patience_s:g} s (is it stopped?)") from None
+        raise BusError(f"{name!r} is running but has not answered for {patience_s:g} s (is it stopped?)") from None
     except wire.MalformedError as fault:
         connection.close()
-        raise UserError(f"{name!r} does not speak the attach protocol: {fault}") from None
+        raise BusError(f"{name!r} does not speak the attach protocol: {fault}") from None
     except OSError as error:
         connection.close()
-        raise UserError(f"attaching to {name!r}: {error.strerror or error}") from None
+        raise BusError(f"attaching to {name!r}: {error.strerror or error}") from None
     except UserError:
         connection.close()
         raise

@@ -14,7 +14,7 @@ from typing import Any
 from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 ERROR_FLAG = 0x20000000  # CAN_ERR_FLAG, linux/can.h
 ERROR_BUS = 0x00000080  # CAN_ERR_BUSERROR, linux/can/error.h
@@ -50,7 +50,7 @@ class CandumpWriter:
             # unbuffered: the output of a killed program is kept, and a full disk is detected at once
             self.file = self.path.open("wb", buffering=0)
         except OSError as error:
-            raise UserError(f"{self.path}: the frame log cannot be written ({error.strerror})") from None
+            raise BusError(f"{self.path}: the frame log cannot be written ({error.strerror})") from None
 
     def __enter__(self) -> "CandumpWriter":
         return self
@@ -87,13 +87,13 @@ def read_candump(path: str | pathlib.Path) -> Iterator[tuple[str, int, int, int,
         text = source.read_text(encoding="ascii")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not plain ASCII"
-        raise UserError(f"{source}: the frame log cannot be read ({reason})") from None
+        raise BusError(f"{source}: the frame log cannot be read ({reason})") from None
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip():
             try:
                 yield frame_of_line(line)
             except ValueError as error:
-                raise UserError(f"{source}:{number}: {error}") from None
+                raise BusError(f"{source}:{number}: {error}") from None
 
 
 def frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ranger_sim.can_bus.bounds import Message, message
 from ranger_sim.foundation.events import FLAG_EXTENDED
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 if TYPE_CHECKING:
     from cantools.database.can import Database
@@ -26,20 +26,20 @@ def read_messages(path: pathlib.Path, bit_rate: int | None) -> tuple[list[Messag
     try:
         database = cantools.database.load_file(str(path), database_format="dbc", strict=False)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise BusError(f"{path}: cannot be read: {error.strerror}") from None
     except Exception as error:  # a broken file makes cantools raise many types
         said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise UserError(f"{path}: not a DBC file that cantools can read: {said}") from None
+        raise BusError(f"{path}: not a DBC file that cantools can read: {said}") from None
     if not isinstance(database, cantools.database.can.Database):
-        raise UserError(f"{path}: holds no CAN messages")
+        raise BusError(f"{path}: holds no CAN messages")
     rate = bit_rate if bit_rate is not None else _baudrate(database)
     if rate is None:
-        raise UserError(f"{path}: says nothing of the bit rate (attribute Baudrate); give --bit-rate")
+        raise BusError(f"{path}: says nothing of the bit rate (attribute Baudrate); give --bit-rate")
     messages = []
     silent = []
     for one in database.messages:
         if one.is_fd or one.length > 8:
-            raise UserError(
+            raise BusError(
                 f"{path}: message {one.name} has {one.length} bytes: CAN FD is not analysed, only classic CAN"
             )
         period = one.cycle_time

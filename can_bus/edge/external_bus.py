@@ -40,7 +40,7 @@ from ranger_sim.foundation.events import (
     TX_LOST,
     TX_SENT,
 )
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError, UserError
 
 # Virtual time between two polls of the interfaces: half a step of the plant. Chosen by us: less has no benefit, as the
 # boards' outputs act at the plant's next step, and much more would affect the control loops (500 Hz).
@@ -57,7 +57,7 @@ class _Options(argparse.ArgumentParser):
     """python-can's arguments; a mistake in them is the user's."""
 
     def error(self, message: str) -> NoReturn:
-        raise UserError(message)
+        raise BusError(message)
 
 
 def place_of(text: str) -> tuple[str, dict[str, Any]]:
@@ -69,17 +69,17 @@ def place_of(text: str) -> tuple[str, dict[str, Any]]:
     """
     name, equals, where = text.partition("=")
     if not equals or not name:
-        raise UserError(f"--bus {text}: BUS=INTERFACE:CHANNEL is expected, e.g. can1=socketcan:vcan0")
+        raise BusError(f"--bus {text}: BUS=INTERFACE:CHANNEL is expected, e.g. can1=socketcan:vcan0")
     words = shlex.split(where)
     head = words.pop(0) if words and not words[0].startswith("-") else ""
     found: dict[str, Any] = {}
     interface, colon, channel = head.partition(":")
     if colon:
         if not channel:
-            raise UserError(f"--bus {text}: no channel after {interface}:")
+            raise BusError(f"--bus {text}: no channel after {interface}:")
         if interface not in can.VALID_INTERFACES:
             known = ", ".join(sorted(can.VALID_INTERFACES))
-            raise UserError(f"--bus {text}: python-can knows no interface {interface}; it knows {known}")
+            raise BusError(f"--bus {text}: python-can knows no interface {interface}; it knows {known}")
         found = {"interface": interface, "channel": channel}
     elif head:
         found = {"channel": head}
@@ -88,7 +88,7 @@ def place_of(text: str) -> tuple[str, dict[str, Any]]:
     try:
         options = vars(parser.parse_args(words))
     except (UserError, argparse.ArgumentError) as mistake:
-        raise UserError(f"--bus {text}: {mistake}") from None
+        raise BusError(f"--bus {text}: {mistake}") from None
     return name, {**found, **options.pop("bus_kwargs", {}), **options}
 
 
@@ -100,7 +100,7 @@ def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
     try:
         can.util.load_config(config=dict(keywords), context=name)
     except can.CanInterfaceNotImplementedError as error:
-        raise UserError(
+        raise BusError(
             f"bus {name}: python-can finds no interface for it ({error}): name one, as in {name}=socketcan:vcan0, or "
             f"set `interface` in section [{name}] of python-can's configuration (~/.canrc, ./can.ini, CAN_INTERFACE)"
         ) from None
@@ -111,7 +111,7 @@ def opener(name: str, keywords: dict[str, Any]) -> Callable[[], Any]:
         except Exception as error:  # a driver raises many types when its device is missing
             where = ":".join(str(keywords.get(each, "(by configuration)")) for each in ("interface", "channel"))
             text = " ".join(str(error).split()) or type(error).__name__
-            raise UserError(f"bus {name} on {where}: {text}{hint_for(error, keywords)}") from None
+            raise BusError(f"bus {name} on {where}: {text}{hint_for(error, keywords)}") from None
         widen(connection)
         return connection
 

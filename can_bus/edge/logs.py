@@ -17,7 +17,7 @@ import can
 from ranger_sim.can_bus.edge.candump import frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError, UserError
 
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
 PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
@@ -49,7 +49,7 @@ class RecordedFrames:
         except Exception as error:  # readers of formats raise many types
             said = error.strerror if isinstance(error, OSError) and error.strerror else error
             text = f"{self.source}: the recording cannot be read ({said or type(error).__name__})"
-            raise UserError(text) from None
+            raise DataError(text) from None
 
     def lose(self, reason: str, count: int, where: str) -> None:
         """Record frames that are in the file and were not returned."""
@@ -182,7 +182,7 @@ def _by_lines(
     except (ValueError, IndexError) as error:
         if given.whole:
             text = f"{log.source}:{given.number}: not a frame that python-can can read ({error})"
-            raise UserError(text) from None
+            raise DataError(text) from None
         log.read += not given.waiting
         log.lose("cut_off", 1, f"in line {given.number}")
         return
@@ -216,7 +216,7 @@ def _asc_lines(log: RecordedFrames) -> Iterator[str]:
                 yield first + "\n"
         symbolic = ASC_SYMBOLIC.match(line)
         if symbolic:
-            raise UserError(
+            raise DataError(
                 f"{log.source}:{number}: {symbolic[1][:40]} is a name where an identifier is expected; export the log "
                 "with numeric identifiers"
             )
@@ -245,12 +245,12 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
     try:
         text = log.source.read_text(encoding="ascii")
     except UnicodeDecodeError:
-        raise UserError(f"{log.source}: the recording cannot be read (not plain ASCII)") from None
+        raise DataError(f"{log.source}: the recording cannot be read (not plain ASCII)") from None
     lines = [(number, line) for number, line in enumerate(text.splitlines(keepends=True), 1) if line.strip()]
     parse: Callable[[str], Frame] = frame_of_line
     if lines and lines[0][1].startswith(BUSMASTER_HEADER):
         if any("***DEC***" in line for _, line in lines[:20]):
-            raise UserError(f"{log.source}: BUSMASTER's log in decimal numbers; write it in hexadecimal ones")
+            raise DataError(f"{log.source}: BUSMASTER's log in decimal numbers; write it in hexadecimal ones")
         lines = [(number, line) for number, line in lines if not line.startswith("***")]
         parse = _busmaster_frame
     elif lines and SCREEN.match(lines[0][1]):
@@ -263,7 +263,7 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
             if number == lines[-1][0] and not line.endswith("\n"):
                 log.lose("cut_off", 1, f"in line {number}")
                 return
-            raise UserError(f"{log.source}:{number}: {error}") from None
+            raise DataError(f"{log.source}:{number}: {error}") from None
 
 
 class _ScreenLine:
@@ -336,7 +336,7 @@ def _csv(log: RecordedFrames) -> Iterator[Frame]:
         yield from _by_lines(log, can.CSVReader, _text_lines(log), re.compile(r"\s*[\d.]"))
         return
     if not header.startswith(SAVVYCAN_HEADER):
-        raise UserError(f"{log.source}: a .csv of frames begins with {PYTHON_CAN_HEADER!r} or as SavvyCAN writes it")
+        raise DataError(f"{log.source}: a .csv of frames begins with {PYTHON_CAN_HEADER!r} or as SavvyCAN writes it")
     place = {name: index for index, name in enumerate(header.split(","))}
     for number, line in enumerate(_text_lines(log), 1):
         if number == 1 or not line.strip():
@@ -352,4 +352,4 @@ def _csv(log: RecordedFrames) -> Iterator[Frame]:
             if not line.endswith("\n"):
                 log.lose("cut_off", 1, f"in line {number}")
                 return
-            raise UserError(f"{log.source}:{number}: not a frame as SavvyCAN writes it ({error})") from None
+            raise DataError(f"{log.source}:{number}: not a frame as SavvyCAN writes it ({error})") from None

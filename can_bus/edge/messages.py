@@ -4,7 +4,7 @@ import can
 
 from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 
 def message_of_frame(
@@ -45,7 +45,7 @@ def frame_of_message(message: can.Message) -> tuple[int, int, int, int]:
     UserError for CAN FD, which these buses do not support. An error frame has FLAG_ERROR, identifier 0.
     """
     if message.is_fd:
-        raise UserError(
+        raise BusError(
             f"message {message.arbitration_id:#x}: CAN FD cannot be sent, the buses are classic CAN (8 bytes)"
         )
     if message.is_error_frame:

@@ -5,7 +5,7 @@ from ranger_sim.can_bus.edge.taps import ORDER, TRANSMIT_QUEUE, Tap, Taps
 from ranger_sim.can_bus.transmit_buffers import NODE_SHIFT
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER, EventQueue
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 # bit/s; chosen by us, because it is the fastest rate of classic CAN adapters (ISO 11898-2)
 DEFAULT_BITRATE = 1_000_000
@@ -22,7 +22,7 @@ def speed_of(text: str | float) -> float:
     except (TypeError, ValueError):
         speed = -1.0
     if not 0.001 <= speed <= 1000.0:
-        raise UserError(f"speed {text!r} is neither a number in 0.001 ... 1000 nor 'max'")
+        raise BusError(f"speed {text!r} is neither a number in 0.001 ... 1000 nor 'max'")
     return speed
 
 
@@ -72,7 +72,7 @@ class PacedBus:
             if bit_error_rate:
                 self.bus.set_bit_error_rate(bit_error_rate)
         except ValueError as fault:
-            raise UserError(str(fault)) from None
+            raise BusError(str(fault)) from None
         self.channel = channel
         self.bitrate = bitrate
         self.speed = speed

@@ -32,7 +32,7 @@ from ranger_sim.can_bus.edge.taps import (
 from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError, UserError
 
 log = logging.getLogger("can.ranger_sim")
 
@@ -92,15 +92,15 @@ class RangerSimBus(can.BusABC):
         own, listen = _truth(receive_own_messages), _truth(listen_only)
         try:
             if not bus_name:
-                raise UserError("ranger_sim: no channel was given (for example can1)")
+                raise BusError("ranger_sim: no channel was given (for example can1)")
             if _truth(fd) or isinstance(timing, can.BitTimingFd):
-                raise UserError(f"ranger_sim {channel}: CAN FD is asked for, these buses are classic CAN")
+                raise BusError(f"ranger_sim {channel}: CAN FD is asked for, these buses are classic CAN")
             if timing is not None:
                 bitrate = timing.bitrate
             rate = None if bitrate is None else _whole("bitrate", bitrate, 1000, 100_000_000)
             limit = _whole("rx_queue_size", rx_queue_size, 1, 100_000_000)
             if named and _truth(private):
-                raise UserError(
+                raise BusError(
                     f"ranger_sim {channel}: private=True and the name of a robot, {name!r}, exclude each other"
                 )
             link: AttachedLink | PrivateLink | None = None
@@ -130,7 +130,7 @@ class RangerSimBus(can.BusABC):
             if not named:
                 return None
             running = ", ".join(names_running()) or "none"
-            raise UserError(
+            raise BusError(
                 f"ranger_sim: no robot or bus host named {name!r} is running (running: {running}); "
                 "start `ranger-sim up` or `ranger-sim bus`"
             ) from None
@@ -146,7 +146,7 @@ class RangerSimBus(can.BusABC):
             fault = f"is a bus of another process: {', '.join(given)} can only be set where that is started"
         if fault:
             link.close()
-            raise UserError(f"ranger_sim: {name}/{channel} {fault} (private=True opens a bus of your own)")
+            raise BusError(f"ranger_sim: {name}/{channel} {fault} (private=True opens a bus of your own)")
         return link
 
     def _opened(self, channel: str, rate: int | None, listen: bool, own: bool, limit: int) -> PrivateLink:
@@ -171,7 +171,7 @@ class RangerSimBus(can.BusABC):
                 ("bit_error_rate", errors, bus.paced.bit_error_rate),
             ):
                 if want is not None and want != have:
-                    raise UserError(
+                    raise BusError(
                         f"ranger_sim: the private bus {channel} is open with {what} {have:.12g}, not {want:.12g}: who "
                         "opens it first sets it"
                     )
@@ -368,5 +368,5 @@ def _whole(name: str, value: Any, low: int, high: int) -> int:
     except (TypeError, ValueError):
         number = low - 1
     if not low <= number <= high:
-        raise UserError(f"ranger_sim: {name} {value!r} is not a whole number in {low} ... {high}")
+        raise BusError(f"ranger_sim: {name} {value!r} is not a whole number in {low} ... {high}")
     return number

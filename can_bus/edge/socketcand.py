@@ -16,7 +16,7 @@ from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream, listening_address
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 # Clients read everything that has arrived as the answer to `rawmode`; a frame directly after it confuses them. So
 # nothing follows it for this long (chosen by us: the time in which a client reads its answer on a busy machine).
@@ -61,7 +61,7 @@ class SocketcandServer(StreamServer[_Client]):
         except (OSError, OverflowError) as error:
             listener.close()
             reason = error.strerror if isinstance(error, OSError) else "a port is 0 ... 65535"
-            raise UserError(f"socketcand on {host}:{port}: {reason}") from None
+            raise BusError(f"socketcand on {host}:{port}: {reason}") from None
         super().__init__("socketcand", listener, buses, epoch_ns)
         self.totals["not_carried"] = 0
         self.texts: dict[Event, bytes] = {}  # frames of this poll as text for all clients

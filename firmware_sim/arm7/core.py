@@ -36,7 +36,7 @@ from typing import Final
 
 import cython
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 WRITTEN_BITS: Final = 8
 # modes: low five bits of the CPSR
@@ -66,7 +66,7 @@ BRIDGE_BASE = 0xE0000000  # where the peripheral bus begins (user manual, chapte
 MAM_TIMING = 4  # clocks of a flash access at 60 MHz: what all of the robot's boards write to MAMTIM
 
 
-class ProcessorError(UserError):
+class ProcessorError(FirmwareError):
     """The program did what the processor does not define."""
 
 
@@ -82,7 +82,7 @@ class BusFault(ProcessorError):  # noqa: N818  (what processors call it)
 def memory(what, size):
     """`size` bytes of zeros as an array of words; UserError when that is no whole number of words, 4 or more."""
     if not isinstance(size, int) or size < 4 or size % 4:
-        raise UserError(f"{what} of {size!r} bytes: must be a whole number of words of 4 bytes, at least one")
+        raise FirmwareError(f"{what} of {size!r} bytes: must be a whole number of words of 4 bytes, at least one")
     return array.array("q", [0]) * (size // 4)
 
 
@@ -240,7 +240,7 @@ class Core:
     def set_mam(self, mode, timing) -> None:
         """Mode 0 ... 2 and clocks per access 1 ... 7 of the flash accelerator; what it held is forgotten."""
         if mode not in (0, 1, 2) or not 1 <= timing <= 7:
-            raise UserError(f"{self.name}: MAM mode {mode} of {timing} clocks: modes are 0 ... 2, clocks 1 ... 7")
+            raise FirmwareError(f"{self.name}: MAM mode {mode} of {timing} clocks: modes are 0 ... 2, clocks 1 ... 7")
         self.mam_mode = mode
         self.mam_timing = timing
         self.forget_flash()
@@ -263,7 +263,7 @@ class Core:
             for i in range(len(self.written)):
                 self.written[i] = 1
             return
-        raise UserError(
+        raise FirmwareError(
             f"{self.name}: {len(content)} bytes at {address:#010x} fit neither flash ({self.flash_base:#010x}, "
             f"{self.flash_size} bytes) nor RAM ({self.ram_base:#010x}, {self.ram_size} bytes)"
         )
@@ -274,7 +274,7 @@ class Core:
             return self.flash[(address - self.flash_base) >> 2]
         if 0 <= address - self.ram_base < self.ram_size:
             return self.ram[(address - self.ram_base) >> 2]
-        raise UserError(f"{self.name}: {address:#010x} is neither in flash nor in RAM")
+        raise FirmwareError(f"{self.name}: {address:#010x} is neither in flash nor in RAM")
 
     # ---- status registers and modes
 

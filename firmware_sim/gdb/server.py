@@ -24,7 +24,7 @@ from ranger_sim.foundation.peers import (
     SocketStream,
     listening_address,
 )
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 # Chosen by us: how long a held process waits before it asks whether it should end (Ctrl-C at its own terminal).
 WAIT_S = 0.2
@@ -76,7 +76,7 @@ class GdbServer(Door[_Client]):
         except (OSError, OverflowError) as error:
             listener.close()
             reason = error.strerror if isinstance(error, OSError) else "a port is 0 ... 65535"
-            raise UserError(f"{what}: {reason}") from None
+            raise FirmwareError(f"{what}: {reason}") from None
         super().__init__("gdb", listener)
         self.host, self.port = listener.getsockname()
         self.ends = ends
@@ -100,7 +100,7 @@ class GdbServer(Door[_Client]):
             self.listener.listen(self.limits.peers)
         except OSError as error:
             what = f"gdb for {self.board.name} on {self.host}:{self.port}"
-            raise UserError(f"{what}: {error.strerror}") from None
+            raise FirmwareError(f"{what}: {error.strerror}") from None
 
     def leads_to(self, board: Debuggable) -> None:
         """Set the board: at first, and when a new one replaces it."""

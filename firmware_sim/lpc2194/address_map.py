@@ -5,16 +5,14 @@
 An access acts at the time at which its instruction begins: later events in the chip come after it.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import cython
 
-from ranger_sim.firmware_sim.arm7.core import Device
+from ranger_sim.firmware_sim.arm7.core import Core, Device
 from ranger_sim.firmware_sim.lpc2194.block import Block, NotModelledError
-from ranger_sim.foundation.user_error import UserError
-
-if TYPE_CHECKING:
-    from ranger_sim.firmware_sim.lpc2194.board import ImageBoard
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.foundation.user_error import FirmwareError
 
 BLOCK_BITS: Final = 14  # a block of the peripheral bus has 16 KB
 BLOCKS: Final = 128
@@ -22,13 +20,35 @@ BLOCKS: Final = 128
 NAME_OF_ACCESS = {1: "byte", 2: "half-word", 4: "word"}
 
 
-class NotModelledAccess(UserError):  # noqa: N818  (it is what the program did)
+class NotModelledAccess(FirmwareError):  # noqa: N818  (it is what the program did)
     """The program accessed something that is not modelled; `address` and `pc` give the place, as numbers."""
 
     def __init__(self, text, address, pc) -> None:
-        UserError.__init__(self, text)
+        FirmwareError.__init__(self, text)
         self.address = address
         self.pc = pc
+
+
+@cython.cclass
+class AddressedBoard(Microcontroller):
+    """A board as an access to one of its devices needs it."""
+
+    @cython.cfunc
+    @cython.exceptval(check=True)
+    def reach(self) -> cython.void:
+        """Begin the present instruction's access to a device: devices see the time at which the instruction began."""
+        raise NotImplementedError
+
+    @cython.cfunc
+    @cython.exceptval(check=True)
+    def work(self) -> cython.void:
+        """Note that the present access has an effect: if the main program makes it, the program is at work."""
+        raise NotImplementedError
+
+    @cython.cfunc
+    def settle(self, block: Block) -> cython.int:
+        """After an access: the levels of what the block drives, and how far the processor may run on."""
+        raise NotImplementedError
 
 
 @cython.final
@@ -39,15 +59,19 @@ class AddressMap(Device):
     `touched` counts accesses that may do something or give another value another time, `looks` the others.
     """
 
-    board: "ImageBoard"
+    board: AddressedBoard
+    core: Core
+    image: object
     places: list
     fast_gpio: Block
     vic: Block
     touched: cython.longlong
     looks: cython.longlong
 
-    def __init__(self, board) -> None:
+    def __init__(self, board: AddressedBoard, core: Core, image) -> None:
         self.board = board
+        self.core = core
+        self.image = image
         self.places = [None] * BLOCKS
         self.fast_gpio = None
         self.vic = None
@@ -142,17 +166,16 @@ class AddressMap(Device):
 
     def fail(self, address, size, writing, value, why) -> None:
         """End the run: the access, where the program is, and why it cannot be."""
-        board = self.board
         block = self.find(address)
         name = ""
         if block is not None:
             register = block.REGISTERS.get((address - block.base) & ~3)
             name = f" ({block.name}: {register[0]})" if register is not None else f" ({block.name})"
-        pc = board.core.pc
-        inside = board.image.place_of(pc) if board.image is not None else ""
+        pc = self.core.pc
+        inside = self.image.place_of(pc) if self.image is not None else ""
         what = f"writes {value:#x} to" if writing else "reads"
         raise NotModelledAccess(
-            f"{board.name}: the program {what} {address:#010x}{name} as a {NAME_OF_ACCESS[size]} at pc {pc:#010x}"
+            f"{self.board.name}: the program {what} {address:#010x}{name} as a {NAME_OF_ACCESS[size]} at pc {pc:#010x}"
             f"{f' in {inside}' if inside else ''}: {why}",
             address,
             pc,

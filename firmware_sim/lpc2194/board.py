@@ -26,7 +26,7 @@ from ranger_sim.firmware_sim.arm7.core import FAST, INTERRUPT, STATE, Core
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters, ProcessorCounters, SlotCounters
 from ranger_sim.firmware_sim.edge_line import EdgeLine
-from ranger_sim.firmware_sim.lpc2194.address_map import AddressMap
+from ranger_sim.firmware_sim.lpc2194.address_map import AddressedBoard, AddressMap
 from ranger_sim.firmware_sim.lpc2194.block import Block, Clocks
 from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS, CanBlock, CanFilterBlock
 from ranger_sim.firmware_sim.lpc2194.converter import ConverterBlock
@@ -63,7 +63,7 @@ class ImageCounters(BoardCounters):
 
 
 @cython.cclass
-class ImageBoard(Microcontroller):
+class ImageBoard(AddressedBoard):
     """Board `name` with `image` in its memory, powered up at `phase_ns` (ns).
 
     `core` is the processor, `map` its devices by address, `skips_idle` whether loops that wait are skipped.
@@ -150,7 +150,7 @@ class ImageBoard(Microcontroller):
     def _build(self, hardware) -> None:
         """Build the chip's blocks and the devices connected to them."""
         clocks = self.clocks
-        self.map = AddressMap(self)
+        self.map = AddressMap(self, self.core, self.image)
         self.vic_block = VicBlock(self, clocks)
         external = hardware.external if not hardware.segment_interval_ns else None
         converter = None
@@ -254,6 +254,7 @@ class ImageBoard(Microcontroller):
         self.now = self.time_of(self.core.began)
 
     @cython.cfunc
+    @cython.exceptval(check=True)
     def work(self) -> cython.void:
         """Note that the present access has an effect: if the main program makes it, the program is at work."""
         mode: cython.longlong = self.core.control & 0x1F

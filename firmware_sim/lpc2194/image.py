@@ -11,7 +11,7 @@ import pathlib
 import re
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 # LPC2194 user manual, memory map
 FLASH = (0x00000000, 0x40000)
@@ -66,7 +66,7 @@ class Image:
         for symbol in self.symbols:
             if symbol.name == name:
                 return symbol.address
-        raise UserError(f"{self.path}: there is no symbol {name!r}")
+        raise FirmwareError(f"{self.path}: there is no symbol {name!r}")
 
 
 def read(path: str | os.PathLike) -> Image:
@@ -75,20 +75,20 @@ def read(path: str | os.PathLike) -> Image:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror or error}") from None
+        raise FirmwareError(f"{path}: {error.strerror or error}") from None
     if not content:
-        raise UserError(f"{path}: the file is empty")
+        raise FirmwareError(f"{path}: the file is empty")
     if content.startswith(b"\x7fELF"):
         image = _from_elf(path, content)
     elif content.lstrip().startswith(b":"):
         image = _from_hex(path, content)
     else:
-        raise UserError(f"{path}: {_other_kind(path, content)}")
+        raise FirmwareError(f"{path}: {_other_kind(path, content)}")
     if not image.segments:
-        raise UserError(f"{path}: there is nothing in it for flash or RAM")
+        raise FirmwareError(f"{path}: there is nothing in it for flash or RAM")
     first = image.segments[0][0]
     if first >= RAM[0]:
-        raise UserError(
+        raise FirmwareError(
             f"{path}: linked into RAM ({first:#010x}), where a debugger loads it; the processor starts in flash, at "
             f"{FLASH[0]:#010x}: link it for that"
         )
@@ -112,12 +112,12 @@ def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple
     for address, content in sorted(pieces):
         end = address + len(content)
         if not any(base <= address and end <= base + size for base, size in (FLASH, RAM)):
-            raise UserError(
+            raise FirmwareError(
                 f"{path}: {len(content)} bytes at {address:#010x} are outside the chip's flash "
                 f"({FLASH[0]:#010x}, {FLASH[1]} bytes) and RAM ({RAM[0]:#010x}, {RAM[1]} bytes)"
             )
         if joined and address < joined[-1][0] + len(joined[-1][1]):
-            raise UserError(f"{path}: two pieces of it are at {address:#010x}")
+            raise FirmwareError(f"{path}: two pieces of it are at {address:#010x}")
         if joined and address == joined[-1][0] + len(joined[-1][1]):
             joined[-1] = (joined[-1][0], joined[-1][1] + content)
         else:
@@ -136,32 +136,34 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
         if elf.elfclass != 32 or not elf.little_endian or machine != "EM_ARM":
             order = "little" if elf.little_endian else "big"
             machine = machine if isinstance(machine, str) else f"machine {machine}"
-            raise UserError(
+            raise FirmwareError(
                 f"{path}: an ELF file for {elf.elfclass} bit, {order}-endian {machine.removeprefix('EM_')}; "
                 "the LPC2194 is a 32 bit, little-endian ARM"
             )
         if built_for := _newer_architecture(elf):
-            raise UserError(
+            raise FirmwareError(
                 f"{path}: built for {built_for}, by its build attributes; the LPC2194 is an ARM7TDMI-S, "
                 f"{ARCHITECTURES[ARMV4T]} (-mcpu=arm7tdmi)"
             )
         if elf["e_type"] != "ET_EXEC":
-            raise UserError(f"{path}: an ELF file that is not linked into an image ({elf['e_type']}, not ET_EXEC)")
+            raise FirmwareError(f"{path}: an ELF file that is not linked into an image ({elf['e_type']}, not ET_EXEC)")
         pieces = []
         for segment in elf.iter_segments("PT_LOAD"):
             start, size = segment["p_offset"], segment["p_filesz"]
             if start + size > len(content):
-                raise UserError(
+                raise FirmwareError(
                     f"{path}: truncated: a segment of {size} bytes begins at byte {start}, the file has {len(content)}"
                 )
             if size:
                 pieces.append((segment["p_paddr"], content[start : start + size]))
         if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
-            raise UserError(f"{path}: truncated: the file has {len(content)} bytes, its section table ends behind them")
+            raise FirmwareError(
+                f"{path}: truncated: the file has {len(content)} bytes, its section table ends behind them"
+            )
         symbols = _symbols(elf)
     except (ELFError, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
         reason = str(error) or type(error).__name__
-        raise UserError(f"{path}: a damaged or truncated ELF file: {reason}") from None
+        raise FirmwareError(f"{path}: a damaged or truncated ELF file: {reason}") from None
     return Image(path, _checked(path, pieces), symbols)
 
 
@@ -215,19 +217,21 @@ def _from_hex(path: pathlib.Path, content: bytes) -> Image:
             continue
         where = f"{path}:{number}"
         if ended:
-            raise UserError(f"{where}: more lines behind the end record")
+            raise FirmwareError(f"{where}: more lines behind the end record")
         try:
             record = bytes.fromhex(line[1:].decode("ascii")) if line.startswith(b":") else b""
         except (ValueError, UnicodeDecodeError):
             record = b""
         if len(record) < 5 or len(record) != record[0] + 5:
-            raise UserError(f"{where}: no whole record of Intel HEX")
+            raise FirmwareError(f"{where}: no whole record of Intel HEX")
         if sum(record) & 0xFF:
             right = -sum(record[:-1]) & 0xFF
-            raise UserError(f"{where}: checksum {record[-1]:#04x} is wrong: the record's bytes ask for {right:#04x}")
+            raise FirmwareError(
+                f"{where}: checksum {record[-1]:#04x} is wrong: the record's bytes ask for {right:#04x}"
+            )
         offset, kind, data = record[1] << 8 | record[2], record[3], record[4:-1]
         if kind in HEX_FIXED and len(data) != HEX_FIXED[kind]:
-            raise UserError(f"{where}: a record of type {kind} has {HEX_FIXED[kind]} bytes, this one {len(data)}")
+            raise FirmwareError(f"{where}: a record of type {kind} has {HEX_FIXED[kind]} bytes, this one {len(data)}")
         if kind == HEX_DATA:
             if data:
                 pieces.append((upper + offset, data))
@@ -238,7 +242,7 @@ def _from_hex(path: pathlib.Path, content: bytes) -> Image:
         elif kind == HEX_LINEAR:
             upper = int.from_bytes(data, "big") << 16
         elif kind not in HEX_FIXED:
-            raise UserError(f"{where}: record type {kind} is none of Intel HEX (0 ... 5)")
+            raise FirmwareError(f"{where}: record type {kind} is none of Intel HEX (0 ... 5)")
     if not ended:
-        raise UserError(f"{path}: truncated: there is no end record")
+        raise FirmwareError(f"{path}: truncated: there is no end record")
     return Image(path, _checked(path, pieces))

@@ -11,14 +11,14 @@ import sys
 import tempfile
 from collections.abc import Sequence
 
+from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.firmware_sim.native.manifest import Manifest
 from ranger_sim.firmware_sim.native.trial import tried
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 HERE = pathlib.Path(__file__).resolve().parent
 INCLUDE = HERE / "include"
 RUNTIME = HERE / "runtime" / "runtime.c"
-COMPILERS = ("cc", "gcc", "clang")
 LONGEST_S = 600.0  # a compiler that takes longer than this hangs
 WORD_BITS = sys.maxsize.bit_length() + 1  # of pointers, and of long in the data models of Unix
 
@@ -67,17 +67,6 @@ class Addition:
     sources: tuple[pathlib.Path, ...] = ()
 
 
-def compiler() -> str:
-    """The C compiler: $CC, or the first of the usual ones; UserError when none is found."""
-    asked = os.environ.get("CC")
-    for name in (asked.split()[-1],) if asked and asked.split() else COMPILERS:
-        found = shutil.which(name)
-        if found:
-            return found
-    looked = f"CC={asked}" if asked else ", ".join(COMPILERS)
-    raise UserError(f"no C compiler is installed here (looked for {looked}); firmware in C needs one")
-
-
 def build(
     manifest: Manifest, sanitize: bool = False, coverage: bool = False, addition: Addition | None = None
 ) -> Built:
@@ -117,7 +106,7 @@ def build(
                 _keep_notes(pathlib.Path(making), path.with_suffix(".notes"))
             stamp.write_text(state, encoding="utf-8")
     except OSError as error:
-        raise UserError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
+        raise FirmwareError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
     return Built(path, warnings)
 
 
@@ -143,7 +132,7 @@ def _compile(
     counting = ["-DFW_COVERAGE"] if "--coverage" in watching else []
     code, text = run_compiler([program, *OPTIONS, *counting, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
     if code:
-        raise UserError(f"{RUNTIME} does not compile with {program}:", *text[:20])
+        raise FirmwareError(f"{RUNTIME} does not compile with {program}:", *text[:20])
     failed = False
     for number, source in enumerate(sources):
         place = making / f"{number}-{source.stem}.o"
@@ -159,7 +148,7 @@ def _compile(
         failed = code != 0
         said += text
     if failed:
-        raise UserError(*errors_in(manifest, said))
+        raise FirmwareError(*errors_in(manifest, said))
     return tuple(line for line in map(message_of, said) if line and " warning: " in line)
 
 
@@ -169,7 +158,7 @@ def run_compiler(command: list[str]) -> tuple[int, list[str]]:
     try:
         done = subprocess.run(command, capture_output=True, check=False, timeout=LONGEST_S, env=setting)
     except subprocess.TimeoutExpired:
-        raise UserError(f"{command[0]}: has not finished after {LONGEST_S:g} s") from None
+        raise FirmwareError(f"{command[0]}: has not finished after {LONGEST_S:g} s") from None
     return done.returncode, (done.stderr + done.stdout).decode(errors="replace").splitlines()
 
 

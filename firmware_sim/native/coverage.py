@@ -13,8 +13,8 @@ import tempfile
 from collections.abc import Iterable
 from typing import Any
 
-from ranger_sim.firmware_sim.native.build import compiler
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.firmware_sim.native.compiler import compiler
+from ranger_sim.foundation.user_error import FirmwareError
 
 PREFIX = "GCOV_PREFIX"  # where libgcov writes to
 LONGEST_S = 120.0  # some seconds for large programs
@@ -63,7 +63,7 @@ def gcov() -> str:
     name = path.name.replace("gcc", "gcov") if "gcc" in path.name else "gcov"
     found = shutil.which(str(path.with_name(name))) or shutil.which("gcov")
     if found is None:
-        raise UserError(f"{path} has no gcov beside it: --coverage needs gcc with its gcov")
+        raise FirmwareError(f"{path} has no gcov beside it: --coverage needs gcc with its gcov")
     return found
 
 
@@ -106,7 +106,7 @@ def _told(place: pathlib.Path, stem: str) -> list[FileCounts]:
             found += [_file(base / each["file"], each) for each in said["files"]]
     except (ValueError, KeyError, TypeError):
         why = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason is given"]
-        raise UserError(f"{command[0]}: {stem}: its answer does not read as JSON of gcov: {why[0]}") from None
+        raise FirmwareError(f"{command[0]}: {stem}: its answer does not read as JSON of gcov: {why[0]}") from None
     return found
 
 

@@ -20,7 +20,7 @@ from ranger_sim.firmware_sim.native.build import (
     state_of,
 )
 from ranger_sim.firmware_sim.native.manifest import Manifest
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 CHIP = pathlib.Path(__file__).resolve().parent / "chip"
 TOOLS = "arm-none-eabi-"
@@ -61,7 +61,7 @@ def tool(name: str) -> str:
     """A program of the cross compiler; UserError when it is not installed."""
     found = shutil.which(TOOLS + name)
     if found is None:
-        raise UserError(
+        raise FirmwareError(
             f"no {TOOLS}{name} is installed here; firmware for the chip needs it "
             f"(Debian, Ubuntu: apt install {PACKAGE})"
         )
@@ -96,13 +96,13 @@ def build_image(manifest: Manifest, addition: Addition | None = None) -> Image:
             made, made_hex = place / "image.elf", place / "image.hex"
             code, text = run_compiler([objcopy, "-O", "ihex", str(made), str(made_hex)])
             if code:
-                raise UserError(f"{manifest.folder}: {objcopy} could not write Intel HEX:", *text[:20])
+                raise FirmwareError(f"{manifest.folder}: {objcopy} could not write Intel HEX:", *text[:20])
             stamp.unlink(missing_ok=True)
             made.replace(path)
             made_hex.replace(hex_path)
             stamp.write_text(state, encoding="utf-8")
     except OSError as error:
-        raise UserError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
+        raise FirmwareError(f"{error.filename or folder}: {error.strerror}: nothing can be built there") from None
     return Image(path, hex_path, *_sizes(size, path), warnings)
 
 
@@ -121,7 +121,7 @@ def _compile(
             with_options += SUPPORT_OPTIONS
         code, text = run_compiler([gcc, *with_options, "-c", str(source), "-o", str(place)])
         if code and source in own:
-            raise UserError(f"{source} does not compile with {gcc}:", *text[:20])
+            raise FirmwareError(f"{source} does not compile with {gcc}:", *text[:20])
         objects.append(str(place))
         failed |= code != 0
         said += text
@@ -132,7 +132,7 @@ def _compile(
         failed = code != 0
         said += text
     if failed:
-        raise UserError(*(_too_large(manifest, said) or errors_in(manifest, said)))
+        raise FirmwareError(*(_too_large(manifest, said) or errors_in(manifest, said)))
     return tuple(line for line in map(message_of, said) if line and " warning: " in line)
 
 
@@ -156,5 +156,5 @@ def _sizes(size: str, path: pathlib.Path) -> tuple[int, int]:
     code, text = run_compiler([size, str(path)])
     found = SIZES.search("\n".join(text))
     if code or found is None:
-        raise UserError(f"{path}: {size} does not tell its size")
+        raise FirmwareError(f"{path}: {size} does not tell its size")
     return int(found["text"]) + int(found["data"]), int(found["data"]) + int(found["bss"])

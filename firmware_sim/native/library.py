@@ -15,7 +15,7 @@ from typing import Any
 import cffi
 
 from ranger_sim.firmware_sim.native import coverage, crash, sanitizers
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 VERSION = 1  # of the header: FW_VERSION
 # Of the processor's time, not the clock's: how busy the machine is does not matter. A turn is some slots at most and
@@ -80,27 +80,31 @@ class Library:
     def __init__(self, path: pathlib.Path, shown: pathlib.Path | None = None) -> None:
         self.path = path
         if not path.is_file():
-            raise UserError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
+            raise FirmwareError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
         self.code = _loaded_copy(path)
         sanitizers.lead_findings()
         path = shown if shown is not None else path
         for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch", "fw_turns"):
             if not self.has(name):
-                raise UserError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
+                raise FirmwareError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
         version = self.code.fw_compiled_version
         if version != VERSION:
-            raise UserError(f"{path}: compiled with version {version} of firmware.h, this is {VERSION}: build it again")
+            raise FirmwareError(
+                f"{path}: compiled with version {version} of firmware.h, this is {VERSION}: build it again"
+            )
         sizes = [ffi.sizeof(name) for name in SIZED]
         if list(self.code.fw_sizes) != sizes:
-            raise UserError(f"{path}: its structures have {list(self.code.fw_sizes)} bytes, expected are {sizes}")
+            raise FirmwareError(f"{path}: its structures have {list(self.code.fw_sizes)} bytes, expected are {sizes}")
         missing = [] if self.has("firmware_start") else ["firmware_start()"]
         kinds = [name for name in ("firmware_schedule", "firmware_main") if self.has(name)]
         if not kinds:
             missing.append("firmware_schedule() or firmware_main()")
         if missing:
-            raise UserError(f"{path}: no {' and no '.join(missing)} in it; a program has {ENTRY_POINTS}")
+            raise FirmwareError(f"{path}: no {' and no '.join(missing)} in it; a program has {ENTRY_POINTS}")
         if len(kinds) == 2:
-            raise UserError(f"{path}: firmware_schedule() and firmware_main() are both there: one of them is too many")
+            raise FirmwareError(
+                f"{path}: firmware_schedule() and firmware_main() are both there: one of them is too many"
+            )
         self.schedule = kinds == ["firmware_schedule"]
         self.turns = ffi.addressof(self.code, "fw_turns")
         if self.code.fw_counts_lines:
@@ -177,7 +181,7 @@ def _loaded_copy(path: pathlib.Path) -> Any:
         shutil.copyfile(path, copy)
         return ffi.dlopen(copy, ffi.RTLD_NOW | ffi.RTLD_LOCAL)
     except OSError as error:
-        raise UserError(f"{path}: cannot be loaded as a library: {str(error).replace(copy, path.name)}") from None
+        raise FirmwareError(f"{path}: cannot be loaded as a library: {str(error).replace(copy, path.name)}") from None
     finally:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(copy)

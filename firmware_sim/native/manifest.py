@@ -24,7 +24,7 @@ from typing import Any
 
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter, SpiDevice
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 FILE = "firmware.toml"
 DEFAULT_SOURCES = ["*.c"]
@@ -52,14 +52,14 @@ def load(folder: str | pathlib.Path) -> Manifest:
     folder = pathlib.Path(folder)
     path = folder / FILE
     if not path.exists():
-        raise UserError(f"{folder}: no {FILE} in it, so it is not a folder of firmware")
+        raise FirmwareError(f"{folder}: no {FILE} in it, so it is not a folder of firmware")
     found = toml_file.load(path)
     _known(path, "", found, ("firmware", "defines", "hardware"))
     firmware = _table(path, found, "firmware")
     _known(path, "firmware.", firmware, ("name", "sources", "include", "tables", "master", "options"))
     name = firmware.get("name", folder.resolve().name)
     if not isinstance(name, str) or not re.fullmatch(r"[\w-]+", name):
-        raise UserError(f"{path}: firmware.name {name!r}: letters, digits, _ and - are expected")
+        raise FirmwareError(f"{path}: firmware.name {name!r}: letters, digits, _ and - are expected")
     return Manifest(
         folder=folder,
         name=name,
@@ -76,20 +76,20 @@ def load(folder: str | pathlib.Path) -> Manifest:
 def _table(path: pathlib.Path, within: dict, key: str, prefix: str = "") -> dict[str, Any]:
     found = within.get(key, {})
     if not isinstance(found, dict):
-        raise UserError(f"{path}: {prefix}{key} is {found!r}, a table is expected")
+        raise FirmwareError(f"{path}: {prefix}{key} is {found!r}, a table is expected")
     return found
 
 
 def _known(path: pathlib.Path, prefix: str, found: dict, names: tuple[str, ...]) -> None:
     for key in found:
         if key not in names:
-            raise UserError(f"{path}: {prefix}{key}: not known here; there are {', '.join(names)}")
+            raise FirmwareError(f"{path}: {prefix}{key}: not known here; there are {', '.join(names)}")
 
 
 def _texts(path: pathlib.Path, firmware: dict, key: str, default: list[str]) -> list[str]:
     found = firmware.get(key, default)
     if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
-        raise UserError(f"{path}: firmware.{key} is {found!r}, a list of texts is expected")
+        raise FirmwareError(f"{path}: firmware.{key} is {found!r}, a list of texts is expected")
     return found
 
 
@@ -99,21 +99,21 @@ def _sources(path: pathlib.Path, folder: pathlib.Path, patterns: list[str], give
         try:
             matching = sorted(folder.glob(pattern))
         except (ValueError, NotImplementedError):
-            raise UserError(f"{path}: firmware.sources: {pattern!r} is no pattern relative to its folder") from None
+            raise FirmwareError(f"{path}: firmware.sources: {pattern!r} is no pattern relative to its folder") from None
         if not matching:
-            raise UserError(f"{path}: firmware.sources: {pattern!r} matches no file in {folder}")
+            raise FirmwareError(f"{path}: firmware.sources: {pattern!r} matches no file in {folder}")
         sources += [each for each in matching if each not in sources]
     others = [] if given else [each for each in sorted(folder.iterdir()) if each not in sources]
     for each in (*sources, *others):
         if each.suffix in CPLUSPLUS:
             way_out = "" if each in sources else f" (firmware.sources = {DEFAULT_SOURCES} leaves it out)"
-            raise UserError(f"{path}: {each.name} is C++, and firmware is built from C alone{way_out}")
+            raise FirmwareError(f"{path}: {each.name} is C++, and firmware is built from C alone{way_out}")
     return tuple(sources)
 
 
 def _folder(path: pathlib.Path, folder: pathlib.Path, name: str) -> pathlib.Path:
     if not (folder / name).is_dir():
-        raise UserError(f"{path}: firmware.include: {name!r} is no folder in {folder}")
+        raise FirmwareError(f"{path}: firmware.include: {name!r} is no folder in {folder}")
     return folder / name
 
 
@@ -122,16 +122,16 @@ def _master(path: pathlib.Path, folder: pathlib.Path, firmware: dict) -> pathlib
     if name is None:
         return None
     if not isinstance(name, str) or not (folder / name).is_dir():
-        raise UserError(f"{path}: firmware.master: {name!r} is no folder in {folder}")
+        raise FirmwareError(f"{path}: firmware.master: {name!r} is no folder in {folder}")
     return folder / name
 
 
 def _defines(path: pathlib.Path, found: dict) -> tuple[tuple[str, str], ...]:
     for name, value in found.items():
         if not NAME.fullmatch(name):
-            raise UserError(f"{path}: defines: {name!r} is no name in C")
+            raise FirmwareError(f"{path}: defines: {name!r} is no name in C")
         if not isinstance(value, int | float | str):
-            raise UserError(f"{path}: defines.{name} is {value!r}, a number, text or truth value is expected")
+            raise FirmwareError(f"{path}: defines.{name} is {value!r}, a number, text or truth value is expected")
     return tuple((name, str(int(v) if isinstance(v, bool) else v)) for name, v in found.items())
 
 
@@ -141,7 +141,7 @@ def _hardware(path: pathlib.Path, found: dict) -> Hardware:
     if "hz" in found:
         given["hz"] = _number(path, "hardware.hz", found["hz"], int)
         if given["hz"] < 1:
-            raise UserError(f"{path}: hardware.hz {given['hz']} must be above 0")
+            raise FirmwareError(f"{path}: hardware.hz {given['hz']} must be above 0")
     for key, kind in (("external", ExternalConverter), ("internal", InternalConverter)):
         if key in found:
             given[key] = _record(path, f"hardware.{key}", _table(path, found, key, "hardware."), kind)
@@ -149,7 +149,7 @@ def _hardware(path: pathlib.Path, found: dict) -> Hardware:
         given["spi"] = {}
         for number, device in _table(path, found, "spi", "hardware.").items():
             if not number.isdecimal() or not isinstance(device, dict):
-                raise UserError(f"{path}: hardware.spi.{number}: a number of an SPI, and a table, are expected")
+                raise FirmwareError(f"{path}: hardware.spi.{number}: a number of an SPI, and a table, are expected")
             given["spi"][int(number)] = _record(path, f"hardware.spi.{number}", device, SpiDevice)
     return Hardware(**given)
 
@@ -164,7 +164,7 @@ def _record(path: pathlib.Path, where: str, found: dict, kind: Any) -> Any:
             if not isinstance(value, dict) or not all(
                 code.isdecimal() and type(place) is int and 0 <= place < 8 for code, place in value.items()
             ):
-                raise UserError(f"{path}: {where}.inputs is {value!r}, channel = analog place 0 ... 7 is expected")
+                raise FirmwareError(f"{path}: {where}.inputs is {value!r}, channel = analog place 0 ... 7 is expected")
             given[key] = {int(code): place for code, place in value.items()}
         else:
             given[key] = _number(path, f"{where}.{key}", value, fields[key].type)
@@ -173,5 +173,7 @@ def _record(path: pathlib.Path, where: str, found: dict, kind: Any) -> Any:
 
 def _number(path: pathlib.Path, where: str, value: Any, kind: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, int if kind is int else int | float):
-        raise UserError(f"{path}: {where} is {value!r}, a {'whole number' if kind is int else 'number'} is expected")
+        raise FirmwareError(
+            f"{path}: {where} is {value!r}, a {'whole number' if kind is int else 'number'} is expected"
+        )
     return value

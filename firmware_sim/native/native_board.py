@@ -31,7 +31,7 @@ from ranger_sim.firmware_sim.peripherals.ssp import (
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.peripherals.uart import Uart
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 # fw_schedule_flags and fw_kind of firmware.h
 SPEAKERS_NAMED, NO_COMPLETION_FLAG, NO_IDLE_CALL = 1, 2, 4
@@ -102,7 +102,7 @@ class Calls:
     def new(self, started: Started, number: int) -> None:
         """Device `number` is about to be started."""
         if number in started:
-            raise UserError(f"{started.what} {number} is started twice")
+            raise FirmwareError(f"{started.what} {number} is started twice")
 
     # --- interrupts, time ---------------------------------------------------------------------------------
 
@@ -110,7 +110,7 @@ class Calls:
         it = ffi.cast("fw_interrupt *", address)
         handler = it.handler
         if handler == ffi.NULL:
-            raise UserError(f"interrupt {it.kind}/{it.index}: no handler")
+            raise FirmwareError(f"interrupt {it.kind}/{it.index}: no handler")
         self.chip.vic.attach(
             it.kind,
             it.index,
@@ -132,7 +132,7 @@ class Calls:
         self.chip.spend(cycles)
 
     def idle(self) -> None:
-        raise UserError("only a main loop of its own can sleep, not a task or a handler")
+        raise FirmwareError("only a main loop of its own can sleep, not a task or a handler")
 
     def slot_cycles(self) -> int:
         return self.chip.cycles_since_tick()
@@ -151,13 +151,13 @@ class Calls:
     def pin(self, pin: int) -> int:
         """The number of a pin that exists: the models take any."""
         if pin > 63:
-            raise UserError(f"pin {pin} is not 0 ... 63")
+            raise FirmwareError(f"pin {pin} is not 0 ... 63")
         return pin
 
     def port(self, port: int) -> int:
         """The number of a port that exists."""
         if port > 1:
-            raise UserError(f"port {port} is neither 0 nor 1")
+            raise FirmwareError(f"port {port} is neither 0 nor 1")
         return port
 
     def IOPIN(self, port: int) -> int:
@@ -210,7 +210,7 @@ class Calls:
     def match(self, number: int) -> str:
         """The name of a match register."""
         if number > 6:
-            raise UserError(f"PWM: match register {number} is not 0 ... 6")
+            raise FirmwareError(f"PWM: match register {number} is not 0 ... 6")
         return f"MR{number}"
 
     def pwm_MR(self, match: int) -> int:
@@ -239,7 +239,7 @@ class Calls:
     def channel(self, channel: int) -> int:
         """A channel of the internal converter that exists."""
         if channel > 7:
-            raise UserError(f"internal converter: channel {channel} is not 0 ... 7")
+            raise FirmwareError(f"internal converter: channel {channel} is not 0 ... 7")
         return channel
 
     def adc_start(self, channel: int) -> int:
@@ -258,9 +258,9 @@ class Calls:
         self.new(self.adcxs, 0)
         it = self.hardware.external
         if it is None:
-            raise UserError("no external converter hangs on this board")
+            raise FirmwareError("no external converter hangs on this board")
         if 0 in self.masters:
-            raise UserError("the SSP is a master of words already, so the external converter cannot have it")
+            raise FirmwareError("the SSP is a master of words already, so the external converter cannot have it")
         adc = Ads7871(self.chip, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)
         adc.inputs = [it.inputs.get(code, code) for code in range(16)]
         self.adcxs[0] = adc
@@ -279,7 +279,7 @@ class Calls:
     def spi_start(self, number: int) -> None:
         self.new(self.spis, number)
         if number not in self.hardware.spi:
-            raise UserError(f"nothing hangs on SPI {number} of this board")
+            raise FirmwareError(f"nothing hangs on SPI {number} of this board")
         it = self.hardware.spi[number]
         self.spis[number] = SpiEncoder(self.chip, number, it.word, it.bits, it.bit_rate, it.value_bits)
 
@@ -318,11 +318,11 @@ class Calls:
     def ssp_start_words(self, bits: int, divider: int) -> None:
         self.new(self.masters, 0)
         if 0 in self.adcxs:
-            raise UserError("the external converter has the SSP")
+            raise FirmwareError("the external converter has the SSP")
         if not 4 <= bits <= LONGEST_WORD:
-            raise UserError(f"SSP: words of {bits} bits: 4 to {LONGEST_WORD} are possible")
+            raise FirmwareError(f"SSP: words of {bits} bits: 4 to {LONGEST_WORD} are possible")
         if divider % 2 or not 2 <= divider <= 512:
-            raise UserError(f"SSP: divider {divider}: even, 2 to 512 is possible")
+            raise FirmwareError(f"SSP: divider {divider}: even, 2 to 512 is possible")
         device = self.chip.panel.ssp if self.chip.panel is not None else SspDevice(self.chip)
         self.masters[0] = SspMaster(self.chip, device, bits)
 
@@ -359,7 +359,7 @@ class Calls:
     def buffer(self, buffer: int) -> int:
         """A transmit buffer that exists."""
         if not 1 <= buffer <= 3:
-            raise UserError(f"CAN: transmit buffer {buffer} is not 1 ... 3")
+            raise FirmwareError(f"CAN: transmit buffer {buffer} is not 1 ... 3")
         return buffer
 
     def can_buffer_free(self, controller: int, buffer: int) -> int:
@@ -451,7 +451,7 @@ class NativeBoard(Microcontroller):
         """What a call of the program leads to."""
         method = getattr(self.devices, name, None)
         if method is None:
-            raise UserError(f"{self.library.path}: it calls fw_{name}, which is not known here: build it again")
+            raise FirmwareError(f"{self.library.path}: it calls fw_{name}, which is not known here: build it again")
         count = method.__code__.co_argcount - 1
         functions = (
             lambda a, b, c, d, e: method() or 0,
@@ -464,7 +464,7 @@ class NativeBoard(Microcontroller):
 
         def fails(kind: Any, error: Any, trace: Any) -> None:
             if self.failure is None:
-                self.failure = UserError(f"{self.name}: fw_{name}: {error}")
+                self.failure = FirmwareError(f"{self.name}: fw_{name}: {error}")
                 self.stop_at(self.now)
 
         callback = ffi.callback("host_call", functions[count], error=0, onerror=fails)
@@ -530,7 +530,7 @@ class NativeBoard(Microcontroller):
             given = self.library.code.firmware_schedule()
         self._raise_failure()
         if given == ffi.NULL:
-            raise UserError(f"{self.library.path}: firmware_schedule() returned NULL")
+            raise FirmwareError(f"{self.library.path}: firmware_schedule() returned NULL")
         every, last = self._tasks(given.every, "every"), self._tasks(given.last, "last")
         rows = [self._tasks(given.rows[row], f"row {row}") for row in range(given.row_count)] or [[]]
         occasional = None
@@ -575,7 +575,7 @@ class NativeBoard(Microcontroller):
 
     def _task(self, given: Any, where: str) -> Task:
         if given.function == ffi.NULL:
-            raise UserError(f"{self.library.path}: schedule: {where} {text(given.name)!r} has no function")
+            raise FirmwareError(f"{self.library.path}: schedule: {where} {text(given.name)!r} has no function")
         name = text(given.name) or where
         if given.kind == WAIT:
             return Wait(given.function, cost=given.cost, limit=given.limit, name=name)
@@ -587,7 +587,7 @@ class NativeBoard(Microcontroller):
         """One turn of a main loop of its own: until it lets time pass. Returns the instant at which it goes on."""
         cycles = self.library.code.fw_turn()
         if cycles == NO_STACK:
-            self.failure = UserError(f"{self.name}: no memory for the stack of the main loop")
+            self.failure = FirmwareError(f"{self.name}: no memory for the stack of the main loop")
         if cycles in (MAIN_ENDED, NO_STACK):
             self.background = None  # as on the chip, where start-up code spins behind it
             return 0

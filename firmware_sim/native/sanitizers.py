@@ -16,9 +16,9 @@ import shutil
 import subprocess
 from collections.abc import Collection, Iterable
 
-from ranger_sim.firmware_sim.native.build import compiler
+from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.firmware_sim.native.crash import lines_of
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 # Each place is reported once. Leaks are not checked: the program allocates nothing, Python does. crash.py reports
 # programs that a signal ended.
@@ -43,7 +43,7 @@ def environment(logs: pathlib.Path) -> dict[str, str]:
     asked = subprocess.run([program, "-print-file-name=libasan.so"], capture_output=True, check=False, text=True)
     runtime = pathlib.Path(asked.stdout.strip())
     if not runtime.is_file():
-        raise UserError(f"{program} has no runtime of the address sanitizer (libasan.so): --sanitize needs it")
+        raise FirmwareError(f"{program} has no runtime of the address sanitizer (libasan.so): --sanitize needs it")
     place = str(logs / "findings")
     options = f"{OPTIONS}:log_path={place}"
     return {**os.environ, "LD_PRELOAD": str(runtime), "ASAN_OPTIONS": options, "UBSAN_OPTIONS": options, PLACE: place}

@@ -14,7 +14,7 @@ from typing import Any
 
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, wallclock
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 PATIENCE_S = 10.0  # of the clock: to load and to start takes milliseconds; chosen by us
 LONGEST_TEXT = 32768  # less than a pipe holds
@@ -59,7 +59,7 @@ def tried(
         return
     reached, _, mistake = said.partition(REFUSED)
     if mistake:
-        raise UserError(*mistake.decode(errors="replace").split("\n"))
+        raise FirmwareError(*mistake.decode(errors="replace").split("\n"))
     how = crash.told(library, sources, record.tolist()) or (
         f"no answer for {PATIENCE_S:g} s"
         if code is None
@@ -68,7 +68,7 @@ def tried(
         else f"it ended its process with code {code}"
     )
     when = "start" if reached == LOADED else "loading (what runs in it before firmware_start, such as a constructor)"
-    raise UserError(f"{what}: its program does not get through its {when}: {how}")
+    raise FirmwareError(f"{what}: its program does not get through its {when}: {how}")
 
 
 def _load_and_start(

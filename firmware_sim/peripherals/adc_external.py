@@ -20,7 +20,7 @@ from cython.cimports.libc.math import copysign
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT, InterruptSource
 from ranger_sim.foundation.events import NEVER
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
@@ -47,9 +47,9 @@ REFERENCE_V = 2.5  # full scale at gain 1; external reference of the usual 2.5 V
 def register4(channel_code, gain_code) -> int:
     """Start word: bit 7, gain code in bits 4-6, multiplexer code in bits 0-3."""
     if not 0 <= channel_code <= 15:
-        raise UserError(f"ADS7871: channel code {channel_code} is not 0 ... 15")
+        raise FirmwareError(f"ADS7871: channel code {channel_code} is not 0 ... 15")
     if not 0 <= gain_code <= 7:
-        raise UserError(f"ADS7871: gain code {gain_code} is not 0 ... 7")
+        raise FirmwareError(f"ADS7871: gain code {gain_code} is not 0 ... 7")
     return START | gain_code << GAIN_SHIFT | channel_code
 
 
@@ -87,7 +87,7 @@ class Ads7871(Peripheral):
     ) -> None:
         Peripheral.__init__(self, chip)
         if reference_V <= 0.0:
-            raise UserError(f"{chip.name}: ADS7871: reference_V {reference_V} must be above 0")
+            raise FirmwareError(f"{chip.name}: ADS7871: reference_V {reference_V} must be above 0")
         self.eint = eint
         self.conversion_ns = conversion_ns
         self.alarm = chip.new_alarm(self, 0)
@@ -109,7 +109,7 @@ class Ads7871(Peripheral):
     def set_sequence(self, *entries) -> None:
         """What `start_sequence` converts: entries (channel code, gain code, analog pin), at most 16."""
         if not 1 <= len(entries) <= 16:
-            raise UserError(f"{self.chip.name}: ADS7871: {len(entries)} sequence entries; 1 ... 16 are possible")
+            raise FirmwareError(f"{self.chip.name}: ADS7871: {len(entries)} sequence entries; 1 ... 16 are possible")
         for place, (channel_code, gain_code, pin) in enumerate(entries):
             self.sequence[place] = register4(channel_code, gain_code)
             self.inputs[channel_code] = pin

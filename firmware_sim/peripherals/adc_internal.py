@@ -15,7 +15,7 @@ import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import ADC_DONE, InterruptSource
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
@@ -66,7 +66,7 @@ class AdcInternal(Peripheral):
     def __init__(self, chip, clkdiv=200, hz=0, reference_V=3.3, scale=1.0, offset_counts=0) -> None:
         Peripheral.__init__(self, chip)
         if clkdiv <= 0 or reference_V <= 0.0:
-            raise UserError(f"{chip.name}: ADC: clkdiv {clkdiv} and reference_V {reference_V} must be above 0")
+            raise FirmwareError(f"{chip.name}: ADC: clkdiv {clkdiv} and reference_V {reference_V} must be above 0")
         self.clkdiv = clkdiv
         self.hz = hz if hz else chip.hz
         self.conversion_ns = CONVERSION_CLOCKS * clkdiv * 1_000_000_000 // self.hz
@@ -127,7 +127,7 @@ class AdcInternal(Peripheral):
     def start_burst(self, *channels) -> None:
         """Convert `channels` in turn from `now` on, without interrupts."""
         if not 1 <= len(channels) <= 8 or not all(0 <= channel <= 7 for channel in channels):
-            raise UserError(f"{self.chip.name}: ADC: burst channels {channels} are not 1 ... 8 of 0 ... 7")
+            raise FirmwareError(f"{self.chip.name}: ADC: burst channels {channels} are not 1 ... 8 of 0 ... 7")
         for place, channel in enumerate(channels):
             self.channels[place] = channel
         self.burst_count = len(channels)

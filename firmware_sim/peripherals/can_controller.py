@@ -37,7 +37,7 @@ from ranger_sim.foundation.events import (
     TX_ABORTED,
     TX_SENT,
 )
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 MOD_RESET: Final = 0x1  # CxMOD: reset mode
 
@@ -96,7 +96,7 @@ def btr_value(brp, sjw, tseg1, tseg2, sam=0) -> int:
         ("SAM", sam, 1),
     ):
         if not 0 <= value <= limit:
-            raise UserError(f"CxBTR: {name} {value} is not 0 ... {limit}")
+            raise FirmwareError(f"CxBTR: {name} {value} is not 0 ... {limit}")
     return brp | sjw << 14 | tseg1 << 16 | tseg2 << 20 | sam << 23
 
 
@@ -179,7 +179,7 @@ class CanController(Peripheral):
         # 0x00254001: BRP 1, SJW 1, TSEG1 5, TSEG2 2: 3 Mbit/s at 60 MHz, sampled at 70 %
         Peripheral.__init__(self, chip)
         if not 1 <= number <= 4:
-            raise UserError(f"{chip.name}: CAN controller {number} is not 1 ... 4")
+            raise FirmwareError(f"{chip.name}: CAN controller {number} is not 1 ... 4")
         self.number = number
         self.ends = TransmitEnds()
         self.MOD = 0

@@ -13,7 +13,7 @@ import array
 import cython
 
 from ranger_sim.firmware_sim.peripherals.ssp import SspDevice
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 PORTS = 10
 REGISTERS = 32  # of a device, the last ones not there
@@ -45,7 +45,7 @@ class LedDrivers(SspDevice):
 
     def __init__(self, chip, select_pin, count=1) -> None:
         if not 1 <= count <= MOST_DEVICES:
-            raise UserError(f"{chip.name}: a chain of {count} LED drivers: 1 to {MOST_DEVICES} are modelled")
+            raise FirmwareError(f"{chip.name}: a chain of {count} LED drivers: 1 to {MOST_DEVICES} are modelled")
         SspDevice.__init__(self, chip)
         self.select_pin = select_pin
         self.count = count

@@ -13,7 +13,7 @@ import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.foundation.events import PWM_UPDATE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 # PWMLER, latch enable
 LER_MR0: Final = 0x1
@@ -145,7 +145,7 @@ class Pwm(Peripheral):
         # ROBOT PARITY: on the chip a changed MR0 shifts the later periods instead of counting them anew. MR0 is
         # constant on boards that drive a bridge.
         if not 0 < self.latched_MR0 <= LONGEST_PERIOD_S * self.hz:
-            raise UserError(
+            raise FirmwareError(
                 f"{self.chip.name}: PWM: period {self.latched_MR0} counts must be above 0"
                 f" and at most {LONGEST_PERIOD_S * self.hz}"
             )

@@ -12,7 +12,7 @@ import cython
 
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import SPI_DONE, InterruptSource
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
@@ -44,11 +44,11 @@ class SpiEncoder(Peripheral):
     def __init__(self, chip, number=0, word=0, bits=14, bit_rate=1_000_000, value_bits=13) -> None:
         Peripheral.__init__(self, chip)
         if not 1 <= bits <= 16 or not 1 <= value_bits <= 16 or bit_rate <= 0:
-            raise UserError(
+            raise FirmwareError(
                 f"{chip.name}: SPI {number}: {bits} bits, {value_bits} value bits at {bit_rate} Hz are impossible"
             )
         if not 0 <= word < len(chip.words):
-            raise UserError(f"{chip.name}: SPI {number}: word {word} is not 0 ... {len(chip.words) - 1}")
+            raise FirmwareError(f"{chip.name}: SPI {number}: word {word} is not 0 ... {len(chip.words) - 1}")
         self.number = number
         self.word = word
         self.bits = bits

@@ -16,7 +16,7 @@ import cython
 from ranger_sim.firmware_sim.clock import TickTrain
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import TIMER_MATCH, InterruptSource
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
@@ -62,12 +62,14 @@ class TimerCapture(Peripheral):
     def __init__(self, chip, number=0, period=30000, hz=0, phase_ns=0, match_interrupt=False) -> None:
         Peripheral.__init__(self, chip)
         if period <= 0:
-            raise UserError(f"{chip.name}: timer {number}: period {period} counts must be above 0")
+            raise FirmwareError(f"{chip.name}: timer {number}: period {period} counts must be above 0")
         self.number = number
         self.MR0 = period - 1
         self.hz = hz if hz else chip.hz
         if period * 1_000_000_000 % self.hz:
-            raise UserError(f"{chip.name}: timer {number}: {period} counts at {self.hz} Hz are no whole number of ns")
+            raise FirmwareError(
+                f"{chip.name}: timer {number}: {period} counts at {self.hz} Hz are no whole number of ns"
+            )
         self.period_ns = period * 1_000_000_000 // self.hz
         self.counts_per_ns = chip.crystal.cycles_per_ns(self.hz)
         self.phase_ns = phase_ns
@@ -104,7 +106,7 @@ class TimerCapture(Peripheral):
         `source`: another one than that of the pin.
         """
         if not 0 <= channel <= 3:
-            raise UserError(f"{self.chip.name}: timer {self.number}: channel {channel} is not 0 ... 3")
+            raise FirmwareError(f"{self.chip.name}: timer {self.number}: channel {channel} is not 0 ... 3")
         source = self.chip.claim_pin(pin, channel, self, source)
         self.pins[channel] = pin
         self.arm(channel, rising, falling)

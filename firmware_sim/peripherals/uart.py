@@ -18,7 +18,7 @@ import cython
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import UART_TRANSMIT, InterruptSource
 from ranger_sim.foundation.events import NEVER, UART_BYTE, UART_OUTPUT
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
@@ -75,7 +75,7 @@ class Uart(Peripheral):
     def __init__(self, chip, number=0, divisor=6, divaddval=0, mulval=1, trigger=8, hz=0) -> None:
         Peripheral.__init__(self, chip)
         if trigger not in (1, 4, 8, 14):
-            raise UserError(f"{chip.name}: UART {number}: trigger level {trigger} is not 1, 4, 8 or 14")
+            raise FirmwareError(f"{chip.name}: UART {number}: trigger level {trigger} is not 1, 4, 8 or 14")
         self.number = number
         self.hz = hz if hz else chip.hz
         self.trigger = trigger
@@ -99,7 +99,7 @@ class Uart(Peripheral):
     def set_divisor(self, DL: cython.longlong, DIVADDVAL: cython.longlong = 0, MULVAL: cython.longlong = 1) -> None:
         """Set the divisor latch and the fractional divider."""
         if DL < 1 or MULVAL < 1 or DIVADDVAL < 0 or DIVADDVAL > 14 or MULVAL > 15:
-            raise UserError(
+            raise FirmwareError(
                 f"{self.chip.name}: UART {self.number}: divisor {DL}, fraction {DIVADDVAL}/{MULVAL} is impossible"
             )
         self.DL = DL

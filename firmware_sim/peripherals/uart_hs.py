@@ -19,7 +19,7 @@ import cython
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import DMA_DONE, InterruptSource
 from ranger_sim.foundation.events import UART_BYTE, UART_OUTPUT
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 if TYPE_CHECKING:
     from ranger_sim.firmware_sim.alarm import Alarm
@@ -55,7 +55,7 @@ class HsUart(Peripheral):
     def __init__(self, chip, number, channel, rate=0, hz=13_000_000, buffer_bytes=1000, cts_pin=-1) -> None:
         Peripheral.__init__(self, chip)
         if not 0 <= rate <= 255 or hz < 1 or buffer_bytes < 1:
-            raise UserError(
+            raise FirmwareError(
                 f"{chip.name}: UART {number}: rate {rate} (0 ... 255), clock {hz} Hz or buffer of {buffer_bytes} bytes "
                 "is impossible"
             )

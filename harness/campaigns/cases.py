@@ -9,7 +9,7 @@ import tempfile
 from typing import Any
 
 from ranger_sim import __version__, datatable, loading
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError, UserError, unknown
 from ranger_sim.harness.campaigns.subjects import own_machine
 from ranger_sim.harness.campaigns.walks import WALKS
 from ranger_sim.harness.ranger import Ranger
@@ -71,13 +71,13 @@ class Settings:
         for task, factor in self.costs.items():
             board, _, entry = task.partition(".")
             if board not in robot.boards:
-                raise UserError(f"campaign: cost.{task}: there is no board {board!r}, but {', '.join(robot.boards)}")
+                raise CampaignError(f"campaign: cost.{task}: {unknown('board', board, robot.boards)}")
             try:
                 found = robot.boards[board].scheduler.find(entry)
             except UserError as error:
-                raise UserError(f"campaign: cost.{task}: {error}") from None
+                raise CampaignError(f"campaign: cost.{task}: {error}") from None
             if not 0.0 <= factor < math.inf:
-                raise UserError(f"campaign: cost.{task} is {factor:g}, a factor of 0 or more is expected")
+                raise CampaignError(f"campaign: cost.{task} is {factor:g}, a factor of 0 or more is expected")
             found.cost, found.per_item = round(found.cost * factor), round(found.per_item * factor)
         return robot
 
@@ -94,7 +94,7 @@ class Settings:
             try:
                 return Ranger(Scenario(**walk))
             except TypeError as error:
-                raise UserError(f"campaign: walk: {error}") from None
+                raise CampaignError(f"campaign: walk: {error}") from None
 
 
 def subject_of(machine: str) -> Any:

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError, UserError
 from ranger_sim.harness.branching import BranchError, branch, die_with
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band
@@ -86,7 +86,7 @@ def digest_of(path: str) -> str:
     try:
         return hashlib.blake2b(pathlib.Path(path).read_bytes(), digest_size=16).hexdigest()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+        raise CampaignError(f"{path}: {error.strerror}") from None
 
 
 def start_of(fault: str) -> str:
@@ -149,12 +149,12 @@ def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
     settings = Settings(**request["settings"])
     here = version(settings.machine)
     if request["version"] != here:
-        raise UserError(f"campaign: this worker runs {here}, asked for is {request['version']}")
+        raise CampaignError(f"campaign: this worker runs {here}, asked for is {request['version']}")
     if request.get("fault_module"):
         name, digest = request["fault_module"]
         settings.subject.catalogue.load_file(name)
         if digest_of(name) != digest:
-            raise UserError(f"campaign: fault module {name}: it is not the file that was asked for")
+            raise CampaignError(f"campaign: fault module {name}: it is not the file that was asked for")
     watch = Watch.from_dict(request["watch"])
     healthy = Healthy.from_dict(request["healthy"]) if request.get("healthy") else None
     cases = request["cases"]

@@ -15,7 +15,7 @@ from typing import Any
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.quantities import LENGTHS, SHARES, in_base_units, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError, UserError
 from ranger_sim.harness.campaigns.cases import Case, Settings, subject_of
 from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, Band, severity
@@ -249,7 +249,9 @@ def walk_value(name: str, value: Any, path: str) -> Any:
         return value
     number = in_base_units(value, units)
     if number is None:
-        raise UserError(f"{path}: {name} = {value!r}: a number with one of the units {', '.join(units)} is expected")
+        raise CampaignError(
+            f"{path}: {name} = {value!r}: a number with one of the units {', '.join(units)} is expected"
+        )
     return number
 
 
@@ -277,31 +279,33 @@ def of_data(data: dict[str, Any], path: str) -> Plan:
     sample = sample_of(data, path)
     search = search_of(data, path)
     if sample and search:
-        raise UserError(f"{path}: [sample] and [search]: one of them, or neither for a census")
+        raise CampaignError(f"{path}: [sample] and [search]: one of them, or neither for a census")
     ranges = [name for name, values in axes.items() if isinstance(values, Range)]
     free = [name for name in ranges if axes[name].step is None]  # type: ignore[union-attr]
     if free and not (sample or search):
-        raise UserError(
+        raise CampaignError(
             f"{path}: [vary] {free[0]}: a range needs [sample] or [search]; a census takes a list, or a range with step"
         )
     if search and not ranges:
-        raise UserError(f"{path}: [search]: at least one range in [vary] is expected, for instance start and magnitude")
+        raise CampaignError(
+            f"{path}: [search]: at least one range in [vary] is expected, for instance start and magnitude"
+        )
     if search and search.least is not None and search.least not in ranges:
-        raise UserError(
+        raise CampaignError(
             f"{path}: [search] least = {search.least!r}: one of the ranges is expected, {', '.join(ranges)}"
         )
     stepped = [] if sample or search else [axes[name].size for name in ranges]  # type: ignore[union-attr]
     runs = math.prod([len(each) for each in axes.values() if not isinstance(each, Range)] + stepped)
     if runs > MOST_RUNS or (sample is None and search is None and runs == 0):
-        raise UserError(f"{path}: {runs} runs, allowed are 1 to {MOST_RUNS}")
+        raise CampaignError(f"{path}: {runs} runs, allowed are 1 to {MOST_RUNS}")
     healthy = table(data, "healthy", path)
     only(healthy, ("seeds",), f"{path}: [healthy]")
     seeds = healthy.get("seeds", [1, 2, 3, 4, 5, 6])
     if not (isinstance(seeds, list) and all(type(each) is int for each in seeds) and len(set(seeds)) >= 2):
-        raise UserError(f"{path}: [healthy] seeds = {seeds!r}: a list of two or more whole numbers is expected")
+        raise CampaignError(f"{path}: [healthy] seeds = {seeds!r}: a list of two or more whole numbers is expected")
     tolerances = tuple(tolerances_of(data, path))
     if search and tolerances:
-        raise UserError(
+        raise CampaignError(
             f"{path}: [tolerance] {tolerances[0].what}: the runs of a [search] are chosen and stand for no population"
         )
     plan = Plan(
@@ -329,15 +333,15 @@ def machine_of(data: dict[str, Any], path: str) -> tuple[str, dict[str, Any]]:
         return "", {}
     found = dict(table(data, "machine", path))
     if "walk" in data:
-        raise UserError(f"{path}: [walk] and [machine]: one of them; [walk] is Ranger's")
+        raise CampaignError(f"{path}: [walk] and [machine]: one of them; [walk] is Ranger's")
     make = found.pop("make", None)
     if not isinstance(make, str) or not make:
-        raise UserError(f"{path}: [machine] make = {make!r}: FILE.py:NAME is expected, relative to the plan")
+        raise CampaignError(f"{path}: [machine] make = {make!r}: FILE.py:NAME is expected, relative to the plan")
     try:
         machine = str((pathlib.Path(path).parent / make).resolve())
         subject_of(machine)
     except (UserError, ValueError) as error:
-        raise UserError(f"{path}: {error}") from None
+        raise CampaignError(f"{path}: {error}") from None
     return machine, found
 
 
@@ -347,12 +351,14 @@ def module_of(data: dict[str, Any], path: str, subject: Any) -> str | None:
     if name is None:
         return None
     if not isinstance(name, str) or not name:
-        raise UserError(f"{path}: fault_module = {name!r}: the name of a .py file is expected, relative to the plan")
+        raise CampaignError(
+            f"{path}: fault_module = {name!r}: the name of a .py file is expected, relative to the plan"
+        )
     found = (pathlib.Path(path).parent / name).resolve()
     try:
         subject.catalogue.load_file(found)
     except UserError as error:
-        raise UserError(f"{path}: {error}") from None
+        raise CampaignError(f"{path}: {error}") from None
     return str(found)
 
 
@@ -363,7 +369,7 @@ def check_settings(settings: Settings, where: str) -> None:
             Scenario(**settings.walk)
         settings.robot().close()
     except UserError as error:
-        raise UserError(f"{where}: {error}") from None
+        raise CampaignError(f"{where}: {error}") from None
 
 
 def check_axes(plan: Plan) -> None:
@@ -395,14 +401,14 @@ def check_faults(plan: Plan) -> None:
             try:
                 text = str(plan.case({**first, **point, "fault": fault}).fault)
             except KeyError as error:
-                raise UserError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
+                raise CampaignError(f"{plan.path}: fault {fault!r}: {error} is no name of [vary]") from None
             except (ValueError, IndexError, AttributeError) as error:
-                raise UserError(f"{plan.path}: fault {fault!r}: {error}") from None
+                raise CampaignError(f"{plan.path}: fault {fault!r}: {error}") from None
             try:
                 plan.subject.condition(start_of(text))
                 plan.subject.catalogue.typed(text)
             except UserError as error:
-                raise UserError(f"{plan.path}: {error}") from None
+                raise CampaignError(f"{plan.path}: {error}") from None
 
 
 def names_in(fault: str, path: str) -> set[str]:
@@ -410,7 +416,7 @@ def names_in(fault: str, path: str) -> set[str]:
     try:
         return {name for _, name, _, _ in string.Formatter().parse(fault) if name}
     except ValueError as error:
-        raise UserError(f"{path}: fault {fault!r}: {error}") from None
+        raise CampaignError(f"{path}: fault {fault!r}: {error}") from None
 
 
 def is_setting(name: str, machine: str) -> bool:
@@ -427,11 +433,11 @@ def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, lis
         axes[name] = values_of(name, values, path)
     groups = data.get("faults", [])
     if not isinstance(groups, list):
-        raise UserError(f"{path}: faults = {groups!r}: tables [[faults]] are expected")
+        raise CampaignError(f"{path}: faults = {groups!r}: tables [[faults]] are expected")
     listed = [fault for group in groups for fault in faults_of(group, path, subject_of(machine).catalogue)]
     if listed:
         if "fault" in axes:
-            raise UserError(f"{path}: [vary] fault and [[faults]]: one of them")
+            raise CampaignError(f"{path}: [vary] fault and [[faults]]: one of them")
         axes["fault"] = listed  # last, so that an interrupted campaign has every fault at the first of the starts
     used: set[str] = set()
     for fault in axes.get("fault", []):  # type: ignore[union-attr]
@@ -440,11 +446,11 @@ def axes_of(data: dict[str, Any], path: str, machine: str = "") -> dict[str, lis
         if name == "fault" or name in used or is_setting(name, machine):
             continue
         if machine:
-            raise UserError(
+            raise CampaignError(
                 f"{path}: [vary] {name}: it is no setting (seed, machine.KEYWORD, cost.BOARD.TASK) and no fault's text "
                 f"has {{{name}}}"
             )
-        raise UserError(
+        raise CampaignError(
             f"{path}: [vary] {name}: it is no setting of a walk ({', '.join(WALK)}, controller.PARAMETER, "
             f"body.PARAMETER, cost.BOARD.TASK) and no fault's text has {{{name}}}"
         )
@@ -475,7 +481,7 @@ def values_of(name: str, values: Any, path: str) -> list[Any] | Range:
     elif name.startswith(PREFIXES):
         kinds, expected = (int, float), "a list of numbers, or { low, high },"
     if not listed or not all(type(each) in kinds for each in listed):
-        raise UserError(f"{path}: [vary] {name} = {values!r}: {expected} is expected")
+        raise CampaignError(f"{path}: [vary] {name} = {values!r}: {expected} is expected")
     return listed
 
 
@@ -487,11 +493,11 @@ def range_of(name: str, values: dict[str, Any], path: str) -> Range:
     low, high = values["low"], values["high"]
     log, step = bool(values.get("log", False)), values.get("step")
     if not (number(low) and number(high)) or not low < high or (log and low <= 0.0):
-        raise UserError(f"{where} = {low!r} to {high!r}: low below high" + (", above 0" if log else ""))
+        raise CampaignError(f"{where} = {low!r} to {high!r}: low below high" + (", above 0" if log else ""))
     if step is None:
         return Range(float(low), float(high), log)
     if log or not number(step) or not 0.0 < step <= high - low or (high - low) / step >= MOST_RUNS:
-        raise UserError(f"{where}: step = {step!r}: above 0 and at most high - low is expected, without log")
+        raise CampaignError(f"{where}: step = {step!r}: above 0 and at most high - low is expected, without log")
     return Range(low, high, False, step)
 
 
@@ -504,7 +510,7 @@ def faults_of(group: Any, path: str, catalogue: Catalogue) -> Iterator[str]:
     """The faults of one [[faults]]: every mode at every place that takes it, both by patterns with * and ?."""
     where = f"{path}: [[faults]]"
     if not isinstance(group, dict):
-        raise UserError(f"{where}: a table is expected")
+        raise CampaignError(f"{where}: a table is expected")
     only(group, ("places", "kinds", "modes", "without", "values", "period"), where)
     places = patterns(group, "places", where)
     kinds = patterns(group, "kinds", where)
@@ -522,7 +528,7 @@ def faults_of(group: Any, path: str, catalogue: Catalogue) -> Iterator[str]:
                 count += 1
                 yield text + values + (f"@{period}" if period else "")
     if not count:
-        raise UserError(f"{where}: no place and mode fit {places} and {modes}; `ranger-sim faults` lists them")
+        raise CampaignError(f"{where}: no place and mode fit {places} and {modes}; `ranger-sim faults` lists them")
 
 
 def patterns(group: dict[str, Any], key: str, where: str, default: Any = ("*",)) -> list[str]:
@@ -530,7 +536,7 @@ def patterns(group: dict[str, Any], key: str, where: str, default: Any = ("*",))
     found = group.get(key, list(default))
     listed = [found] if isinstance(found, str) else found
     if not isinstance(listed, list) or not all(isinstance(each, str) for each in listed):
-        raise UserError(f"{where}: {key} = {found!r}: a list of texts is expected")
+        raise CampaignError(f"{where}: {key} = {found!r}: a list of texts is expected")
     return listed
 
 
@@ -547,16 +553,16 @@ def watch_of(data: dict[str, Any], path: str, machine: str = "") -> Watch:
     times = {f"{name}_s": nanoseconds(value, f"{path}: [watch] {name}") * 1e-9 for name, value in found.items()}
     for name in ("after", "limit"):
         if times.get(f"{name}_s") == 0.0:
-            raise UserError(f"{path}: [watch] {name} = {found[name]!r}: it must be above 0")
+            raise CampaignError(f"{path}: [watch] {name} = {found[name]!r}: it must be above 0")
     band = table(data, "band", path)
     if machine:
         for name, value in band.items():
             if not number(value) or not 0.0 < value < math.inf:
-                raise UserError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
+                raise CampaignError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
         try:
             subject.check_band(band)
         except UserError as error:
-            raise UserError(f"{path}: {error}") from None
+            raise CampaignError(f"{path}: {error}") from None
         usual = {"after_s": subject.after_s, "from_s": subject.from_s, "patience_s": subject.patience_s}
         return Watch(**{**usual, **times}, band={name: float(value) for name, value in band.items()})
     names = tuple(field.name for field in dataclasses.fields(Band))
@@ -565,7 +571,7 @@ def watch_of(data: dict[str, Any], path: str, machine: str = "") -> Watch:
     for name, value in band.items():
         share = in_base_units(value, SHARES) if isinstance(value, str) else value
         if share is None or not number(share) or not 0.0 < share < 10.0:
-            raise UserError(f"{path}: [band] {name} = {value!r}: a share such as 0.15 or '15 %' is expected")
+            raise CampaignError(f"{path}: [band] {name} = {value!r}: a share such as 0.15 or '15 %' is expected")
         shares[name] = float(share)
     return Watch(**times, band=Band(**shares))
 
@@ -575,13 +581,13 @@ def tolerances_of(data: dict[str, Any], path: str) -> Iterator[Tolerance]:
     for name, value in table(data, "tolerance", path).items():
         where = f"{path}: [tolerance] {name}"
         if name not in ("detection", "reaction"):
-            raise UserError(f"{where}: allowed are detection, reaction")
+            raise CampaignError(f"{where}: allowed are detection, reaction")
         if not isinstance(value, dict) or "within" not in value:
-            raise UserError(f"{where}: a table with `within` is expected")
+            raise CampaignError(f"{where}: a table with `within` is expected")
         only(value, ("within", "share", "confidence"), where)
         share, confidence = value.get("share", 0.95), value.get("confidence", CONFIDENCE)
         if not all(number(each) and 0.0 < each < 1.0 for each in (share, confidence)):
-            raise UserError(f"{where}: share {share!r} and confidence {confidence!r} must be above 0 and below 1")
+            raise CampaignError(f"{where}: share {share!r} and confidence {confidence!r} must be above 0 and below 1")
         yield Tolerance(name, rounded(nanoseconds(value["within"], where) * 1e-6), share, confidence)
 
 
@@ -595,26 +601,26 @@ def sample_of(data: dict[str, Any], path: str) -> Sample | None:
     runs = whole(found, "runs", where, None, 1, MOST_RUNS)
     interval = found.get("interval", "clopper-pearson")
     if not isinstance(interval, str) or interval not in INTERVALS:
-        raise UserError(f"{where}: interval = {interval!r}: allowed are {', '.join(INTERVALS)}")
+        raise CampaignError(f"{where}: interval = {interval!r}: allowed are {', '.join(INTERVALS)}")
     confidence = found.get("confidence", CONFIDENCE)
     if not isinstance(confidence, float) or not 0.5 <= confidence < 1.0:
-        raise UserError(f"{where}: confidence = {confidence!r}: from 0.5 to below 1 is expected")
+        raise CampaignError(f"{where}: confidence = {confidence!r}: from 0.5 to below 1 is expected")
     stopping = None
     if "stop" in found:
         stop = table(found, "stop", where)
         only(stop, ("outcome", "limit", "looks", "rule"), f"{where} stop")
         outcome = stop.get("outcome")
         if outcome not in OUTCOMES:
-            raise UserError(f"{where} stop: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
+            raise CampaignError(f"{where} stop: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
         limit: Any = stop.get("limit")
         rule = stop.get("rule", Stopping.rule)
         if not number(limit) or not isinstance(rule, str):
-            raise UserError(f"{where} stop: limit = {limit!r}, rule = {rule!r}: a share and a name are expected")
+            raise CampaignError(f"{where} stop: limit = {limit!r}, rule = {rule!r}: a share and a name are expected")
         looks = whole(stop, "looks", f"{where} stop", Stopping.looks, 1, 50)
         try:
             stopping = Stopping(outcome, limit, runs, looks, rule, confidence)
         except UserError as error:
-            raise UserError(f"{where} stop: {error}") from None
+            raise CampaignError(f"{where} stop: {error}") from None
     return Sample(runs, whole(found, "seed", where, 1, -(2**63), 2**63), interval, confidence, stopping)
 
 
@@ -627,11 +633,13 @@ def search_of(data: dict[str, Any], path: str) -> Search | None:
     only(found, ("first", "rounds", "each", "seed", "least", "outcome"), where)
     least, outcome = found.get("least"), found.get("outcome", "fall")
     if outcome not in OUTCOMES:
-        raise UserError(f"{where}: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
+        raise CampaignError(f"{where}: outcome = {outcome!r}: allowed are {', '.join(OUTCOMES)}")
     if least is not None and not isinstance(least, str):
-        raise UserError(f"{where}: least = {least!r}: the name of a range in [vary] is expected")
+        raise CampaignError(f"{where}: least = {least!r}: the name of a range in [vary] is expected")
     if "outcome" in found and least is None:
-        raise UserError(f"{where}: outcome = {outcome!r}: it needs `least`, the range whose smallest value is wanted")
+        raise CampaignError(
+            f"{where}: outcome = {outcome!r}: it needs `least`, the range whose smallest value is wanted"
+        )
     return Search(
         whole(found, "first", where, 12, 1, 100_000),
         whole(found, "rounds", where, 4, 0, 1000),
@@ -646,14 +654,14 @@ def only(data: dict[str, Any], allowed: tuple[str, ...], where: str) -> None:
     """UserError for a key that is not allowed."""
     for key in data:
         if key not in allowed:
-            raise UserError(f"{where}: unknown key {key!r}; allowed are {', '.join(allowed)}")
+            raise CampaignError(f"{where}: unknown key {key!r}; allowed are {', '.join(allowed)}")
 
 
 def table(data: dict[str, Any], key: str, where: str) -> dict[str, Any]:
     """A table of a file, empty when it is missing."""
     value = data.get(key, {})
     if not isinstance(value, dict):
-        raise UserError(f"{where}: {key} = {value!r}: a table is expected")
+        raise CampaignError(f"{where}: {key} = {value!r}: a table is expected")
     return value
 
 
@@ -661,7 +669,7 @@ def text(data: dict[str, Any], key: str, where: str, default: str) -> str:
     """A text of a file."""
     value = data.get(key, default)
     if not isinstance(value, str):
-        raise UserError(f"{where}: {key} = {value!r}: text is expected")
+        raise CampaignError(f"{where}: {key} = {value!r}: text is expected")
     return value
 
 
@@ -669,5 +677,5 @@ def whole(data: dict[str, Any], key: str, where: str, default: int | None, low: 
     """A whole number of a file."""
     value = data.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise UserError(f"{where}: {key} = {value!r}: a whole number from {low} to {high} is expected")
+        raise CampaignError(f"{where}: {key} = {value!r}: a whole number from {low} to {high} is expected")
     return value

@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError
 
 ATTEMPTS = 3
 DASK_LOGS = ("distributed", "distributed.client")  # those that print by themselves
@@ -68,7 +68,7 @@ def results_of(request: Request, start: Callable[[Request], "subprocess.Popen[st
                 result = json.loads(line)
                 if "refused" in result:
                     process.wait()
-                    raise UserError(result["refused"])
+                    raise CampaignError(result["refused"])
                 done.add(result["key"])
                 yield result
         code = process.wait()
@@ -79,7 +79,7 @@ def results_of(request: Request, start: Callable[[Request], "subprocess.Popen[st
         if deaths == ATTEMPTS:
             first = asked(left)[0]
             if "cases" not in left:
-                raise UserError(f"campaign: the process of the healthy walks ended with {code}, {ATTEMPTS} times")
+                raise CampaignError(f"campaign: the process of the healthy walks ended with {code}, {ATTEMPTS} times")
             yield {"key": first, "outcome": "crashed", "why": f"its process ended with {code}, {ATTEMPTS} times"}
             left = without(left, {first})
             deaths = 0
@@ -188,10 +188,10 @@ class DaskPool:
             return self.distributed.Client(address, timeout="10s", security=security)
         except OSError as error:
             if error.filename or isinstance(error, ssl.SSLError):  # a file of the certificates, not the scheduler
-                raise UserError(f"--scheduler {address}: TLS files: {error}") from None
-            raise UserError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
+                raise CampaignError(f"--scheduler {address}: TLS files: {error}") from None
+            raise CampaignError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
         except (TimeoutError, ValueError, RuntimeError) as error:
-            raise UserError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
+            raise CampaignError(f"--scheduler {address}: no Dask scheduler there ({error})") from None
 
     def run(self, requests: list[Request]) -> Iterator[Result]:
         """The results of all requests, those of a group together."""
@@ -201,10 +201,10 @@ class DaskPool:
                 try:
                     yield from done.result()
                 except self.distributed.KilledWorker as error:
-                    raise UserError(f"campaign: Dask's workers died again and again: {error}") from None
+                    raise CampaignError(f"campaign: Dask's workers died again and again: {error}") from None
                 except self.distributed.CancelledError:
                     where = f" at {self.address}" if self.address else ""
-                    raise UserError(
+                    raise CampaignError(
                         f"campaign: the Dask scheduler{where} went away; results are kept, and the same command runs "
                         "what is missing"
                     ) from None

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import optimize, stats
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError
 
 CONFIDENCE = 0.95
 # Points of the grid on which the score statistic's density is carried from look to look: the integrands are smooth, and
@@ -48,9 +48,9 @@ class Share:
 
 def _check(count: int, total: int, confidence: float) -> None:
     if not (0 <= count <= total and total > 0):
-        raise UserError(f"share: {count} of {total}: a count from 0 to the total is expected, of at least one")
+        raise CampaignError(f"share: {count} of {total}: a count from 0 to the total is expected, of at least one")
     if not 0.0 < confidence < 1.0:
-        raise UserError(f"share: confidence is {confidence!r}, allowed is above 0 and below 1")
+        raise CampaignError(f"share: confidence is {confidence!r}, allowed is above 0 and below 1")
 
 
 def clopper_pearson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
@@ -99,7 +99,7 @@ def tolerance_place(total: int, share: float, confidence: float) -> int | None:
     """Which order statistic (1 ... total) of `total` values is the upper tolerance limit; None: none suffices."""
     for name, value in (("share", share), ("confidence", confidence)):
         if not 0.0 < value < 1.0:
-            raise UserError(f"tolerance: {name} is {value!r}, allowed is above 0 and below 1")
+            raise CampaignError(f"tolerance: {name} is {value!r}, allowed is above 0 and below 1")
     if total == 0 or stats.binom.cdf(total - 1, total, share) < confidence:
         return None
     return int(stats.binom.ppf(confidence, total, share)) + 1
@@ -160,9 +160,9 @@ def pocock(looks: int, error: float = 1.0 - CONFIDENCE) -> list[float]:
 
 def _bounds(shape: list[float], error: float) -> list[float]:
     if not 1 <= len(shape) <= 50:
-        raise UserError(f"stopping rule: {len(shape)} looks, allowed are 1 to 50")
+        raise CampaignError(f"stopping rule: {len(shape)} looks, allowed are 1 to 50")
     if not 0.0 < error < 0.5:
-        raise UserError(f"stopping rule: an error of {error!r}, allowed is above 0 and below 0.5")
+        raise CampaignError(f"stopping rule: an error of {error!r}, allowed is above 0 and below 0.5")
     constant = optimize.brentq(
         lambda c: crossing_probability([c * each for each in shape]) - error, 0.5, WIDEST_Z, xtol=1e-6
     )
@@ -186,11 +186,13 @@ class Stopping:
 
     def __post_init__(self) -> None:
         if self.rule not in RULES:
-            raise UserError(f"stopping rule {self.rule!r}: allowed are {', '.join(RULES)}")
+            raise CampaignError(f"stopping rule {self.rule!r}: allowed are {', '.join(RULES)}")
         if not 0.0 < self.limit < 1.0:
-            raise UserError(f"stopping rule: limit is {self.limit!r}, allowed is above 0 and below 1")
+            raise CampaignError(f"stopping rule: limit is {self.limit!r}, allowed is above 0 and below 1")
         if not 1 <= self.looks <= min(50, self.runs):
-            raise UserError(f"stopping rule: {self.looks} looks at {self.runs} runs, allowed are 1 to 50, one run each")
+            raise CampaignError(
+                f"stopping rule: {self.looks} looks at {self.runs} runs, allowed are 1 to 50, one run each"
+            )
 
     @functools.cached_property
     def bounds(self) -> list[float]:

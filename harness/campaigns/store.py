@@ -11,7 +11,7 @@ import os
 import pathlib
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError
 
 
 class Store:
@@ -26,7 +26,7 @@ class Store:
             fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self.file.close()
-            raise UserError(f"{path}: another campaign is writing here") from None
+            raise CampaignError(f"{path}: another campaign is writing here") from None
         self._read()
 
     def _read(self) -> None:
@@ -40,7 +40,7 @@ class Store:
                 self.results[result["key"]] = result
             except (ValueError, KeyError, TypeError):
                 self.file.close()
-                raise UserError(f"{self.path}:{number}: this is no result; move the file away") from None
+                raise CampaignError(f"{self.path}:{number}: this is no result; move the file away") from None
             whole += len(line)
         self.file.truncate(whole)
         self.file.seek(0, os.SEEK_END)

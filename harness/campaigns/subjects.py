@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import CampaignError, UserError
 from ranger_sim.harness.faults.evidence import Record
 from ranger_sim.harness.faults.proof import Proof
 
@@ -51,9 +51,9 @@ class OwnMachine:
         name, _, self.name = reference.rpartition(":")
         self.file = pathlib.Path(name)
         if not self.name.isidentifier() or self.file.suffix != ".py":
-            raise UserError(f"machine {reference!r}: FILE.py:NAME is expected, as servo.py:new")
+            raise CampaignError(f"machine {reference!r}: FILE.py:NAME is expected, as servo.py:new")
         if not self.file.is_file():
-            raise UserError(f"machine {reference!r}: there is no file {self.file}")
+            raise CampaignError(f"machine {reference!r}: there is no file {self.file}")
 
     @functools.cached_property
     def make(self) -> Callable[..., Any]:
@@ -66,10 +66,10 @@ class OwnMachine:
         except UserError:
             raise
         except Exception as error:  # whatever a user's program raises
-            raise UserError(f"machine {self.file}: {type(error).__name__}: {error}") from error
+            raise CampaignError(f"machine {self.file}: {type(error).__name__}: {error}") from error
         found: Callable[..., Any] | None = getattr(module, self.name, None)
         if not callable(found):
-            raise UserError(f"machine {self.file}: there is no function or class {self.name!r} in it")
+            raise CampaignError(f"machine {self.file}: there is no function or class {self.name!r} in it")
         return found
 
     def machine(self, settings: Mapping[str, Any]) -> Any:
@@ -78,7 +78,7 @@ class OwnMachine:
             inspect.signature(self.make).bind(**settings)
             return self.make(**settings)
         except TypeError as error:
-            raise UserError(f"machine {self.file.name}:{self.name}: {error}") from None
+            raise CampaignError(f"machine {self.file.name}:{self.name}: {error}") from None
 
     @functools.cached_property
     def shown(self) -> Any:
@@ -111,7 +111,7 @@ class OwnMachine:
         for name in band:
             if name not in self.shown.plant.sample_names:
                 known = ", ".join(self.shown.plant.sample_names) or "none"
-                raise UserError(f"[band] {name}: it is no quantity of the body, but {known}")
+                raise CampaignError(f"[band] {name}: it is no quantity of the body, but {known}")
 
     def judge(
         self, proof: Proof, golden: Record, record: Record, since_ns: int, band: Mapping[str, float], is_sweep: bool

@@ -7,7 +7,7 @@ what the firmware has written stays.
 import math
 from typing import Any, ClassVar
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.kinds import BRIDGE, CABLE, JOINT, MOTOR
@@ -177,7 +177,7 @@ class OneLeg(Fault):
     def connect(self) -> None:
         self.drive: Any = self.robot.plant.motors[self.place.details["motor"]].drive
         if self.values["leg"] not in (2.0, 6.0):
-            raise UserError(f"fault {self.text()}: leg is {self.values['leg']:g}, there are 2 and 6")
+            raise FaultError(f"fault {self.text()}: leg is {self.values['leg']:g}, there are 2 and 6")
 
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)

@@ -5,7 +5,7 @@ from typing import Any
 from ranger_sim.can_bus import rewiring, tampering
 from ranger_sim.can_bus.disturbance import HIGHEST_RATE
 from ranger_sim.can_bus.node import OPERATING
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.kinds import BUS
@@ -104,7 +104,7 @@ class BabblingNode(IntruderFault):
         IntruderFault.connect(self)
         self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
         if self.identifier < 0:
-            raise UserError(f"fault {self.text()}: a babbling node needs an identifier, not {ANY!r}")
+            raise FaultError(f"fault {self.text()}: a babbling node needs an identifier, not {ANY!r}")
 
     def clip_on(self, now_ns: int) -> None:
         self.tamper = tampering.Babbling(self.intruder, self.identifier, round(1000 * self.values["period_us"]))
@@ -138,7 +138,7 @@ class DuplicateIdentifier(IntruderFault):
     def connect(self) -> None:
         IntruderFault.connect(self)
         if not self.values["frame"] or self.values["frame"] == ANY:
-            raise UserError(f"fault {self.text()}: say by frame= which identifier is there twice")
+            raise FaultError(f"fault {self.text()}: say by frame= which identifier is there twice")
         self.identifier = identifier_of(self.robot, self.values["frame"], f"fault {self.text()}")
 
     def made_outside(self) -> OutsideIntruder:

@@ -4,14 +4,13 @@ A mode belongs to kinds of places, not to a machine: a fault of an encoder's edg
 Ranger's places, and the modes that only it has, are in ranger_catalogue.py.
 """
 
-import difflib
 import importlib
 import importlib.util
 import pathlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError, UserError, unknown
 from ranger_sim.harness.faults import text as typed_text
 from ranger_sim.harness.faults.fault import Fault, Place
 from ranger_sim.harness.waiting import Condition, Wanted
@@ -33,7 +32,7 @@ def mode(kind: type[Kind]) -> type[Kind]:
     """Class decorator that registers a mode for places of its kinds."""
     for place_kind in kind.kinds:
         if (place_kind, kind.mode) in MODES:
-            raise UserError(f"fault mode {kind.mode} at {place_kind}: it is in the catalogue already")
+            raise FaultError(f"fault mode {kind.mode} at {place_kind}: it is in the catalogue already")
         MODES[place_kind, kind.mode] = kind
     return kind
 
@@ -71,7 +70,7 @@ class Catalogue:
         """Add places to the catalogue. UserError for a name that it has already."""
         for place in places:
             if place.name in self.known:
-                raise UserError(f"fault place {place.name}: it is in the catalogue already")
+                raise FaultError(f"fault place {place.name}: it is in the catalogue already")
             self.known[place.name] = place
 
     def modes_of(self, place: Place) -> dict[str, type[Fault]]:
@@ -92,13 +91,11 @@ class Catalogue:
             return ""
         return f"it needs {needs or 'a place that is a ' + ' or a '.join(sorted(others))}"
 
-    def named(self, name: str, there: Iterable[str], what: str) -> str:
+    def named(self, name: str, there: Iterable[str], what: str, where: str = "") -> str:
         """Return `name`, which must be in `there`; otherwise a UserError with the nearest ones."""
         names = list(there)
         if name not in names:
-            near = difflib.get_close_matches(name, names, 3)
-            hint = f"meant was perhaps {' or '.join(near)}" if near else f"there are {', '.join(names) or 'none'}"
-            raise UserError(f"{what} {name!r}: {hint}{self.hint}")
+            raise FaultError(f"{where}{unknown(what, name, names)}{self.hint}")
         return name
 
     def find(self, name: str) -> Place:
@@ -111,14 +108,14 @@ class Catalogue:
         """A fault, not armed yet. UserError for a place, mode, parameter or value that the catalogue does not have."""
         where = self.find(place) if isinstance(place, str) else place
         if reason := self.refusal(where, mode):
-            raise UserError(f"fault {where.name}:{mode}: it cannot act there; {reason}, this is {where.what}")
+            raise FaultError(f"fault {where.name}:{mode}: it cannot act there; {reason}, this is {where.what}")
         modes = self.modes_of(where)
-        kind = modes[self.named(mode, modes, f"fault mode at {where.name},")]
+        kind = modes[self.named(mode, modes, "mode", f"fault {where.name}: ")]
         known = [parameter.name for parameter in kind.parameters]
         for name in parameters:
-            self.named(name, known, f"fault {where.name}:{mode}, parameter")
+            self.named(name, known, "parameter", f"fault {where.name}:{mode}: ")
         if self.condition is None:
-            raise UserError(f"fault {where.name}:{mode}: this catalogue belongs to no machine")
+            raise FaultError(f"fault {where.name}:{mode}: this catalogue belongs to no machine")
         return kind.asked(where, start, end, parameters, self.condition)
 
     def typed(self, text: str) -> Fault:
@@ -134,18 +131,18 @@ class Catalogue:
         self.load()
         path = pathlib.Path(name)
         if not path.is_file():
-            raise UserError(f"fault module {path}: there is no such file")
+            raise FaultError(f"fault module {path}: there is no such file")
         whole = path.resolve()
         if whole in FILES:
             return
         spec = importlib.util.spec_from_file_location(f"ranger_sim_fault_module_{path.stem}", path)
         if spec is None or spec.loader is None:
-            raise UserError(f"fault module {path}: it is no Python file (.py)")
+            raise FaultError(f"fault module {path}: it is no Python file (.py)")
         module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)
         except UserError:
             raise
         except Exception as error:  # whatever a user's program raises
-            raise UserError(f"fault module {path}: {type(error).__name__}: {error}") from error
+            raise FaultError(f"fault module {path}: {type(error).__name__}: {error}") from error
         FILES.add(whole)

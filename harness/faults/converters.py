@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from ranger_sim.firmware_sim.peripherals.adc_external import GAIN_MASK, GAIN_SHIFT
 from ranger_sim.foundation.events import NEVER
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.kinds import BURST_CONVERTER, CONVERTER, INTERNAL_CONVERTER
@@ -30,7 +30,7 @@ class ConverterFault(Fault):
     def connect(self) -> None:
         board = self.robot.loop.board(self.place.details["board"])
         if board.apart:
-            raise UserError(f"fault {self.text()}: {board.name} runs in a process of its own; its converter is there")
+            raise FaultError(f"fault {self.text()}: {board.name} runs in a process of its own; its converter is there")
         emulated(self.robot, board.name, f"fault {self.text()}")
         self.board: Any = board
         self.inside = board.name

@@ -20,7 +20,7 @@ one). Then the faults of the previous set end. Those of this one begin when all 
 import dataclasses
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.waiting import Condition
@@ -61,7 +61,7 @@ class ErrorPort(StepWatch):
     def set_configuration(self, configuration: ErrorConfiguration) -> None:
         """Set what will be activated. UserError for an impossible fault, or one that has a start or an end."""
         if self in self.robot.loop.watchers:
-            raise UserError(f"error port: {configuration.name}: deactivate the one that is active first")
+            raise FaultError(f"error port: {configuration.name}: deactivate the one that is active first")
         for one in configuration.sets:
             for each in one.errors:
                 self._made(configuration, each)  # so that mistakes are reported now
@@ -72,15 +72,17 @@ class ErrorPort(StepWatch):
     def _made(self, configuration: ErrorConfiguration, text: str) -> Fault:
         fault = self.robot.catalogue.typed(text)
         if fault.start is not None or fault.end is not None:
-            raise UserError(f"error configuration {configuration.name}: {text!r}: its set says when it begins and ends")
+            raise FaultError(
+                f"error configuration {configuration.name}: {text!r}: its set says when it begins and ends"
+            )
         return fault
 
     def activate(self) -> None:
         """Let the first set wait for its trigger from now on. UserError without a configuration."""
         if self.configuration is None:
-            raise UserError("error port: there is no configuration to activate")
+            raise FaultError("error port: there is no configuration to activate")
         if self in self.robot.loop.watchers:
-            raise UserError(f"error port: {self.configuration.name} is active already")
+            raise FaultError(f"error port: {self.configuration.name} is active already")
         self.robot.loop.watchers.append(self)
         self.number = -1
         self.triggered = False
@@ -89,9 +91,9 @@ class ErrorPort(StepWatch):
     def trigger(self) -> None:
         """Make the next set active with the next step of the plant, regardless of its trigger."""
         if self.configuration is None or self not in self.robot.loop.watchers:
-            raise UserError("error port: there is nothing to trigger before a configuration is activated")
+            raise FaultError("error port: there is nothing to trigger before a configuration is activated")
         if self.number + 1 >= len(self.configuration.sets):
-            raise UserError("error port: there is no set left to trigger")
+            raise FaultError("error port: there is no set left to trigger")
         self.triggered = True
 
     def deactivate(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.error_rows import StateWord
 from ranger_sim.harness.names import Names
 
@@ -68,7 +68,7 @@ class Evidence:
 
     def __init__(self, robot: Any) -> None:
         if any(board.apart for board in robot.loop.boards):
-            raise UserError(
+            raise FaultError(
                 "proof of a fault: every board must run in this process (backend sim; firmware in C: --in-process, "
                 "or Ranger(in_process=True))"
             )

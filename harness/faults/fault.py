@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Self
 
 from ranger_sim.foundation.quantities import nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.waiting import Condition, Wanted
 
@@ -47,7 +47,7 @@ class Parameter:
             number = float("nan")
         if not self.low <= number <= self.high:
             unit = "" if self.unit == "1" else f" {self.unit}"
-            raise UserError(
+            raise FaultError(
                 f"{where}: {self.name} is {value!r}, allowed are {self.low:g} to {self.high:g}{unit}".rstrip()
             )
         return number
@@ -61,7 +61,7 @@ class WholeNumber(Parameter):
         """`value` as a whole number within the limits, or a UserError naming `where`."""
         number = Parameter.checked(self, value, where)
         if not number.is_integer():
-            raise UserError(f"{where}: {self.name} is {value!r}, a whole number is expected")
+            raise FaultError(f"{where}: {self.name} is {value!r}, a whole number is expected")
         return number
 
 
@@ -152,7 +152,7 @@ class Fault(StepWatch):
         where = f"fault {place.name}:{cls.mode}"
         for name, value in parameters.items():
             if name not in known:
-                raise UserError(f"{where}: there is no parameter {name!r}, but {', '.join(known) or 'none at all'}")
+                raise FaultError(f"{where}: there is no parameter {name!r}, but {', '.join(known) or 'none at all'}")
             values[name] = known[name].checked(value, where)
         return cls(place, None if start is None else condition(start), end_condition(end, condition), values)
 
@@ -204,7 +204,7 @@ class Fault(StepWatch):
         self.random = RandomStream(robot.seed, f"fault {len(robot.faults)} {self.place.name} {self.mode}")
         self.connect()
         if self.gives_way and self.start is None and (taken := self._in_its_way()):
-            raise UserError(f"fault {self.text()}: {taken}; one fault at a time")
+            raise FaultError(f"fault {self.text()}: {taken}; one fault at a time")
         for each in (self.start, self.end):
             if each is not None:
                 each.begin(robot)
@@ -233,7 +233,7 @@ class Fault(StepWatch):
             if self.start is None or self.start.met():
                 if taken := self._in_its_way():
                     if not self.gives_way:
-                        raise UserError(f"fault {self.text()}: {taken}; one fault at a time")
+                        raise FaultError(f"fault {self.text()}: {taken}; one fault at a time")
                     self.gave_way_ns, self.gave_way_to = now_ns, taken
                     self.stop()
                     self.robot.loop.watchers.remove(self)
@@ -285,7 +285,7 @@ class Fault(StepWatch):
         one's activation on: the comparison does not attribute a difference to one of them.
         """
         if self.twin is None:
-            raise UserError(f"fault {self.text()}: it has no golden run; Ranger.inject(..., proof=True) gives it one")
+            raise FaultError(f"fault {self.text()}: it has no golden run; Ranger.inject(..., proof=True) gives it one")
         from ranger_sim.harness.faults import proof  # only here: it imports numpy for the comparison
 
         golden, faulty = self.twin.records()

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from ranger_sim.can_bus import rewiring, tampering
 from ranger_sim.can_bus.frame import wire
 from ranger_sim.can_bus.node import OPERATING
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError, UserError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, WholeNumber
 from ranger_sim.harness.faults.kinds import CONTROLLER
@@ -106,10 +106,10 @@ class ErrorFault(FrameFault):
         try:
             made = tampering.Misreading(self.mode, self.node, of_sender, self.identifier)
         except UserError as reason:
-            raise UserError(f"fault {self.text()}: {reason}") from None
+            raise FaultError(f"fault {self.text()}: {reason}") from None
         if self.mode == "BIT_STUFFING" and of_sender and self.identifier >= 0:
             if not tampering.places_of_error(self.mode, True, *wire(self.identifier, 8, 0, 0)):
-                raise UserError(
+                raise FaultError(
                     f"fault {self.text()}: identifier {self.identifier:#x} has no recessive stuff bit in its"
                     " arbitration field, the only place where its sender can see this error"
                 )

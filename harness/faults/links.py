@@ -3,7 +3,7 @@
 from typing import Any
 
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
@@ -142,9 +142,9 @@ class DropOut(Fault):
         self.lines: dict[int, Any] = loop.wires[loop.place(board)].serial_lines
         self.imu_wire: Any = loop.serial_device if board == "UI" else None
         if not self.lines:
-            raise UserError(f"fault {self.text()}: nothing is connected to this line, so nobody could miss its bytes")
+            raise FaultError(f"fault {self.text()}: nothing is connected to this line, so nobody could miss its bytes")
         if self.imu_wire is not None and not self.imu_wire.plugged:
-            raise UserError(f"fault {self.text()}: another unit outside stands in the place of the emulated one")
+            raise FaultError(f"fault {self.text()}: another unit outside stands in the place of the emulated one")
 
     def begin(self, now_ns: int) -> None:
         for uart, line in list(self.lines.items()):

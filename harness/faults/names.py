@@ -1,10 +1,9 @@
 """Parameters that are names: of a frame, a task, an interrupt."""
 
 import dataclasses
-import difflib
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError, unknown
 from ranger_sim.harness.faults.fault import Parameter
 
 ANY = "any"
@@ -19,7 +18,7 @@ class NameParameter(Parameter):
         """`value` as text, or a UserError naming `where`."""
         text = str(value).strip()
         if not text:
-            raise UserError(f"{where}: {self.name} is empty, it is {self.meaning}")
+            raise FaultError(f"{where}: {self.name} is empty, it is {self.meaning}")
         return text
 
 
@@ -38,19 +37,15 @@ def identifier_of(robot: Any, text: str, where: str) -> int:
     try:
         number = int(text, 0)
     except ValueError:
-        near = difflib.get_close_matches(text, known, 3)
-        hint = f", meant was perhaps {' or '.join(near)}" if near else ""
-        raise UserError(f"{where}: frame {text!r} is neither a variable nor an identifier{hint}") from None
+        raise FaultError(f"{where}: {unknown('frame', text, known)}, neither a variable nor an identifier") from None
     if not 0 <= number <= HIGHEST_IDENTIFIER:
-        raise UserError(f"{where}: frame {text!r} is outside 0 ... {HIGHEST_IDENTIFIER:#x}")
+        raise FaultError(f"{where}: frame {text!r} is outside 0 ... {HIGHEST_IDENTIFIER:#x}")
     return number
 
 
-def chosen(name: str, there: Any, what: str) -> str:
+def chosen(name: str, there: Any, what: str, where: str) -> str:
     """Return `name`, which must be in `there`; otherwise a UserError that lists the known ones."""
     names = sorted(there)
     if name not in names:
-        near = difflib.get_close_matches(name, names, 3)
-        hint = f"meant was perhaps {' or '.join(near)}" if near else f"there are {', '.join(names)}"
-        raise UserError(f"{what} {name!r}: {hint}")
+        raise FaultError(f"{where}: {unknown(what, name, names)}")
     return name

@@ -6,7 +6,7 @@ from typing import Any
 from ranger_sim.firmware_sim.activity import ActivityLog
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation.events import NEVER
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
@@ -109,7 +109,7 @@ class PackLost(BatteryFault):
     def connect(self) -> None:
         BatteryFault.connect(self)
         if self.values["packs"] >= self.battery.parameters.packs:
-            raise UserError(
+            raise FaultError(
                 f"fault {self.text()}: there are {self.battery.parameters.packs} packs, and without any of them the"
                 " robot is switched off; one has to be left"
             )
@@ -195,7 +195,9 @@ class Restart(Fault):
         self.where = f"fault {self.text()}"
         emulated(self.robot, self.name, self.where)
         if self.robot.polled:
-            raise UserError(f"{self.where}: ends outside hold on to this board; start them with processes of their own")
+            raise FaultError(
+                f"{self.where}: ends outside hold on to this board; start them with processes of their own"
+            )
         self.back_ns = NEVER
         self.slots_before = 0
 

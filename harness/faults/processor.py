@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from ranger_sim.boards.firmware_board import SatelliteBoard
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import NORMAL_TASK
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter, Place, WholeNumber
 from ranger_sim.harness.faults.names import chosen, name_parameter
@@ -66,7 +66,7 @@ class TaskFault(ProcessorFault):
     def found(self, name: str) -> Any:
         """The task of this name. UserError for a missing one, or one that calls others."""
         tasks = [task for task in self.board.scheduler.schedule.all_tasks() if task.kind == NORMAL_TASK]
-        chosen(name, [task.name for task in tasks], f"fault {self.place.name}:{self.mode}, task")
+        chosen(name, [task.name for task in tasks], "task", f"fault {self.place.name}:{self.mode}")
         return next(task for task in tasks if task.name == name)
 
 
@@ -173,7 +173,7 @@ class FullRing(Hold):
     def connect(self) -> None:
         ProcessorFault.connect(self)
         if not isinstance(self.board, SatelliteBoard):
-            raise UserError(
+            raise FaultError(
                 f"fault {self.text()}: {self.name} has no ring of a satellite; the router's rings only lose frames, the"
                 " main brain has no CAN, and a program in C keeps its ring to itself"
             )
@@ -280,7 +280,7 @@ class StuckInterrupt(ProcessorFault):
     def connect(self) -> None:
         ProcessorFault.connect(self)
         there = {source.name: source for source in self.board.vic.sources.values() if source.attached}
-        name = chosen(self.values["interrupt"], there, f"fault {self.place.name}:{self.mode}, interrupt")
+        name = chosen(self.values["interrupt"], there, "interrupt", f"fault {self.place.name}:{self.mode}")
         self.source = there[name]
         if name == "can_receive" and self.robot.quirks.full_receive_ring_kills:
             self.permanent = POWER_CYCLE  # its handler fills the ring with copies of the last frame

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from ranger_sim.boards.steering import LIMITS as STEERING_LIMITS
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults import kinds, signals
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Parameter, WholeNumber
@@ -44,7 +44,7 @@ class RangerVoltageFault(VoltageFault):
             return
         most_A, low, high = STEERING_LIMITS["current_max"], self.values["low"], self.values["high"]
         if self.place.kind in DIFFERENTIAL and low <= -most_A and high >= most_A:
-            raise UserError(
+            raise FaultError(
                 f"fault {self.text()}: it cannot act there; the steering's board holds its motor to {most_A:g} A, so "
                 f"its currents never leave {low:g} to {high:g} A; give low= and high= inside -{most_A:g} to {most_A:g}"
             )

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 
 
 def emulated(robot: Any, name: str, where: str) -> Any:
@@ -14,7 +14,7 @@ def emulated(robot: Any, name: str, where: str) -> Any:
     if not isinstance(board, Microcontroller):
         in_c = name in getattr(robot, "firmware", ())
         hint = " (firmware in C: --in-process, or Ranger(in_process=True))" if in_c else ""
-        raise UserError(
+        raise FaultError(
             f"{where}: {name} is not emulated in this process: its processor cannot be reached from here{hint}"
         )
     return board
@@ -44,7 +44,7 @@ def controller_of(robot: Any, board: str, bus: int, where: str) -> tuple[Any, in
     wire = next(wire for wire in robot.wiring.can if wire.board == board and wire.bus == bus)
     wires = loop.wires[loop.place(board)]
     if wires.buses[wire.controller] is None:
-        raise UserError(
+        raise FaultError(
             f"{where}: can{bus} is a real bus outside here, on which bits of others cannot be reached;"
             " that takes a disturbance generator on the wire"
         )

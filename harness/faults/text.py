@@ -9,7 +9,7 @@ import re
 from typing import NamedTuple
 
 from ranger_sim.foundation.quantities import TIMES, in_base_units
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 
 
 class Typed(NamedTuple):
@@ -32,12 +32,12 @@ def parse(text: str) -> Typed:
     for pair in pairs:
         name, equals, value = (part.strip() for part in pair.partition("="))
         if not (name and equals and value) or name in parameters:
-            raise UserError(f"fault {text!r}: {pair!r} is not name=value, once per name")
+            raise FaultError(f"fault {text!r}: {pair!r} is not name=value, once per name")
         parameters[name] = value
     if not (colon and place.strip() and mode) or ("@" in text and not start) or (dots and not end):
-        raise UserError(f"fault {text!r}: it reads PLACE:MODE[,name=value][@START[..END]]")
+        raise FaultError(f"fault {text!r}: it reads PLACE:MODE[,name=value][@START[..END]]")
     if start and end and _ends_before(start, end):
-        raise UserError(f"fault {text!r}: it ends at {end!r}, which is not after its start, {start!r}")
+        raise FaultError(f"fault {text!r}: it ends at {end!r}, which is not after its start, {start!r}")
     return Typed(place.strip(), mode, parameters, start or None, end or None)
 
 

@@ -12,7 +12,7 @@ import pickle
 import signal
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.branching import fork
 from ranger_sim.harness.faults.evidence import Evidence, Record
 from ranger_sim.harness.faults.fault import Fault
@@ -26,7 +26,7 @@ class Twin:
 
     def __init__(self, robot: Any) -> None:
         if robot.polled:
-            raise UserError("proof of a fault: something outside takes part in this run, so it has no golden twin")
+            raise FaultError("proof of a fault: something outside takes part in this run, so it has no golden twin")
         self.evidence = Evidence(robot)
         self.robot = robot
         self.closed = False
@@ -43,7 +43,7 @@ class Twin:
     def records(self) -> tuple[Record, Record]:
         """(golden, faulty) until now."""
         if self.closed:
-            raise UserError("proof of a fault: the robot was closed before it was asked for")
+            raise FaultError("proof of a fault: the robot was closed before it was asked for")
         faulty = self.evidence.record()
         with contextlib.suppress(BrokenPipeError):
             os.write(self.asking, faulty.end_ns.to_bytes(LENGTH_BYTES, "little"))
@@ -85,7 +85,7 @@ def _read(pipe: int, length: int) -> bytes:
     while len(parts) < length:
         part = os.read(pipe, min(1 << 20, length - len(parts)))
         if not part:
-            raise UserError("proof of a fault: the process of the golden run has died")
+            raise FaultError("proof of a fault: the process of the golden run has died")
         parts += part
     return bytes(parts)
 

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.faults.catalogue import mode
 from ranger_sim.harness.faults.fault import Fault, Parameter
 from ranger_sim.harness.faults.kinds import FLOOR, ROBOT
@@ -105,7 +105,9 @@ class StepInFloor(WorldFault):
     def begin(self, now_ns: int) -> None:
         super().begin(now_ns)
         if self.floor.step_at is not None:
-            raise UserError(f"fault {self.text()}: the floor has a step already, from foothold {self.floor.step_at} on")
+            raise FaultError(
+                f"fault {self.text()}: the floor has a step already, from foothold {self.floor.step_at} on"
+            )
         self.foothold = self.floor.foothold
         self.floor.step_at = self.foothold + 1
         self.floor.step_m = self.values["height"]
@@ -143,7 +145,7 @@ class SlipperyFloor(WorldFault):
         super().connect()
         contact = self.robot.plant.parameters.contact
         if contact in RIGID:
-            raise UserError(
+            raise FaultError(
                 f"fault {self.text()}: it cannot act there; with the body's contact {contact!r} feet never slide, "
                 f"bodies with contact 'coulomb' or 'compliant' have friction"
             )

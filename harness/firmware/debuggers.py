@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from ranger_sim.firmware_sim.gdb.server import GdbServer, never
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError, unknown
 
 
 class Place(NamedTuple):
@@ -20,7 +20,7 @@ def placed(text: str) -> Place:
     board, _, where = text.partition("=")
     host, _, port = where.rpartition(":")
     if not board or not port.isdecimal():
-        raise UserError(f"gdb {text!r}: BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333")
+        raise FirmwareError(f"gdb {text!r}: BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333")
     return Place(board, host or "127.0.0.1", int(port))
 
 
@@ -36,12 +36,12 @@ def open_doors(
         for text in wanted:
             place = placed(text)
             if place.board not in boards:
-                raise UserError(f"gdb {text}: there is no board {place.board}; there are {', '.join(boards)}")
+                raise FirmwareError(f"gdb {text}: {unknown('board', place.board, boards)}")
             board = boards[place.board]
             if getattr(board, "core", None) is None:
-                raise UserError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")
+                raise FirmwareError(f"gdb {text}: {place.board} runs no machine code, so give it an --image")
             if any(door.board is board for door in doors):
-                raise UserError(f"gdb {text}: {place.board} has a door already")
+                raise FirmwareError(f"gdb {text}: {place.board} has a door already")
             doors.append(GdbServer(board, place.port, place.host, allow_network, ends))
     except BaseException:
         close_doors(doors)

@@ -9,7 +9,7 @@ from ranger_sim.boards.modules.front_panel import FrontPanel
 from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
 from ranger_sim.firmware_sim.lpc2194.image import Image, read
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, InternalConverter, SpiDevice
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 BATTERY_VOLTAGE_CHANNEL = 1  # AIN1, P0.28
 SEQUENCES = {
@@ -55,7 +55,7 @@ def hardware_of(board: str) -> BoardHardware:
 def known(board: str) -> str:
     """Return `board`, which must be able to run an image."""
     if board not in BOARDS:
-        raise UserError(f"image for board {board!r}: boards that can run a firmware image are {', '.join(BOARDS)}")
+        raise FirmwareError(f"image for board {board!r}: boards that can run a firmware image are {', '.join(BOARDS)}")
     return board
 
 
@@ -63,7 +63,7 @@ def placed(text: str) -> tuple[str, str]:
     """Board and file of `MCH=FILE`; UserError for other forms."""
     board, equals, path = text.partition("=")
     if not equals or not path:
-        raise UserError(f"image {text!r}: BOARD=FILE is expected, as in MCH=B2A_Hip_Motor_Controller.axf")
+        raise FirmwareError(f"image {text!r}: BOARD=FILE is expected, as in MCH=B2A_Hip_Motor_Controller.axf")
     return known(board), path
 
 

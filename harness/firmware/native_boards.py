@@ -14,7 +14,7 @@ from ranger_sim.firmware_sim.native import build as compiling
 from ranger_sim.firmware_sim.native import image_build
 from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter
 from ranger_sim.firmware_sim.peripherals.adc_external import CONVERSION_NS as FASTEST_CONVERSION_NS
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 from ranger_sim.harness.firmware import native_firmware
 from ranger_sim.harness.firmware.native_firmware import Firmware
 
@@ -92,12 +92,12 @@ def placed(text: str) -> tuple[str, str]:
     """Board and folder of `MCH=DIR`; UserError for other forms."""
     board, equals, folder = text.partition("=")
     if not equals or not folder:
-        raise UserError(f"firmware {text!r}: BOARD=DIR is expected, as in MCH=examples/hip_in_c")
+        raise FirmwareError(f"firmware {text!r}: BOARD=DIR is expected, as in MCH=examples/hip_in_c")
     return known(board), folder
 
 
 def known(board: str) -> str:
     """A board that firmware in C can take."""
     if board not in PLACES:
-        raise UserError(f"firmware for board {board!r}: boards that can run firmware in C are {', '.join(PLACES)}")
+        raise FirmwareError(f"firmware for board {board!r}: boards that can run firmware in C are {', '.join(PLACES)}")
     return board

@@ -8,7 +8,7 @@ from ranger_sim.firmware_sim.native import build as compiling
 from ranger_sim.firmware_sim.native import coverage as counting
 from ranger_sim.firmware_sim.native import image_build, sanitizers
 from ranger_sim.firmware_sim.native import manifest as manifests
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 
 GENERATED_C = pathlib.Path("generated") / "c"  # below a folder of master files
 VERSION_FILE = "ranger_table.h"
@@ -72,7 +72,7 @@ def place_of_tables(manifest: manifests.Manifest, table: pathlib.Path | None) ->
     """The folder of the generated C."""
     place = table if manifest.master is None else fresh_c(manifest.master)
     if place is None:
-        raise UserError(f"{manifest.folder}: firmware.master is missing: the folder of the master table")
+        raise FirmwareError(f"{manifest.folder}: firmware.master is missing: the folder of the master table")
     return place
 
 
@@ -83,7 +83,7 @@ def table_sources(manifest: manifests.Manifest, place: pathlib.Path) -> compilin
         source = place / f"{name.lower()}_table.c"
         if not source.is_file():
             there = ", ".join(sorted(each.name.removesuffix("_table.c") for each in place.glob("*_table.c")))
-            raise UserError(f"{manifest.folder}: firmware.tables: no board {name!r}; there are {there}")
+            raise FirmwareError(f"{manifest.folder}: firmware.tables: no board {name!r}; there are {there}")
         sources.append(source)
     return compiling.Addition((place,), tuple(sources))
 
@@ -95,7 +95,7 @@ def fresh_c(master: pathlib.Path) -> pathlib.Path:
 
     stale = generate.stale(load_table(master), master / "generated")
     if stale:
-        raise UserError(
+        raise FirmwareError(
             f"{master}: what was generated is not of the table as it is now ({stale[0]}): "
             f"ranger-sim table generate --master {master}"
         )
@@ -107,5 +107,5 @@ def table_version(table: pathlib.Path) -> int:
     path = table / VERSION_FILE
     found = re.search(r"#define RANGER_TABLE_VERSION 0x([0-9A-F]{8})u", path.read_text(encoding="utf-8"))
     if found is None:
-        raise UserError(f"{path}: no version; `ranger-sim table generate` writes it")
+        raise FirmwareError(f"{path}: no version; `ranger-sim table generate` writes it")
     return int(found[1], 16)

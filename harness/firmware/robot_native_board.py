@@ -6,7 +6,7 @@ from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.network_time import NetworkTime
 from ranger_sim.firmware_sim.native.native_board import Started
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 from ranger_sim.harness.firmware.native_boards import PLACES, hardware_of, table_version
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.table_board import TableBoard
@@ -41,7 +41,7 @@ class RobotNativeBoard(TableBoard):
     def _started(self, devices: Started) -> Any:
         """The one device of a kind."""
         if 0 not in devices:
-            raise UserError(f"{self.name}: its program has not started the {devices.what}")
+            raise FirmwareError(f"{self.name}: its program has not started the {devices.what}")
         return devices[0]
 
     def counters(self) -> object:

@@ -5,7 +5,7 @@ from typing import Any
 
 from ranger_sim.firmware_sim.native.hardware import Hardware
 from ranger_sim.firmware_sim.native.native_board import NativeBoard
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import FirmwareError
 from ranger_sim.harness.firmware.native_firmware import Firmware, table_version
 
 
@@ -36,12 +36,12 @@ class TableBoard(NativeBoard):
         wanted = table_version(firmware.table) if version is None else version
         compiled = self.library.table_version()
         if compiled is not None and compiled != wanted:
-            raise UserError(
+            raise FirmwareError(
                 f"{firmware.library}: compiled with version 0x{compiled:08X} of the master table, "
                 f"this robot has 0x{wanted:08X}: build it again"
             )
         if controller and controller not in self.devices.cans:
-            raise UserError(
+            raise FirmwareError(
                 f"{firmware.library}: firmware_start() does not start CAN controller {controller}, "
                 f"on which {name}'s bus hangs (fw_can_start)"
             )

@@ -23,7 +23,7 @@ from typing import Any
 
 from ranger_sim.datatable.model import ROUTER, Table
 from ranger_sim.foundation import toml_file
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ProfileError, unknown
 from ranger_sim.harness.outside.bus_schedule import (
     MOST_ROWS,
     MOST_TURNS,
@@ -66,7 +66,7 @@ class ProfileFault:
         return f"{self.file}{':' if what else ''}{what}{value}: {self.rule}"
 
 
-class ProfileError(UserError):
+class FaultyProfileError(ProfileError):
     """A bad profile with all its faults: `faults` in order, and one line each as the message."""
 
     def __init__(self, faults: list[ProfileFault]) -> None:
@@ -277,7 +277,7 @@ def full_schedule() -> BusSchedule:
     faults: list[ProfileFault] = []
     found = _schedule(FULL, FOLDER, robots_table(), faults)
     if faults:
-        raise ProfileError(faults)
+        raise FaultyProfileError(faults)
     return found
 
 
@@ -291,13 +291,13 @@ def load(
     """
     text = str(name)
     if not text.endswith(".toml") and text not in available():
-        raise UserError(f"profile {text!r}: unknown; there are {', '.join(available())}, or give a .toml file")
+        raise ProfileError(f"{unknown('profile', text, available())}, or give a .toml file")
     path = pathlib.Path(text) if text.endswith(".toml") else FOLDER / f"{text}.toml"
     faults: list[ProfileFault] = []
     reader = _Reader(str(path), faults)
     content = reader.content(path)
     if content is None:
-        raise ProfileError(faults)
+        raise FaultyProfileError(faults)
     known = tuple(wiring.BOARDS)
     buses_known: tuple[str, ...] = BUSES
     if table is None:
@@ -312,7 +312,7 @@ def load(
     buses = _buses(reader, reader.table(content, "buses"), path.parent, table, interfaces or _interfaces, buses_known)
     _together(reader, boards, buses, table)
     if faults:
-        raise ProfileError(faults)
+        raise FaultyProfileError(faults)
     return Profile(path.stem, str(path), title, description, boards, buses)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.peers import LIMITS, REASONS, Door, Peer, SocketStream, connected
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import RequestError, UserError
 from ranger_sim.harness.processes.requests import Request, admitted
 
 ANSWER_S = 10.0  # a client waits so long
@@ -39,7 +39,7 @@ class ControlServer(Door[Client]):
             listener.bind(address(name))
         except OSError:
             listener.close()
-            raise UserError(f"a robot named {name} is already running: give this one another --name") from None
+            raise RequestError(f"a robot named {name} is already running: give this one another --name") from None
         listener.listen(LIMITS["control"].peers)
         listener.setblocking(False)
         super().__init__("control", listener)
@@ -108,7 +108,7 @@ def ask(name: str, request: dict) -> Any:
     try:
         link = connected(address(name), f"the robot named {name}", ANSWER_S)
     except OSError:
-        raise UserError(f"no robot named {name} is running here (ranger-sim up --name {name})") from None
+        raise RequestError(f"no robot named {name} is running here (ranger-sim up --name {name})") from None
     end = wallclock.monotonic_s() + ANSWER_S
     with link:
         try:
@@ -117,19 +117,19 @@ def ask(name: str, request: dict) -> Any:
             while not data.endswith(b"\n"):
                 part = link.recv(65536)
                 if not part:
-                    raise UserError(f"robot {name} has ended without an answer")
+                    raise RequestError(f"robot {name} has ended without an answer")
                 data += part
                 if len(data) > LONGEST_ANSWER or wallclock.monotonic_s() > end:
                     raise TimeoutError
         except TimeoutError:
-            raise UserError(f"robot {name} has not answered for {ANSWER_S:.0f} s") from None
+            raise RequestError(f"robot {name} has not answered for {ANSWER_S:.0f} s") from None
         except OSError as error:
-            raise UserError(f"robot {name}: {error.strerror}") from None
+            raise RequestError(f"robot {name}: {error.strerror}") from None
     try:
         answer = json.loads(data)
         refused = answer.get("error")
     except (ValueError, AttributeError, RecursionError):
-        raise UserError(f"robot {name}: its answer is not understood") from None
+        raise RequestError(f"robot {name}: its answer is not understood") from None
     if refused is not None:
-        raise UserError(str(refused))
+        raise RequestError(str(refused))
     return answer

@@ -13,7 +13,7 @@ from typing import Any
 from ranger_sim.datatable import parameters
 from ranger_sim.datatable.parameters import shown
 from ranger_sim.foundation import json_text
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import RequestError
 from ranger_sim.harness.conditions import ErrorNoted
 from ranger_sim.harness.faults.fault import Fault
 from ranger_sim.harness.faults.ranger_catalogue import CATALOGUE
@@ -44,25 +44,25 @@ class Request:
 
 def _key(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < KEYS:
-        raise UserError(f"key: {shown(value)} is not 0 to {KEYS - 1}")
+        raise RequestError(f"key: {shown(value)} is not 0 to {KEYS - 1}")
     return value
 
 
 def _board(value: Any) -> str:
     if not isinstance(value, str) or value not in wiring.BOARDS:
-        raise UserError(f"restart: {shown(value)} is none of {', '.join(wiring.BOARDS)}")
+        raise RequestError(f"restart: {shown(value)} is none of {', '.join(wiring.BOARDS)}")
     return value
 
 
 def _parameter(value: Any) -> str:
     if not isinstance(value, str):
-        raise UserError(f"set: {shown(value)} is no name of a parameter")
+        raise RequestError(f"set: {shown(value)} is no name of a parameter")
     return parameters.parameter(value).name
 
 
 def _fault(value: Any) -> str:
     if not isinstance(value, str):
-        raise UserError(f"fault: {shown(value)} is no fault, as PLACE:MODE")
+        raise RequestError(f"fault: {shown(value)} is no fault, as PLACE:MODE")
     return can_be_armed(CATALOGUE.typed(value)).text()
 
 
@@ -70,7 +70,7 @@ def can_be_armed(fault: Fault) -> Fault:
     """The fault, if the body's process can arm it. UserError for one that waits for a counter of another process."""
     for each in (fault.start, fault.end):
         if isinstance(each, ErrorNoted):
-            raise UserError(
+            raise RequestError(
                 f"fault {fault.text()}: {each.text!r} is counted in the process of its board, and asked for only "
                 "at the end; a time, a step, a state or a variable can be waited for here"
             )
@@ -79,14 +79,14 @@ def can_be_armed(fault: Fault) -> Fault:
 
 def _which(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_FAULTS:
-        raise UserError(f"clear: {shown(value)} is no number of a fault, 0 to {MOST_FAULTS}")
+        raise RequestError(f"clear: {shown(value)} is no number of a fault, 0 to {MOST_FAULTS}")
     return value
 
 
 def _stick(value: Any) -> float:
     number = parameters.number_of(value)
     if number is None or not -1.0 <= number <= 1.0:
-        raise UserError(f"radio: {shown(value)} is not -1 (left) to 1 (right)")
+        raise RequestError(f"radio: {shown(value)} is not -1 (left) to 1 (right)")
     return number
 
 
@@ -115,14 +115,14 @@ def admitted(line: bytes) -> Request:
     what = content.pop("do", None)
     fields = REQUESTS.get(what) if isinstance(what, str) else None
     if fields is None:
-        raise UserError(f"{shown(what)} is no request; there are {', '.join(REQUESTS)}")
+        raise RequestError(f"{shown(what)} is no request; there are {', '.join(REQUESTS)}")
     for name in content:
         if name not in fields:
-            raise UserError(f"{what}: {shown(name)} is no field of it; it has {', '.join(fields) or 'none'}")
+            raise RequestError(f"{what}: {shown(name)} is no field of it; it has {', '.join(fields) or 'none'}")
     found: dict[str, Any] = {}
     for name, check in fields.items():
         if name not in content:
-            raise UserError(f"{what}: {name} is missing")
+            raise RequestError(f"{what}: {name} is missing")
         found[name] = check(content[name])
     if what == "set":
         found["word"] = parameters.checked_word(parameters.parameter(found["name"]), found["value"], "set")
@@ -135,7 +135,7 @@ def _object(line: bytes) -> dict[str, Any]:
     try:
         content = json_text.loads(line, "a request")
     except json_text.JsonError as mistake:
-        raise UserError(f"a request is one line with a JSON object ({mistake.reason})") from None
+        raise RequestError(f"a request is one line with a JSON object ({mistake.reason})") from None
     if not isinstance(content, dict):
-        raise UserError("a request is one line with a JSON object")
+        raise RequestError("a request is one line with a JSON object")
     return content

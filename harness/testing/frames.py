@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 from ranger_sim.foundation.events import FLAG_ERROR
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.names import Names
 
 WINDOW_S = 20.0  # how much is kept: some 30 steps of a walk, 16 MB for all four buses (chosen by us)
@@ -121,7 +121,7 @@ class FrameKeeper:
     def frames(self, bus: str, identifiers: set[int] | None = None, since_ns: int = 0) -> list[Frame]:
         """Frames of a bus in their order; only those identifiers (None: all), from `since_ns` on."""
         if bus not in self.streams:
-            raise UserError(f"bus {bus!r}: there is none of this name, but {', '.join(self.streams)}")
+            raise UserError(unknown("bus", bus, self.streams))
         self.streams[bus].flush()
         found: list[Frame] = []
         for last_ns, block in self.blocks[bus]:

@@ -13,8 +13,8 @@ from typing import Any
 
 from ranger_sim.can_bus.node import BUS_OFF
 from ranger_sim.firmware_sim.counters import ProgramCounters
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.names import Names, meant
+from ranger_sim.foundation.user_error import UserError, unknown
+from ranger_sim.harness.names import Names
 from ranger_sim.harness.normal_errors import most_normal
 from ranger_sim.harness.records import vital_signs
 
@@ -49,9 +49,9 @@ class Expected:
         for text in self.errors:
             board, _, name = text.rpartition(":")
             if name not in names.codes:
-                raise UserError(f"expected error {text!r}: the table has none of this name{meant(name, names.codes)}")
+                raise UserError(f"expected error {text!r}: {unknown('error', name, names.codes)}")
             if board and board not in boards:
-                raise UserError(f"expected error {text!r}: board {board!r} is none of {', '.join(boards)}")
+                raise UserError(f"expected error {text!r}: {unknown('board', board, boards)}")
 
 
 @dataclasses.dataclass(frozen=True)

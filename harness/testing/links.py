@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS, MainBrainSspLink, RouterSspLink, empty_segment
 from ranger_sim.datatable.generated import all_variables
@@ -11,18 +12,26 @@ from ranger_sim.foundation.events import ORDER_INTERRUPTS, SSP_SEGMENT, SSP_STAR
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.frames import Frame, frame_type
 
-if TYPE_CHECKING:
-    from ranger_sim.harness.testing.bench import BoardAlone
-
 PERIOD_NS = 200_000  # between two exchanges (robot.md N1.6)
 LAST_ID = 2031  # the highest identifier of the link
 DATA_8 = 8
 
 
+class Bench(Protocol):
+    """A board that runs alone, as its link needs it; `now` in ns."""
+
+    name: str
+    chip: Any
+    now: int
+
+    def call_at(self, time_ns: int, function: Callable[[float], Any], period_ns: int = 0) -> None:
+        """Call `function(time_s)` at a time, and again every `period_ns` if that is above 0."""
+
+
 class Link:
     """The test's end of the link. `heard`: frames of the board, stamped when they were complete here."""
 
-    def __init__(self, bench: BoardAlone) -> None:
+    def __init__(self, bench: Bench) -> None:
         self.bench = bench
         self.heard: list[Frame] = []
         self.errors: list[int] = []  # codes that this end would report
@@ -58,7 +67,7 @@ class Link:
 class BrainsEnd(Link):
     """The test replaces the main brain; the router is the master and starts the exchanges."""
 
-    def __init__(self, bench: BoardAlone) -> None:
+    def __init__(self, bench: Bench) -> None:
         Link.__init__(self, bench)
         self.end = MainBrainSspLink(self.errors.append, LAST_ID, False)
 
@@ -78,7 +87,7 @@ class BrainsEnd(Link):
 class RoutersEnd(Link):
     """The test replaces the router: an exchange every 200 us."""
 
-    def __init__(self, bench: BoardAlone) -> None:
+    def __init__(self, bench: Bench) -> None:
         Link.__init__(self, bench)
         self.end = RouterSspLink(self.errors.append)
         self.loaded = empty_segment()
@@ -101,7 +110,7 @@ class RoutersEnd(Link):
             self.note(now + EXCHANGE_NS, self.end.rx_id, self.end.rx_word0, self.end.rx_word1)
 
 
-def link_of(bench: BoardAlone) -> Link | None:
+def link_of(bench: Bench) -> Link | None:
     """The other end for the board on the bench; None when it has no link."""
     if bench.name == "CSR":
         return BrainsEnd(bench)

@@ -8,17 +8,11 @@ board.run_for("2 s")
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from ranger_sim.can_bus.edge.logs import read_log as read_frames
-from ranger_sim.can_bus.frame import frame_bits
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.ranger_names import RANGER
 from ranger_sim.harness.testing.frames import Frame, frame_type
-
-if TYPE_CHECKING:
-    from ranger_sim.harness.testing.bench import BoardAlone
 
 LOST = 0.01  # of a recording's frames: with more lost the traffic is different
 
@@ -48,30 +42,3 @@ def read_log(path: str | pathlib.Path, bus: str | None = None) -> list[Frame]:
     if not found:
         raise UserError(f"{source}: there is no frame in this recording")
     return sorted(found)
-
-
-def into_board(board: BoardAlone, frames: Iterable[Frame]) -> int:
-    """Give the test's nodes every frame that the board did not send itself; returns their number."""
-    own = set(board.chip.table.SEND)
-    given = 0
-    first_ns: int | None = None
-    for frame in frames:
-        if frame.bus not in board.buses:
-            if frame.bus in ("can1", "can2", "can3", "can4"):
-                continue  # of a walk's folder, but not of this board
-            raise UserError(
-                f"replay: channel {frame.bus!r} is no bus of {board.name}: "
-                f"read_log(path, bus={next(iter(board.buses), 'can1')!r}) says which it is"
-            )
-        if frame.identifier in own:
-            continue
-        if first_ns is None:
-            first_ns = frame.time_ns
-        node = board.node_on[frame.bus]
-        # receivers should have it at its stamp, a bit before its end; the first one begins now
-        bits = frame_bits(frame.identifier, frame.flags, frame.lo, frame.hi) - 1
-        length_ns = bits * 1_000_000_000 // node.bus.bitrate
-        due_ns = board.now + frame.time_ns - first_ns
-        node.send_words(max(board.now, due_ns - length_ns), *frame[2:])
-        given += 1
-    return given

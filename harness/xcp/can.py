@@ -39,7 +39,7 @@ from ranger_sim.foundation.events import (
     STAGE_BUS,
     TX_SENT,
 )
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.outside import bus_schedule, profile
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.xcp.slave import ANSWER, ERR_CMD_UNKNOWN, ERR_OUT_OF_RANGE, ERROR, SHORT, Slave
@@ -131,7 +131,7 @@ class XcpCanProbe(StepWatch):
         StepWatch.__init__(self)
         names = [each.name for each in robot.buses]
         if bus not in names:
-            raise UserError(f"XCP on {bus}: there is no such bus, but {', '.join(names)}")
+            raise UserError(f"XCP: {unknown('bus', bus, names)}")
         self.robot, self.bus = robot, bus
         emulated = robot.buses[names.index(bus)]
         bit_rate = emulated.bitrate if outside is None else outside.bit_rate

@@ -18,7 +18,7 @@ import cython
 from cython.cimports.libc.math import sqrt
 
 from ranger_sim.foundation.numbers import reals
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 # Open-circuit volts of one lithium-ion cell of the 18650 class at charge 0, 0.1 ... 1. Chosen by us after usual
 # discharge curves of lithium cobalt oxide: 3.0 V and 4.2 V at the ends (appendix 3.10: 9 and 12.6 V for three
@@ -44,14 +44,14 @@ class BatteryParameters:
         for name in ("packs", "cells_in_series", "pack_energy_Wh"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
-                raise UserError(f"battery: {name} is {value!r}, it must be above 0")
+                raise ModelError(f"battery: {name} is {value!r}, it must be above 0")
         if not (math.isfinite(self.pack_resistance_ohm) and self.pack_resistance_ohm >= 0.0):
-            raise UserError(f"battery: pack_resistance_ohm is {self.pack_resistance_ohm!r}, it must be 0 or more")
+            raise ModelError(f"battery: pack_resistance_ohm is {self.pack_resistance_ohm!r}, it must be 0 or more")
         if not 0.0 < self.charge <= 1.0:
-            raise UserError(f"battery: charge is {self.charge!r}, allowed is above 0 to 1 (full)")
+            raise ModelError(f"battery: charge is {self.charge!r}, allowed is above 0 to 1 (full)")
         volts = self.cell_volts
         if len(volts) < 2 or any(a >= b for a, b in zip(volts, volts[1:], strict=False)) or volts[0] <= 0.0:
-            raise UserError(f"battery: cell_volts {volts!r} must hold at least two values that rise from above 0")
+            raise ModelError(f"battery: cell_volts {volts!r} must hold at least two values that rise from above 0")
 
     @property
     def capacity_As(self) -> float:

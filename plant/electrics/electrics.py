@@ -25,7 +25,7 @@ import cython
 from cython.cimports.libc.math import exp
 
 from ranger_sim.foundation.numbers import reals
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant.electrics.battery import Battery, BatteryParameters
 from ranger_sim.plant.electrics.electronics import power_W
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, STEERING_MOTOR, MotorParameters
@@ -106,7 +106,7 @@ class ElectricsParameters:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if isinstance(value, float) and not (math.isfinite(value) and value >= 0.0):
-                raise UserError(f"electrics: {field.name} is {value!r}, it must be a finite number from 0 up")
+                raise ModelError(f"electrics: {field.name} is {value!r}, it must be a finite number from 0 up")
 
 
 @cython.final

@@ -6,7 +6,7 @@ walk ran at 4.7 W because the left outer ankle was switched off, board and senso
 so the 0.45 W saved put the converter's efficiency at 0.40 / 0.45 = 8/9, and everything else sums to that.
 """
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError, unknown
 
 TOTAL_W = 5.15  # appendix 1.1.2
 EFFICIENCY = 8.0 / 9.0  # battery to 5.5 V, from the two totals (see above)
@@ -50,7 +50,7 @@ def itemised_W(off: tuple[str, ...] = ()) -> dict[str, float]:
     for name in off:
         for item in SWITCHES.get(name, (name,)):
             if item not in items:
-                raise UserError(f"electronics: there is no item {item!r} to switch off; there are: {', '.join(items)}")
+                raise ModelError(f"electronics: {unknown('item', item, items)}")
             del items[item]
     items["converter loss"] = sum(items.values()) * (1.0 / EFFICIENCY - 1.0)
     return items

@@ -7,7 +7,7 @@ of docs/robot.md, "chosen by us, because ...". Angles and rates of a motor are t
 import dataclasses
 import math
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 # Measured winding inductance against frequency [A 3.9]: 94 uH at 1 kHz ... 16 uH at 200 kHz.
 FAULHABER_INDUCTANCE = ((1e3, 94e-6), (20e3, 35e-6), (100e3, 20e-6), (200e3, 16e-6))
@@ -74,18 +74,18 @@ class MotorParameters:
             if field.name == "inductance_table":
                 continue
             if not math.isfinite(value):
-                raise UserError(f"motor: {field.name} is {value!r}, it must be a finite number")
+                raise ModelError(f"motor: {field.name} is {value!r}, it must be a finite number")
             if field.name in positive and value <= 0.0:
-                raise UserError(f"motor: {field.name} is {value!r}, it must be above 0")
+                raise ModelError(f"motor: {field.name} is {value!r}, it must be above 0")
             if field.name not in positive and field.name not in signed and value < 0.0:
-                raise UserError(f"motor: {field.name} is {value!r}, it must not be negative")
+                raise ModelError(f"motor: {field.name} is {value!r}, it must not be negative")
         table = self.inductance_table
         if not table or any(f <= 0.0 or inductance < 0.0 for f, inductance in table):
-            raise UserError(f"motor: inductance_table {table!r} needs frequencies above 0 and inductances from 0 up")
+            raise ModelError(f"motor: inductance_table {table!r} needs frequencies above 0 and inductances from 0 up")
         if any(a[0] >= b[0] for a, b in zip(table, table[1:], strict=False)):
-            raise UserError(f"motor: inductance_table {table!r} must rise in frequency")
+            raise ModelError(f"motor: inductance_table {table!r} must rise in frequency")
         if self.inductance_H(self.settling_frequency_hz) <= 0.0 or self.inductance_H(self.pwm_frequency_hz) <= 0.0:
-            raise UserError("motor: the inductance of winding and series inductor together must be above 0")
+            raise ModelError("motor: the inductance of winding and series inductor together must be above 0")
 
     @property
     def loop_resistance_ohm(self) -> float:

@@ -3,7 +3,7 @@
 import math
 
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 
 class Floor:
@@ -24,13 +24,13 @@ class Floor:
         step_m: float = 0.0,
     ) -> None:
         if not (math.isfinite(roughness_m) and 0.0 <= roughness_m <= 0.1):
-            raise UserError(f"floor: roughness is {roughness_m!r}, allowed are 0 to 0.1 m")
+            raise ModelError(f"floor: roughness is {roughness_m!r}, allowed are 0 to 0.1 m")
         if not (math.isfinite(slope_rad) and abs(slope_rad) <= 0.5):
-            raise UserError(f"floor: slope is {slope_rad!r}, allowed are -0.5 to 0.5 rad")
+            raise ModelError(f"floor: slope is {slope_rad!r}, allowed are -0.5 to 0.5 rad")
         if not (math.isfinite(step_m) and abs(step_m) <= 0.1):
-            raise UserError(f"floor: the step is {step_m!r} m high, allowed are -0.1 to 0.1 m")
+            raise ModelError(f"floor: the step is {step_m!r} m high, allowed are -0.1 to 0.1 m")
         if step_at is not None and step_at < 1:
-            raise UserError(f"floor: the step is at foothold {step_at!r}, it must be 1 or later")
+            raise ModelError(f"floor: the step is at foothold {step_at!r}, it must be 1 or later")
         self.slope_rad = slope_rad
         self.roughness_m = roughness_m
         self.step_at = step_at

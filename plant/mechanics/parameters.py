@@ -10,7 +10,7 @@ import dataclasses
 import math
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 # How a foot meets the floor (EQUATIONS 8, 9). "sticking": the strike of the appendix, which holds both feet, by a pull
 # if need be; "unilateral": a trailing foot that the strike would pull lets go; "coulomb": no foot ever pulls nor holds
@@ -112,7 +112,7 @@ class BodyParameters:
     def __post_init__(self) -> None:
         wrong = list(faults(self))
         if wrong:
-            raise UserError("body: " + "; ".join(wrong))
+            raise ModelError("body: " + "; ".join(wrong))
 
     @property
     def hip_rotor_inertia_kg_m2(self) -> float:

@@ -11,7 +11,7 @@ import cython
 from cython.cimports.libc.math import exp, sin
 
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant.sensors.noise import NoiseSource
 
 WORD_BITS: Final = 13
@@ -49,9 +49,9 @@ class AbsoluteEncoder:
 
     def __init__(self, name, zero, sign=1, noise_counts=0.3, bit_flip=0.0, seed=0) -> None:
         if not 0 <= zero < COUNTS_PER_TURN or sign not in (-1, 1):
-            raise UserError(f"absolute encoder {name}: zero {zero} (0 ... 8191), sign {sign} (-1, 1) are impossible")
+            raise ModelError(f"absolute encoder {name}: zero {zero} (0 ... 8191), sign {sign} (-1, 1) are impossible")
         if noise_counts < 0.0 or not 0.0 <= bit_flip <= 1.0:
-            raise UserError(
+            raise ModelError(
                 f"absolute encoder {name}: noise_counts {noise_counts} or bit_flip {bit_flip} is impossible"
             )
         self.name = name

@@ -17,7 +17,7 @@ gap is closed and the stop takes over (appendix 2.4): chosen by us, half of the 
 import cython
 from cython.cimports.libc.math import exp
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 SWING_COUNTS = 700.0
 STANCE_COUNTS = 7000.0
@@ -58,7 +58,7 @@ class FootSensors:
         stance_counts=STANCE_COUNTS,
     ) -> None:
         if rise_time_constant_s <= 0.0 or full_load_N <= 0.0 or not 0.0 <= share <= 1.0:
-            raise UserError(
+            raise ModelError(
                 f"foot sensors {name}: rise_time_constant_s {rise_time_constant_s} and full_load_N {full_load_N} "
                 f"must be above 0, share {share} between 0 and 1"
             )

@@ -27,7 +27,7 @@ from cython.cimports.libc.math import cos, exp, sin
 from ranger_sim.foundation.edge_buffer import ByteBuffer
 from ranger_sim.foundation.numbers import word_of_float
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 # `Imu.mode`: the header of the packets that it sends
 SILENT: Final = 0
@@ -104,12 +104,12 @@ class Imu:
         phase_ns=0,
     ) -> None:
         if not 1 <= filter_samples <= MAX_FILTER or fusion_divider < 1 or baud < 1 or sample_ns < 1:
-            raise UserError(
+            raise ModelError(
                 f"inertial sensor: filter_samples {filter_samples} (1 ... {MAX_FILTER}), fusion_divider "
                 f"{fusion_divider}, baud {baud} or sample_ns {sample_ns} is impossible"
             )
         if noise_rad_s < 0.0 or roll_noise_rad < 0.0 or latency_ns < 0:
-            raise UserError("inertial sensor: noise and latency must not be negative")
+            raise ModelError("inertial sensor: noise and latency must not be negative")
         self.bias_rad_s = bias_rad_s
         self.noise_rad_s = noise_rad_s
         self.roll_bias_rad = roll_bias_rad

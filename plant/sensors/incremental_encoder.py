@@ -26,7 +26,7 @@ from cython.cimports.libc.math import cos, sin, sqrt
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.numbers import reals
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 
 BOUNCE_NS: Final = 3_000  # from over to back: chosen by us, longer than the fast interrupt, so that each edge is seen
 
@@ -96,7 +96,7 @@ class IncrementalEncoder:
         seed=0,
     ) -> None:
         if lines < 1 or gear <= 0.0 or sign not in (-1, 1):
-            raise UserError(f"encoder {name}: {lines} lines, gear {gear}, sign {sign} are impossible")
+            raise ModelError(f"encoder {name}: {lines} lines, gear {gear}, sign {sign} are impossible")
         self.name = name
         self.lines = lines
         self.gear = gear
@@ -148,7 +148,7 @@ class IncrementalEncoder:
             or self.jitter < 0.0
             or not 0.0 <= self.bounce <= 1.0
         ):
-            raise UserError(
+            raise ModelError(
                 f"encoder {self.name}: line_error {line_error} (0 ... 0.1), duty_error {duty_error} (-0.4 ... 0.4)"
                 f", jitter {self.jitter} (0 or more) or bounce {self.bounce} (0 ... 1) is out of range"
             )

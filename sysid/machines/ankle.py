@@ -28,7 +28,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError, UserError
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import plausibility, signals
 from ranger_sim.sysid.dataset import Array, Finding, Table
@@ -442,9 +442,9 @@ def _filter_found(table: Table) -> Finding:
 def _check(table: Table) -> None:
     """Raise UserError when the channels do not determine the ankle's command."""
     if "joint_angle_rad" not in table:
-        raise UserError(f"{table.name}: ankle needs joint_angle_rad; there are {', '.join(table.columns)}")
+        raise ModelError(f"{table.name}: ankle needs joint_angle_rad; there are {', '.join(table.columns)}")
     if "command_current_A" not in table and not ("target_angle_rad" in table and "target_rate_rad_per_s" in table):
-        raise UserError(
+        raise ModelError(
             f"{table.name}: ankle needs command_current_A, or target_angle_rad and target_rate_rad_per_s; "
             f"there are {', '.join(table.columns)}"
         )
@@ -459,11 +459,11 @@ def _gains(table: Table) -> tuple[float, float]:
     ):
         value = float(np.median(table[name])) if name in table else usual
         if name in table and float(np.ptp(table[name])) > 0.01 * abs(value):
-            raise UserError(
+            raise ModelError(
                 f"{table.name}: {name} goes from {table[name].min():g} to {table[name].max():g}, it must stay"
             )
         if not value > 0.0:
-            raise UserError(f"{table.name}: {name} is {value:g}, it must be above 0")
+            raise ModelError(f"{table.name}: {name} is {value:g}, it must be above 0")
         found.append(value)
     return found[0], found[1]
 
@@ -520,7 +520,7 @@ class _Fit:
             target, target_rate = self._target(rows, command / K)
             self.runs.append(Run(rows, drive, motion, *(np.interp(motion.time_s, t, x) for x in (target, target_rate))))
         if not self.runs:
-            raise UserError(f"{table.name}: ankle needs a stretch of {SHORTEST_S:g} s without a gap")
+            raise ModelError(f"{table.name}: ankle needs a stretch of {SHORTEST_S:g} s without a gap")
         self.missed = self._missed([run.motion for run in self.runs], self.values)
 
     def _start(self, rows: slice, values: Values) -> tuple[float, float, float, float]:
@@ -761,7 +761,7 @@ class _Fit:
         self._made_so(other.creep_rad_s, other.filter_s)
         moved = self._moved(other.values)
         if moved is None:
-            raise UserError(f"{self.table.name}: the ankle cannot be simulated with these values")
+            raise ModelError(f"{self.table.name}: the ankle cannot be simulated with these values")
         self._take(other.values, *moved)
 
     def _take(self, values: Mapping[str, float], motions: Sequence[Motion], missed: Array) -> None:

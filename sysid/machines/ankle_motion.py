@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.linalg import lapack
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import body_files
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid.dataset import Array
@@ -208,7 +208,7 @@ def simulated(
     motion.pushed = pushed
     steps.complete(motion, *pushed)
     if not np.all(np.isfinite(motion.slopes)) or np.max(np.abs(motion.p)) > FARTHEST_rad:
-        raise UserError(
+        raise ModelError(
             "the ankle's motion cannot be simulated with " + ", ".join(f"{k} {v:.3g}" for k, v in values.items())
         )
     motion.factors = steps.factors(motion)
@@ -319,7 +319,7 @@ class _Steps:
                 bands[diagonal + row - column + STATES, at[:-1]] = -self.starts[row, column]
         factors, pivots, failed = lapack.dgbtrf(bands, BELOW, ABOVE)
         if failed:
-            raise UserError("the ankle's motion cannot be simulated: its equations have no answer")
+            raise ModelError("the ankle's motion cannot be simulated: its equations have no answer")
         return factors, pivots
 
 

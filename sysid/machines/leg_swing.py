@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation import (
@@ -86,7 +86,7 @@ class LegSwing:
         kinds = {self._of(recording).with_voltage for recording in recordings}
         if len(kinds) > 1:
             without = ", ".join(r.table.name for r in recordings if "voltage_V" not in r.table)
-            raise UserError(f"{without}: no voltage_V, which the other recordings have; diagnose them apart")
+            raise ModelError(f"{without}: no voltage_V, which the other recordings have; diagnose them apart")
         return self._of(recordings[0]).effects(recordings)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:

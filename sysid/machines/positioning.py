@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
@@ -52,7 +52,7 @@ class Positioning:
         """Signals and the equation of one recording."""
         missing = [each.name for each in self.quantities if each.needed and each.name not in table]
         if missing:
-            raise UserError(
+            raise ModelError(
                 f"{table.name}: {self.name} needs {', '.join(missing)}; there are {', '.join(table.columns)}"
             )
         table = signals.uniform(table)
@@ -63,7 +63,7 @@ class Positioning:
         s["dF"] = np.gradient(force, table.step_s)
         top = float(np.quantile(np.abs(v), 0.98))
         if top <= 0.0:
-            raise UserError(f"{table.name}: position_m does not move")
+            raise ModelError(f"{table.name}: position_m does not move")
         s["sgn_v"] = np.tanh(v / (0.25 * NEAR_STANDSTILL * top))
         equation = Equation(
             "force",

@@ -3,7 +3,7 @@
 import pathlib
 from collections.abc import Mapping
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import csv_file, measurement, robodaq, run_folder
 
@@ -25,14 +25,14 @@ def read(
     """
     path = pathlib.Path(path)
     if not path.exists():
-        raise UserError(f"{path}: there is no such file")
+        raise DataError(f"{path}: there is no such file")
     if path.is_dir():
         return run_folder.read(path, mapping)
     suffix = path.suffix.lower()
     if suffix in MEASUREMENTS:
         return measurement.read(path, mapping)
     if suffix in FRAMES:
-        raise UserError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
+        raise DataError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
     if robodaq.is_one(path):
         return robodaq.read(path, mapping, variable_units)
     return csv_file.read(path, mapping, time_unit)

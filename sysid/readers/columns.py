@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.units import Unit
@@ -32,9 +32,9 @@ def mapping_of(texts: list[str]) -> dict[str, str]:
         old, equals, new = text.partition("=")
         old, new = old.strip(), new.strip()
         if not equals or not old or not new:
-            raise UserError(f"--map {text!r}: old=new is expected, as in --map MCH_ANGLE=hip_angle_rad")
+            raise DataError(f"--map {text!r}: old=new is expected, as in --map MCH_ANGLE=hip_angle_rad")
         if old in found:
-            raise UserError(f"--map {text!r}: {old} is named already, it became {found[old]}")
+            raise DataError(f"--map {text!r}: {old} is named already, it became {found[old]}")
         found[old] = new
     return found
 
@@ -57,7 +57,7 @@ def label(source: str, column: str, unit_text: str | None, mapping: Mapping[str,
         in_name = new_unit is not None
         unit = unit if unit is not None else new_unit
         if unit is not None and new_unit is not None and not unit.same_kind(new_unit):
-            raise UserError(
+            raise DataError(
                 f"{source}: {column} is in {unit.text or 'parts of one'}, it cannot become {given} "
                 f"({new_unit.text or 'parts of one'})"
             )
@@ -77,7 +77,7 @@ def add(
     """Put a column into the dataset, in SI, and record the changes there. losses: samples that were read and left
     out."""
     if named.name in dataset.channels:
-        raise UserError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
+        raise DataError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
     unit = named.unit
     if named.unknown:
         text = f"{column}: its unit {named.unknown[:40]!r} is not known (--map {column}=NAME_UNIT says it)"
@@ -120,4 +120,4 @@ def check_mapping(dataset: Dataset, mapping: Mapping[str, str], columns: list[st
     """UserError for a column that `mapping` names and the file does not have."""
     for old in mapping:
         if old not in columns:
-            raise UserError(f"{dataset.name}: --map {old}=...: there is no such column; there are {', '.join(columns)}")
+            raise DataError(f"{dataset.name}: --map {old}=...: there is no such column; there are {', '.join(columns)}")

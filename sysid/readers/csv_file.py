@@ -15,7 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.readers import columns, stamps
@@ -70,7 +70,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tim
         columns.add(dataset, name, named, time_s[kept], value[kept], finest, lost)
     if not dataset.channels:
         called = " and ".join(names[index] for index in sorted(time_columns))
-        raise UserError(f"{path}: there is no channel beside the time column {called}")
+        raise DataError(f"{path}: there is no channel beside the time column {called}")
     return dataset
 
 
@@ -78,13 +78,13 @@ def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
     """(line number, text) of every line that is neither empty nor a comment."""
     try:
         if path.stat().st_size > LARGEST_BYTES:
-            raise UserError(f"{path}: {path.stat().st_size} bytes, a text table may have {LARGEST_BYTES}")
+            raise DataError(f"{path}: {path.stat().st_size} bytes, a text table may have {LARGEST_BYTES}")
         content = path.read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: the table cannot be read ({error.strerror or error})") from None
+        raise DataError(f"{path}: the table cannot be read ({error.strerror or error})") from None
     lines = content.count(b"\n")
     if lines > MOST_LINES:
-        raise UserError(
+        raise DataError(
             f"{path}: {lines} lines, a text table may have {MOST_LINES}: thin it out or split it, or use MF4 (.mf4)"
         )
     encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
@@ -94,15 +94,15 @@ def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
         text = content.decode("latin-1")
         encoding = "latin-1"
     if "\0" in text:
-        raise UserError(f"{path}: this is no text table, it has bytes of value 0")
+        raise DataError(f"{path}: this is no text table, it has bytes of value 0")
     if encoding != "utf-8-sig":
         dataset.repairs.append(Repair("", "encoding", 0, f"the text is read as {encoding}, it is not UTF-8"))
     found = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" \t\r,;")]
     kept = [(number, line) for number, line in found if not line.lstrip().startswith(COMMENTS)]
     if not kept and found:  # a header behind a comment mark, as numpy writes it, and no rows
-        raise UserError(f"{path}: the table has comment lines only")
+        raise DataError(f"{path}: the table has comment lines only")
     if not kept:
-        raise UserError(f"{path}: the table is empty")
+        raise DataError(f"{path}: the table is empty")
     behind_mark = _header_in_comment(found, kept)
     return ([behind_mark] if behind_mark else []) + kept
 
@@ -169,7 +169,7 @@ def _header(
         names.pop()  # separators at the ends of all lines
     for name in names:
         if names.count(name) > 1:
-            raise UserError(f"{dataset.name}:{number}: two columns are called {name[:60]}")
+            raise DataError(f"{dataset.name}:{number}: two columns are called {name[:60]}")
     unit_texts: list[str | None] = [None] * len(names)
     if len(rows) > 1:
         second = [cell if units.unit_of(cell) is not None else cell.strip("[]()") for cell in rows[1][1]]
@@ -194,7 +194,7 @@ def _grid(
         lost = (Loss("ragged", len(wrong), f"in line {wrong[0]}"),)
         rows[:] = [(number, cells) for number, cells in rows if _fits(cells, len(names))]
     if not rows:
-        raise UserError(f"{dataset.name}: the table has no row below its header")
+        raise DataError(f"{dataset.name}: the table has no row below its header")
     return [[cells[index] for _, cells in rows] for index in range(len(names))], lost
 
 
@@ -215,7 +215,7 @@ def _time(
     split = [units.split(mapping.get(name, name)) for name in names]
     candidates = [k for k, (stem, _) in enumerate(split) if stem.lower() in (*units.TIME_WORDS, *CLOCKS)]
     if not candidates:
-        raise UserError(
+        raise DataError(
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
             "--map NAME=t_s says which it is"
         )
@@ -260,14 +260,14 @@ def _counted(
     time_s = plain if plain is not None else np.array([_value(cell, decimal_comma) for cell in cells])
     if len(time_s) and np.isfinite(time_s).mean() < 0.5:
         first = next((cell for cell in cells if cell and not _is_number(cell)), "")
-        raise UserError(
+        raise DataError(
             f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
             "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
         )
     if unit is None:
         unit = _assumed(dataset, name, time_s)
     if unit.numerator != ("s",) or unit.denominator:
-        raise UserError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
+        raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
     if unit.factor == 1.0:
         return columns.from_zero(dataset, time_s)
     text = f"{name}: times {unit.factor:g}, now in s"

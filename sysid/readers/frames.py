@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
 
@@ -68,9 +68,9 @@ def decode(
             samples[key][1].append(float(value))
     for bus in buses:
         if bus not in seen:
-            raise UserError(f"{name}: --bus {bus}: unknown bus (available: {', '.join(sorted(seen))})")
+            raise DataError(f"{name}: --bus {bus}: unknown bus (available: {', '.join(sorted(seen))})")
     if not samples or first_ns is None:
-        raise UserError(f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others)")
+        raise DataError(f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others)")
     of_message: dict[str, list[str]] = {}
     for bus, message, _ in samples:
         of_message.setdefault(message, [])
@@ -103,20 +103,20 @@ def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
         try:
             database: Any = cantools.database.load_file(str(path), database_format="dbc", strict=False)
         except OSError as error:
-            raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+            raise DataError(f"{path}: cannot be read ({error.strerror or error})") from None
         except Exception as error:  # a broken file raises many kinds of exceptions in cantools
             said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            raise UserError(f"{path}: not a DBC file that cantools can read ({said})") from None
+            raise DataError(f"{path}: not a DBC file that cantools can read ({said})") from None
         for message in database.messages:
             key = message.frame_id | (EXTENDED_BIT if message.is_extended_frame else 0)
             if key in found and found[key].name != message.name:
-                raise UserError(
+                raise DataError(
                     f"{path}: the identifier {message.frame_id:#x} is {message.name} here and {found[key].name} in "
                     "another DBC file; read one bus at a time (--bus) with its own file"
                 )
             found[key] = message
     if not found:
-        raise UserError("a recording of CAN frames needs a DBC file with messages (--dbc FILE)")
+        raise DataError("a recording of CAN frames needs a DBC file with messages (--dbc FILE)")
     return found
 
 

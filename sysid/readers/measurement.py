@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError, UserError
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
 
@@ -27,7 +27,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     """
     path = pathlib.Path(path)
     if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
+        raise DataError(f"{path}: there is no such file")
     dataset = Dataset(path.name, {})
     mapping = dict(mapping or {})
     said = ""
@@ -43,7 +43,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
         if said:
             gc.collect()  # a half-made file of the library complains when it is deleted: suppressed here
     if said:
-        raise UserError(f"{path}: not a measurement file that asammdf can read ({said})")
+        raise DataError(f"{path}: not a measurement file that asammdf can read ({said})")
     columns.check_mapping(dataset, mapping, [name for name, *_ in found])
     skipped = [name for name, _, _, value, _ in found if value is None]
     if skipped:
@@ -65,7 +65,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
             dataset.findings.append(Finding(named.name, "text", *ends, float(lost[0].count), "samples", text))
         columns.add(dataset, name, named, stamps[~has_text], value[~has_text], losses=lost)
     if not dataset.channels:
-        raise UserError(f"{path}: there is no channel with numbers in it")
+        raise DataError(f"{path}: there is no channel with numbers in it")
     return dataset
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.readers import columns
 
@@ -74,9 +74,9 @@ def read(
                 elif line.strip():
                     odd.append(number)
     except OSError as error:
-        raise UserError(f"{path}: the log cannot be read ({error.strerror or error})") from None
+        raise DataError(f"{path}: the log cannot be read ({error.strerror or error})") from None
     if not samples:
-        raise UserError(f"{path}: this is no log of the robot: no line reads id, value and time in ms between tabs")
+        raise DataError(f"{path}: this is no log of the robot: no line reads id, value and time in ms between tabs")
     if odd:
         text = f"{len(odd)} lines are not id, value, time, and are left out (the first: line {odd[0]})"
         dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(odd)), "rows", text))
@@ -100,5 +100,5 @@ def read(
         lost = tuple(Loss(reason, count) for reason, count in counts.items() if count)
         columns.add(dataset, called[key], named, pair[kept, 0] * 1e-3, pair[kept, 1], losses=lost)
     if not dataset.channels:
-        raise UserError(f"{path}: no variable of this log was ever written")
+        raise DataError(f"{path}: no variable of this log was ever written")
     return dataset

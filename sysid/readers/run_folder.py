@@ -4,7 +4,7 @@ import pathlib
 from collections.abc import Mapping
 
 from ranger_sim.foundation import json_text
-from ranger_sim.foundation.user_error import UserError, printable
+from ranger_sim.foundation.user_error import DataError, printable
 from ranger_sim.sysid.dataset import Dataset, Finding
 from ranger_sim.sysid.readers import measurement
 
@@ -15,7 +15,7 @@ def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, tru
     """The variables that the boards knew, named like the folder; that the robot fell is a finding."""
     folder = pathlib.Path(path)
     if not (folder / VARIABLES).is_file():
-        raise UserError(f"{folder}: this is no folder of a walk, it has no {VARIABLES} (walk --log decides)")
+        raise DataError(f"{folder}: this is no folder of a walk, it has no {VARIABLES} (walk --log decides)")
     dataset = measurement.read(folder / VARIABLES, mapping, truth)
     dataset.name = printable(folder.resolve().name)
     try:

@@ -12,7 +12,13 @@ import multiprocessing
 import pathlib
 import traceback
 
+from ranger_sim import diagnose
 from tests.blind.comparators import COMPARATORS
+
+
+def diagnosis(files, holdout, experiment):
+    """What `ranger-sim diagnose --json` writes."""
+    return diagnose(files, experiment, holdout=holdout).to_dict()
 
 
 def method(name):

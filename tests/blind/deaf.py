@@ -7,8 +7,8 @@ The same diagnosis on the same recordings, whose machine has no equation of that
 
 import dataclasses
 
+from ranger_sim import diagnose
 from ranger_sim.sysid.machines.motor_bench import MotorBench
-from ranger_sim.tools.diagnose.work import answer
 
 
 class Without:
@@ -48,12 +48,12 @@ WITHOUT_E, WITHOUT_M, WITHOUT_T = WITHOUT.values()
 
 
 def without_E(files, holdout, experiment):  # noqa: N802  (the balance's letter)
-    return answer(files, holdout, "tests.blind.deaf:WITHOUT_E")
+    return diagnose(files, WITHOUT_E, holdout=holdout).to_dict()
 
 
 def without_M(files, holdout, experiment):  # noqa: N802
-    return answer(files, holdout, "tests.blind.deaf:WITHOUT_M")
+    return diagnose(files, WITHOUT_M, holdout=holdout).to_dict()
 
 
 def without_T(files, holdout, experiment):  # noqa: N802
-    return answer(files, holdout, "tests.blind.deaf:WITHOUT_T")
+    return diagnose(files, WITHOUT_T, holdout=holdout).to_dict()

@@ -20,7 +20,7 @@ from tests.blind.generator.experiment import SUBSYSTEM
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 from tests.blind.score import read_folder, score, table
 
-DIAGNOSIS = "ranger_sim.tools.diagnose.work:answer"
+DIAGNOSIS = "tests.blind.answers:diagnosis"
 GIVEN = os.environ.get("RANGER_SIM_BLIND", "")
 # Of a recording: a strength is in units of what can be detected in it, so a short one is as fair as a long one.
 SECONDS = "5"

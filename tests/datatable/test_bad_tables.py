@@ -5,8 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ranger_sim.datatable.loader import hash_of_master_files, load_table
-from ranger_sim.datatable.model import TableError
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import TableError, UserError
 from tests.examples import examples
 
 from .small_table import BOARDS, ERRORS, VARIABLES, write

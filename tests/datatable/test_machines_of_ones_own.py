@@ -4,7 +4,7 @@ import pytest
 
 from ranger_sim.datatable import generate
 from ranger_sim.datatable.loader import load_table
-from ranger_sim.datatable.model import TableError
+from ranger_sim.foundation.user_error import TableError
 
 BOARDS = """\
 [buses]

@@ -24,10 +24,10 @@ def robot():
         ("12", "reads like"),
         ("-1 s", "reads like"),
         ("knee in HI_premid", "machine 'knee' is none of leg, hip"),
-        ("MCH_ANGEL > 0", "meant was perhaps MCH_ANGLE"),
-        ("hip_rat > 0", "meant was perhaps hip_rad"),
-        ("error MC_TCUR_OOB", "meant was perhaps MC_TCURR_OOB"),
-        ("error MC_TCURR_OOB from MCX", "board 'MCX' is none of MCH, MCFO"),
+        ("MCH_ANGEL > 0", "did you mean 'MCH_ANGLE'"),
+        ("hip_rat > 0", "did you mean 'hip_rad"),
+        ("error MC_TCUR_OOB", "did you mean 'MC_TCURR_OOB'"),
+        ("error MC_TCURR_OOB from MCX", "unknown board 'MCX' (available: MCH, MCFO"),
     ],
 )
 def test_a_text_that_is_no_condition_is_refused_with_what_was_perhaps_meant(text, what):

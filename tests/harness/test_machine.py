@@ -123,7 +123,7 @@ def test_waiting_in_vain_says_what_was_nearest_and_why_it_ended(firmware):
         assert robot.ended == "it hit its end"
     with (
         machine(firmware) as robot,
-        pytest.raises(UserError, match="'angel_rad' is no quantity of the body, but angle"),
+        pytest.raises(UserError, match="unknown quantity of the body 'angel_rad' .available: angle"),
     ):
         robot.until("angel_rad > 1")
 

@@ -105,7 +105,7 @@ def test_the_nearest_value_that_a_quantity_had_is_told_with_its_unit():
     machine.rate = 1.0
     other.met()
     assert other.nearest() == "the nearest value of rate was 1"
-    with pytest.raises(UserError, match="'angel_rad' is no quantity of the body, but angle_rad, rate"):
+    with pytest.raises(UserError, match="unknown quantity of the body 'angel_rad' \\(available: angle_rad, rate"):
         condition("angel_rad > 1")
 
 
@@ -127,7 +127,10 @@ def test_an_error_is_noted_when_the_count_of_its_board_has_grown():
     assert begun.met()
     machine.noted["B"].clear()
     assert condition("error LATE from B", machine).counts() == [0]
-    for text, told in (("error LATER", "the table has no error 'LATER'"), ("error LATE from C", "'C' is none of A, B")):
+    for text, told in (
+        ("error LATER", "unknown error 'LATER'"),
+        ("error LATE from C", "unknown board 'C' .available: A, B."),
+    ):
         with pytest.raises(UserError, match=told):
             condition(text)
 

@@ -231,7 +231,7 @@ def test_a_model_file_is_read_and_checked(tmp_path):
 @pytest.mark.parametrize(
     "text, words",
     [
-        ('[[term]]\nform = "coging"\n', "term 1: form is 'coging'; there are: stribeck"),
+        ('[[term]]\nform = "coging"\n', "term 1: unknown form 'coging'"),
         ('[[term]]\nform = "drag"\nat = "nose"\n', "term 1 \\(drag\\): at is 'nose'; this form can stand at: hip_j"),
         ('[[term]]\nform = "drag"\nat = "hip_joint"\n', "quadratic_Nms2 is missing, a number from 0 to 10"),
         (

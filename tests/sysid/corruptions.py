@@ -16,13 +16,13 @@ import tempfile
 
 import numpy as np
 
+from ranger_sim import diagnose
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.benches.ankle_sine import ankle_sine
 from ranger_sim.sysid.benches.motor_run import motor_run
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.tools.cli import main as command_line
-from ranger_sim.tools.diagnose import work
 from ranger_sim.tools.recordings import datasets
 
 Columns = dict[str, np.ndarray]
@@ -177,7 +177,7 @@ def diagnosed(columns: Columns, experiment: str, path: pathlib.Path) -> dict:
                fmt="%.9g")  # fmt: skip
     path.write_text(out.getvalue(), encoding="utf-8")
     try:
-        answer = work.answer([str(path)], [], experiment)
+        answer = diagnose(path, experiment).to_dict()
     except UserError as error:
         return {"outcome": "refused", "text": str(error).replace(str(path), path.name)}
     except Exception as error:  # that is what is looked for

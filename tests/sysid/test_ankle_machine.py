@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import ranger_sim
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files
 from ranger_sim.sysid.benches import ankle_sine as bench
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines import ankle_motion
 from ranger_sim.sysid.machines.ankle import Ankle, predicted
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.readers import read
 from ranger_sim.tools.cli import main
-from ranger_sim.tools.diagnose.work import answer
 
 GK, J_A = 34.0 * 0.018, 34.0**2 * 1.6e-6
 K, D = 11.219, 1.634
@@ -225,7 +225,7 @@ SLOW = DATA / "ranger_ankle_sine_slow.csv"
 @pytest.mark.skipif(not SLOW.is_file(), reason="the robot's sine logs are not here (RANGER_SIM_DATA)")
 def test_the_robot_s_ankle_has_a_return_spring_whose_form_the_slow_sine_does_not_tell():
     """First half against second; square and cube of the angle do equally well there (13.4 and 13.6 %)."""
-    found = answer([str(SLOW)], [], "ankle", holdout_part=0.5)
+    found = ranger_sim.diagnose(SLOW, "ankle", holdout_part=0.5).to_dict()
     assert not found["abstained"]
     assert [each["name"] for each in found["causes"]] == ["return_spring"]
     (cause,) = found["causes"]

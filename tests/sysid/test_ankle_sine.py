@@ -13,7 +13,7 @@ from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import readers
 from ranger_sim.sysid.benches import ankle_sine as bench
 from ranger_sim.sysid.dataset import Dataset
-from ranger_sim.sysid.identify import ankle
+from ranger_sim.sysid.identification import ankle
 
 FRICTIONLESS = dataclasses.replace(bench.MOTOR, constant_friction_Nm=0.0, viscous_friction_Nms=0.0, load_friction=0.0)
 

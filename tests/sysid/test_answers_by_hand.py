@@ -11,7 +11,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms as plant_terms
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
-from ranger_sim.sysid import answer, intervals, isolability, misfit, model_terms, plausibility, residual_term
+from ranger_sim.sysid import answer, intervals, isolability, misfit, model_terms, plausibility, residual_term, results
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.experiment_models import SAMPLES, Equation
@@ -64,13 +64,11 @@ def test_something_is_wrong_and_what_it_is_can_be_said_or_not(names, p, after_p,
 
 def test_a_value_is_told_with_two_errors_either_way():
     regression = SimpleNamespace(values={"a": 3.0, "b": -1.0}, names=["b", "a"], covariance=np.diag([0.25, 4.0]))
-    assert answer._value(regression, "a") == {
-        "value": 3.0,
-        "ci95": [pytest.approx(3.0 - 3.92), pytest.approx(3.0 + 3.92)],
-    }
-    assert answer._value(regression, "b")["ci95"] == pytest.approx([-1.98, -0.02])
+    found = answer._value(regression, "a")
+    assert found.value == 3.0 and found.ci95 == pytest.approx((3.0 - 3.92, 3.0 + 3.92))
+    assert answer._value(regression, "b").ci95 == pytest.approx((-1.98, -0.02))
     regression.covariance[0, 0] = -1e-18  # rounding
-    assert answer._value(regression, "b")["ci95"] == [-1.0, -1.0]
+    assert answer._value(regression, "b").ci95 == (-1.0, -1.0)
 
 
 @pytest.mark.parametrize(("low", "high", "wrong"), [(0.0, 10.0, False), (3.93, 10.0, True), (3.91, 10.0, False),
@@ -88,7 +86,7 @@ def test_what_the_model_had_is_told_beside_what_these_data_say():
     regression = SimpleNamespace(
         values={"drag@there:size": 0.7}, names=["drag@there:size"], covariance=np.zeros((1, 1))
     )
-    assert answer._known(had, was, regression) == {
+    assert results.plain(answer._known(had, was, regression)) == {
         "name": "drag", "at": "there", "shape": {"n": 1.0},
         "parameters": {"size": {"model": 0.5, "value": 0.7, "ci95": [0.7, 0.7]}},
     }  # fmt: skip
@@ -124,7 +122,7 @@ def test_a_misfit_is_told_for_all_rows_and_each_regime_of_fifty():
     louder = SimpleNamespace(whitening={"one": Whitening(np.zeros(0), 2.0)}, shared={})
     after = Regression([one], [{"one": extra[:, None]}], ["x"], noise=louder)
     found = answer._channels(SimpleNamespace(plain=before, extended=after, recordings=[one]))
-    assert [(each["channel"], each["regime"]) for each in found] == [("one", "all"), ("one", "many")]
+    assert [(each.channel, each.regime) for each in found] == [("one", "all"), ("one", "many")]
 
     def left(*columns):
         matrix = np.column_stack(columns)[8:]
@@ -132,10 +130,10 @@ def test_a_misfit_is_told_for_all_rows_and_each_regime_of_fifty():
 
     without, with_it = left(base), left(base, extra)
     for told, rows in zip(found, (slice(None), slice(0, 50)), strict=True):
-        assert told["rms"] == pytest.approx(math.sqrt(np.mean(without[rows] ** 2)))
-        assert told["noise"] == pytest.approx(math.sqrt(np.mean(with_it**2)))
+        assert told.rms == pytest.approx(math.sqrt(np.mean(without[rows] ** 2)))
+        assert told.noise == pytest.approx(math.sqrt(np.mean(with_it**2)))
         share = 1.0 - np.mean(with_it[rows] ** 2) / np.mean(without[rows] ** 2)
-        assert told["repeatable_fraction"] == pytest.approx(share)
+        assert told.repeatable_fraction == pytest.approx(share)
 
 
 def test_letters_and_subsystems_are_those_of_the_equations():
@@ -206,9 +204,10 @@ def test_a_learned_table_is_least_squares_over_cells_beside_the_machine_s_own_co
     for told, values in ((without, response[8:]), (rest, response[8:] - column[8:, 0])):
         gone = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
         assert told == pytest.approx(math.sqrt(np.mean(gone**2)))
-    told = found.told()
+    told = results.plain(found.result((2.0, 1.0)))
     assert told["over"] == list(found.over) and told["domain"][0] == [a.min(), a.max()]
     assert told["value"] == found.value.tolist() and told["deviation"] == found.error.tolist()
+    assert told["holdout_rms"] == [2.0, 1.0] and "holdout_rms" not in results.plain(found.result())
 
 
 def test_nothing_is_learned_where_no_test_over_signals_tells():

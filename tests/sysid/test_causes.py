@@ -50,7 +50,7 @@ def test_a_cause_is_found_by_key_or_by_a_name_that_stands_at_one_place():
     assert causes.find("sensor_offset@gyro").number == 33
     with pytest.raises(UserError, match="sensor_offset: this cause has several places: sensor_offset@current"):
         causes.find("sensor_offset")
-    with pytest.raises(UserError, match="'ghost': no such cause"):
+    with pytest.raises(UserError, match="unknown cause 'ghost'"):
         causes.find("ghost")
     assert causes.as_json(causes.find("drag"))["confusable_with"] == [
         "coulomb_friction",

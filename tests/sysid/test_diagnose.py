@@ -9,15 +9,15 @@ import sys
 import numpy as np
 import pytest
 
+import ranger_sim
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.diagnosis import KnownEffect
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
 from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
-from ranger_sim.tools.diagnose.work import answer, machine_of
 
 SIZE = 6000
 STEP_S = 0.01
@@ -203,7 +203,7 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
         (["none.csv", "--experiment", "motor-bench"], "none.csv: there is no such file"),
         (
             ["data.csv", "--experiment", "moon"],
-            f"--experiment moon: there are {', '.join(MACHINES)}; a machine of yours",
+            f"--experiment moon: unknown experiment 'moon' (available: {', '.join(MACHINES)}); a machine of yours",
         ),
         (["data.csv", "--experiment", "nowhere:Cart"], "--experiment nowhere:Cart: No module named 'nowhere'"),
         (["data.csv", "--experiment", "json:dumps"], "--experiment json:dumps: it has no name, quantities"),
@@ -273,7 +273,7 @@ def test_a_fault_of_the_motor_bench_is_named(tmp_path):
     subprocess.run(command, check=True, cwd=root, capture_output=True)
     (case,) = json.loads((folder / "data" / "cases.json").read_text(encoding="utf-8"))
     files, held = ([str(folder / "data" / each) for each in case[role]] for role in ("files", "holdout"))
-    found = answer(files, held, "motor-bench")
+    found = ranger_sim.diagnose(files, "motor-bench", holdout=held).to_dict()
     assert found["detected"]
     assert found["causes"][0]["name"] == cause
     assert found["subsystem"] == part
@@ -287,7 +287,8 @@ DATA = pathlib.Path(os.environ.get("RANGER_SIM_DATA", pathlib.Path(__file__).par
 @pytest.mark.skipif(not (DATA / "emps_run1.csv").is_file(), reason="the two EMPS runs are not here (RANGER_SIM_DATA)")
 def test_the_positioning_machine_is_wrong_where_its_literature_says():
     """Published: M 95.1089 kg, F_v 203.50 N s/m, F_c 20.39 N; friction that differs by direction first."""
-    found = answer([str(DATA / "emps_run1.csv")], [str(DATA / "emps_run2_pulses.csv")], "positioning")
+    run, pulses = DATA / "emps_run1.csv", DATA / "emps_run2_pulses.csv"
+    found = ranger_sim.diagnose(run, "positioning", holdout=[pulses]).to_dict()
     names = [each["name"] for each in found["causes"]]
     assert names[0] == "direction_friction"
     assert "sensor_lag" in names  # the drive's delay of some tenths of a millisecond
@@ -299,5 +300,5 @@ def test_the_positioning_machine_is_wrong_where_its_literature_says():
 
 
 def test_an_unknown_machine_is_refused():
-    with pytest.raises(UserError, match="there are motor-bench, leg-swing, positioning, ankle, walk"):
-        machine_of("mars")
+    with pytest.raises(UserError, match="available: motor-bench, leg-swing, positioning, ankle, walk"):
+        ranger_sim.diagnose("none.csv", "mars")

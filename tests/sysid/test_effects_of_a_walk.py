@@ -11,8 +11,8 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machines.walk import Walk, causes, machine, strikes
-from ranger_sim.sysid.machines.walk.machine import Rows, WalkRecording
 from ranger_sim.sysid.machines.walk.mechanics import Numbers
+from ranger_sim.sysid.machines.walk.recording import Rows, WalkRecording, _of_others
 
 NUMBERS = Numbers.of(BodyParameters())
 COUNT, STEP_S = 200, 0.01
@@ -327,7 +327,7 @@ def test_places_are_every_so_long_after_a_strike_and_repeat_from_stride_to_strid
 
 def test_a_mean_of_others_leaves_oneself_out():
     values = np.array([1.0, 2.0, 4.0, 10.0, 7.0])
-    found = machine._of_others(values, np.array([3, 3, 3, 9, -1]))
+    found = _of_others(values, np.array([3, 3, 3, 9, -1]))
     assert found.tolist() == [3.0, 2.5, 1.5, 10.0, 7.0]
 
 

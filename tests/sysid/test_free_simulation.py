@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.free_simulation import Predictor, _Fit
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

@@ -11,8 +11,8 @@ from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches import leg, motor, pulley
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.fit import Parameter
-from ranger_sim.sysid.identify import coverage, legs, registry
-from ranger_sim.sysid.identify import motor as identify_motor
+from ranger_sim.sysid.identification import coverage, legs, registry
+from ranger_sim.sysid.identification import motor as identify_motor
 
 
 def altered(data, name, value):
@@ -163,7 +163,7 @@ def test_a_constant_channel_is_told_and_not_fitted():
 
 def test_what_is_known_must_be_an_unknown_of_the_bench():
     bench = registry.BENCHES["stall"]
-    with pytest.raises(UserError, match="k_h: stall has no such unknown; it has R, V_c"):
+    with pytest.raises(UserError, match="stall: unknown parameter 'k_h' .available: R, V_c"):
         registry.alone(bench, motor.stall(), [Parameter("k_h", "", 7.0, uncertainty=1.0)])
-    with pytest.raises(UserError, match="bench 'stal': there is none; there are stall, cantilever"):
+    with pytest.raises(UserError, match="unknown bench 'stal' .available: stall, cantilever"):
         registry.bench_of("stal")

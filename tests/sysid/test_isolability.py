@@ -234,10 +234,10 @@ def test_the_command_prints_the_catalogue_one_cause_and_what_channels_show(capsy
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["--experiment", "bench"], "'bench': no such experiment; there are motor-bench"),
-        (["--experiment", "ankle", "--channels", "torque_Nm"], "torque_Nm: ankle has no such channel"),
+        (["--experiment", "bench"], "unknown experiment 'bench' (available: motor-bench"),
+        (["--experiment", "ankle", "--channels", "torque_Nm"], "ankle: unknown channel 'torque_Nm'"),
         (["--channels", "torque_Nm"], "--channels: of which experiment?"),
-        (["ghost"], "'ghost': no such cause"),
+        (["ghost"], "unknown cause 'ghost'"),
         (["drag", "--experiment", "ankle"], "either one cause or an experiment"),
     ],
 )
@@ -247,5 +247,5 @@ def test_a_mistake_on_the_command_line_is_told_in_a_line(capsys, arguments, line
 
 
 def test_a_channel_that_the_experiment_does_not_have_is_told():
-    with pytest.raises(UserError, match="speed_rad_per_s: leg-swing has no such channel"):
+    with pytest.raises(UserError, match="leg-swing: unknown channel 'speed_rad_per_s'"):
         analyse("leg-swing", ["speed_rad_per_s"])

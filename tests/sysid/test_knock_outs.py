@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.robot_joint import HeavyJoint, Joint
 
 DATA = pathlib.Path(os.environ.get("RANGER_SIM_DATA", pathlib.Path(__file__).parents[3] / "shared" / "data"))

@@ -9,9 +9,9 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines import leg_swing
 from ranger_sim.sysid.machines.leg_swing import LegSwing
+from ranger_sim.sysid.pipeline import diagnose
 
 STEP_S, FINE, SIZE = 0.002, 4, 6000
 COUNT_RAD = 2.0 * math.pi / 8192

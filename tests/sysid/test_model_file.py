@@ -15,9 +15,9 @@ from ranger_sim.sysid import model_file
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, SuppliedMotor
 from ranger_sim.sysid.benches.motor_run import error, motor_run
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines.motor_bench import MotorBench
 from ranger_sim.sysid.model_terms import NoFormError, effects_of, term_of
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
 
 BENCH = MotorBench()

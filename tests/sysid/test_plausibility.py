@@ -12,10 +12,10 @@ from ranger_sim.sysid import plausibility
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.benches.motor_run import motor_run
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machine import Effect, Known
 from ranger_sim.sysid.machines.motor_bench import MotorBench
 from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.regression import Regression
 from tests.sysid.test_diagnose import SIZE, Cart, cart_run
 

@@ -5,10 +5,10 @@ import pytest
 from ranger_sim.sysid import predicted_ties
 from ranger_sim.sysid.benches.motor_run import motor_run
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machine import Effect
 from ranger_sim.sysid.machines.motor_bench import MotorBench
 from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.test_diagnose import Cart, cart_run
 
 

@@ -589,7 +589,7 @@ def test_a_needed_channel_that_is_missing_is_told_with_what_names_it(table):
         channels.named_for(data, "motor-bench")
     with pytest.raises(UserError, match="hip_angle_rad"):
         channels.named_for(data, "leg-swing")
-    with pytest.raises(UserError, match="'bench': no such experiment; there are motor-bench, leg-swing"):
+    with pytest.raises(UserError, match="unknown experiment 'bench' .available: motor-bench, leg-swing"):
         channels.named_for(data, "bench")
 
 

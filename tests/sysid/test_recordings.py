@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import losses
+from ranger_sim.sysid import losses, preparation
 from ranger_sim.sysid.machines import made
-from ranger_sim.tools.diagnose import work
 from ranger_sim.tools.recordings import datasets
 from tests.boards.original_images import DATA
 
@@ -14,7 +13,7 @@ needs_data = pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason=f"
 
 
 def prepared(path, experiment, mapping=None, accepted=losses.ACCEPTED):
-    return work.prepared(datasets.open_recording(path, mapping), made(experiment)(), experiment, accepted)
+    return preparation.prepared(datasets.open_recording(path, mapping), made(experiment)(), accepted)
 
 
 def bench(path, change=lambda name, value: value, count=400):
@@ -109,7 +108,7 @@ def test_rows_that_cannot_be_read_are_lost_in_every_channel(tmp_path):
 def test_a_repair_of_a_channel_that_is_not_there_is_refused(tmp_path):
     data = datasets.open_recording(bench(tmp_path / "a.csv"))
     with pytest.raises(UserError, match=r"--repair amps: unknown channel of a.csv \(available: voltage_V, current_A"):
-        work.prepared(data, made("motor-bench")(), "motor-bench", asked=["amps"])
+        preparation.prepared(data, made("motor-bench")(), asked=["amps"])
 
 
 def test_a_file_of_another_experiment_is_refused_in_a_line(tmp_path):

@@ -5,8 +5,8 @@ import pytest
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machine import Equation, Known, Quantity, Recording
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.residual_term import learn
 
 SIZE = 6000

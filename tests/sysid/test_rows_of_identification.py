@@ -13,7 +13,7 @@ from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid import plausibility
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify import ankle, blocks, legs, motor
+from ranger_sim.sysid.identification import ankle, blocks, legs, motor
 from ranger_sim.sysid.instruments import Instrument
 from ranger_sim.sysid.machine import Known
 

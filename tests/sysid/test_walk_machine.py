@@ -7,9 +7,9 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
-from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines.walk import Walk, mechanics, strikes, timebase
 from ranger_sim.sysid.machines.walk.mechanics import Motion, Numbers
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.recordings import datasets
 

@@ -107,7 +107,7 @@ def test_a_broken_parameter_file_gets_one_line(command, tmp_path, content, words
         ('[[term]]\nform = "magic"\nat = "hip"\n', ["term 1", "magic"]),
         ('[[term]]\nform = "edge_jitter"\nat = "moon"\n', ["term 1", "moon"]),
         ("[extra]\n", ["extra"]),
-        ('[[term]]\nform = {}\nat = "hip"\n', ["term 1", "form is {}"]),
+        ('[[term]]\nform = {}\nat = "hip"\n', ["term 1", "unknown form '{}'"]),
     ],
 )
 def test_a_broken_model_file_gets_one_line(command, tmp_path, content, words):

@@ -63,9 +63,9 @@ def test_the_json_has_the_same_for_programs(capsys):
 @pytest.mark.parametrize(
     ("typed", "words"),
     [
-        ("MCH.joint_encodr:stuck", "meant was perhaps MCH.joint_encoder"),
-        ("MCH.joint_encoder:stuk", "meant was perhaps stuck"),
-        ("MCH.joint_encoder:stuck,levl=1", "meant was perhaps level"),
+        ("MCH.joint_encodr:stuck", "did you mean 'MCH.joint_encoder'"),
+        ("MCH.joint_encoder:stuk", "unknown mode 'stuk'"),
+        ("MCH.joint_encoder:stuck,levl=1", "level"),
         ("MCH.joint_encoder:stuck,level=4", "level is '4', allowed are 0 to 3"),
         ("MCH.joint_encoder:stuck,level=high", "level is 'high'"),
         ("MCH.joint_encoder:stuck,level", "is not name=value"),
@@ -81,7 +81,7 @@ def test_what_is_typed_wrong_is_refused_in_a_line_that_says_what_was_perhaps_mea
 
 
 def test_a_place_that_is_not_there_is_refused_by_the_list_too(capsys):
-    assert "meant was perhaps world.floor" in refused(capsys, "faults", "world.flor")
+    assert "did you mean 'world.floor'" in refused(capsys, "faults", "world.flor")
 
 
 def test_a_fault_reads_back_as_it_was_typed():

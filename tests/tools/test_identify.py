@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from ranger_sim.sysid.identify import motor, registry
-from ranger_sim.sysid.identify.registry import OF_TABLES
+from ranger_sim.sysid.identification import motor, registry
+from ranger_sim.sysid.identification.registry import OF_TABLES
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.identify import command
 
@@ -88,7 +88,7 @@ def test_columns_in_other_units_and_names_are_read(folder, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["stal"], "bench 'stal': there is none; there are stall, cantilever, pulley"),
+        (["stal"], "unknown bench 'stal' (available: stall, cantilever, pulley"),
         (["stall", "--data", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["stall", "--known", "R=1"], "--known 'R=1': NAME=VALUE+-SD is needed"),
         (["stall", "--known", "R=1+-0"], "--known 'R=1+-0': NAME=VALUE+-SD is needed"),

@@ -2,29 +2,27 @@
 
 import argparse
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 SHELLS = ("bash", "zsh", "fish")
 FILES = {"FILE", "PROFILE", "DATA", "LOG", "FIGURES", "PAGE"}  # help's names for values that are, or may be, a file
 
 
-def register(commands: Any) -> None:
-    """Add the subcommand to the command line."""
+def register(commands: Any, parser: Callable[[], argparse.ArgumentParser]) -> None:
+    """Add the subcommand to the command line. parser: makes the parser of all commands, including this one."""
     command = commands.add_parser(
         "completion",
         help="a script by which bash, zsh or fish finish commands, options and file names",
         description="Prints the script; docs/reference/commands.md says where each shell looks for it.",
     )
     command.add_argument("shell", choices=SHELLS, metavar="{" + ",".join(SHELLS) + "}", help="whose script")
-    command.set_defaults(run=run)
+    command.set_defaults(run=lambda options: run(options, parser()))
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, whole: argparse.ArgumentParser) -> int:
     """Print the script."""
-    from ranger_sim.tools.cli import parser  # all commands, including this one
-
-    print(script(parser(), options.shell))
+    print(script(whole, options.shell))
     return 0
 
 

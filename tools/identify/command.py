@@ -9,7 +9,7 @@ from typing import Any
 from ranger_sim.tools.command_line.units import number, whole_number
 from ranger_sim.tools.recordings import datasets
 
-# the same as in sysid/identify/registry.py; a test compares them
+# the same as in sysid/identification/registry.py; a test compares them
 BENCHES = {
     "stall": "Motor held: resistance and contact drop",
     "cantilever": "Motor against a brake: torque constant, and all of table 3 at once",

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit
-from ranger_sim.sysid.identify import legs, motor
+from ranger_sim.sysid.identification import legs, motor
 from ranger_sim.tools.report.figures import HIP, INK, INNER, OUTER, Figure, finished, library
 
 HERE = pathlib.Path(__file__).parent

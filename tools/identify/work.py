@@ -1,15 +1,13 @@
-"""The work of `ranger-sim identify`.
+"""The work of `ranger-sim identify`: options, tables on the screen, files. `sysid/identification` does the rest.
 
 Without --data the virtual bench records, and results are shown next to the true values.
 """
 
 import argparse
-import dataclasses
 import json
 import math
 import pathlib
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -17,23 +15,16 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ranger_sim.foundation.user_error import UserError, printable
-from ranger_sim.plant import terms
-from ranger_sim.sysid import losses, readers, repairs, sanity
-from ranger_sim.sysid.benches.bench_terms import BenchTerms
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify import coverage, legs, motor
-from ranger_sim.sysid.identify.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
+from ranger_sim.sysid.identification import coverage
+from ranger_sim.sysid.identification.run import ALL, UNEXPLAINED, identification
 from ranger_sim.sysid.readers.columns import mapping_of
 from ranger_sim.tools.command_line import files, streams, terminal
 from ranger_sim.tools.identify import page
 
-ALL = "all"
 EXIT_DONE, EXIT_REFUSED = 0, 1
-# Residual in standard deviations of the stated instruments, above which noise is no explanation. Chosen by us: double
-# noise may be another instrument's.
-UNEXPLAINED = 2.0
 UNEXPLAINED_TEXT = (
     "the residual is {:.0f} times the instruments' noise: something that is not in the model moves it, "
     "and these values may stand in for it (not physical)"
@@ -46,20 +37,23 @@ def run(options: argparse.Namespace) -> int:
     folder = files.writable_folder(options.out) if options.out else None
     # with --json - standard output gets only the JSON
     console = terminal.console(markup=True, highlight=False, stderr=options.json == "-")
-    if options.gear <= 0.0 or not math.isfinite(options.gear):
-        raise UserError(f"--gear {options.gear!r}: it must be above 0")
     if options.coverage is not None:
         told = run_coverage(options, console)
         write(told, options, target)
         return EXIT_DONE
-    known = [known_of(text) for text in options.known]
-    machine = machine_with(options, console)
-    if options.bench == ALL:
-        if known:
-            raise UserError("--known belongs to a single bench")
-        recordings, told, fits = identify_all(options, machine, console)
-    else:
-        recordings, told, fits = identify_one(options, machine, known, console)
+    done = identification(
+        options.bench,
+        options.data,
+        [known_of(text) for text in options.known],
+        options.gear,
+        options.model,
+        options.accept_loss,
+        mapping_of(options.map),
+        options.seed,
+        report=lambda line: console.print(escape(line)),
+        before=lambda line: console.print(f"[dim]{escape(line)}[/dim]"),
+    )
+    recordings, fits, told = done.recordings, done.fits, done.result.to_dict()
     truth = told["truth"]
     for title, found in fits.items():
         console.print(f"\n[bold]{escape(title)}[/bold]")
@@ -104,114 +98,6 @@ def known_of(text: str) -> Parameter:
     return Parameter(name.strip(), "", number, uncertainty=sd)
 
 
-def machine_with(options: argparse.Namespace, console: Console) -> coverage.Machine:
-    """The robot that the virtual benches measure, with the terms of --model; reports terms that a bench lacks."""
-    if options.model is None:
-        return coverage.ROBOT
-    if options.data is not None:
-        raise UserError("--model is what a virtual bench has; with --data use `ranger-sim diagnose --model`")
-    model, told = terms.load(options.model), terms.content_of(options.model).get("diagnosis", {})
-    fitted = told.get("parameters", {}) if told.get("experiment") == "motor-bench" else {}
-    made = BenchTerms(model.terms, fitted, float(told.get("gear", options.gear)))
-    for name in model.left_out:
-        console.print(escape(f"{options.model}: {name} is left out"))
-    benches = OF_TABLES if options.bench == ALL else (bench_of(options.bench).name,)
-    for each in dict.fromkeys(each for bench in benches for each in made.not_of_bench(bench)):
-        missing = [bench for bench in benches if each in made.not_of_bench(bench)]
-        console.print(escape(f"{options.model}: {each} has no part in {', '.join(missing)}"))
-    return dataclasses.replace(coverage.ROBOT, terms=made)
-
-
-def recorded(
-    name: str, path: pathlib.Path, mapping: dict[str, str], console: Console, accepted: float = losses.ACCEPTED
-) -> Dataset:
-    """A user's recording of a bench; anomalies in a series of samples are reported.
-
-    accepted: share of a channel's samples that may be lost. UserError if more are.
-    """
-    data = readers.read(path, mapping)
-    if name in ("pendulum", "ankle-sine"):  # the others are single readings
-        findings = sanity.inspect(data)
-        sanity.stop_if_fatal(str(path), findings)
-        if name == "ankle-sine":  # the legs of a pendulum may have separate stamps
-            data = repairs.mend(data, findings, [each for each in data.channels if each.startswith(("target", "cmd"))])
-        for finding in data.findings if name == "ankle-sine" else findings:
-            if finding.severity != "note":
-                console.print(escape(f"{path.name}: {finding.channel}: {finding.text}"))
-    losses.stop_if_too_many(data, data.channels, accepted)
-    return data
-
-
-def identify_one(
-    options: argparse.Namespace, machine: coverage.Machine, known: list[Parameter], console: Console
-) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
-    """One bench: recordings, report, fits by title."""
-    bench = bench_of(options.bench)
-    tell = before(console)
-    if options.data is not None:
-        path = pathlib.Path(options.data)
-        recordings = {bench.name: recorded(bench.name, path, mapping_of(options.map), console, options.accept_loss)}
-        fits = {bench.name: alone(bench, recordings[bench.name], known, gear=options.gear, tell=tell)}
-        truth: dict[str, float] = {}
-    else:
-        if options.map:
-            raise UserError("--map names columns of a file: --data is needed")
-        if known:
-            recordings = {bench.name: bench.record(machine, options.seed)}
-            fits = {bench.name: alone(bench, recordings[bench.name], known, gear=options.gear, tell=tell)}
-        else:
-            recordings, fits = by_virtual_benches(bench, machine, options.seed, options.gear, tell)
-        truth = machine.truth()
-    titled = {}
-    for name, found in fits.items():
-        source = BENCHES[name].appendix
-        titled[f"{BENCHES[name].title} ({'appendix ' if source[0].isdigit() else ''}{source})"] = found
-    return recordings, told_of(options, titled, truth), titled
-
-
-def identify_all(
-    options: argparse.Namespace, machine: coverage.Machine, console: Console
-) -> tuple[dict[str, Dataset], dict, dict[str, Fit]]:
-    """Tables 2 and 3 in steps and jointly."""
-    if options.data is None:
-        recordings = {name: BENCHES[name].record(machine, options.seed) for name in OF_TABLES}
-        truth = machine.truth()
-    else:
-        folder, truth = pathlib.Path(options.data), {}
-        lacking = [name for name in OF_TABLES if not (folder / f"{name}.csv").is_file()]
-        if lacking:
-            raise UserError(f"--data {options.data}: for all a folder is needed; {lacking[0]}.csv is not in it")
-        mapping = mapping_of(options.map)
-        recordings = {
-            name: recorded(name, folder / f"{name}.csv", mapping, console, options.accept_loss) for name in OF_TABLES
-        }
-    tell = before(console)
-    of_motor = (recordings["stall"], recordings["cantilever"], recordings["pulley"])
-    of_legs = (recordings["level"], recordings["hang"], recordings["pendulum"])
-    motor_path = motor.steps(*of_motor, gear=options.gear, tell=tell)
-    leg_path = legs.steps(*of_legs, tell=tell)
-    fits = {
-        "Step 8.3.1: stall": motor_path.stall,
-        "Step 8.3.2: torque constant, with R and V_c of the stall": motor_path.power,
-        "Step 8.4: friction at the pulley, with that K": motor_path.friction,
-        "Step 7.2, 2-3: moment of mass": leg_path.level,
-        "Step 7.2, 4-5: hanging angle": leg_path.hang,
-        **{f"Step 7.2, 6-7: period of the {name} leg": found for name, found in leg_path.periods.items()},
-        "Table 3, one joint fit": motor.joint(*of_motor, gear=options.gear, tell=tell),
-        "Table 2, inertia, one joint fit": legs.joint(*of_legs, tell=tell),
-        **{
-            f"Table 2, {name}": alone(BENCHES[name], recordings[name], tell=tell)
-            for name in ("hip-spring", "ankle-spring")
-        },
-    }
-    return recordings, told_of(options, fits, truth), fits
-
-
-def before(console: Console) -> Any:
-    """Printed before each fit: identifiability."""
-    return lambda line: console.print(f"[dim]{escape(line)}[/dim]")
-
-
 def asked(names: Iterable[str]) -> list[str]:
     """The machine's own parameters: an instrument's are named BENCH.WHAT."""
     return [name for name in names if "." not in name]
@@ -242,54 +128,6 @@ def print_fit(console: Console, found: Fit, truth: dict[str, float]) -> None:
         console.print(
             f"[yellow]{UNEXPLAINED_TEXT.format(found.residual_rms)}[/yellow]",
         )
-
-
-def told_of(options: argparse.Namespace, fits: dict[str, Fit], truth: dict[str, float]) -> dict:
-    """Everything as plain data."""
-    balance = [
-        {**{key: getattr(row, key) for key in row.__dataclass_fields__}, "balanced": row.balanced}
-        for found in fits.values()
-        if not found.refused and set(legs.TABLE_2_LEGS) <= set(found.names) and "level.arm_m" in found.names
-        for row in legs.balance(found)
-    ]
-    return {
-        "bench": options.bench,
-        "data": None if options.data is None else printable(options.data),
-        "seed": options.seed if options.data is None else None,
-        "gear": options.gear,
-        "fits": [fit_as_data(title, found) for title, found in fits.items()],
-        "balance": balance,
-        "truth": truth,
-    }
-
-
-def fit_as_data(title: str, found: Fit) -> dict:
-    """One fit as plain data."""
-    singular = [float(value) for value in found.identifiability.singular_values]
-    return {
-        "title": title,
-        "refused": found.refused or None,
-        "parameters": {
-            name: {
-                "value": found.values[name],
-                "standard_error": found.standard_errors[name],
-                "ci95": list(found.ci95[name]),
-                "unit": found.units[name],
-                "instrument": "." in name,
-            }
-            for name in found.values
-        },
-        "residual_rms": found.residual_rms,
-        "unexplained": found.residual_rms > UNEXPLAINED,
-        "samples": len(found.residual),
-        "effective_samples": found.effective_samples,
-        "rho": found.rho,
-        "identifiability": {
-            "singular_values": singular,
-            "not_separable": [list(tie) for tie in found.identifiability.ties],
-            "sensitivity": found.sensitivity,
-        },
-    }
 
 
 def csv_of(data: Dataset) -> str:

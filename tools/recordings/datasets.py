@@ -6,7 +6,7 @@ import pathlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import losses, readers
 from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns, frames
@@ -59,10 +59,10 @@ def open_recording(
     path = pathlib.Path(path)
     if path.is_file() and _has_frames(path, bool(databases)):
         if not databases:
-            raise UserError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
+            raise DataError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
         return _decoded(path, mapping, databases, each_frame, buses)
     if buses:
-        raise UserError(f"--bus {' '.join(buses)}: {path} is not a recording of CAN frames, or --dbc is missing")
+        raise DataError(f"--bus {' '.join(buses)}: {path} is not a recording of CAN frames, or --dbc is missing")
     return readers.read(path, mapping, time_unit=time_unit, variable_units=robot_units())
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.ranger import BOARD_CLASSES, Ranger
 from ranger_sim.harness.scenario import Scenario, StopRule
 from ranger_sim.harness.timing import robot_figures, static_check
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     """Check, run, print; 0, or 1 when a slot of the run overran."""
     names = list(BOARD_CLASSES) if options.board is None else [options.board]
     if options.board is not None and options.board not in BOARD_CLASSES:
-        raise UserError(f"board {options.board!r}: there is none of this name, but {', '.join(BOARD_CLASSES)}")
+        raise UserError(unknown("board", options.board, BOARD_CLASSES))
     if options.time is not None and options.time <= FIRST_SECONDS:
         raise UserError(f"--time {options.time:g}: the first {FIRST_SECONDS:g} s do not count, so more are needed")
     json_file = json_target(options.json)

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
@@ -92,7 +92,7 @@ class MotorBench:
         """Signals and the two or three equations of one recording."""
         missing = [each.name for each in self.quantities if each.needed and each.name not in table]
         if missing:
-            raise UserError(
+            raise ModelError(
                 f"{table.name}: {self.name} needs {', '.join(missing)}; there are {', '.join(table.columns)}"
             )
         table = signals.uniform(table)
@@ -227,13 +227,13 @@ def _same_motion(table: Table, angle: Array, w: Array) -> None:
     factor = float(np.std(turning) / np.std(speed))
     alike = float(np.corrcoef(turning, speed)[0, 1])
     if abs(alike) < SAME_MOTION:
-        raise UserError(
+        raise ModelError(
             f"{table.name}: motor_angle_rad and speed_rad_per_s are not the same motion (correlation {alike:.2f}); "
             "nothing is concluded from such data"
         )
     if alike < 0.0 or not 1.0 / SAME_SPEED < factor < SAME_SPEED:
         told = f"{factor:.3g} times as fast" if alike > 0.0 else "the other way round"
-        raise UserError(
+        raise ModelError(
             f"{table.name}: motor_angle_rad over the gear turns {told} as speed_rad_per_s: another gear (--gear), or "
             "one of the two in another unit; nothing is concluded from such data"
         )
@@ -242,7 +242,7 @@ def _same_motion(table: Table, angle: Array, w: Array) -> None:
 def _one_way(table: Table, induced: Array, w: Array) -> None:
     """Raise UserError when the voltage without the winding's drop opposes the speed: no motor turns so."""
     if np.std(induced) > 0.0 and np.std(w) > 0.0 and float(np.corrcoef(induced, w)[0, 1]) < -SAME_MOTION:
-        raise UserError(
+        raise ModelError(
             f"{table.name}: voltage_V and speed_rad_per_s have opposite signs: what resistance and brushes leave of "
             "the voltage goes against the speed; nothing is concluded from such data"
         )

@@ -7,7 +7,7 @@ import numpy as np
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
-from ranger_sim.sysid.machines.walk.machine import (
+from ranger_sim.sysid.machines.walk.recording import (
     GYRO_BIAS_REACH_RAD_S,
     SIGN_RAD_S,
     Rows,

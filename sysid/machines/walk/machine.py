@@ -13,21 +13,20 @@ The fit covers differences between robots (a drive's R, K and friction, zeros of
 constant of its integral) and not the body file's numbers: their deviations are causes. `Numbers` lists both.
 """
 
-import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy import ndimage
 
-from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant import body_files
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import channels, signals
 from ranger_sim.sysid.dataset import Array, Dataset, Table
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
-from ranger_sim.sysid.machines.walk import mechanics, strikes
+from ranger_sim.sysid.machines.walk import causes, mechanics, strikes
 from ranger_sim.sysid.machines.walk.base import PRIORS, TOLERATED, HIP_K_Nm_per_A
 from ranger_sim.sysid.machines.walk.mechanics import LEGS, Course, Left, Motion, Numbers
+from ranger_sim.sysid.machines.walk.recording import GYRO_BIAS_REACH_RAD_S, SIGN_RAD_S, Rows, WalkRecording, numbers_of
 from ranger_sim.sysid.machines.walk.timebase import even_table, freshness
 
 SMOOTH_S = 0.020  # Gaussian of all courses: stamps of 2 ms leave 0.3 rad/s^2 of noise in the hip's acceleration
@@ -37,16 +36,13 @@ UNSURE_S = 0.040  # more on either side where only the hip indicates strikes
 STEADY_A = 0.6  # between neighbouring samples of a slow current: above it, the time of the change is unknown
 JUMP_REACH = 1.5  # Gaussians about such a jump that do not count
 GYRO_BIAS_RAD_S = -0.004  # as the firmware of 2011 subtracts it (robot.md C3.1); the leg's rate has the opposite sign
-GYRO_BIAS_REACH_RAD_S = 0.02  # of any sound gyro: its log at rest spans -0.006 to 0.024 (robot.md C6.2)
 LOAD_FRICTION = 0.1  # mu of the hip's gearhead: appendix table 3; the constant itself is fitted
-SIGN_RAD_S = 0.05  # rate over which a sign changes, as in the plant (EQUATIONS 2.1)
 SIGN_A = 0.05  # current over which the brushes' drop changes; chosen by us: a few counts of the sensors
 STICKS_RAD_S = 0.3  # near standstill friction may be anything up to its limit (appendix eq. 35)
 SLOW_FOOT_RAD_S = 1.5  # above it, stamps of a millisecond between motor and joint are two counts of the cable
 COUNT_RAD = 2.0 * np.pi / 8192.0  # of a joint's encoder: a cable's stretch is not known better
 ROBUST_ROUNDS = 8
 SPIKE, FEW = 6.0, 0.08  # deviations beyond which single rows do not count, if they are at most this part
-FEWEST_ROWS = 60  # of a usable equation
 
 ANGLES = ("hip_angle_rad", "outer_ankle_angle_rad", "inner_ankle_angle_rad", "outer_motor_angle_rad",
           "inner_motor_angle_rad")  # fmt: skip
@@ -62,79 +58,6 @@ NEEDS = {
     "a winding": "its voltage, current, and rate or angle",
     "encoders": "an angle and its rate",
 }
-
-
-@dataclasses.dataclass
-class Rows:
-    """One equation before it is linearised: left(numbers) -> (k,) at the rows `where`, and measured columns."""
-
-    name: str
-    letter: str
-    subsystem: str
-    unit: str
-    where: np.ndarray
-    left: Callable[[Numbers], Array]
-    base: tuple[str, ...] = ()  # fields of Numbers that are fitted
-    columns: dict[str, Array] = dataclasses.field(default_factory=dict)  # (n,), by parameter
-    repeats: bool = False  # noise is the difference from stride to stride, otherwise the equation's whole residual
-    fewest: int = FEWEST_ROWS
-    floor: float = 0.0  # of the noise: the part that is the same in all strides, which their differences do not show
-
-
-@functools.cache
-def numbers_of(body: str) -> tuple[Numbers, float]:
-    """Numbers of a body by name or file, and the joint angle of its sweet spot."""
-    p = body_files.load(body).parameters
-    return Numbers.of(p), p.ankle_zero_rad
-
-
-@dataclasses.dataclass
-class WalkRecording(Recording):
-    """A recording with its equations as functions of `Numbers`, for the effects' columns."""
-
-    rows: list[Rows] = dataclasses.field(default_factory=list)
-    numbers: Numbers = dataclasses.field(default_factory=lambda: numbers_of("ranger")[0])
-    gyro_bias_rad_s: float = 0.0  # in addition to the known one, by closures
-    closures: tuple[np.ndarray, Array] | None = None  # rows of strikes, and the gyro's gain since the last, rad/s
-    loads: dict[str, Array] = dataclasses.field(default_factory=dict)  # N m, of the cable, by equation
-    places: np.ndarray | None = None  # (n,) of rows that may count: number of their place in the stride, else -1
-    seen: dict[str, Array] = dataclasses.field(default_factory=dict)
-
-    def slope(self, equation: str, changes: tuple[tuple[str, float], ...]) -> Array:
-        """(n,) minus the derivative of an equation's residual, on a change of numbers: {field: weight}.
-
-        The mean over the other strides at the same place: a stride's own derivative would share the noise of its
-        accelerations with the residual, and its square would look like a mass of 3 % too much.
-        """
-        if changes == (("leg_lag_drift_s", 1.0),):  # the lag's, as it grows: it differs between the strides
-            return self.slope(equation, (("leg_lag_s", 1.0),)) * np.linspace(-1.0, 1.0, len(self.table))
-        key = f"{equation} by {changes}"
-        if key not in self.seen:
-            rows = next(each for each in self.rows if each.name == equation)
-            steps = {field: weight * STEP for field, weight in changes}
-            up, down = (_moved(self.numbers, steps, sign) for sign in (1.0, -1.0))
-            out = np.zeros(len(self.table))
-            out[rows.where] = -(rows.left(up) - rows.left(down)) / (2.0 * STEP)
-            if self.places is not None:
-                out[rows.where] = _of_others(out[rows.where], self.places[rows.where])
-            self.seen[key] = out
-        return self.seen[key]
-
-
-def _of_others(values: Array, places: np.ndarray) -> Array:
-    """Mean of the other values at the same place; where there are none, the value itself."""
-    _, place, count = np.unique(places, return_inverse=True, return_counts=True)
-    others = np.bincount(place, values)[place] - values
-    return np.where(count[place] > 1, others / np.maximum(count[place] - 1, 1), values)
-
-
-STEP = 1e-4  # of differences; all numbers are between 0.001 and 20 in SI, and residuals nearly linear in them
-
-
-def _moved(numbers: Numbers, steps: Mapping[str, float], sign: float) -> Numbers:
-    return dataclasses.replace(
-        numbers, **{field: getattr(numbers, field) + sign * step for field, step in steps.items()}
-    )
 
 
 class Walk:
@@ -179,7 +102,7 @@ class Walk:
         rows += _encoder_rows(table, single, recording)
         recording.rows = [each for each in rows if len(each.where) >= each.fewest]
         if not recording.rows:
-            raise UserError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
+            raise ModelError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
         for each in recording.rows:
             recording.equations[each.name] = _equation(recording, each, self.numbers)
             if recording.places is not None and each.repeats:
@@ -272,8 +195,6 @@ class Walk:
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The catalogue's causes that such a log can have."""
-        from ranger_sim.sysid.machines.walk import causes
-
         walks = [each for each in recordings if isinstance(each, WalkRecording)]
         return causes.made(walks)
 

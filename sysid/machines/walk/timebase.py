@@ -7,7 +7,7 @@ slow channel, a column "NAME fresh", 1.0 at a sample and 0.0 elsewhere.
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Table
 
 FINEST_STEP_S, COARSEST_STEP_S = 0.002, 0.008
@@ -29,7 +29,7 @@ def even_table(dataset: Dataset, names: list[str], carrying: tuple[str, ...]) ->
     start = max(float(channel.time_s[0]) for channel in carriers)
     stop = min(float(channel.time_s[-1]) for channel in carriers)
     if stop - start < 20.0 * step_s:
-        raise UserError(f"{dataset.name}: {', '.join(each.name for each in carriers)} have no time in common")
+        raise ModelError(f"{dataset.name}: {', '.join(each.name for each in carriers)} have no time in common")
     count = int((stop - start) / step_s + 1e-9) + 1
     time_s = np.asarray(start + step_s * np.arange(count), dtype=np.float64)
     columns: dict[str, Array] = {}
@@ -48,7 +48,7 @@ def even_table(dataset: Dataset, names: list[str], carrying: tuple[str, ...]) ->
             columns[name + FRESH] = _fresh(channel.time_s, time_s, step_s)
     kept = np.flatnonzero(~lost)
     if len(kept) < 20:
-        raise UserError(f"{dataset.name}: hardly any time in which all of {', '.join(c.name for c in carriers)} came")
+        raise ModelError(f"{dataset.name}: hardly any time in which all of {', '.join(c.name for c in carriers)} came")
     begins = np.flatnonzero(np.diff(kept, prepend=-2) != 1)
     runs = tuple(slice(int(a), int(b)) for a, b in zip(begins, [*begins[1:], len(kept)], strict=True))
     return Table(time_s[kept], {name: column[kept] for name, column in columns.items()}, runs, dataset.name)

@@ -3,7 +3,8 @@
 import pathlib
 import shutil
 
-from ranger_sim.firmware_sim.native.build import COMPILERS, build
+from ranger_sim.firmware_sim.native.build import build
+from ranger_sim.firmware_sim.native.compiler import COMPILERS
 from ranger_sim.firmware_sim.native.manifest import load
 
 EXAMPLE = pathlib.Path(__file__).parent / "example"

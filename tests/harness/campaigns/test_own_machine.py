@@ -47,7 +47,7 @@ def test_settings_are_the_keywords_of_what_makes_it():
         ({"band": {"angel_rad": 0.1}}, r"\[band\] angel_rad: it is no quantity of the body, but angle_rad"),
         ({"band": {"angle_rad": -1.0}}, "a number above 0 is expected"),
         ({"vary": {"controller.P": [1.0]}}, r"no setting \(seed, machine.KEYWORD, cost.BOARD.TASK\)"),
-        ({"vary": {"fault": ["DRIVE.encodr:stuck"]}}, "meant was perhaps DRIVE.encoder"),
+        ({"vary": {"fault": ["DRIVE.encodr:stuck"]}}, "unknown fault place 'DRIVE.encodr'"),
         ({"vary": {"fault": ["DRIVE.encoder:stuck@step 3"]}}, "it reads like 12.3 s, angle_rad > 0.3"),
     ],
 )

@@ -124,7 +124,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
 @pytest.mark.parametrize(
     ("data", "told"),
     [
-        ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "meant was perhaps stuck"),
+        ({"vary": {"fault": ["MCH.absolute_encoder:stuk@step 6"]}}, "unknown mode 'stuk'"),
         ({"vary": {"fault": ["MCH.encoder:stuck"]}}, "fault place 'MCH.encoder'"),
         ({"vary": {"fault": [STUCK]}}, "'start' is no name of [vary]"),
         ({"vary": {"fault": ["MCH.joint_encoder:stuck@{"]}}, "Single '{'"),
@@ -135,7 +135,7 @@ def test_later_rounds_stay_near_the_worst_point_and_inside_the_ranges():
             "rate is '9', allowed are -5.2 to 5.2",
         ),
         ({"walk": {"seed": 1.5}}, "[walk]: scenario: seed is 1.5, a whole number"),
-        ({"walk": {"controller": "nobody"}}, "[walk]: controller 'nobody': unknown"),
+        ({"walk": {"controller": "nobody"}}, "[walk]: unknown controller 'nobody'"),
         ({"vary": {"seed": ["one"]}}, "[vary] seed = one: scenario: seed is 'one', a whole number"),
         ({"vary": {"body.gear_of_the_hip": [60]}}, "[vary] body.gear_of_the_hip = 60: "),
         ({"vary": {"controller.P_X": ["fast"]}}, "[vary] controller.P_X = ['fast']: a list of numbers"),

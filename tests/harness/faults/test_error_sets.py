@@ -110,7 +110,7 @@ def test_a_set_whose_faults_had_no_time_to_begin_does_not_keep_the_next_one_wait
 @pytest.mark.parametrize(
     ("sets", "words"),
     [
-        ((ErrorSet("a", ("MCH.joint_encoder:stuk",)),), "meant was perhaps stuck"),
+        ((ErrorSet("a", ("MCH.joint_encoder:stuk",)),), "unknown mode 'stuk'"),
         ((ErrorSet("a", ("MCH.joint_encoder:stuck@3 s",)),), "its set says when it begins"),
         ((ErrorSet("a", (), trigger="stp 3"),), "reads like"),
     ],

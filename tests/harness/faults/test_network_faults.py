@@ -66,7 +66,7 @@ def test_a_sender_that_cannot_see_an_error_is_refused_before_anything_runs():
             robot.inject("MCH.can1", "CRC", sender=1)
         with pytest.raises(UserError, match="no recessive stuff bit"):
             robot.inject("MCH.can1", "BIT_STUFFING", sender=1, frame="0x555")
-        with pytest.raises(UserError, match="meant was perhaps MCH_ANGLE"):
+        with pytest.raises(UserError, match="did you mean 'MCH_ANGLE'"):
             robot.inject("MCH.can1", "loss", frame="MCH_ANGEL")
         with pytest.raises(UserError, match="it needs"):
             robot.inject("can1", "ACK")

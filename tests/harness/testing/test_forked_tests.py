@@ -178,11 +178,11 @@ def test_a_wrong_order_is_told_in_a_line(done):
 
 def test_a_wrong_mark_or_call_is_told_where_it_is_made_and_the_other_tests_go_on(done):
     assert "seed is 'three', a whole number from 0 on is expected" in done.reason("test_wrong_seed")
-    assert "meant was perhaps AE_SPIKE" in done.reason("test_wrong_error")
+    assert "did you mean 'AE_SPIKE'" in done.reason("test_wrong_error")
     assert "expects(overrun=...): what can be expected is overruns" in done.reason("test_wrong_expectation")
     assert "'fall' has no name" in done.reason("test_expectation_without_name")
     assert "mark can_bus: " in done.reason("test_wrong_bus") and "'bitrate'" in done.reason("test_wrong_bus")
-    assert "meant was perhaps MCH.joint_encoder" in done.reason("test_mistake_in_a_call")
+    assert "did you mean 'MCH.joint_encoder'" in done.reason("test_mistake_in_a_call")
     assert "catalogue.py" not in done.reason("test_mistake_in_a_call")  # not how we came to say so
     assert "INTERNALERROR" not in done.text
 

@@ -202,5 +202,5 @@ def test_a_frame_is_told_in_a_line():
     assert frame(1500, lo=0x3F000000).text() == f"    0.001500 s  can1  {ANGLE:03X} MCH_ANGLE 0.5 (stamp 7)"
     assert frame(1500, flags=FLAG_ERROR).text() == "    0.001500 s  can1  error frame"
     assert frame(0, flags=FLAG_ERROR).is_error and not frame(0).is_error
-    with pytest.raises(UserError, match="bus 'can9': there is none of this name, but can1"):
+    with pytest.raises(UserError, match="unknown bus 'can9' .available: can1"):
         BusAlone().wire("can9")

@@ -15,7 +15,7 @@ from ranger_sim.tools.cli import main
         ("wlak", "unknown 'wlak'; did you mean 'walk'?"),
         ("zzz", "unknown 'zzz'; available: help, walk, info, "),
         ("table shw MCH_ANGLE", "unknown 'shw'; did you mean 'show'?"),
-        ("table show MCH_ANGEL", "unknown variable 'MCH_ANGEL': did you mean 'MCH_ANGLE' or"),
+        ("table show MCH_ANGEL", "unknown variable 'MCH_ANGEL'; did you mean 'MCH_ANGLE' or"),
         ("walk --log ful", "unknown 'ful'; did you mean 'full'?"),
         ("walk --step 5", "unrecognized arguments: --step 5; did you mean '--steps'?"),
         ("walk --floor 1mm", "unrecognized arguments: --floor 1mm; did you mean '--floor-roughness'?"),

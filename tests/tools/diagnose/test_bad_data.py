@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.dataset import Finding
 from ranger_sim.sysid.machines import MACHINES, made
+from ranger_sim.sysid.pipeline import diagnose
+from ranger_sim.sysid.preparation import Prepared
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.diagnose import work
 from tests.examples import examples
@@ -180,16 +182,17 @@ def test_a_name_of_a_file_that_is_not_utf_8_is_escaped_in_the_answer(tmp_path, c
 def walk_with_gaps():
     """What a diagnosis has to print of a recording with many gaps, and no gain."""
     gaps = [
-        {"recording": "walk", "channel": f"{name}_rad", "kind": "gap", "start_s": 1.0 * k, "end_s": 2.0,
-         "size": 0.1 * k, "unit": "s", "text": f"no sample for {0.1 * k:.4g} s, usual are 0.002 s", "severity": "note"}
-        for name in ("hip", "knee") for k in range(1, 4)
-    ]  # fmt: skip
-    return diagnose(Cart(), [cart_run(1, drag=0.02)], [], 0, gaps)
+        Finding(f"{name}_rad", "gap", 1.0 * k, 2.0, 0.1 * k, "s", f"no sample for {0.1 * k:.4g} s", "note")
+        for name in ("hip", "knee")
+        for k in range(1, 4)
+    ]
+    run = cart_run(1, drag=0.02)
+    run.name = "walk"
+    return diagnose(Cart(), [run], prepared=[Prepared(run, gaps, [], {})])
 
 
 def test_many_gaps_are_one_line_on_a_screen_and_a_gain_is_shown_where_one_was_measured():
     found = walk_with_gaps()
-    found.answer["data_repairs"] = []
     console = Console(file=io.StringIO(), width=200)
     work._show(found, console)
     printed = console.file.getvalue()

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from ranger_sim.sysid import causes
-from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
 from tests.sysid.test_diagnose import Cart, cart_run
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnose import diagnose
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.diagnose import figures, page, words
 from ranger_sim.tools.report.figures import library
 from tests.sysid.test_diagnose import Cart, cart_run

@@ -118,7 +118,7 @@ def test_ctrl_c_at_the_robots_terminal_ends_a_run_that_a_debugger_holds_and_fini
     ("wanted", "line"),
     [
         (("UI=3333",), "gdb UI=3333: UI runs no machine code, so give it an --image"),
-        (("HIP=3333",), "gdb HIP=3333: there is no board HIP; there are MCH, UI"),
+        (("HIP=3333",), "gdb HIP=3333: unknown board 'HIP' (available: MCH, UI"),
         (("MCH=here",), "gdb 'MCH=here': BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333"),
         (("3333",), "gdb '3333': BOARD=PORT or BOARD=HOST:PORT is expected, as in MCH=3333"),
         (("MCH=0", "MCH=0"), "gdb MCH=0: MCH has a door already"),

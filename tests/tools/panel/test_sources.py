@@ -498,7 +498,7 @@ def test_two_recordings_are_laid_over_each_other_by_an_event(stepped):
         ("level_V", "it reads like FSM_HIP = 3"),
         ("level_V = much", "it reads like FSM_HIP = 3"),
         ("level_V > 5", "level_V > 5 does not begin anywhere in it"),
-        ("nothing = 1", "there is no channel nothing"),
+        ("nothing = 1", "unknown channel 'nothing'"),
     ],
 )
 def test_an_event_that_never_comes_is_told(stepped, event, words):

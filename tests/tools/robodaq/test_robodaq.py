@@ -171,7 +171,7 @@ def test_a_value_that_comes_before_the_packet_was_sent_confirms_nothing():
         ("MCH_ANGLE", 1.0, "not a parameter, it is published by MCH"),
         ("TIMESTAMP", 1.0, "published by CSR"),
         ("LV_CH_3", 1.0, "--fast and --medium"),
-        ("C_F_ST_FANG", 1.0, "no such variable; did you mean C_F_ST_F_ANG"),
+        ("C_F_ST_FANG", 1.0, "unknown variable 'C_F_ST_FANG'; did you mean 'C_F_ST_F_ANG'"),
         ("C_F_ST_F_ANG", 101.0, "C_F_ST_F_ANG = 101 is outside 0 to 100 A/rad"),
         ("C_F_ST_F_ANG", float("nan"), "a number is expected"),
         ("CTRL_HIP_KP", 1e39, "does not fit into its type, f32"),

@@ -90,7 +90,7 @@ def test_an_overrun_of_the_run_is_told_and_is_the_exit_code(capsys, monkeypatch,
 @pytest.mark.parametrize(
     "arguments, complaint",
     [
-        (["MCX"], "board 'MCX': there is none of this name"),
+        (["MCX"], "unknown board 'MCX'"),
         (["MCH", "--time", "0.1"], "--time 0.1: the first 0.1 s do not count, so more are needed"),
     ],
 )

@@ -15,7 +15,7 @@ from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid.benches.ankle_sine import ENCODER, DAMPING_As_per_rad, STIFFNESS_A_per_rad
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify.blocks import Block, column, solve
+from ranger_sim.sysid.identification.blocks import Block, column, solve
 
 Array = NDArray[np.float64]
 

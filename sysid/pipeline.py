@@ -1,8 +1,10 @@
 """From measured data to the simulation's errors: detect, localise, name, tie or abstain, extend, gain.
 
-The result is a `Diagnosis`, which `answer.py` turns into the printed answer; held-out data judge it in `held_out.py`.
+`api.py` has the same for files. The workings are a `Diagnosis`, of which `answer.py` makes the result; held-out data
+judge it in `held_out.py`.
 """
 
+import dataclasses
 from collections.abc import Callable, Sequence
 
 from threadpoolctl import threadpool_limits
@@ -11,9 +13,10 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import answer, by_candidates, held_out, intervals, misfit, naming, plausibility, residual_term
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
-from ranger_sim.sysid.held_out import simulated_again
+from ranger_sim.sysid.held_out import Held, simulated_again
 from ranger_sim.sysid.machine import Effect, Machine
 from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.preparation import Prepared
 from ranger_sim.sysid.regression import Regression
 
 NAMED_LEVEL = 0.005  # of the whole selection
@@ -29,21 +32,22 @@ def diagnose(
     tables: Sequence[Table],
     holdout: Sequence[Table] = (),
     seed: int = 0,
-    findings: Sequence[dict] = (),
+    prepared: Sequence[Prepared] = (),
     known: Sequence[KnownEffect] = (),
     progress: Progress = lambda what, share: None,
 ) -> Diagnosis:
     """Errors of `machine`'s equations about these recordings. UserError when they cannot be judged at all.
 
-    known: effects that the model has already; like the machine's parameters they are fitted again and are not findings.
+    prepared: of all these recordings, for the result's findings, repairs and ledger. known: effects that the model has
+    already; like the machine's parameters they are fitted again and are not findings.
     """
     progress("equations", 0.0)
     recordings = [machine.prepare(table) for table in tables]
     if all(each.noise_by_candidates for each in recordings):
         with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
             found = by_candidates.diagnose(machine, recordings, holdout, seed, known, _had, progress)
-        found.answer = answer.of(found, findings)
-        by_candidates.complete(found, [table.name for table in holdout])
+        judged = by_candidates.held(found, [table.name for table in holdout])
+        found.result = answer.of(found, found, judged, None, prepared)
         progress("done", 1.0)
         return found
     progress("general tests", 0.1)
@@ -81,32 +85,29 @@ def diagnose(
     found = Diagnosis(
         machine, recordings, plain, extended, skews, had, list(known), named, known_to, before, after, doubts
     )
-    found.answer = answer.of(found, findings)
     may_learn = found.doubtful and not doubts.forbid
     term = residual_term.learn(machine, recordings, plain, before) if may_learn else None
-    found.answer["evidence"]["residual_term"] = term.told() if term is not None else None
+    final, held, holdout_rms = found, None, None
     if holdout and found.detected:
         progress("gain", 0.85)
-        _hold_out(found, holdout, seed)
+        final, held = _hold_out(found, holdout, seed)
         if term is not None:
-            found.answer["evidence"]["residual_term"]["holdout_rms"] = _left(machine, term, holdout)
+            holdout_rms = _left(machine, term, holdout)
+    learned = term.result(holdout_rms) if term is not None else None
+    final.result = answer.of(found, final, held, learned, prepared)
     progress("done", 1.0)
-    return found
+    return final
 
 
-def _hold_out(found: Diagnosis, holdout: Sequence[Table], seed: int) -> None:
-    """Judgement by held-out data; effects that they refuse are no longer named."""
+def _hold_out(found: Diagnosis, holdout: Sequence[Table], seed: int) -> tuple[Diagnosis, Held]:
+    """The diagnosis without the effects that held-out data refuse, and their judgement."""
     named = [] if found.doubtful else found.named
     held = held_out.judged(found.machine, found.plain, found.extended, holdout, found.skews, named, seed)
-    told = found.answer
-    told["gain"] = held.told()
-    told["evidence"]["refused_by_holdout"] = [each.effect.name for each in held.refused]
-    told["evidence"]["holdout_excites_it"] = held.tells
-    if held.refused:
-        found.named = [each for each in named if each not in held.refused]
-        found.extended = naming.refit(found.plain, found.named, [*found.skews, *found.named], fresh=True)
-        told["causes"] = [answer.cause(found, each) for each in found.named]
-        told["abstained"] = not found.named
+    if not held.refused:
+        return found, held
+    kept = [each for each in named if each not in held.refused]
+    extended = naming.refit(found.plain, kept, [*found.skews, *kept], fresh=True)
+    return dataclasses.replace(found, named=kept, extended=extended), held
 
 
 def _name(
@@ -150,7 +151,7 @@ def _had(known: KnownEffect, effects: Sequence[Effect]) -> Named:
     raise UserError(f"the model has {known.cause} at {known.at}, which these channels cannot show")
 
 
-def _left(machine: Machine, term: residual_term.ResidualTerm, holdout: Sequence[Table]) -> list[float]:
+def _left(machine: Machine, term: residual_term.ResidualTerm, holdout: Sequence[Table]) -> tuple[float, float]:
     """rms of the equation's residual on held-out data without and with the learned term, in its unit."""
     recordings = [machine.prepare(table) for table in holdout]
-    return list(term.left(machine, recordings, Regression(recordings)))
+    return term.left(machine, recordings, Regression(recordings))

@@ -17,9 +17,9 @@ from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.sysid.benches import ankle_sine, leg, motor, pulley, springs
 from ranger_sim.sysid.benches.bench_terms import NOTHING, BenchTerms
 from ranger_sim.sysid.fit import Fit
-from ranger_sim.sysid.identify import legs as identify_legs
-from ranger_sim.sysid.identify import motor as identify_motor
-from ranger_sim.sysid.identify import springs as identify_springs
+from ranger_sim.sysid.identification import legs as identify_legs
+from ranger_sim.sysid.identification import motor as identify_motor
+from ranger_sim.sysid.identification import springs as identify_springs
 
 SPREAD = 0.1
 MOTOR_NUMBERS = (

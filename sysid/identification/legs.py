@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.benches.leg import BEARING_SMOOTHING, GRAVITY, BEARING_Nm
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify.blocks import Block, column, corrected, length, solve, start_at
+from ranger_sim.sysid.identification.blocks import Block, column, corrected, length, solve, start_at
 from ranger_sim.sysid.instruments import FISH_SCALE, INCLINOMETER, JOINT_ENCODER, TAPE_M
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.benches.pulley import FRICTION_SCATTER, GRAVITY, MASS_STEP_KG, RADIUS_M
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify.blocks import Block, column, corrected, length, same_rows, solve, start_at
+from ranger_sim.sysid.identification.blocks import Block, column, corrected, length, same_rows, solve, start_at
 from ranger_sim.sysid.instruments import CALLIPER_M, CURRENT_SENSOR, SHAFT_SPEED, TORQUE_CELL, VOLTMETER
 
 Array = NDArray[np.float64]

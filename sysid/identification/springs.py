@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ranger_sim.sysid.benches.springs import ANKLE_ARM_M, HIP_ARM_M, ZEROED
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify.blocks import Block, column, corrected, length, same_rows, solve
+from ranger_sim.sysid.identification.blocks import Block, column, corrected, length, same_rows, solve
 from ranger_sim.sysid.instruments import FISH_SCALE, TAPE_M
 
 Array = NDArray[np.float64]

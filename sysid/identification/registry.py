@@ -3,16 +3,16 @@
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.sysid.benches import ankle_sine, leg, motor, pulley, springs
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identify import ankle as fit_ankle
-from ranger_sim.sysid.identify import legs as fit_legs
-from ranger_sim.sysid.identify import motor as fit_motor
-from ranger_sim.sysid.identify import springs as fit_springs
-from ranger_sim.sysid.identify.blocks import Block, solve
-from ranger_sim.sysid.identify.coverage import Machine
+from ranger_sim.sysid.identification import ankle as fit_ankle
+from ranger_sim.sysid.identification import legs as fit_legs
+from ranger_sim.sysid.identification import motor as fit_motor
+from ranger_sim.sysid.identification import springs as fit_springs
+from ranger_sim.sysid.identification.blocks import Block, solve
+from ranger_sim.sysid.identification.coverage import Machine
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,7 +134,7 @@ def bench_of(name: str) -> Bench:
     try:
         return BENCHES[name]
     except KeyError:
-        raise UserError(f"bench {name!r}: there is none; there are {', '.join(BENCHES)}") from None
+        raise UserError(unknown("bench", name, BENCHES)) from None
 
 
 def alone(
@@ -151,7 +151,7 @@ def alone(
     given = []
     for each in known:
         if each.name not in asked:
-            raise UserError(f"{each.name}: {bench.name} has no such unknown; it has {', '.join(asked)}")
+            raise UserError(f"{bench.name}: {unknown('parameter', each.name, asked)}")
         own = asked[each.name]
         given.append(dataclasses.replace(own, value=each.value, uncertainty=each.uncertainty, scale=own.step))
     return solve(blocks, given, earlier, tell)
