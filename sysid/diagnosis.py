@@ -16,6 +16,7 @@ from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
 GENERAL_LEVEL = 0.0001
 CONFIRMS = 0.01  # of the error on held-out data, by which a learned term must improve it
+LITTLE = 0.02  # of the residual's square: an integrator's own error is predictable too
 MUCH = 0.3  # of the residual's square: no chance, whatever held-out data with another motion show
 EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not named
 
@@ -72,7 +73,10 @@ class Diagnosis:
     @property
     def detected(self) -> bool:
         """Something is wrong."""
-        return (self.before.p < self.level and self.confirmed) or bool(self.named) or self.doubts.forbid
+        general = (
+            self.before.p < self.level and self.confirmed and (not self.by_candidates or self.before.excess > LITTLE)
+        )
+        return general or bool(self.named) or self.doubts.forbid
 
     @property
     def confirmed(self) -> bool:

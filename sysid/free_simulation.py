@@ -28,7 +28,7 @@ A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is
 import abc
 import copy
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -383,6 +383,9 @@ class SimulatedMachine(abc.ABC):
     ports: tuple[Port, ...]
     # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
+    # From one sample to the next inputs and ports are straight lines, but for those that a converter holds
+    held_inputs: Collection[str] = ()
+    parts: int = 2  # steps from one sample to the next, each with the inputs of its own middle
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording
     window_s: float = 2.0  # over which the gain is measured in free simulation
@@ -398,7 +401,7 @@ class SimulatedMachine(abc.ABC):
 
     @abc.abstractmethod
     def step(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
-        """The states one sample later. u: inputs and ports in the middle of the step."""
+        """The states after a step, a sample or a part of it. u: inputs and ports in the step's middle."""
 
     @abc.abstractmethod
     def observe(self, x: Quantities, u: Quantities, p: Quantities) -> Quantities:
@@ -585,10 +588,15 @@ class _Fit:
         given = {name: column[None] for name, column in self.inputs.items()}
         given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
         given |= {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
-        middle = {
-            name: np.asarray(0.5 * (c + np.concatenate((c[:, 1:], c[:, -1:]), axis=1))) for name, c in given.items()
+        change = {
+            name: 0.0 * c if name in machine.held_inputs else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
+            for name, c in given.items()
         }
-        after = machine.step(states, middle, values, self.step_s)
+        after: Quantities = states
+        for part in range(machine.parts):
+            share = (part + 0.5) / machine.parts
+            middle = {name: np.asarray(c + share * change[name]) for name, c in given.items()}
+            after = machine.step(after, middle, values, self.step_s / machine.parts)
         seen = machine.observe(states, given, values)
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
