@@ -53,6 +53,7 @@ STRETCH = 400  # samples of a stretch; covariances of all stretches are computed
 LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
 OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
 AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
 Quantities = Mapping[str, Array]  # by name, all of one shape
@@ -739,8 +740,10 @@ class _Fit:
         along = self._seen().signals
         counts = machine.counts(along, table)
         equations = {}
+        widths = self._standstill(predictor) if machine.noise_by_candidates else {}
         for number, each in enumerate(machine.outputs):
             own = {name: columns[:, number, i] for i, name in enumerate(self.names)}
+            own |= {name: column[:, number] for name, column in widths.items()}
             valid = counts.get(each.channel, np.ones(len(table), dtype=bool))
             response = missed[:, number] + columns[:, number] @ self.p_at
             equations[each.channel] = Equation(
@@ -765,6 +768,23 @@ class _Fit:
 
         made.entries = {each.name: entry(each) for each in machine.ports}
         return made
+
+    def _standstill(self, predictor: Predictor) -> dict[str, Array]:
+        """By name (n, outputs): the outputs' response to a wrong width of the smoothed sign about standstill.
+
+        A smoothed sign lacks friction just before a machine comes to rest, where the law is open (`loose`): the base
+        fits how much, and no cause is made of it.
+        """
+        open_by, found = self._loose(), {}
+        for number, state in enumerate(self.machine.states):
+            active = open_by[:, number] > SHARE_OPEN * np.max(open_by[:, number])
+            if not 0 < np.count_nonzero(active) < len(active):
+                continue
+            forcing = np.zeros((len(self.x), len(self.machine.states), 1))
+            forcing[:, number, 0] = -open_by[:, number] * np.sign(self.x[:, number])
+            nothing = np.zeros((len(self.x), len(self.machine.outputs), 1))
+            found[f"width of standstill@{state}"] = predictor.white(predictor.errors(forcing, nothing))[:, :, 0]
+        return found
 
     def round_again(self) -> None:
         """Linearise where the last round ended, without moving."""

@@ -24,6 +24,7 @@ from ranger_sim.sysid.results import HeldOutError
 DRAWS = 400
 BLOCKS = 20  # of the bootstrap: each longer than the memory of most residuals
 SURE = 2.33  # standard errors over the blocks by which an effect must improve the held-out prediction: 1 % on one side
+BETTER_SHOWN = 5.0  # times in training, where the held-out data do not excite an effect
 SHOWS = 1e-3  # of the error's square: an effect below it on the held-out data is not judged by them
 
 
@@ -89,8 +90,8 @@ class Held:
 
     def accepts(self, named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
         """False when the data, which excite the candidate, are not surely predicted better with it than without."""
-        if not self.shows(candidate, extended.values):
-            return True
+        if not self.shows(candidate, extended.values):  # then it must show much better in the training data
+            return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
         before = self.residual(named, without.values)
         after = self.residual([*named, candidate], extended.values)
         won = sum(
