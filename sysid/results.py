@@ -173,7 +173,7 @@ class DiagnosisEvidence:
     Only where noise is what all candidates leave: band_hz, edge of the band of the equations; held_out_errors and
     noise_floor, by equation; above_noise_floor, equations that leave far more than their channel's noise;
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
-    these channels do not show.
+    the machine's own parameters explain in these data.
     """
 
     p_general: float
