@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ranger_sim.sysid import model_file, predicted_ties, repairs
+from ranger_sim.sysid import by_candidates, model_file, predicted_ties, repairs
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.held_out import Held
 from ranger_sim.sysid.machine import Recording
@@ -44,9 +44,11 @@ def of(
     found: Diagnosis, final: Diagnosis, held: Held | None, term: LearnedTerm | None, prepared: Sequence[Prepared]
 ) -> DiagnosisResult:
     """The result. final: `found` without the effects that held-out data refuse; prepared: every recording."""
-    doubtful, refused = found.doubtful, bool(held is not None and held.refused)
+    doubtful, refused = found.doubtful, len(final.named) < len(found.named)
     abstained = not final.named if refused else doubtful
     evidence = _evidence(found, held, term)
+    if found.by_candidates:
+        evidence = by_candidates.evidence(found, evidence)
     return DiagnosisResult(
         detected=bool(found.detected),
         misfit=tuple(_channels(found)),

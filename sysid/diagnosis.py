@@ -4,15 +4,20 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ranger_sim.sysid import intervals, misfit, plausibility
-from ranger_sim.sysid.machine import Machine, Recording
+from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
-from ranger_sim.sysid.results import DiagnosisResult
+from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
 
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
 GENERAL_LEVEL = 0.0001
+CONFIRMS = 0.01  # of the error on held-out data, by which a learned term must improve it
+LITTLE = 0.02  # of the residual's square: an integrator's own error is predictable too
+MUCH = 0.3  # of the residual's square: no chance, whatever held-out data with another motion show
 EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not named
 
 
@@ -23,6 +28,15 @@ class KnownEffect:
     cause: str
     at: str
     coefficients: Mapping[str, float]
+    shape: Mapping[str, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class Visible:
+    """The smallest size of an effect that the data would show, by coefficient; None: these channels do not show it."""
+
+    effect: Effect
+    sizes: Mapping[str, float] | None
     shape: Mapping[str, float]
 
 
@@ -42,6 +56,13 @@ class Diagnosis:
     before: misfit.Misfit
     after: misfit.Misfit
     doubts: plausibility.Doubts
+    level: float = GENERAL_LEVEL  # of the tests without a cause in mind
+    band_hz: float | None = None  # edge of the band of the equations; None: as recorded
+    refused: list[Named] = dataclasses.field(default_factory=list)  # by held-out data, while causes were sought
+    errors: dict[str, HeldOutError] | None = None  # on held-out data, by equation
+    floors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    visible: list[Visible] = dataclasses.field(default_factory=list)
+    by_candidates: bool = False  # found with the noise that all candidates leave
     result: DiagnosisResult = dataclasses.field(init=False)  # made last, by answer.py alone
 
     @property
@@ -52,17 +73,59 @@ class Diagnosis:
     @property
     def detected(self) -> bool:
         """Something is wrong."""
-        return self.before.p < GENERAL_LEVEL or bool(self.named) or self.doubts.forbid
+        general = (
+            self.before.p < self.level and self.confirmed and (not self.by_candidates or self.before.excess > LITTLE)
+        )
+        return general or bool(self.named) or self.doubts.forbid
+
+    @property
+    def confirmed(self) -> bool:
+        """False when held-out data are predicted no better by what was learned from little of the residual."""
+        if not self.errors or self.before.excess > MUCH:
+            return True
+        return any(
+            each.black_box is not None and each.black_box < (1.0 - CONFIRMS) * each.before
+            for each in self.errors.values()
+        )
 
     @property
     def explained(self) -> float:
         """Share of the repeatable excess that the named effects explain."""
+        if self.by_candidates:
+            return self._explained_of_predictable()
         gained = sum(each.chi2 - each.freedom for each in self.named)
         total = gained + self.after.excess
         return float(gained / total) if total > 0.0 else 0.0
 
+    def _more_on_held_out(self) -> bool:
+        """True when a black box explains much more of the held-out data than the named effects do."""
+        if not self.errors:
+            return True
+        possible = sum(
+            each.before**2 - min(each.black_box or each.after, each.after) ** 2 for each in self.errors.values()
+        )
+        won = sum(each.before**2 - each.after**2 for each in self.errors.values())
+        return won < EXPLAINED * possible
+
+    def _explained_of_predictable(self) -> float:
+        """What the named effects take of the residual's square, of that and of what is predictable after them."""
+        if not self.named:
+            return 0.0
+        was, left = (sum(_left(each, name) for name in each.equations) for each in (self.plain, self.extended))
+        won, more = max(0.0, was - left), left * self.after.excess
+        return won / (won + more) if won > 0.0 else 0.0
+
     @property
     def doubtful(self) -> bool:
         """Something is wrong, and its cause cannot be named."""
-        left = self.explained < EXPLAINED and self.after.p < GENERAL_LEVEL
+        left = self.explained < EXPLAINED and self.after.p < self.level and self._more_on_held_out()
         return self.detected and (not self.named or self.doubts.forbid or left)
+
+
+def _left(regression: Regression, name: str) -> float:
+    """Sum of squares that an equation leaves, not whitened, over its rows that count, relative to its response."""
+    part, good = regression.parts[name], regression.good[name]
+    values = np.array([regression.values[each] for each in regression.names])
+    response = part.response[good]
+    left = response - part.measured[good] @ values
+    return float(left @ left) / max(float(response @ response), 1e-300)

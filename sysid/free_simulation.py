@@ -28,7 +28,7 @@ A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is
 import abc
 import copy
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -53,6 +53,7 @@ STRETCH = 400  # samples of a stretch; covariances of all stretches are computed
 LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
 OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
 AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
 Quantities = Mapping[str, Array]  # by name, all of one shape
@@ -383,9 +384,13 @@ class SimulatedMachine(abc.ABC):
     ports: tuple[Port, ...]
     # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
+    # From one sample to the next inputs and ports are straight lines, but for those that a converter holds
+    held_inputs: Collection[str] = ()
+    parts: int = 2  # steps from one sample to the next, each with the inputs of its own middle
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording
     window_s: float = 2.0  # over which the gain is measured in free simulation
+    noise_by_candidates: bool = True  # `Recording.noise_by_candidates`
 
     @abc.abstractmethod
     def inputs(self, table: Table) -> dict[str, Array]:
@@ -397,7 +402,7 @@ class SimulatedMachine(abc.ABC):
 
     @abc.abstractmethod
     def step(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
-        """The states one sample later. u: inputs and ports in the middle of the step."""
+        """The states after a step, a sample or a part of it. u: inputs and ports in the step's middle."""
 
     @abc.abstractmethod
     def observe(self, x: Quantities, u: Quantities, p: Quantities) -> Quantities:
@@ -584,10 +589,15 @@ class _Fit:
         given = {name: column[None] for name, column in self.inputs.items()}
         given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
         given |= {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
-        middle = {
-            name: np.asarray(0.5 * (c + np.concatenate((c[:, 1:], c[:, -1:]), axis=1))) for name, c in given.items()
+        change = {
+            name: 0.0 * c if name in machine.held_inputs else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
+            for name, c in given.items()
         }
-        after = machine.step(states, middle, values, self.step_s)
+        after: Quantities = states
+        for part in range(machine.parts):
+            share = (part + 0.5) / machine.parts
+            middle = {name: np.asarray(c + share * change[name]) for name, c in given.items()}
+            after = machine.step(after, middle, values, self.step_s / machine.parts)
         seen = machine.observe(states, given, values)
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
@@ -730,8 +740,10 @@ class _Fit:
         along = self._seen().signals
         counts = machine.counts(along, table)
         equations = {}
+        widths = self._standstill(predictor) if machine.noise_by_candidates else {}
         for number, each in enumerate(machine.outputs):
             own = {name: columns[:, number, i] for i, name in enumerate(self.names)}
+            own |= {name: column[:, number] for name, column in widths.items()}
             valid = counts.get(each.channel, np.ones(len(table), dtype=bool))
             response = missed[:, number] + columns[:, number] @ self.p_at
             equations[each.channel] = Equation(
@@ -748,6 +760,7 @@ class _Fit:
             ports=machine.ports,
             outputs=tuple(each.channel for each in machine.outputs),
             fit=self,
+            noise_by_candidates=machine.noise_by_candidates,
         )
 
         def entry(port: Port) -> Entry:
@@ -755,6 +768,23 @@ class _Fit:
 
         made.entries = {each.name: entry(each) for each in machine.ports}
         return made
+
+    def _standstill(self, predictor: Predictor) -> dict[str, Array]:
+        """By name (n, outputs): the outputs' response to a wrong width of the smoothed sign about standstill.
+
+        A smoothed sign lacks friction just before a machine comes to rest, where the law is open (`loose`): the base
+        fits how much, and no cause is made of it.
+        """
+        open_by, found = self._loose(), {}
+        for number, state in enumerate(self.machine.states):
+            active = open_by[:, number] > SHARE_OPEN * np.max(open_by[:, number])
+            if not 0 < np.count_nonzero(active) < len(active):
+                continue
+            forcing = np.zeros((len(self.x), len(self.machine.states), 1))
+            forcing[:, number, 0] = -open_by[:, number] * np.sign(self.x[:, number])
+            nothing = np.zeros((len(self.x), len(self.machine.outputs), 1))
+            found[f"width of standstill@{state}"] = predictor.white(predictor.errors(forcing, nothing))[:, :, 0]
+        return found
 
     def round_again(self) -> None:
         """Linearise where the last round ended, without moving."""

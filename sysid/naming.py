@@ -109,7 +109,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
             if key not in best or each[0] > best[key][0]:
                 best[key] = each
         ranking = sorted(best.values(), key=lambda each: -each[0])
-        chosen = next((each for each in ranking if _possible(each[3])), None)
+        chosen = next((each for each in ranking if possible(each[3])), None)
         if chosen is None:
             break
         bic, chi2, freedom, trial = chosen
@@ -120,7 +120,7 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
         tied = [
             each[3].effect
             for each in ranking
-            if each[3].effect is not trial.effect and bic - each[0] < TIE and _possible(each[3])
+            if each[3].effect is not trial.effect and bic - each[0] < TIE and possible(each[3])
         ]
         taken.append(Named(trial.effect, trial.shape, chi2, freedom, p, bic, tied, rivals))
         _take(trial, all_trials, regression)
@@ -148,7 +148,7 @@ def coefficients(columns: Array, residual: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns, residual, rcond=1e-9)[0], dtype=float)
 
 
-def _possible(trial: Trial) -> bool:
+def possible(trial: Trial) -> bool:
     """Whether a machine can have these values. A sign within the noise may be the possible one."""
     found = np.linalg.lstsq(trial.gram, trial.product, rcond=1e-12)[0]
     errors = np.sqrt(np.diag(np.linalg.pinv(trial.gram, rcond=1e-12)))

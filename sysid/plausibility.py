@@ -58,10 +58,14 @@ class Doubts:
     forbid: bool
 
 
-def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) -> Doubts:
-    """Implausible values of a fit. regression: with every named cause in it."""
+def look(machine: Machine, regression: Regression, named: Sequence[Named] = (), by_candidates: bool = False) -> Doubts:
+    """Implausible values of a fit. regression: with every named cause in it.
+
+    by_candidates: the noise is what all candidates leave. Then a slow residual is what a model error looks like, and a
+    start value only starts: neither forbids a name.
+    """
     findings: list[Finding] = []
-    if len(named) >= MOST:
+    if len(named) >= MOST and not by_candidates:
         text = f"{len(named)} causes at once explain it: where everything is wrong it is another machine, or other data"
         findings.append(_finding("", "too_many", len(named), "", text))
     for each in named:
@@ -78,7 +82,7 @@ def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) 
         elif known.value * value != 0.0 and error < CLEAR * abs(value):
             factor = value / known.value
             if not 1.0 / FACTOR <= abs(factor) <= FACTOR:
-                findings.append(_factor(known, value, factor, _of_a_simulator(regression)))
+                findings.append(_factor(known, value, factor, _of_a_simulator(regression) and not by_candidates))
     few = {name: each.few for recording in regression.recordings for name, each in recording.equations.items()}
     for name in regression.equations:
         counted, rows = int(np.count_nonzero(regression.good[name])), len(regression.parts[name].valid)
@@ -86,12 +90,13 @@ def look(machine: Machine, regression: Regression, named: Sequence[Named] = ()) 
             text = f"{counted} of {rows} rows of this equation count: its residual shows next to nothing"
             findings.append(_finding(name, "few_rows", counted, "rows", text))
         share = explained(regression, name)
-        if share is not None and (share < EXPLAINED or (share < COHERENT and _memory(_left(regression, name)) > SLOW)):
+        moves = share is not None and not by_candidates and _memory(_left(regression, name)) > SLOW
+        if share is not None and (share < EXPLAINED or (share < COHERENT and moves)):
             text = (
                 f"the equation explains {max(0.0, share):.0%} of what was measured: the channels do not belong together"
             )
             findings.append(_finding(name, "unexplained", share, "", text))
-        new = slowness(regression, name)
+        new = None if by_candidates else slowness(regression, name)
         if new is not None and new > SLOWEST:
             text = (
                 f"what the equation leaves is {new:.0f} times what is new in it from sample to sample: no instrument's "

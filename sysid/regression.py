@@ -55,6 +55,13 @@ def _inside(recording: Recording) -> np.ndarray:
     return np.concatenate(parts)
 
 
+def _run_numbers(recording: Recording) -> np.ndarray:
+    """For each kept row the number of its run."""
+    return np.concatenate(
+        [np.full(len(range(run.start, run.stop, recording.every)), i) for i, run in enumerate(recording.table.runs)]
+    )
+
+
 def _starts(recording: Recording) -> np.ndarray:
     """True for the first kept rows of each run, which have too few rows before them."""
     first = [
@@ -158,6 +165,7 @@ class Part:
     valid: np.ndarray
     starts: np.ndarray
     repeats: np.ndarray
+    run: np.ndarray  # number of the stretch without a gap
 
     def pure_error(self, residual: Array) -> tuple[Array, int]:
         """(residual less the mean of its repeats (n,), degrees of freedom); 0 degrees where repeats are too few."""
@@ -179,6 +187,14 @@ class Whitening:
     deviation: float
 
 
+@dataclasses.dataclass
+class Noise:
+    """The noise of some equations: whitening by equation, and correlations of innovations by pair of equations."""
+
+    whitening: dict[str, Whitening]
+    shared: dict[tuple[str, str], float] = dataclasses.field(default_factory=dict)
+
+
 class Regression:
     """Equations of some recordings, whitened and solved, for tests of effects.
 
@@ -190,10 +206,10 @@ class Regression:
         recordings: Sequence[Recording],
         extra: Sequence[Columns] = (),
         extra_names: Sequence[str] = (),
-        noise: "Regression | None" = None,
+        noise: "Regression | Noise | None" = None,
     ) -> None:
         """extra: more base columns, as an effect gives them: one {equation: (n, k)} per recording, by name. noise:
-        another regression whose whitening and parameters are the start here."""
+        known already, or another regression's; estimated from the residual when None."""
         self.recordings = list(recordings)
         self.equations = list(dict.fromkeys(name for each in recordings for name in each.equations))
         if noise is not None:  # the noise is unknown for an equation that the other regression does not have
@@ -223,16 +239,19 @@ class Regression:
         """One equation over all recordings, unwhitened."""
         parts = []
         first_free = 0  # a recording's repeats are not repeats of another recording's rows
+        runs = 0
         for number, recording in enumerate(self.recordings):
             rows = len(_rows(recording))
             repeats = kept_rows(recording, recording.repeats.get(equation, np.full(len(recording.table), -1)))
             repeats = np.where(repeats >= 0, repeats + first_free, -1)
             first_free = max(first_free, int(np.max(repeats, initial=-1)) + 1)
+            run = runs + _run_numbers(recording)
+            runs = int(np.max(run, initial=-1)) + 1
             measured = np.zeros((rows, self.count))
             made: Equation | None = recording.equations.get(equation)
             if made is None:
                 nothing = np.zeros(rows, dtype=bool)
-                parts.append((np.zeros(rows), measured, measured.copy(), nothing, _starts(recording), repeats))
+                parts.append((np.zeros(rows), measured, measured.copy(), nothing, _starts(recording), repeats, run))
                 continue
             for name, column in made.columns.items():
                 measured[:, self.names.index(name)] = reduced(recording, column)
@@ -243,7 +262,7 @@ class Regression:
                 first = self.count - len(extra_names)
                 measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation])
             response, valid = reduced(recording, made.response), made.valid[_rows(recording)] & _inside(recording)
-            parts.append((response, measured, stand_in, valid, _starts(recording), repeats))
+            parts.append((response, measured, stand_in, valid, _starts(recording), repeats, run))
         return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _find_whitening(self) -> None:
@@ -296,7 +315,8 @@ class Regression:
         if coefficients is None and equation in self.whitening:
             coefficients = self.whitening[equation].coefficients
         for lag in range(1, 1 + (0 if coefficients is None else len(coefficients))):
-            good[lag:] &= part.valid[:-lag]
+            good[:lag] = False
+            good[lag:] &= part.valid[:-lag] & (part.run[lag:] == part.run[:-lag])
         return good
 
     def _scaled(self, equation: str, column: Array) -> Array:

@@ -104,6 +104,26 @@ class Gain:
 
 
 @dataclasses.dataclass(frozen=True)
+class HeldOutError:
+    """Error of one equation on held-out data, as a share of what was measured: rms over the response's rms, or over a
+    simulated channel's deviation. after: with the named causes; black_box: the least that a learned predictor leaves,
+    with or without the physics; ratio95: interval of after over before by a bootstrap of blocks."""
+
+    before: float
+    after: float
+    black_box: float | None
+    ratio95: Interval
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseFloor:
+    """left: rms of what an equation leaves; channel: its channel's own noise, a lower bound. In the equation's unit."""
+
+    left: float
+    channel: float
+
+
+@dataclasses.dataclass(frozen=True)
 class LearnedTerm:
     """A term without a cause: a table over one or two signals. domain: by signal; edges: by signal, the inner borders
     of its cells; value, deviation: rows of cells, in `unit`; holdout_rms: of the equation's residual on held-out data
@@ -150,6 +170,10 @@ class DiagnosisEvidence:
     suspects: effects that were found where none is named; parameters: of the machine, as fitted; impossible: those that
     no machine has; skew_samples: by channel, its stamps' delay; known: effects of the given model.
     Only with held-out data: refused_by_holdout, holdout_excites_it. Only with a model file: without_form.
+    Only where noise is what all candidates leave: band_hz, edge of the band of the equations; held_out_errors and
+    noise_floor, by equation; above_noise_floor, equations that leave far more than their channel's noise;
+    smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
+    the machine's own parameters explain in these data.
     """
 
     p_general: float
@@ -165,6 +189,12 @@ class DiagnosisEvidence:
     refused_by_holdout: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     holdout_excites_it: bool | None = dataclasses.field(default=None, metadata=OPTIONAL)
     without_form: tuple[WithoutForm, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    band_hz: float | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    held_out_errors: Mapping[str, HeldOutError] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    noise_floor: Mapping[str, NoiseFloor] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    above_noise_floor: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    smallest_visible: Mapping[str, Mapping[str, float]] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    cannot_be_seen: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
 
 
 @dataclasses.dataclass(frozen=True)

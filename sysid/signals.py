@@ -90,3 +90,18 @@ def _inside(table: Table) -> np.ndarray:
     for run in table.runs[1:]:
         inside[run.start - 1] = False
     return inside
+
+
+def resting(table: Table, rate: Array, share: float = 0.01, shortest_s: float = 0.2) -> np.ndarray:
+    """True while a machine with dry friction rests: its rate stays below `share` of the fastest for `shortest_s`.
+
+    There friction balances any torque up to its limit, and an equation says nothing. A reversal is not a rest.
+    """
+    slow = np.abs(rate) <= share * float(np.quantile(np.abs(rate), 0.98))
+    out = np.zeros(len(slow), dtype=bool)
+    for run in table.runs:
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], slow[run].astype(int), [0]))))
+        for first, last in edges.reshape(-1, 2).tolist():
+            if (last - first) * table.step_s >= shortest_s:
+                out[run.start + first : run.start + last] = True
+    return out

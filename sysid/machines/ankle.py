@@ -302,7 +302,16 @@ def _recording(fit: "_Fit") -> AnkleRecording:
     """Equations about the fitted motion."""
     table = fit.table
     recording = AnkleRecording(
-        table, {}, {}, width=WIDTH, every=EVERY, left_over=True, simulated=fit.runs, fit=fit, loose=fit.loose
+        table,
+        {},
+        {},
+        width=WIDTH,
+        every=EVERY,
+        left_over=True,
+        noise_by_candidates=False,
+        simulated=fit.runs,
+        fit=fit,
+        loose=fit.loose,
     )
     recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
     recording.values = dict(fit.values)

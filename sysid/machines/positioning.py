@@ -21,8 +21,7 @@ from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity,
 from ranger_sim.sysid.machines.forms import Made, bristles
 
 FORCE_N_PER_V = 35.15065188  # the drive's gain, published with the data
-WIDTH_S = 0.006  # Gaussian over both sides: -3 dB at 22 Hz, well above the controller's motion and below its noise
-EVERY_S = 0.008
+FINE_S = 0.0015  # Gaussian of the speed: -3 dB at 88 Hz, far above the controller's motion
 NEAR_STANDSTILL = 0.01  # of the fastest speed: below it friction may be anything up to its limit
 PITCHES_M = tuple(round(0.0005 * n, 4) for n in range(2, 61))
 
@@ -57,10 +56,9 @@ class Positioning:
                 f"{table.name}: {self.name} needs {', '.join(missing)}; there are {', '.join(table.columns)}"
             )
         table = signals.uniform(table)
-        width = WIDTH_S / table.step_s
         q = table["position_m"]
         force = self.force_N_per_V * table["voltage_V"]
-        v = signals.derivative(table, q, 0.25 * width)
+        v = signals.derivative(table, q, FINE_S / table.step_s)
         s = {"x": q, "v": v, "F": force, "t": table.time_s - table.time_s[0], "a": np.gradient(v, table.step_s)}
         s["dF"] = np.gradient(force, table.step_s)
         top = float(np.quantile(np.abs(v), 0.98))
@@ -83,8 +81,7 @@ class Positioning:
         )
         fast = np.abs(v) > 0.2 * top
         regimes = {"forward": v > 0.0, "backward": v < 0.0, "low speed": ~fast, "fast": fast}
-        every = max(1, round(EVERY_S / table.step_s))
-        return Recording(table, s, {"force": equation}, regimes, width, every, whitened=False)
+        return Recording(table, s, {"force": equation}, regimes)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which the force is looked at without a cause in mind."""
@@ -141,6 +138,7 @@ class Positioning:
             ),
         ]
         places = {"sensor_lag": ("drive", "timing")}
+        forms = {"slide_m": "by the way", "speed_m_per_s": "by the speed"}  # of one cause: only one of them is named
         more_at_rest = {"stribeck": "excess_N", "presliding": "friction_N", "friction_warm_up": "N_per_m"}
 
         def admissible(cause: str) -> Callable[[Mapping[str, float]], bool]:
@@ -148,6 +146,14 @@ class Positioning:
             return lambda found: name is None or found[name] > 0.0
 
         return [
-            Effect(cause, *places.get(cause, ("guide", "mechanical")), names, shapes, columns, admissible(cause))
+            Effect(
+                cause,
+                *places.get(cause, ("guide", "mechanical")),
+                names,
+                shapes,
+                columns,
+                admissible(cause),
+                form=forms.get(next(iter(shapes[0]), ""), "") if cause == "presliding" else "",
+            )
             for cause, names, shapes, columns in made
         ]

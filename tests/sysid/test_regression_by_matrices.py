@@ -248,7 +248,9 @@ def test_rows_are_kept_from_each_run_s_start_under_a_gaussian_of_their_own():
 
 
 def test_pure_error_is_what_repeats_differ_by():
-    part = regression.Part(*(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.arange(60) // 3)
+    part = regression.Part(
+        *(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.arange(60) // 3, run=np.zeros(60)
+    )
     part.repeats[57:] = -1
     part.valid[0] = False
     residual = RNG.normal(size=60)
@@ -261,7 +263,9 @@ def test_pure_error_is_what_repeats_differ_by():
     )
     # 20 degrees of freedom are enough, 19 are not
     for pairs, there in ((20, 20), (19, 0)):
-        few = regression.Part(*(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.full(60, -1))
+        few = regression.Part(
+            *(None,) * 3, valid=np.ones(60, dtype=bool), starts=None, repeats=np.full(60, -1), run=np.zeros(60)
+        )
         few.repeats[: 2 * pairs] = np.arange(2 * pairs) // 2
         assert few.pure_error(residual)[1] == there
         if not there:
@@ -444,7 +448,7 @@ def test_what_no_machine_can_have_is_not_taken_and_no_tie():
         beside = A - BASE * (BASE[8:] @ A[8:]) / (BASE[8:] @ BASE[8:])
         lone = NOISE - beside * (beside[8:] @ NOISE[8:]) / (beside[8:] @ beside[8:])
         (trial,) = naming.trials([positive], asked(lone + size * beside / math.sqrt(float(beside[8:] @ beside[8:]))))
-        assert naming._possible(trial) is possible
+        assert naming.possible(trial) is possible
 
 
 def test_forms_of_one_cause_at_one_place_are_taken_once_and_four_causes_at_most():

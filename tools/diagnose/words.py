@@ -16,8 +16,7 @@ def sentence(found: Diagnosis) -> str:
     if doubts(answer):
         return f"{name}: {doubted(answer)}."
     if not answer["detected"]:
-        p = answer["evidence"]["p_general"]
-        return f"{name}: nothing that these data could show is missing from the equations (p {p:.2g})."
+        return f"{name}: {nothing(answer)}."
     if answer["abstained"]:
         suspects = answer["evidence"]["suspects"]
         also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
@@ -27,6 +26,47 @@ def sentence(found: Diagnosis) -> str:
         )
     names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
     return f"{name}: the {answer['subsystem']} part is wrong: {names}."
+
+
+def nothing(answer: dict[str, Any]) -> str:
+    """What is said where nothing was found; a residual far above the noise is no proof of a sound machine."""
+    evidence = answer["evidence"]
+    if above := evidence.get("above_noise_floor"):
+        each = evidence["noise_floor"][above[0]]
+        return (
+            f"no cause was found, and the {above[0]} equation leaves {each['left'] / max(each['channel'], 1e-300):.3g} "
+            "times its channel's own noise: something may be missing that these data do not show"
+        )
+    if evidence.get("noise_floor"):
+        return "nothing that these data could show is missing from the equations"
+    return f"nothing that these data could show is missing from the equations (p {evidence['p_general']:.2g})"
+
+
+def held_out(answer: dict[str, Any]) -> list[str]:
+    """The three errors on held-out data, an equation a line; empty without held-out data."""
+    lines = []
+    for name, each in (answer["evidence"].get("held_out_errors") or {}).items():
+        text = f"held-out error of {name}: {each['before']:.2%} before"
+        if answer["causes"]:
+            text += f", {each['after']:.2%} after"
+        if each["black_box"] is not None:
+            text += f", {each['black_box']:.2%} by a black box"
+        lines.append(text)
+    return lines
+
+
+def unseen(answer: dict[str, Any]) -> list[str]:
+    """What these channels cannot show, and the smallest sizes that they could; empty where a cause was found."""
+    evidence = answer["evidence"]
+    if answer["causes"] or "smallest_visible" not in evidence:
+        return []
+    lines = [
+        f"{name} would have been named from {', '.join(f'{key} {size:.3g}' for key, size in sizes.items())} on"
+        for name, sizes in evidence["smallest_visible"].items()
+    ]
+    if evidence["cannot_be_seen"]:
+        lines.append(f"not to be told from the machine's own parameters: {', '.join(evidence['cannot_be_seen'])}")
+    return lines
 
 
 def learned(answer: dict[str, Any]) -> str:

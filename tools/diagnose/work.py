@@ -27,7 +27,7 @@ from ranger_sim.tools.command_line.files import json_target, replace_file, writa
 from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.recordings import datasets
 
-EXIT_CLEAN, EXIT_FOUND = 0, 1
+EXIT_CLEAN, EXIT_FOUND, EXIT_ABOVE_NOISE = 0, 1, 3  # 2 is a user's mistake
 MOST_GAPS = 4  # more of them are one line on a screen; report and JSON have all
 
 
@@ -63,7 +63,9 @@ def run(options: argparse.Namespace) -> int:
         if target is not None:
             replace_file(target, _json(found.answer).encode())
         _show(found, terminal.console())
-    return EXIT_FOUND if found.result.detected else EXIT_CLEAN
+    if found.result.detected:
+        return EXIT_FOUND
+    return EXIT_ABOVE_NOISE if found.result.evidence.above_noise_floor else EXIT_CLEAN
 
 
 def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
@@ -150,6 +152,8 @@ def _show(found: Diagnosis, console: Console) -> None:
             for name, value in each["parameters"].items()
         )
         console.print(f"known: {each['name']} at {each['at']}: {values}", highlight=False, soft_wrap=True)
+    for line in [*words.held_out(told), *words.unseen(told)]:
+        console.print(line, highlight=False, soft_wrap=True)
     if not told["detected"]:
         return
     table = RichTable("equation", "regime", "misfit", "noise", "repeatable", box=None)

@@ -80,7 +80,13 @@ class Walk:
         """Courses, strikes and every equation whose channels exist; UserError when no equation has its channels."""
         table = signals.uniform(table)
         recording = WalkRecording(
-            table, {"t": table.time_s - table.time_s[0]}, {}, whitened=False, lags=(0,), left_over=True
+            table,
+            {"t": table.time_s - table.time_s[0]},
+            {},
+            whitened=False,
+            lags=(0,),
+            left_over=True,
+            noise_by_candidates=False,
         )
         recording.numbers = self.numbers
         motion, stands, single = self._motion(table, recording)

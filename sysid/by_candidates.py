@@ -1,0 +1,262 @@
+"""Diagnosis in the noise that all candidates leave: for machines without a noise estimate of their own.
+
+The order: the band (`bands.py`), what can be predicted at all (`predictability.py`), causes by likelihood that
+held-out data do not refuse (`likelihood.py`), three errors (`three_numbers.py`), what would not have been seen.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ranger_sim.sysid import bands, gain, held_out, intervals, likelihood, misfit, naming, plausibility, predictability
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
+from ranger_sim.sysid.free_simulation import roughness
+from ranger_sim.sysid.machine import Effect, Machine, Recording
+from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
+from ranger_sim.sysid.three_numbers import Held
+
+AGAIN = 2  # simulations with the named effects, at most
+BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
+MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
+LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
+FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
+HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
+
+
+def diagnose(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    holdout: Sequence[Table],
+    seed: int,
+    known: Sequence[KnownEffect],
+    find: Callable[[KnownEffect, Sequence[Effect]], Named],
+    progress: Callable[[str, float], None],
+) -> Diagnosis:
+    """All findings but the printed answer. find: a known effect among the machine's."""
+    progress("band", 0.1)
+    band, predictor = _band(machine, recordings, seed)
+    recordings = [band.of(each) for each in recordings]
+    held = [band.of(machine.prepare(table)) for table in holdout]
+    effects = machine.effects(recordings)
+    had = [find(each, effects) for each in known]
+    effects = [each for each in effects if all(each is not other.effect for other in had)]
+    progress("misfit", 0.2)
+    skews = list(had)
+
+    def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
+        rest = _others(effects, skews)
+        base = naming.refit(bands.plain(recordings), skews)
+        accepts = Held(held, skews, base.values).accepts if held else likelihood.everything
+        return likelihood.select(
+            recordings, rest, skews, seed, accepts, progress=lambda share: progress("causes", begin + 0.2 * share)
+        )
+
+    found = selected(recordings, held, 0.25)
+    stamps = _stamps(found)
+    if stamps:
+        skews += stamps
+        found = selected(recordings, held, 0.25)
+    before = predictability.test(found.base, predictor.columns(recordings), seed)
+    for number in range(AGAIN if found.named and hasattr(machine, "again") else 0):
+        progress("simulated again", 0.5 + 0.2 * number / AGAIN)
+        previous = found
+        recordings = held_out.simulated_again(machine, recordings, found.named, found.with_named)
+        held = held_out.simulated_again(machine, held, found.named, found.with_named, fixed=True)
+        found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
+        if [each.effect for each in found.named] == [each.effect for each in previous.named]:
+            break
+    progress("what is left", 0.75)
+    known_to: dict[str, intervals.Intervals] = {}
+    extended = found.with_named
+    for each in found.named:
+        others = [other for other in found.named if other is not each]
+        base = naming.refit(found.base, others, [*skews, *others]) if others else found.base
+        each.shape, known_to[each.effect.name] = intervals.profile(each, base)
+    if found.named:
+        extended = naming.refit(found.base, found.named, [*skews, *found.named])
+    _widen(extended)
+    after = predictability.test(extended, predictor.columns(recordings), seed)
+    progress("gain", 0.85)
+    errors = None
+    if held:
+        if hasattr(machine, "free"):
+            held = [machine.free(each) for each in held]
+        lasting = predictability.predictor(machine, recordings, seed, without=("t",))  # another run has its own time
+        errors = Held(held, skews, found.base.values).errors(found.named, extended, found.base, lasting, seed)
+    return Diagnosis(
+        machine,
+        list(recordings),
+        found.base,
+        extended,
+        skews,
+        had,
+        list(known),
+        found.named,
+        known_to,
+        _misfit(before),
+        _misfit(after),
+        plausibility.look(machine, extended, found.named, by_candidates=True),
+        level=LEVEL,
+        band_hz=band.edge_hz,
+        refused=found.refused,
+        errors=errors,
+        floors=floors(extended),
+        by_candidates=True,
+        visible=smallest(
+            _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
+        ),
+    )
+
+
+def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple[bands.Band, predictability.Predictor]:
+    """The band, of three that suit, in which most of the residual can be predicted; and the predictor in it."""
+    best: tuple[float, bands.Band, predictability.Predictor] | None = None
+    for band in bands.choose(recordings):
+        inside = [band.of(each) for each in recordings]
+        predictor = predictability.predictor(machine, inside, seed)
+        tests = predictability.test(bands.plain(inside), predictor.columns(inside), seed)
+        share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
+        if best is None or share > max(MORE_PREDICTED * best[0], predictability.WORTH):
+            best = (share, band, predictor)
+    assert best is not None
+    return best[1], best[2]
+
+
+def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
+    return [each for each in effects if all(each is not skew.effect for skew in skews)]
+
+
+def _stamps(found: likelihood.Selection) -> list[Named]:
+    """Named lags of less than half a sample: stamps, not causes. They are in the base from then on."""
+    limit_s = HALF_SAMPLE * found.base.recordings[0].table.step_s
+    lags = [each for each in found.named if each.effect.cause == "sensor_lag"]
+    return [each for each in lags if abs(found.with_named.values[each.coefficients[0]]) < limit_s]
+
+
+def _misfit(tests: Sequence[predictability.Predicted]) -> misfit.Misfit:
+    """The tests as those of any machine; excess: the share of the residual's square that can be predicted."""
+    made = [
+        misfit.Test(each.equation, "the flexible predictor", each.share * each.stretches, 1, each.p) for each in tests
+    ]
+    p = min(1.0, min((each.p for each in made), default=1.0) * len(made))
+    return misfit.Misfit(made, p, max((each.share for each in tests), default=0.0))
+
+
+def _widen(regression: Regression) -> None:
+    """Widen the covariance to the coefficients' scatter over blocks where a model error makes them scatter more."""
+    scores = []
+    for rows in regression.rows.values():
+        product = regression.z[rows] * regression.residual[rows, None]
+        block = np.arange(len(product)) * BLOCKS // max(1, len(product))
+        scores.append(np.stack([product[block == each].sum(axis=0) for each in range(BLOCKS)]))
+    together = np.sum(scores, axis=0)
+    spread = regression.inverse @ (together.T @ together) @ regression.inverse.T
+    kept = np.flatnonzero(np.diag(regression.covariance) > 0.0)
+    model = regression.inverse @ regression.own @ regression.inverse.T
+    wider = np.ones(regression.count)
+    ratio = np.diag(spread) / np.maximum(np.diag(model), 1e-300)
+    if len(kept) == len(ratio):
+        wider[kept] = np.sqrt(np.maximum(1.0, ratio * BLOCKS / max(1, BLOCKS - len(kept))))
+    regression.covariance = regression.covariance * np.outer(wider, wider)
+
+
+def floors(regression: Regression) -> dict[str, tuple[float, float]]:
+    """By equation (rms of the residual, noise of the channel itself), both in the band and in the equation's unit.
+
+    The channel's own noise is what departs from a parabola over a tenth of a second: a lower bound of the noise.
+    """
+    out: dict[str, tuple[float, float]] = {}
+    values = np.array([regression.values[each] for each in regression.names])
+    for name, part in regression.parts.items():
+        good = regression.good[name]
+        if not np.any(good):
+            continue
+        left = float(np.sqrt(np.mean((part.response - part.measured @ values)[good] ** 2)))
+        own = [_own(each, name) for each in regression.recordings if name in each.equations]
+        out[name] = (left, float(np.sqrt(np.mean(np.square(own)))))
+    return out
+
+
+def _own(recording: Recording, name: str) -> float:
+    """Noise of what an equation responds with, in the recording's band."""
+    predictor = getattr(recording, "predictor", None)
+    if predictor is not None:
+        return float(predictor.unit[list(getattr(recording, "outputs", ())).index(name)])
+    alone = roughness(recording.table, recording.equations[name].response)
+    return alone / math.sqrt(max(1.0, 2.0 * recording.width * math.sqrt(math.pi)))
+
+
+def smallest(effects: Sequence[Effect], regression: Regression, threshold: float) -> list[Visible]:
+    """For each effect the smallest size that these data would have named, at the shape that they show best."""
+    out = []
+    for effect in effects:
+        sizes: list[tuple[float, dict[str, float], Mapping[str, float]]] = []
+        for trial in naming.trials([effect], regression):
+            inverse = np.linalg.pinv(trial.gram, rcond=1e-9, hermitian=True)
+            shapes = len(effect.shapes)
+            free = len(inverse) + (shapes > 1)
+            needed = threshold + free * math.log(regression.size) + 2.0 * math.log(shapes)
+            errors = np.sqrt(np.maximum(np.diag(inverse), 0.0) * needed * trial.inflation)
+            off = _off(trial.gram, trial.white)
+            if off > predictability.HIDDEN:
+                named = dict(zip(effect.coefficients, (float(each) for each in errors), strict=True))
+                sizes.append((off, named, trial.shape))
+        if sizes:
+            _, named, shape = max(sizes, key=lambda one: one[0])
+            out.append(Visible(effect, named, dict(shape)))
+        else:
+            out.append(Visible(effect, None, {}))
+    return out
+
+
+def _off(gram: Array, white: Mapping[str, Array]) -> float:
+    """Part of an effect's square that the base does not explain."""
+    whole = sum(float(np.sum(columns**2)) for columns in white.values())
+    return float(np.trace(gram)) / max(whole, 1e-300)
+
+
+def unexplained(found: Diagnosis) -> list[str]:
+    """Equations whose residual is far above the noise of their channel."""
+    return [name for name, (left, own) in found.floors.items() if left > FAR * own]
+
+
+def held(found: Diagnosis, holdout: Sequence[str]) -> held_out.Held | None:
+    """The judgement by held-out data, for the result; None without any."""
+    if found.errors is None:
+        return None
+    named = bool(found.named) and found.detected and not found.doubtful
+    names = ", ".join(holdout)
+    return held_out.Held(_gain(found.errors, names) if named else None, names, found.refused, True)
+
+
+def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence with errors on held-out data, the noise floor, and what would not have been seen."""
+    return dataclasses.replace(
+        made,
+        band_hz=found.band_hz,
+        held_out_errors=found.errors,
+        noise_floor={name: NoiseFloor(left, own) for name, (left, own) in found.floors.items()},
+        above_noise_floor=tuple(unexplained(found)),
+        smallest_visible={each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
+        cannot_be_seen=tuple(each.effect.name for each in found.visible if each.sizes is None),
+    )
+
+
+def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:
+    """Share of what can be explained at all that the named causes explain on held-out data, in squares of the error."""
+    possible = won = 0.0
+    ends = np.zeros(2)
+    for each in errors.values():
+        best = min(each.after, each.black_box if each.black_box is not None else each.after)
+        possible += max(0.0, each.before**2 - best**2)
+        won += each.before**2 - each.after**2
+        ends += each.before**2 * (1.0 - np.square(each.ratio95[::-1]))
+    scale = max(possible, won, 1e-12 * sum(each.before**2 for each in errors.values()), 1e-300)
+    before = math.sqrt(sum(each.before**2 for each in errors.values()))
+    after = math.sqrt(sum(each.after**2 for each in errors.values()))
+    return gain.Gain(won / scale, (float(ends[0]) / scale, min(1.0, float(ends[1]) / scale)), before, after, holdout)

@@ -1,0 +1,284 @@
+"""Causes by likelihood, in the noise that the model *and all of its candidates* leave.
+
+A residual that contains a slow fault looks like slow noise; noise estimated from it explains the fault away, and the
+larger the fault, the better. What the base and all candidates together leave contains no fault of the catalogue, and
+the score of a cause grows with its size. The score is then held against chance: surrogates of the base's own residual,
+an autoregression without any cause, pass through the same selection.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ranger_sim.sysid import naming, noise
+from ranger_sim.sysid.bands import least_squares, plain
+from ranger_sim.sysid.dataset import Array
+from ranger_sim.sysid.machine import Effect, Recording
+from ranger_sim.sysid.naming import Named, Trial
+from ranger_sim.sysid.regression import Noise, Part, Regression, Whitening, explained, innovations, reduced
+
+SURROGATES = 199
+LEVEL = 0.02  # chance that the best of all candidates exceeds its threshold on a sound recording
+MOST = 5  # causes
+LEAST = 6.0  # score that a cause must have whatever the surrogates say: that of a tie
+BLOCKS = 8  # of the cross-validation within the training data
+FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
+
+Accepts = Callable[[Sequence[Named], Named, Regression, Regression], bool]
+
+
+@dataclasses.dataclass
+class Selection:
+    """named: the causes in the order found; refused: by held-out data; base: the regression without any of them.
+
+    with_named: in the same noise; thresholds: of each round's score; best: (effect, score) of the last round, in which
+    nothing was found any more.
+    """
+
+    named: list[Named]
+    refused: list[Named]
+    base: Regression
+    with_named: Regression
+    thresholds: list[float]
+    best: list[tuple[Effect, float]]
+
+
+def everything(named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
+    """For `accepts` where there are no held-out data."""
+    return True
+
+
+def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: Sequence[Named]) -> Noise:
+    """Noise that base, `fixed` effects and all candidates leave together; each candidate at its best shape."""
+    base = naming.refit(plain(recordings), fixed)
+    candidates = [_columns(effect, base) for effect in effects]
+    found: dict[str, Whitening] = {}
+    white: dict[str, Array] = {}
+    for name, part in base.parts.items():
+        good = part.valid & ~part.starts
+        x, y, z = part.measured, part.response, part.stand_in
+        basis = np.linalg.qr(_scaled(z[good]))[0]
+        left = y[good] - x[good] @ np.array([base.values[each] for each in base.names])
+        left -= basis @ (basis.T @ left)
+        added: list[tuple[float, Array]] = []
+        for shapes in candidates:
+            tried = [(_gain(each[name][good], basis, left), each[name]) for each in shapes if name in each]
+            if tried:
+                added.append(max(tried, key=lambda one: one[0]))
+        added.sort(key=lambda one: -one[0])
+        most = np.count_nonzero(good) // FEWEST_FREE - x.shape[1]
+        kept: list[Array] = []
+        for _, columns in added:
+            if sum(each.shape[1] for each in kept) + columns.shape[1] <= most:
+                kept.append(columns)
+        wide = np.hstack([x, *kept])
+        residual = y - wide @ least_squares(wide[good], y[good])
+        memory = noise.autoregression(residual, good & _unbroken(part))
+        counted = base._good(name, memory)
+        shocks = innovations(memory, residual)
+        free = max(1, np.count_nonzero(counted) - wide.shape[1] - len(memory))
+        least = 1e-9 * float(np.max(np.abs(y), initial=0.0)) or 1.0
+        deviation = max(math.sqrt(float(np.sum(shocks[counted] ** 2)) / free), least)
+        found[name] = Whitening(memory, deviation)
+        white[name] = np.where(counted, shocks / deviation, np.nan)
+    return Noise(found, _correlations(white))
+
+
+def _correlations(white: dict[str, Array]) -> dict[tuple[str, str], float]:
+    """Correlations of the innovations of each pair of equations."""
+    shared = {}
+    names = list(white)
+    for number, one in enumerate(names):
+        for other in names[number + 1 :]:
+            product = white[one] * white[other]
+            if np.count_nonzero(np.isfinite(product)) > 40:
+                shared[one, other] = float(np.clip(np.nanmean(product), -0.98, 0.98))
+    return shared
+
+
+def _unbroken(part: Part) -> np.ndarray:
+    return np.diff(part.run, prepend=part.run[:1]) == 0
+
+
+def _scaled(columns: Array) -> Array:
+    lengths = np.linalg.norm(columns, axis=0)
+    return columns[:, lengths > 0.0] / lengths[lengths > 0.0]
+
+
+def _gain(columns: Array, basis: Array, left: Array) -> float:
+    """Square that columns explain of what the base left."""
+    off = columns - basis @ (basis.T @ columns)
+    return float(left @ left - np.sum((left - off @ least_squares(off, left)) ** 2))
+
+
+def _columns(effect: Effect, base: Regression) -> list[dict[str, Array]]:
+    """Columns of an effect at each of its shapes, by equation over all recordings, in the band and not whitened."""
+    out = []
+    for shape in effect.shapes:
+        made = [effect.columns(recording, shape, base.values) for recording in base.recordings]
+        names = {name for each in made for name in each if name in base.parts}
+        width = max((each[name].shape[1] for each in made for name in each), default=0)
+        out.append({name: _stacked(base, made, name, width) for name in sorted(names)})
+    return out
+
+
+def _stacked(base: Regression, made: Sequence[dict[str, Array]], name: str, width: int) -> Array:
+    parts = []
+    for recording, columns in zip(base.recordings, made, strict=True):
+        given = columns.get(name, np.zeros((len(recording.table), width)))
+        parts.append(reduced(recording, given))
+    return np.vstack(parts)
+
+
+def own_noise(regression: Regression) -> Noise:
+    """Noise of a regression's residual as it is, whatever is in it."""
+    found: dict[str, Whitening] = {}
+    values = np.array([regression.values[each] for each in regression.names])
+    for name, part in regression.parts.items():
+        residual = part.response - part.measured @ values
+        memory = noise.autoregression(residual, part.valid & ~part.starts & _unbroken(part))
+        counted = regression._good(name, memory)
+        shocks = innovations(memory, residual)[counted]
+        least = 1e-9 * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
+        deviation = math.sqrt(float(np.mean(shocks**2))) if len(shocks) else least
+        found[name] = Whitening(memory, max(deviation, least))
+    return Noise(found)
+
+
+def surrogates(regression: Regression, seed: int, count: int = SURROGATES) -> Array:
+    """(N, count) recordings without any cause, in the regression's rows: noise as its own residual is."""
+    out = np.zeros((regression.size, count))
+    for name, own in own_noise(regression).whitening.items():
+        raw = noise.surrogates(
+            own.coefficients, own.deviation, len(regression.parts[name].response), count, seed, f"noise of {name}"
+        )
+        out[regression.rows[name]] = regression._scaled(name, raw)[regression.good[name]]
+    return out
+
+
+def score(chi2: Array | float, freedom: int, shapes: int, size: int) -> Array | float:
+    """Gain of the information criterion: a shape found on a grid counts as a parameter."""
+    return chi2 - (freedom + (shapes > 1)) * math.log(size) - 2.0 * math.log(shapes)
+
+
+def by_chance(tried: Sequence[Trial], regression: Regression, drawn: Array) -> Array:
+    """(count,) largest score of all trials on each surrogate (N, count)."""
+    together = regression.z.T @ drawn
+    best = np.full(drawn.shape[1], -np.inf)
+    for trial in tried:
+        straight = sum((columns.T @ drawn[regression.rows[name]] for name, columns in trial.white.items()), 0.0)
+        product = straight - trial.shadow.T @ together
+        inverse = np.linalg.pinv(trial.gram, rcond=1e-9, hermitian=True)
+        chi2 = np.einsum("km,kl,lm->m", product, inverse, product) / trial.inflation
+        best = np.maximum(best, score(chi2, len(inverse), len(trial.effect.shapes), regression.size))
+    return best
+
+
+def select(
+    recordings: Sequence[Recording],
+    effects: Sequence[Effect],
+    fixed: Sequence[Named] = (),
+    seed: int = 0,
+    accepts: Accepts = everything,
+    most: int = MOST,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Selection:
+    """The causes that these data support. fixed: effects that are in the base.
+
+    accepts(named, candidate, without, extended), the last two the regressions without the candidate and with it: False
+    where held-out data refuse the candidate; naming goes on without it.
+    """
+    known = noise_of(recordings, effects, fixed)
+    base = naming.refit(Regression(recordings, noise=known), fixed)
+    named: list[Named] = []
+    regression, rest = base, list(effects)
+    left_out: list[Effect] = []
+    refused: list[Named] = []
+    thresholds: list[float] = []
+    while True:
+        progress(len(named) / most)
+        tried = naming.trials(rest, regression)
+        if not tried:
+            return Selection(named, refused, base, regression, thresholds, [])
+        chance = by_chance(tried, regression, surrogates(regression, seed))
+        threshold = max(float(np.quantile(chance, 1.0 - LEVEL)), LEAST)
+        thresholds.append(threshold)
+        ranking = _ranking(tried, regression)
+        chosen = next((each for each in ranking if naming.possible(each[3])), None)
+        if chosen is None or chosen[0] <= threshold or len(named) == most:
+            return Selection(
+                named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranking]
+            )
+        bic, chi2, freedom, trial = chosen
+        others = [each for each in ranking if each[3].effect is not trial.effect]
+        found = Named(
+            trial.effect,
+            trial.shape,
+            chi2,
+            freedom,
+            (1.0 + float(np.count_nonzero(chance >= bic))) / (1.0 + len(chance)),
+            bic,
+            [each[3].effect for each in others if bic - each[0] < naming.TIE and naming.possible(each[3])],
+            [(each[3].effect, bic - each[0]) for each in others],
+        )
+        extended = naming.refit(base, [*named, found], [*fixed, *named, found])
+        if not _predicts(regression, extended):
+            left_out.append(trial.effect)
+        elif not accepts(named, found, regression, extended):
+            refused.append(found)
+        else:
+            named.append(found)
+            regression = extended
+        rest = [
+            each
+            for each in rest
+            if each not in left_out
+            and all(each is not other.effect for other in refused)
+            and not any(other.effect.excludes(each) for other in named)
+        ]
+
+
+def _ranking(tried: Sequence[Trial], regression: Regression) -> list[tuple[float, float, int, Trial]]:
+    """(score, chi-square, freedom, trial) of each effect at its best shape, best first."""
+    best: dict[int, tuple[float, float, int, Trial]] = {}
+    for trial in tried:
+        chi2, freedom = explained(trial.gram, trial.product)
+        if not freedom:
+            continue
+        chi2 /= trial.inflation
+        found = (float(score(chi2, freedom, len(trial.effect.shapes), regression.size)), chi2, freedom, trial)
+        if id(trial.effect) not in best or found[0] > best[id(trial.effect)][0]:
+            best[id(trial.effect)] = found
+    return sorted(best.values(), key=lambda each: -each[0])
+
+
+def _predicts(without: Regression, extended: Regression) -> bool:
+    """True when the extended model predicts blocks of the training data better that neither model was fitted to."""
+    errors = np.zeros(2)
+    for number, regression in enumerate((without, extended)):
+        rows = {name: np.flatnonzero(without.good[name]) for name in without.equations}
+        block = {name: each * BLOCKS // len(without.good[name]) for name, each in rows.items()}
+        z, x, y = _unwhitened(regression)
+        place = np.concatenate([block[name] for name in without.equations])
+        for each in range(BLOCKS):
+            fitted, held = place != each, place == each
+            if not np.any(held):
+                continue
+            scale = np.linalg.norm(z[fitted], axis=0)
+            scale = np.where(scale > 0.0, scale, 1.0)
+            zs, xs = z[fitted] / scale, x[fitted] / scale
+            found = np.linalg.lstsq(zs.T @ xs, zs.T @ y[fitted], rcond=1e-10)[0]
+            errors[number] += np.sum((y[held] - (x[held] / scale) @ found) ** 2)
+    return bool(errors[1] < errors[0])
+
+
+def _unwhitened(regression: Regression) -> tuple[Array, Array, Array]:
+    """(stand-ins, columns, response) of the rows that count, each equation by its residual's size only."""
+    out: list[tuple[Array, Array, Array]] = []
+    for name, part in regression.parts.items():
+        good = regression.good[name]
+        size = regression.whitening[name].deviation
+        out.append((part.stand_in[good] / size, part.measured[good] / size, part.response[good] / size))
+    return tuple(np.concatenate(each) for each in zip(*out, strict=True))  # type: ignore[return-value]

@@ -1,0 +1,71 @@
+"""True terms left out of real recordings at a graded share: named with their size, and not when they are in the model.
+
+The gravity of joint 4 is -0.327 A times the cosine of its angle, by both parts of the recording.
+"""
+
+import functools
+import os
+import pathlib
+
+import numpy as np
+import pytest
+
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.pipeline import diagnose
+from tests.sysid.robot_joint import HeavyJoint, Joint
+
+DATA = pathlib.Path(os.environ.get("RANGER_SIM_DATA", pathlib.Path(__file__).parents[3] / "shared" / "data"))
+GRAVITY_A = -0.327
+pytestmark = pytest.mark.skipif(
+    not (DATA / "ur10e_joint4_a.csv").is_file(), reason="the joints of the UR10e are not here (RANGER_SIM_DATA)"
+)
+
+
+def recording(name, left_in=1.0):
+    """A part of a recording whose gravity is left in by this share."""
+    rows = np.loadtxt(DATA / f"ur10e_{name}.csv", delimiter=",", skiprows=1)
+    current = rows[:, 3] - (1.0 - left_in) * GRAVITY_A * np.cos(rows[:, 1])
+    columns = {"angle_rad": rows[:, 1], "rate_rad_per_s": rows[:, 2], "current_A": current}
+    return Table(rows[:, 0], columns, (slice(0, len(rows)),), name)
+
+
+@functools.cache
+def diagnosed(joint, left_in=1.0, machine=Joint):
+    found = diagnose(machine(), [recording(f"{joint}_a", left_in)], [recording(f"{joint}_b", left_in)])
+    return found.answer, found.answer["evidence"]["held_out_errors"]["current_A"]
+
+
+@pytest.mark.parametrize("left_in", [0.2, 0.5, 1.0])
+def test_gravity_that_a_model_lacks_is_named_first_with_its_size(left_in):
+    answer, _ = diagnosed("joint4", left_in)
+    first = answer["causes"][0]
+    assert first["name"] == "gravity" and not answer["abstained"]
+    low, high = first["parameters"]["cosine"]["ci95"]
+    assert low < left_in * GRAVITY_A < high
+
+
+def test_gravity_takes_the_error_on_the_other_part_below_five_per_cent():
+    _, error = diagnosed("joint4")
+    assert error["before"] > 0.2 and error["after"] < 0.05
+    # nothing that a black box learns from the same part explains much more of the other one
+    assert error["black_box"] > 0.8 * error["after"]
+
+
+def test_nothing_of_weight_is_named_where_gravity_is_in_the_model():
+    answer, error = diagnosed("joint4", machine=HeavyJoint)
+    assert "gravity" not in [each["name"] for each in answer["causes"]]
+    assert error["after"] > 0.95 * error["before"]
+
+
+def test_a_friction_that_bends_with_speed_is_named_for_joint_1_and_a_black_box_is_compared():
+    answer, error = diagnosed("joint1")
+    first = answer["causes"][0]
+    assert first["name"] == "drag" and first["form"] in ("square", "cube", "root")
+    assert error["after"] < 0.9 * error["before"]
+    assert 0.0 < error["black_box"] <= error["after"]
+
+
+def test_a_term_too_small_for_these_data_has_its_smallest_visible_size_printed():
+    answer, _ = diagnosed("joint4", 0.02)
+    assert "gravity" not in [each["name"] for each in answer["causes"]]
+    assert answer["evidence"]["smallest_visible"]["gravity at angle_rad"]["cosine"] > 0.02 * abs(GRAVITY_A)
