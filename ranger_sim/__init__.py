@@ -13,6 +13,8 @@ The public names:
     StopRule    when a walk is done: steps, time or distance
     Quirks      where the firmware follows the one of 2016 instead of the appendix
     Profile     which boards and buses are real, bit rates and schedules of the buses; `load_profile` reads one
+    read        measured data of any format: channels, what became of every sample, what is odd
+    Measurement what `read` returns
     UserError   a mistake of the user, reported in one line
 
 Everything else is internal and changes without notice; CAN programs find the interface `ranger_sim` by python-can.
@@ -34,11 +36,13 @@ if TYPE_CHECKING:
     from ranger_sim.harness.outside.profile import load as load_profile
     from ranger_sim.harness.ranger import Ranger
     from ranger_sim.harness.scenario import Scenario, StopRule
+    from ranger_sim.sysid.reading import Measurement, read
 
-__all__ = ["Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "load_profile"]
+__all__ = ["Measurement", "Profile", "Quirks", "Ranger", "Scenario", "StopRule", "UserError", "load_profile", "read"]
 __version__ = "0.1.0"
 
 _PLACES = {
+    "Measurement": ("sysid.reading", "Measurement"),
     "Profile": ("harness.outside.profile", "Profile"),
     "Quirks": ("boards.quirks", "Quirks"),
     "Ranger": ("harness.ranger", "Ranger"),
@@ -46,6 +50,7 @@ _PLACES = {
     "StopRule": ("harness.scenario", "StopRule"),
     "UserError": ("foundation.user_error", "UserError"),
     "load_profile": ("harness.outside.profile", "load"),
+    "read": ("sysid.reading", "read"),
 }
 
 

@@ -26,7 +26,7 @@ MAY_IMPORT = {
     "firmware_sim": {"foundation", "can_bus"},
     "boards": {"foundation", "firmware_sim", "datatable"},
     "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards"},
-    "sysid": {"foundation", "plant"},
+    "sysid": {"foundation", "datatable", "can_bus", "plant"},
     "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "sysid"},
 }
 # The same inside a room, for those of its rooms that stand above one another.

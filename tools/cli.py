@@ -61,6 +61,7 @@ def parser() -> argparse.ArgumentParser:
     from ranger_sim.tools.identify import command as identify
     from ranger_sim.tools.new import command as new
     from ranger_sim.tools.panel import command as panel
+    from ranger_sim.tools.read import command as read
     from ranger_sim.tools.robodaq import command as daq
     from ranger_sim.tools.run import summary_schema, up, walk
     from ranger_sim.tools.timing import slots, trace
@@ -98,6 +99,7 @@ def parser() -> argparse.ArgumentParser:
     diagnose.register(commands)
     figures.register(commands)
     fmu.register(commands)
+    read.register(commands)
     identify.register(commands)
     compare_walk.register(commands)
     completion.register(commands)

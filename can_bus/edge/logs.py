@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import can
 
+from ranger_sim.can_bus.edge import log_kinds
 from ranger_sim.can_bus.edge.candump import frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
@@ -65,27 +66,17 @@ def read_log(path: str | pathlib.Path) -> RecordedFrames:
     return RecordedFrames(pathlib.Path(path))
 
 
-def is_frame_table(path: pathlib.Path) -> bool:
-    """True for a .csv of frames: python-can's or SavvyCAN's."""
-    try:
-        with path.open(encoding="utf-8", errors="replace") as file:
-            first = file.readline(200).strip().lower()
-    except OSError:
-        return False
-    return first == PYTHON_CAN_HEADER or first.startswith(SAVVYCAN_HEADER)
-
-
 def _opened(log: RecordedFrames) -> Iterator[Frame]:
-    suffix = log.source.suffix.lower()
     if not log.source.is_file():
         raise FileNotFoundError(2, "no such file")  # sqlite would make one
-    if suffix == ".log":
+    kind = log_kinds.kind(log.source)
+    if kind in (log_kinds.CANDUMP, log_kinds.SCREEN, log_kinds.BUSMASTER):
         return _candump_or_busmaster(log)
-    if suffix == ".csv":
+    if kind in (log_kinds.PYTHON_CAN, log_kinds.SAVVYCAN) or log.source.suffix.lower() == ".csv":
         return _csv(log)
-    if suffix == ".asc":
+    if kind == log_kinds.ASC:
         return _by_lines(log, can.ASCReader, _asc_lines(log), ASC_FRAME)
-    if suffix == ".trc":
+    if kind == log_kinds.TRC:
         return _by_lines(log, can.TRCReader, _text_lines(log), TRC_FRAME)
     return _by_python_can(log)
 

@@ -5,7 +5,7 @@ import itertools
 import can
 import pytest
 
-from ranger_sim.can_bus.edge import logs
+from ranger_sim.can_bus.edge import log_kinds, logs
 from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 from tests.boards.original_images import DATA
@@ -201,10 +201,10 @@ def test_extended_and_remote_frames_of_busmaster_and_savvycan(tmp_path):
 
 
 def test_a_table_of_frames_is_known_by_its_header(tmp_path):
-    assert logs.is_frame_table(written(tmp_path / "a.csv", 3))
+    assert log_kinds.kind(written(tmp_path / "a.csv", 3)) == log_kinds.PYTHON_CAN
     other = tmp_path / "b.csv"
     other.write_text("t_s,voltage_V\n0,1\n")
-    assert not logs.is_frame_table(other) and not logs.is_frame_table(tmp_path / "none.csv")
+    assert log_kinds.kind(other) == ""
     with pytest.raises(UserError, match="b.csv: a .csv of frames begins with 'timestamp,arbitration_id"):
         recorded(other)
 

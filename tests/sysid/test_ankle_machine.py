@@ -17,7 +17,7 @@ from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnose import diagnose
 from ranger_sim.sysid.machines import ankle_motion
 from ranger_sim.sysid.machines.ankle import Ankle, predicted
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 from ranger_sim.tools.cli import main
 from ranger_sim.tools.diagnose.work import answer
 

@@ -19,13 +19,14 @@ from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.plant import terms
-from ranger_sim.sysid import losses, readers, repairs, sanity
+from ranger_sim.sysid import losses, repairs, sanity
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identify import coverage, legs, motor
 from ranger_sim.sysid.identify.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
 from ranger_sim.sysid.readers.columns import mapping_of
+from ranger_sim.sysid.reading import open_recording
 from ranger_sim.tools.command_line import files, streams, terminal
 from ranger_sim.tools.identify import page
 
@@ -129,7 +130,7 @@ def recorded(
 
     accepted: share of a channel's samples that may be lost. UserError if more are.
     """
-    data = readers.read(path, mapping)
+    data = open_recording(path, mapping)
     if name in ("pendulum", "ankle-sine"):  # the others are single readings
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(str(path), findings)
