@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import order, wraps
+from ranger_sim.sysid import headlines, order, wraps
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
 
 NOTE, WARNING, FATAL = "note", "warning", "fatal"
@@ -22,6 +22,10 @@ KINDS = {
     "no_unit": "nothing says the unit",
     "unknown_unit": "the file says a unit that is not known",
     "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
+    "time_assumed": "which column is the time follows from its values only",
+    "dates_either_way": "day and month can be exchanged",
+    "names_again": "the names of the columns come again",
+    "cut_off": "the last row is cut off",
     "no_stamp": "rows without a stamp",
     "ragged": "rows with too many or too few cells",
     "unreadable": "cells that are no numbers",
@@ -40,6 +44,7 @@ KINDS = {
     "stamp_wrap": "the clock's counter ran over",
     "reversed_stamps": "stamps that go back",
     "duplicate_stamps": "stamps that come twice",
+    "rounded_stamps": "stamps are rounded so far that several samples have one",
     "gap": "no samples for a while",
     "slow_samples": "samples so far apart that the stamps may be in another unit",
     "clock_drift": "two clocks do not run alike",
@@ -49,6 +54,10 @@ KINDS = {
     "not_repaired": "what drives the machine looks wrong and stays as it is",
     "bit_flip": "single values that are wrong by a power of two of the finest step",
     "spike": "single values far from both neighbours",
+    "held": "it keeps each value for several rows",
+    "resampled": "it goes in straight lines between fewer samples",
+    "jump": "all channels jump at one row",
+    "mixed": "rows of two recordings in turn",
     "stuck": "a value stands still while other channels move",
     "constant": "one value all the time",
     "saturation": "values cut off at a limit",
@@ -56,7 +65,17 @@ KINDS = {
     "wrong_unit": "values as of another unit than is told",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
-DOUBTED = ("unknown_unit", "slow_samples", "wrong_unit", "stuck", "noise")
+DOUBTED = (
+    "jump",
+    "mixed",
+    "resampled",
+    "rounded_stamps",
+    "unknown_unit",
+    "slow_samples",
+    "wrong_unit",
+    "stuck",
+    "noise",
+)
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more become one finding
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
@@ -139,13 +158,16 @@ def _inspected(dataset: Dataset) -> list[Finding]:
     sound: dict[str, Channel] = {}
     for channel in dataset.channels.values():
         found += _stamps(channel)
+        found += headlines.of_stamps(channel)
         tidy = _tidied(channel)
         found += _not_finite(channel)
         if len(tidy.value) >= FEWEST:
             sound[channel.name] = tidy
     for channel in sound.values():
         found += _values(channel, sound)
+        found += headlines.of_values(channel)
     found += _between(sound)
+    found += headlines.of_all(sound)
     return found
 
 

@@ -8,6 +8,7 @@ not a number becomes "not a number" and a finding.
 
 import dataclasses
 import pathlib
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -26,6 +27,8 @@ LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewe
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
 EVEN = 0.01  # of the usual step: what counts evenly without a name may be the time
+
+HEX, HEXADECIMAL = re.compile("(?:0[xX])?[0-9A-Fa-f]{4,16}"), 0.01  # of the cells of a column
 
 Progress = Callable[[str, float], None]
 
@@ -102,7 +105,7 @@ class _Rows:
                     else layouts.cells_of(line, separator)
                 )
                 if len(cells) == width or (len(cells) > width and not any(map(str.strip, cells[width:]))):
-                    if line[:1] in "#%/ \t" and layouts.is_comment(line):
+                    if line[:1] in "#%/ \t" and layouts.is_comment(line) and not layouts.is_data(cells):
                         self._count("comments")
                         continue
                     cells = [cell.strip() for cell in cells[:width]]
@@ -388,6 +391,10 @@ def _channels(
             ]
             dataset.findings.append(Finding(named.name, "unreadable", *place, float(column.odd), "samples", text))
         kept = present & stamped
+        if column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2]):
+            text = f"{name}: hexadecimal numbers such as {column.first_odd[2]!r} are not read, left out"
+            dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
+            continue
         if not np.isfinite(value[kept]).any():
             text = f"{name}: has no number in it, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))

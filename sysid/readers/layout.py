@@ -249,7 +249,7 @@ def _names(
         words = [(place, cells) for place, cells in attempt.rows if place < run and is_words(cells)]
         if words and len(words[-1][1]) > 1 and words[-1][0] == max(p for p, _ in attempt.rows if p < run):
             place, cells = words[-1]
-            if len(cells) == count - 1:
+            if len(cells) == count - 1 and _counts_rows(attempt):
                 return place + 1, place, _unique(path, place, ["row", *cells], [])
             raise UserError(
                 f"{path}:{place}: {len(cells)} names, and the rows below have {count} cells"
@@ -267,6 +267,14 @@ def _names(
         (c for p, c in reversed(attempt.rows) if p < line and len(c) in (count, count - 1) and is_words(c)), []
     )
     return line + 1, line, _unique(path, line, cells, group)
+
+
+def _counts_rows(attempt: _Attempt) -> bool:
+    """True when the first cells are the numbers of the rows, which R writes without a name."""
+    first = [cells[0] for place, cells in attempt.rows if place in attempt.data]
+    return all(cell.isdecimal() for cell in first) and [int(cell) for cell in first] == list(
+        range(int(first[0]), int(first[0]) + len(first))
+    )
 
 
 def _as_many(text: str, separator: str, count: int) -> list[str] | None:

@@ -17,13 +17,21 @@ DAY_NS, SECOND_NS = 86_400_000_000_000, 1_000_000_000
 FEW_DAYS = 3  # a recording takes no more; of two ways to read its dates, one that makes it shorter is right
 DATE = (
     r"(?P<year>\d{4})[-/.](?P<month>\d\d?)[-/.](?P<day>\d\d?)"
-    r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4})"
+    r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4}|\d\d)"
+    r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4})"
 )
 TIME = (
-    r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+    r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
     r"\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
 )
 STAMP = re.compile(rf"(?:(?P<date>{DATE})(?:[T ]\s*(?=\d))?)?(?P<time>{TIME})?")
+MONTHS = {
+    name: k % 12 + 1
+    for k, name in enumerate(
+        "jan feb mar apr may jun jul aug sep oct nov dec jan feb mrz apr mai jun jul aug sep okt nov dez".split()
+    )
+}  # English and German
+CENTURY = 2000
 NONE = np.iinfo(np.int64).min  # in an array: no stamp
 
 
@@ -106,8 +114,14 @@ def _day(found: re.Match[str], month_first: bool) -> int | None:
     """Days since 1970; None for a date that is not in the calendar."""
     if found["year"]:
         year, month, day = (int(found[name]) for name in ("year", "month", "day"))
+    elif found["named"]:
+        if found["named"].lower() not in MONTHS:
+            return None
+        year, day = int(found["of_year"]), int(found["of_month"])
+        month = MONTHS[found["named"].lower()]
     else:
         year, first, second = (int(found[name]) for name in ("late", "first", "second"))
+        year += CENTURY if year < 100 else 0
         month, day = (first, second) if month_first else (second, first)
     if not 1 <= month <= 12 or not 1 <= day <= calendar.monthrange(max(year, 1), month)[1]:
         return None

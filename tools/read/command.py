@@ -14,7 +14,7 @@ def register(commands: Any) -> None:
         "read",
         help="what is in measured data: channels, what became of every row, what is odd",
         description="Reads text tables of any kind, oscilloscope exports, MDF, MATLAB, Parquet, ULog, MCAP, recordings "
-        "of CAN frames and folders of runs; accounts for every line and sample, finds what is odd, and proposes repairs. "
+        "of CAN frames, and folders of runs; accounts for every line and sample, finds what is odd, proposes repairs. "
         "Exit code 0: read; 1: read, with findings that matter; 2: refused.",
         epilog="ranger-sim read run1.csv --plot run1.html --write-recipe lab.toml",
     )
