@@ -32,6 +32,7 @@ LOSSES = {
     "reversed_stamps": "stamps that go back and do not fit between the others either",
     "restarted_stamps": "stamps that begin again within the time of those before: several recordings in one file?",
     "duplicate_stamps": "stamps that come twice, with different values",
+    "clipped": "values cut off at a limit",
     "bit_flip": "single values with a wrong bit",
 }
 NOTHING_LOST = {

@@ -20,7 +20,9 @@ JOIN, USUAL_PERCENT = 8.0, 99.5
 SMOOTH = 0.2  # largest usual step of a smooth channel to its range
 # Straight lines: kinks at one distance, and nothing between them but the rounding of the digits.
 LINES_PART, FEWEST_STEPS, DIGITS, SHARP = 0.8, 3, 2.5, 10.0
-HELD_PART, MOST_HELD = 0.8, 200
+POSITIONS = ("rad", "m")
+MOST_JOINS = 3
+MOST_HELD = 200
 MIXED = 3.0  # neighbours are so many times as far from each other as next neighbours
 
 
@@ -68,7 +70,10 @@ def of_values(channel: Channel) -> Iterator[Finding]:
     distance = _usual_distance(kinks)
     if distance < FEWEST_STEPS or len(kinks) < 10 or float(np.median(bends[kinks])) < SHARP * rounding:
         return
-    text = f"it goes in straight lines over {distance} rows each: resampled from samples {distance * _step(time_s):.4g} s apart"
+    text = (
+        f"it goes in straight lines over {distance} rows each: resampled from samples "
+        f"{distance * _step(time_s):.4g} s apart"
+    )
     yield Finding(channel.name, "resampled", *ends, distance * _step(time_s), "s", text)
 
 
@@ -89,7 +94,7 @@ def of_all(channels: dict[str, Channel]) -> Iterator[Finding]:
     """Recordings that were joined, or whose rows are mixed: what happens to all channels of one time base at a row."""
     for group in _by_stamps(channels):
         smooth = [channel for channel in group if _is_smooth(channel.value)]
-        yield from _joined(smooth, group)
+        yield from _joined(smooth)
         yield from _mixed(group)
 
 
@@ -109,20 +114,23 @@ def _is_smooth(value: Array) -> bool:
     return bool(np.percentile(steps, USUAL_PERCENT) < SMOOTH * np.ptp(value)) and bool(np.mean(steps == 0.0) < 0.5)
 
 
-def _joined(smooth: list[Channel], group: list[Channel]) -> Iterator[Finding]:
-    if len(smooth) < 2:
-        return
-    counts = np.zeros(len(smooth[0].value) - 1, dtype=int)
+def _joined(smooth: list[Channel]) -> Iterator[Finding]:
+    """Rows at which every position jumps, and another channel with it: what is driven may step, a position does not."""
+    jumping = {}
     for channel in smooth:
         steps = np.abs(np.diff(channel.value))
         steps[np.diff(channel.time_s) > 3.0 * _step(channel.time_s)] = 0.0  # across a gap it may have moved
-        counts += steps > JOIN * max(float(np.percentile(steps, USUAL_PERCENT)), 2.0 * channel.resolution)
-    places = np.flatnonzero(counts == len(smooth))
-    for place in places[:3]:
+        jumping[channel.name] = steps > JOIN * max(float(np.percentile(steps, USUAL_PERCENT)), 2.0 * channel.resolution)
+    positions = [channel.name for channel in smooth if channel.unit in POSITIONS]
+    if not positions or len(smooth) < 2:
+        return
+    at_all = np.all([jumping[name] for name in positions], axis=0)
+    places = np.flatnonzero(at_all & (np.sum(list(jumping.values()), axis=0) > 1))
+    for place in places if len(places) <= MOST_JOINS else ():
         at, after = float(smooth[0].time_s[place]), float(smooth[0].time_s[place + 1])
-        names = ", ".join(channel.name for channel in smooth[:3])
-        text = f"{names} jump at one row ({at:.6g} s): two recordings were joined there, or the machine was moved"
-        yield Finding("", "jump", at, after, float(len(smooth)), "channels", text)
+        names = [name for name, jumps in jumping.items() if jumps[place]]
+        text = f"{', '.join(names[:3])} jump at one row ({at:.6g} s): two recordings were joined there"
+        yield Finding("", "jump", at, after, float(len(names)), "channels", text)
 
 
 def _mixed(group: list[Channel]) -> Iterator[Finding]:

@@ -35,6 +35,7 @@ KINDS = {
     "lost_frames": "frames that the file has, or should have, and that did not come out",
     "several_buses": "messages that came on several buses",
     "broken_frames": "frames that do not fit their message",
+    "dropouts": "the logger reports that it dropped data",
     "no_summary": "a walk's folder without its summary",
     "fell": "the robot fell in this walk",
     # of the stamps

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from ranger_sim.can_bus.edge import log_kinds
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Dataset
-from ranger_sim.sysid.readers import csv_file, layout, measurement, robodaq, run_folder
+from ranger_sim.sysid.readers import binary, csv_file, layout, measurement, robodaq, run_folder
 from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 
 TEXT_TABLE = "text table"
@@ -30,6 +30,11 @@ TABLE = Format(TEXT_TABLE)
 BEGINNINGS = {
     b"MDF     ": MDF,
     b"UnFinMF ": MDF,
+    b"MATLAB 5.0": Format("MATLAB"),
+    b"MATLAB 7.3": Format("MATLAB"),
+    b"PAR1": Format("Parquet"),
+    b"ULog\x01\x12\x35": Format("ULog"),
+    b"\x89MCAP0\r\n": Format("MCAP"),
 }
 REFUSED = {
     b"TDSm": "a TDMS file: export it as CSV or as MDF (nptdms reads it)",
@@ -39,6 +44,7 @@ REFUSED = {
     b"\xd0\xcf\x11\xe0": "a workbook of an old Excel: export the sheet as CSV",
     b"%PDF": "a PDF",
     b"\x7fELF": "a program",
+    b"\x89HDF": "an HDF5 file: export the channels as CSV or MDF (a .mat of version 7.3: save it with '-v7')",
     b"\x89PNG": "a picture",
 }
 MDF_ENDINGS = (".mf4", ".mdf", ".dat")
@@ -97,6 +103,8 @@ def read(
         return run_folder.read(path, mapping)
     if known is MDF:
         return measurement.read(path, mapping)
+    if known.name in binary.KINDS:
+        return binary.read(path, known.name, mapping, time_unit)
     if known is ROBODAQ:
         return robodaq.read(path, mapping, variable_units)
     return csv_file.read(path, mapping, time_unit, assumed, progress)

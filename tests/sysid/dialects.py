@@ -79,11 +79,7 @@ def number(value: float, how: Dialect, form: str = "") -> str:
             groups.insert(0, digits[-3:])
             digits = digits[:-3]
         text = sign + how.thousands.join(groups) + mark + rest
-    return (
-        text.replace(".", "\0").replace(",", how.thousands or ",").replace("\0", how.decimal)
-        if how.decimal == "," and not how.thousands
-        else _swapped(text, how)
-    )
+    return _swapped(text, how)
 
 
 def _swapped(text: str, how: Dialect) -> str:
@@ -218,7 +214,8 @@ def dialects() -> Iterator[tuple[str, Dialect]]:
     for stamps in (
         "s long", "s exponent", "ms", "us", "ns", "min", "epoch s", "epoch ms", "epoch us", "epoch ns", "bare epoch s",
         "bare epoch ms", "bare epoch us", "bare epoch ns", "iso", "iso space", "iso Z", "iso offset", "iso slashes",
-        "iso micros", "german", "german short", "us dates", "us dates 24", "named month", "date and time", "german date and time",
+        "iso micros", "german", "german short", "us dates", "us dates 24", "named month", "date and time",
+        "german date and time",
         "time of day", "time of day colon", "excel",
     ):  # fmt: skip
         for name, sign in (("comma", ","), ("semicolon", ";"), ("tab", "\t")):
@@ -633,9 +630,9 @@ def alike(found: Measurement, how: Dialect | None = None, mended: bool = False) 
     missing = set(UNITS) - set(by_stem)
     if missing:
         return f"without {', '.join(sorted(missing))}, there are {', '.join(channels)}"
-    for name in UNITS:
+    for name, unit in UNITS.items():
         channel = by_stem[name]
-        if how is not None and how.names != "none" and channel.unit != UNITS[name]:
+        if how is not None and how.names != "none" and channel.unit != unit:
             return f"{name} in {channel.unit!r}"
         if not len(channel.value):
             return f"{name} empty"
