@@ -152,6 +152,7 @@ def open_recording(
     dataset = _read(path, mapping, databases, time_unit, each_frame, buses, assume, progress)
     if recipe is not None:
         recipe.check(dataset)
+    dataset.findings += sanity.of_recording(dataset)
     if mapping:
         dataset.layout["map"] = mapping
     return dataset

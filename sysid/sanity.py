@@ -23,6 +23,7 @@ KINDS = {
     "unknown_unit": "the file says a unit that is not known",
     "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
     "time_assumed": "which column is the time follows from its values only",
+    "time_of_rate": "the stamps follow from a rate above the table",
     "dates_either_way": "day and month can be exchanged",
     "names_again": "the names of the columns come again",
     "cut_off": "the last row is cut off",
@@ -168,8 +169,14 @@ def _inspected(dataset: Dataset) -> list[Finding]:
         found += _values(channel, sound)
         found += headlines.of_values(channel)
     found += _between(sound)
-    found += headlines.of_all(sound)
     return found
+
+
+def of_recording(dataset: Dataset) -> list[Finding]:
+    """Oddities of all channels together, which only the import sees: later steps choose some of the channels."""
+    sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
+    with np.errstate(all="ignore"):
+        return list(headlines.of_all(sound))
 
 
 def stop_if_fatal(name: str, findings: list[Finding]) -> None:

@@ -24,6 +24,7 @@ SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
 LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
+REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
 EVEN = 0.01  # of the usual step: what counts evenly without a name may be the time
@@ -339,7 +340,7 @@ def _note_layout(
     if layout.encoding != "utf-8-sig":
         text = f"the text is read as {layout.encoding}, it is not UTF-8"
         dataset.repairs.append(Repair("", "encoding", 0, text))
-    if not layout.names_line:
+    if layout.names[-1] == f"column_{len(layout.names)}" and not layout.names_line:
         count = len(layout.names)
         text = f"the table has no names, its columns are column_1 to {layout.names[-1]}"
         dataset.findings.append(Finding("", "no_header", 0.0, 0.0, float(count), "columns", text))
@@ -378,7 +379,7 @@ def _channels(
         dataset.findings.append(Finding("", "no_stamp", *columns.ends(time_s), float(count), "rows", text))
         lost += (Loss("no_stamp", count, f"in line {places[0]}"),)
     for index, (name, column) in enumerate(zip(names, table, strict=True)):
-        if index in time_columns:
+        if index in time_columns or index in rows.layout.ignored:
             continue
         unit_text = rows.layout.units[index]
         named = columns.label(dataset.name, name, unit_text or column.unit_text or unit_text, mapping)
@@ -397,7 +398,8 @@ def _channels(
             continue
         if not np.isfinite(value[kept]).any():
             text = f"{name}: has no number in it, left out"
-            dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
+            severity = "warning" if present.any() or not name.lower().startswith(REMARKS) else "note"
+            dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text, severity))
             continue
         whole = bool(kept.all())
         finest = column.finest if column.finest < 1.0 or column.first else 0.0
@@ -450,6 +452,13 @@ def _time(
         candidates = [names.index(assumed["time"])]
     else:
         candidates = [k for k, name in enumerate(called) if layouts.is_time_name(name)]
+    step_s = rows.layout.above.step_s
+    in_time = [k for k in range(len(names)) if _may_be_time(called[k], rows.layout.units[k])]
+    if step_s and not any(np.isfinite(table[k].value()).any() or table[k].written for k in candidates or in_time):
+        text = f"no column has stamps: they are those of the rate above the table, {step_s:.6g} s apart"
+        dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, step_s, "s", text, "note"))
+        dataset.layout |= {"time": "rate", "time_unit": "s"}
+        return set(candidates), step_s * np.arange(rows.kept)
     month_first = {"month-first": True, "day-first": False}.get(assumed.get("dates", ""))
     candidates = candidates or _unnamed_time(dataset, rows, table, called)
     written = {k: found for k in candidates if (found := table[k].stamps(month_first)) is not None}

@@ -14,16 +14,17 @@ from collections.abc import Mapping, Sequence
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import units
-from ranger_sim.sysid.readers import numerals, stamps, text_file
+from ranger_sim.sysid.readers import numerals, preamble, stamps, text_file
 
 COMMENTS = ("#", "%", "//")
 CLOCKS = (  # in addition to those of units.TIME_WORDS
     "datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock", "x_value", "second", "seconds", "sek",
-    "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
+    "x-axis", "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
 )  # fmt: skip
 SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "space": " "}
 HEAD_LINES = 4000
 AHEAD = 0.1  # of the rows: by so much more of them the better of two separators must read
+SETTINGS = 30  # rows of an older Tektronix that have settings in their first columns
 SECOND_TABLE = 5  # rows of numbers below other names: another table
 KEYS = {  # --assume KEY=VALUE
     "encoding": "one of " + ", ".join(text_file.ENCODINGS),
@@ -37,7 +38,10 @@ KEYS = {  # --assume KEY=VALUE
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """How a text table is read. Lines count from 1, 0: none; names: as in the file; units: text, None: none."""
+    """How a text table is read. Lines count from 1, 0: none; names: as in the file; units: text, None: none.
+
+    above: what the lines above say; ignored: columns that are no channels.
+    """
 
     encoding: str
     separator: str
@@ -47,6 +51,8 @@ class Layout:
     first_line: int
     names: tuple[str, ...]
     units: tuple[str | None, ...]
+    above: preamble.Preamble = preamble.Preamble()
+    ignored: tuple[int, ...] = ()
 
     def as_assumptions(self) -> dict[str, str]:
         """What --assume would say."""
@@ -157,7 +163,41 @@ def of(path: pathlib.Path, survey: text_file.Survey, assumed: Mapping[str, str])
     below = [(place, cells) for place, cells in attempt.rows if place > names_line]
     names, unit_texts, units_line, first = _units(attempt, names, names_line, below, first)
     decimal = {"point": ".", "comma": ","}.get(assumed.get("decimal", ""), "")
-    return Layout(survey.encoding, attempt.separator, decimal, names_line, units_line, first, names, unit_texts)
+    ignored: tuple[int, ...] = ()
+    if "Increment" in names and below:  # Rigol: units, start and increment in the row below
+        units_line, cells = below[0]
+        unit_texts = tuple(cell if k and units.unit_of(cell) is not None else None for k, cell in enumerate(cells))
+        ignored, first = tuple(k for k in range(len(names)) if names[k] in ("X", "Start", "Increment")), units_line + 1
+    begin = max(first, _longest_run(attempt))
+    rows = [cells_of(line, attempt.separator) for place, line in head if place < begin and not is_blank(line)]
+    if not names_line and attempt.rows[0][1][:1] == ["Record Length"]:  # older Tektronix: settings next to the data
+        rows, ignored = [cells for _, cells in attempt.rows[:SETTINGS]], (0, 1, 2)
+        names = ("setting", "setting value", "setting unit", "TIME", *(f"CH{k}" for k in range(1, len(names) - 3)))
+        rows = [cells[:2] for cells in rows]
+    above = preamble.of(rows)
+    if len(above.names) == attempt.count and not any(map(is_time_name, names)):
+        names, unit_texts, names_line, units_line, first = above.names, (None,) * attempt.count, 0, 0, begin
+    unit_texts = _with_preamble(names, unit_texts, above, ignored)
+    return Layout(
+        survey.encoding, attempt.separator, decimal, names_line, units_line, first, names, unit_texts, above, ignored
+    )
+
+
+def _with_preamble(
+    names: tuple[str, ...], unit_texts: tuple[str | None, ...], above: preamble.Preamble, ignored: tuple[int, ...]
+) -> tuple[str | None, ...]:
+    """The unit texts, where nothing next to the names gives them, by the preamble."""
+    if any(unit_texts) or not (above.units or above.time_unit):
+        return unit_texts
+    found = list(unit_texts)
+    times = [k for k, name in enumerate(names) if is_time_name(name)]
+    channels = [k for k in range(len(names)) if k not in times and k not in ignored and names[k] != "Comment"]
+    if len(channels) == len(above.units):
+        for k, text in zip(channels, above.units, strict=True):
+            found[k] = text if units.split(names[k])[1] is None else None
+    for k in times[:1]:
+        found[k] = above.time_unit or None
+    return tuple(found)
 
 
 def _attempt(separator: str, kept: list[tuple[int, str]]) -> _Attempt:
@@ -263,6 +303,11 @@ def _names(
     tied = [each for each in found if each[0] == best]
     again = best >= 3.0 and tied[0][2] != tied[-1][2]
     _, line, cells = tied[-1] if again else tied[0]
+    place_above = next((k for k in range(len(attempt.rows)) if attempt.rows[k][0] == line), 0) - 1
+    if place_above >= 0 and all(units.unit_of(cell.strip("[]() ")) is not None for cell in cells if cell):
+        place, upper = attempt.rows[place_above]
+        if len(_shorn(upper)) == count:  # names that are numbers, above a row of units
+            return line, place, _unique(path, place, _shorn(upper), [])
     group = next(
         (c for p, c in reversed(attempt.rows) if p < line and len(c) in (count, count - 1) and is_words(c)), []
     )
@@ -297,8 +342,10 @@ def _as_many(text: str, separator: str, count: int) -> list[str] | None:
 def _longest_run(attempt: _Attempt) -> int:
     """Line of the first row of the longest stretch of rows of data."""
     best, length, begin, now = 0, 0, 0, 0
+    whole = {place for place, cells in attempt.rows if place in attempt.data and all(map(is_value, cells))}
+    data = whole if 2 * len(whole) > len(attempt.data) else attempt.data
     for place, _ in attempt.rows:
-        if place in attempt.data:
+        if place in data:
             begin, now = (place, 1) if not now else (begin, now + 1)
             if now > length:
                 best, length = begin, now
