@@ -28,6 +28,7 @@ LOSSES = {
     "not_finite": "values or stamps that are not numbers",
     "cut_off": "rows or frames that should be there: the file is cut off",
     "not_frames": "lines of frames that the reader passed over",
+    "can_fd": "frames of CAN FD",
     "broken_frames": "frames that do not fit their message",
     "reversed_stamps": "stamps that go back and do not fit between the others either",
     "restarted_stamps": "stamps that begin again within the time of those before: several recordings in one file?",

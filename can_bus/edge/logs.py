@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 import can
 
 from ranger_sim.can_bus.edge import log_kinds
-from ranger_sim.can_bus.edge.candump import frame_of_line
+from ranger_sim.can_bus.edge.candump import CanFdError, frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
@@ -31,26 +31,34 @@ class RecordedFrames:
     """The frames of a recording, error frames left out. Iterating raises UserError for an unreadable file.
 
     Afterwards `read` is the number of frames in the file, or as stated by it, including error frames, and `losses` are
-    the frames that were not returned: (reason, count, position of the first); reason "cut_off" or "not_frames".
+    the frames that were not returned: (reason, count, position of the first); reason "cut_off", "not_frames" or
+    "can_fd".
     """
 
     def __init__(self, source: pathlib.Path) -> None:
         self.source = source
         self.read = 0
         self.losses: list[tuple[str, int, str]] = []
+        self.fd = 0
 
     def __iter__(self) -> Iterator[Frame]:
-        self.read, self.losses = 0, []
+        self.read, self.losses, self.fd = 0, [], 0
         try:
             for frame in _opened(self):
                 if not frame[3] & FLAG_ERROR:
                     yield frame
+            self.lose("can_fd", self.fd, "")
         except UserError:
             raise
         except Exception as error:  # readers of formats raise many types
             said = error.strerror if isinstance(error, OSError) and error.strerror else error
             text = f"{self.source}: the recording cannot be read ({said or type(error).__name__})"
             raise UserError(text) from None
+
+    def is_fd(self, message: can.Message) -> bool:
+        """True for a frame of CAN FD, which is counted: the frames here have eight bytes."""
+        self.fd += message.is_fd
+        return message.is_fd
 
     def lose(self, reason: str, count: int, where: str) -> None:
         """Record frames that are in the file and were not returned."""
@@ -107,7 +115,8 @@ def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
     with can.LogReader(log.source) as reader:
         for message in reader:
             log.read += 1
-            yield _frame(message)
+            if not log.is_fd(message):
+                yield _frame(message)
         if isinstance(reader, can.BLFReader):
             _count_blf(log, reader)
 
@@ -168,7 +177,8 @@ def _by_lines(
     try:
         for message in reader(given):
             given.waiting = 0
-            yield _frame(message)
+            if not log.is_fd(message):
+                yield _frame(message)
         given.settle()
     except (ValueError, IndexError) as error:
         if given.whole:
@@ -250,6 +260,8 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
         log.read += 1
         try:
             yield parse(line)
+        except CanFdError:
+            log.fd += 1
         except ValueError as error:
             if number == lines[-1][0] and not line.endswith("\n"):
                 log.lose("cut_off", 1, f"in line {number}")
@@ -298,7 +310,7 @@ def _stamp_ns(text: str) -> int:
 def _words(identifier: int, flags: int, length: int, data: list[str]) -> tuple[int, int, int, int]:
     """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError if they are not a classic frame."""
     if length > 8:
-        raise ValueError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
+        raise CanFdError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
     if len(data) != length or not all(re.fullmatch("[0-9A-Fa-f]{2}", byte) for byte in data):
         raise ValueError(f"frame {identifier:x} has {length} bytes and the data {' '.join(data)[:40]!r}")
     lo, hi = words_of_data(bytes.fromhex("".join(data)))

@@ -76,6 +76,8 @@ def of(path: pathlib.Path) -> Format:
             return Format(log_kinds.ENDINGS[suffix], holds_frames=True)
         if suffix in MDF_ENDINGS:
             return MDF
+        if suffix == ".mat":  # of version 4, which begins with numbers
+            return Format("MATLAB")
     return ROBODAQ if robodaq.is_one(path) else TABLE
 
 
