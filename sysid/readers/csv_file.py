@@ -482,7 +482,7 @@ def _time(
     dataset.repairs.append(Repair("", "dates", len(time_ns), text))
     dataset.layout |= {"time": both, "time_unit": "dates" if with_date else "times of the day"}
     if any(written[k].either_way for k in chosen):
-        text = f"{both}: day and month may be either way round; --assume dates=day-first or month-first says which"
+        text = f"{both}: day and month may be either way round; --assume dates=day-first or month-first decides"
         dataset.findings.append(Finding("", "dates_either_way", 0.0, 0.0, 0.0, "", text))
     return set(chosen) | set(written), np.where(missing, np.nan, (time_ns - first_ns) * 1e-9)
 
@@ -504,7 +504,7 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
             "--map NAME=t_s says which it is"
         )
-    text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME says another"
+    text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))
     return found
 

@@ -55,7 +55,7 @@ def value_of(cell: str, mark: str) -> float:
 
 
 class Evidence:
-    """What the cells of a table say about the decimal mark.
+    """The evidence of a table's cells for the decimal mark.
 
     only: {column: {mark: cells that are numbers with this mark only}}; either: {column: {mark: [cells with it that are
     numbers either way, whole numbers below 1,000, longer ones]}}; example: {mark: a cell with it}.

@@ -25,10 +25,10 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identify import coverage, legs, motor
 from ranger_sim.sysid.identify.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
-from ranger_sim.sysid.readers.columns import mapping_of
 from ranger_sim.sysid.reading import open_recording
 from ranger_sim.tools.command_line import files, streams, terminal
 from ranger_sim.tools.identify import page
+from ranger_sim.tools.recordings import datasets
 
 ALL = "all"
 EXIT_DONE, EXIT_REFUSED = 0, 1
@@ -124,13 +124,13 @@ def machine_with(options: argparse.Namespace, console: Console) -> coverage.Mach
 
 
 def recorded(
-    name: str, path: pathlib.Path, mapping: dict[str, str], console: Console, accepted: float = losses.ACCEPTED
+    name: str, path: pathlib.Path, how: dict[str, Any], console: Console, accepted: float = losses.ACCEPTED
 ) -> Dataset:
     """A user's recording of a bench; anomalies in a series of samples are reported.
 
-    accepted: share of a channel's samples that may be lost. UserError if more are.
+    how: as of `reading.open_recording`; accepted: share of a channel's samples that may be lost. UserError if more are.
     """
-    data = open_recording(path, mapping)
+    data = open_recording(path, **how)
     if name in ("pendulum", "ankle-sine"):  # the others are single readings
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(str(path), findings)
@@ -151,7 +151,7 @@ def identify_one(
     tell = before(console)
     if options.data is not None:
         path = pathlib.Path(options.data)
-        recordings = {bench.name: recorded(bench.name, path, mapping_of(options.map), console, options.accept_loss)}
+        recordings = {bench.name: recorded(bench.name, path, datasets.how_of(options), console, options.accept_loss)}
         fits = {bench.name: alone(bench, recordings[bench.name], known, gear=options.gear, tell=tell)}
         truth: dict[str, float] = {}
     else:
@@ -182,9 +182,9 @@ def identify_all(
         lacking = [name for name in OF_TABLES if not (folder / f"{name}.csv").is_file()]
         if lacking:
             raise UserError(f"--data {options.data}: for all a folder is needed; {lacking[0]}.csv is not in it")
-        mapping = mapping_of(options.map)
+        how = datasets.how_of(options)
         recordings = {
-            name: recorded(name, folder / f"{name}.csv", mapping, console, options.accept_loss) for name in OF_TABLES
+            name: recorded(name, folder / f"{name}.csv", how, console, options.accept_loss) for name in OF_TABLES
         }
     tell = before(console)
     of_motor = (recordings["stall"], recordings["cantilever"], recordings["pulley"])

@@ -74,8 +74,8 @@ def show(measurement: Measurement, console: Console) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("channel", "unit", "in the file", "samples", "from", "to", "every", "least", "most"):
         table.add_column(heading, justify="left" if heading in ("channel", "unit", "in the file") else "right")
-    told = measurement.to_dict()
-    for name, each in list(told["channels"].items())[:MOST_CHANNELS]:
+    answer = measurement.to_dict()
+    for name, each in list(answer["channels"].items())[:MOST_CHANNELS]:
         numbers = [each[key] for key in ("start_s", "end_s", "step_s", "least", "most")]
         start, end, step, least, most = ("" if number is None else f"{number:.6g}" for number in numbers)
         source = each["source"] if each["source"] != name else ""
@@ -84,7 +84,7 @@ def show(measurement: Measurement, console: Console) -> None:
             f"{step} s" if step else "", least, most,
         )  # fmt: skip
     terminal.print_table(console, table, ("in the file", "from", "every"))
-    if len(told["channels"]) > MOST_CHANNELS:
+    if len(answer["channels"]) > MOST_CHANNELS:
         console.print(f"and {len(told['channels']) - MOST_CHANNELS} more channels (--json has all)")
     _show_ledger(measurement, console)
     for each in sorted(measurement.findings, key=lambda finding: finding.severity == sanity.NOTE):

@@ -11,7 +11,7 @@ from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 from ranger_sim.sysid.reading import open_recording
 from ranger_sim.tools.command_line.units import SHARES, quantity
 
-__all__ = ["add_accept_loss", "add_options", "open_recording", "open_with"]
+__all__ = ["add_accept_loss", "add_options", "how_of", "open_recording", "open_with"]
 
 
 def add_options(command: Any) -> None:
@@ -55,13 +55,16 @@ def add_accept_loss(command: Any) -> None:
 
 def open_with(options: Any, path: str, progress: Progress = no_progress) -> Dataset:
     """The recording `path` as `add_options` says."""
-    return open_recording(
-        path,
-        columns.mapping_of(options.map),
-        options.dbc,
-        options.time_unit,
-        buses=options.bus,
-        assume=layout.assumptions(options.assume),
-        recipe=options.recipe,
-        progress=progress,
-    )
+    return open_recording(path, progress=progress, **how_of(options))
+
+
+def how_of(options: Any) -> dict[str, Any]:
+    """The options of `add_options` as those of `open_recording`."""
+    return {
+        "mapping": columns.mapping_of(options.map),
+        "databases": options.dbc,
+        "time_unit": options.time_unit,
+        "buses": options.bus,
+        "assume": layout.assumptions(options.assume),
+        "recipe": options.recipe,
+    }
