@@ -1,6 +1,7 @@
 """All dialects and accidents of `tests/sysid/dialects.py`, read and judged: `python -m dev.dialects [--all]`."""
 
 import argparse
+import functools
 import pathlib
 import tempfile
 from collections import Counter
@@ -17,11 +18,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         cases = [
-            ("dialects", title, lambda how=how: dialects.judged_dialect(how, folder))
+            ("dialects", title, functools.partial(dialects.judged_dialect, how, folder))
             for title, how in dialects.dialects()
         ]
         cases += [
-            ("accidents", title, lambda make=make: dialects.judged_accident(make(), folder))
+            ("accidents", title, functools.partial(dialects.judged_accident, make(), folder))
             for title, make in dialects.accidents()
         ]
         for kind, title, judge in cases:

@@ -116,7 +116,7 @@ def read(files: Path | Sequence[Path], **how: Any) -> Measurement | list[Measure
 
 def inspected(dataset: Dataset) -> Measurement:
     """A dataset with what is odd about it and the repairs that are possible."""
-    findings = sanity.inspect(dataset)
+    findings = [*sanity.inspect(dataset), *sanity.pairs(dataset)]
     proposals: list[Repair] = []
     if not any(each.severity == sanity.FATAL for each in findings):
         proposals = repairs.mend(dataset, findings).repairs[len(dataset.repairs) :]

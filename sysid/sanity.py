@@ -64,6 +64,7 @@ KINDS = {
     "constant": "one value all the time",
     "saturation": "values cut off at a limit",
     "lag": "a channel comes later than a redundant one",
+    "pair": "an angle and its rate, or two channels of one unit, that do not fit each other",
     "wrong_unit": "values as of another unit than is told",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
@@ -97,6 +98,11 @@ LAG_STEPS = 0.5  # of the sampling: smaller ones are the stamps' own rounding
 WHITE = 0.8  # half the mean square of neighbours' differences to the variance; 1 for white noise
 COMMON = 6.0  # deviations of a correlation with white noise; some hundred lags of some channels reach 4.5 by chance
 COMMON_LAGS, FEWEST_OF_NOISE = 50, 300  # samples
+SURE, FAR_STEPS, MOST_PAIRS = 0.01, 3.0, 30  # of pairs that only their units make
+QUANTITIES = (
+    "angle", "position", "pos", "rate", "speed", "velocity", "vel", "omega", "theta", "phi", "q", "dq", "v", "x", "w",
+    "rad", "m", "per", "s",
+)  # fmt: skip
 FEWEST = 30  # samples; with fewer, only stamps are checked
 SLOPES = {  # possible factor of a rate to the angle's derivative, and its meaning
     180.0 / math.pi: "the rate is in deg/s, or the angle in turns of rad",
@@ -110,6 +116,7 @@ SLOPES = {  # possible factor of a rate to the angle's derivative, and its meani
     1e-6: "the stamps are in us",
     -1.0: "one of the two counts the other way round",
 }
+SURE_SLOPES = tuple(slope for slope in SLOPES if slope != 6.0)  # which may be a gear
 SLOPE_TOLERANCE = 0.05
 ALIKE = 0.9  # correlation from which on a rate and a derivative are the same motion
 # (angle, rate) that show the same motion. The bench's speed is at the gearbox's output, its angle at the motor.
@@ -177,6 +184,51 @@ def of_recording(dataset: Dataset) -> list[Finding]:
     sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
     with np.errstate(all="ignore"):
         return list(headlines.of_all(sound))
+
+
+def pairs(dataset: Dataset) -> list[Finding]:
+    """What an angle and its rate, or two channels of one unit, show of each other, where only their units pair them.
+
+    A gear or a transmission between two channels is not known here, so that nothing depends on these findings.
+    """
+    with np.errstate(all="ignore"):
+        sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
+        moving = {name: each for name, each in sound.items() if np.ptp(each.value) > 0.0 and not _is_held(each.value)}
+        return list(_pairs(moving))
+
+
+def _pairs(channels: dict[str, Channel]) -> Iterator[Finding]:
+    for unit in ("rad", "m"):
+        positions = [each for each in channels.values() if each.unit == unit]
+        rates = [each for each in channels.values() if each.unit == f"{unit}/s"]
+        for rate in rates:
+            own = [each for each in positions if _stem(each.name) == _stem(rate.name)]
+            own = own or (positions if len(positions) == len(rates) == 1 else [])
+            if len(own) == 1 and (own[0].name, rate.name) not in DERIVATIVES:
+                yield from (
+                    dataclasses.replace(each, kind="pair")
+                    for each in _derivative(own[0], rate)
+                    if each.kind == "lag" or any(abs(each.size / slope - 1.0) < SURE for slope in SURE_SLOPES)
+                )
+    alike = [
+        (first, second)
+        for number, first in enumerate(channels.values())
+        for second in list(channels.values())[number + 1 :]
+        if first.unit == second.unit != "" and (first.name, second.name) not in REDUNDANT
+    ]
+    for first, second in alike[:MOST_PAIRS]:
+        late = lag_s(first, second)
+        step = max(float(np.median(np.diff(each.time_s))) for each in (first, second))
+        if late is not None and abs(late) >= FAR_STEPS * step:
+            text = f"it comes {abs(late) * 1e3:.3g} ms {'after' if late > 0.0 else 'before'} {first.name}"
+            ends = float(second.time_s[0]), float(second.time_s[-1])
+            yield Finding(second.name, "pair", *ends, late, "s", text, NOTE)
+
+
+def _stem(name: str) -> str:
+    """The name without its quantity and unit: "hip" of hip_angle_rad and of hip_rate_rad_per_s."""
+    words = [word for word in name.lower().split("_") if word not in QUANTITIES]
+    return "_".join(words)
 
 
 def stop_if_fatal(name: str, findings: list[Finding]) -> None:

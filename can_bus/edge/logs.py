@@ -6,10 +6,12 @@ file.
 """
 
 import calendar
+import contextlib
 import io
 import itertools
 import pathlib
 import re
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 
 import can
@@ -24,6 +26,8 @@ Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (
 PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 SAVVYCAN_HEADER = "time stamp,id,extended,"
 BUSMASTER_HEADER = "***BUSMASTER"
+CONTAINER, CONTAINER_HEAD = 10, 32  # type and bytes of its head, of an object in a BLF file
+SMALL_CONTAINER, LARGEST_CONTAINER = 1 << 16, 1 << 28  # bytes; deflate makes at most a thousand of one
 SECOND_NS = 1_000_000_000
 
 
@@ -56,9 +60,11 @@ class RecordedFrames:
             raise UserError(text) from None
 
     def is_fd(self, message: can.Message) -> bool:
-        """True for a frame of CAN FD, which is counted: the frames here have eight bytes."""
-        self.fd += message.is_fd
-        return message.is_fd
+        """True for a frame of CAN FD with more than eight bytes, which is counted; a shorter one becomes classic."""
+        too_long = message.is_fd and len(message.data) > 8
+        self.fd += too_long
+        message.is_fd = message.bitrate_switch = message.error_state_indicator = False
+        return too_long
 
     def lose(self, reason: str, count: int, where: str) -> None:
         """Record frames that are in the file and were not returned."""
@@ -112,6 +118,8 @@ TRC_FRAME = re.compile(
 
 def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
     """Formats whose reader takes a path."""
+    if log_kinds.kind(log.source) == log_kinds.BLF:
+        _refuse_bomb(log.source)
     with can.LogReader(log.source) as reader:
         for message in reader:
             log.read += 1
@@ -119,6 +127,27 @@ def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
                 yield _frame(message)
         if isinstance(reader, can.BLFReader):
             _count_blf(log, reader)
+
+
+def _refuse_bomb(path: pathlib.Path) -> None:
+    """UserError for a container that unpacks to more than any program writes: the reader has no limit."""
+    limit = LARGEST_CONTAINER
+    with path.open("rb") as file:
+        place = int.from_bytes(file.read(8)[4:8], "little")
+        while True:
+            file.seek(place)
+            head = file.read(CONTAINER_HEAD)
+            if len(head) < 16 or head[:4] != b"LOBJ":
+                return
+            size, kind = (int.from_bytes(head[at : at + 4], "little") for at in (8, 12))
+            if kind == CONTAINER and size > SMALL_CONTAINER and head[16:18] != b"\0\0":
+                unpacker = zlib.decompressobj()
+                with contextlib.suppress(zlib.error):  # a broken one is reported by the reader
+                    if len(unpacker.decompress(file.read(size - CONTAINER_HEAD), limit)) == limit:
+                        raise UserError(f"{path}: the container at byte {place} unpacks to more than {limit} bytes")
+            place += size + size % 4
+            if not size:
+                return
 
 
 def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
@@ -228,6 +257,9 @@ def _asc_lines(log: RecordedFrames) -> Iterator[str]:
         yield "\n" if "start of measurement" in line.lower() else line
 
 
+FD_MARK = re.compile("##[0-9A-Fa-f]")  # with the flags of a frame of CAN FD
+
+
 # --- formats of other programs ------------------------------------------------------------------------------------
 
 SCREEN = re.compile(  # candump on a screen: with or without stamps, -x, and the name of the interface
@@ -261,7 +293,10 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
         try:
             yield parse(line)
         except CanFdError:
-            log.fd += 1
+            try:
+                yield parse(FD_MARK.sub("#", line))
+            except ValueError:
+                log.fd += 1
         except ValueError as error:
             if number == lines[-1][0] and not line.endswith("\n"):
                 log.lose("cut_off", 1, f"in line {number}")

@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import math
 import pathlib
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -94,6 +95,9 @@ def _matlab(
     with path.open("rb") as file:
         if b"MATLAB 7.3" in file.read(128):
             raise UserError(f"{path}: a .mat file of version 7.3 (HDF5): save it in MATLAB with '-v7'")
+    count = sum(math.prod(shape) for _, shape, _ in library.whosmat(path))
+    if 8 * count > MOST_BYTES:
+        raise UserError(f"{path}: it unpacks to {count} numbers, allowed are {MOST_BYTES // 8}")
     variables = library.loadmat(path, squeeze_me=True, struct_as_record=True)
     table: dict[str, Any] = {}
     for name, value in variables.items():
@@ -142,11 +146,11 @@ def _ulog(
 ) -> Iterator[Column]:
     log = library.ULog(str(path))
     for each in log.data_list:
-        time_s = np.asarray(each.data["timestamp"], dtype=np.int64) * 1e-6
+        time_s = np.asarray(np.asarray(each.data["timestamp"], dtype=np.int64) * 1e-6, dtype=np.float64)
         number = f".{each.multi_id}" if each.multi_id else ""
         for name, value in each.data.items():
             if name != "timestamp":
-                yield f"{each.name}{number}.{name}", "", time_s, np.asarray(value, dtype=float)
+                yield f"{each.name}{number}.{name}", "", time_s, np.asarray(value, dtype=np.float64)
     if log.dropouts:
         count = len(log.dropouts)
         text = (
@@ -189,7 +193,8 @@ def _mcap(
     begin = min((stamps[0] for stamps, *_ in series.values()), default=0)
     begin = begin if begin * 1e-9 > columns.EPOCH_S else 0
     for name, (stamps, values, unit) in series.items():
-        yield name, unit, (np.array(stamps, dtype=np.int64) - begin) * 1e-9, np.array(values)
+        time_s = np.asarray((np.array(stamps, dtype=np.int64) - begin) * 1e-9, dtype=np.float64)
+        yield name, unit, time_s, np.array(values, dtype=np.float64)
 
 
 def _message_class(schema: Any) -> Any:

@@ -74,7 +74,7 @@ class _Rows:
 
     def __init__(self, path: pathlib.Path, survey: text_file.Survey, layout: layouts.Layout, one_table: bool) -> None:
         self.path, self.survey, self.layout, self.one_table = path, survey, layout, one_table
-        self.head: list[list[str]] = []
+        self.places = np.array([], dtype=np.int64)  # line numbers of the rows
         self._start()
 
     def _start(self) -> None:
@@ -233,7 +233,7 @@ class _Column:
 
     def _with_units(self, cells: Sequence[str], values: Array, odd: list[int]) -> list[int]:
         """Numbers with their unit in the cell, one unit in the whole column; the rest of the odd cells."""
-        rest = []
+        rest: list[int] = []
         for k in odd:
             found = numerals.WITH_UNIT.fullmatch(cells[k])
             if found and (found[2] == self.unit_text or (not self.unit_text and self.odd == 0 and not rest)):
@@ -387,10 +387,10 @@ def _channels(
         if column.odd and column.first_odd is not None:
             _, line, cell = column.first_odd
             text = f"{column.odd} cells are no numbers, the first in line {line}: {cell[:30]!r}"
-            place = [
+            begin, end = (
                 float(time_s[k]) if np.isfinite(time_s[k]) else 0.0 for k in (column.first_odd[0], column.last_odd)
-            ]
-            dataset.findings.append(Finding(named.name, "unreadable", *place, float(column.odd), "samples", text))
+            )
+            dataset.findings.append(Finding(named.name, "unreadable", begin, end, float(column.odd), "samples", text))
         kept = present & stamped
         if column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2]):
             text = f"{name}: hexadecimal numbers such as {column.first_odd[2]!r} are not read, left out"
@@ -458,7 +458,7 @@ def _time(
         text = f"no column has stamps: they are those of the rate above the table, {step_s:.6g} s apart"
         dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, step_s, "s", text, "note"))
         dataset.layout |= {"time": "rate", "time_unit": "s"}
-        return set(candidates), step_s * np.arange(rows.kept)
+        return set(candidates), step_s * np.arange(rows.kept, dtype=np.float64)
     month_first = {"month-first": True, "day-first": False}.get(assumed.get("dates", ""))
     candidates = candidates or _unnamed_time(dataset, rows, table, called)
     written = {k: found for k in candidates if (found := table[k].stamps(month_first)) is not None}

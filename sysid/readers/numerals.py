@@ -131,7 +131,7 @@ def numbers(cells: Sequence[str], mark: str) -> tuple[Array, NDArray[np.bool_] |
             return value, None, []
     value = np.array([value_of(cell, mark) if cell else np.nan for cell in cells])
     present = np.array([cell.lower() not in EMPTY for cell in cells])
-    odd = [int(k) for k in np.flatnonzero(np.isnan(value) & present) if cells[k].lower().strip("+-") != "nan"]
+    odd = [k for k in np.flatnonzero(np.isnan(value) & present).tolist() if cells[k].lower().strip("+-") != "nan"]
     return value, present, odd
 
 

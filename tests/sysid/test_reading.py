@@ -3,6 +3,8 @@
 import gzip
 import json
 import math
+import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -319,3 +321,31 @@ def test_a_command_that_reads_takes_the_same_options(written, capsys):
 def test_a_mapping_names_what_the_file_calls_otherwise(written):
     dataset = open_recording(written("t_s,q\n" + rows("{t:.2f},{v:.3f}\n")), {"q": "hip_angle_deg"})
     assert dataset["hip_angle_rad"].unit == "rad" and dataset.layout["map"] == {"q": "hip_angle_deg"}
+
+
+def test_a_rate_that_only_its_unit_pairs_with_an_angle_is_checked_against_it(written):
+    t = 0.01 * np.arange(1000)
+    angle, rate = np.sin(1.3 * t) + 0.3 * np.sin(5.0 * t), lambda t: 1.3 * np.cos(1.3 * t) + 1.5 * np.cos(5.0 * t)
+
+    def findings(shown):
+        table = "".join(f"{a:.2f},{b:.6f},{c:.6f}\n" for a, b, c in zip(t, angle, shown, strict=True))
+        return [each.text for each in read(written(f"t_s,arm_angle_rad,arm_speed_rad_per_s\n{table}")).matters]
+
+    assert findings(rate(t)) == findings(14.0 * rate(t)) == []  # the second may be behind a gear
+    (late,) = findings(rate(t - 0.03))
+    assert "comes 30 ms after arm_angle_rad" in late
+    (turned,) = findings(-rate(t))
+    assert "counts the other way round" in turned
+    (degrees,) = findings(180.0 / math.pi * rate(t))
+    assert "deg/s" in degrees
+
+
+def test_a_container_that_unpacks_without_end_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(logs, "LARGEST_CONTAINER", 1 << 20)
+    monkeypatch.setattr(logs, "SMALL_CONTAINER", 1 << 10)
+    packed = zlib.compress(bytes(1 << 21))
+    head = b"LOBJ" + struct.pack("<HHIIHHIII", 16, 1, 32 + len(packed), 10, 2, 0, 0, 1 << 16, 0)
+    path = tmp_path / "bomb.blf"
+    path.write_bytes(b"LOGG" + struct.pack("<I", 144) + bytes(136) + head + packed)
+    with pytest.raises(UserError, match="the container at byte 144 unpacks to more than 1048576"):
+        list(logs.read_log(path))

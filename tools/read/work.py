@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import pathlib
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ranger_sim.foundation.user_error import UserError, printable
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     with bar:
         for path in options.files:
             task = bar.add_task(printable(path), total=1.0)
-            dataset = datasets.open_with(options, path, lambda _, share, task=task: bar.update(task, completed=share))
+            dataset = datasets.open_with(options, path, functools.partial(_shown, bar, task))
             found.append(inspected(dataset))
             bar.update(task, completed=1.0)
     if options.plot:
@@ -62,6 +63,10 @@ def run(options: argparse.Namespace) -> int:
             show(each, console)
     fatal = any(finding.severity == sanity.FATAL for each in found for finding in each.findings)
     return EXIT_REFUSED if fatal else max(each.exit_code for each in found)
+
+
+def _shown(bar: Progress, task: TaskID, what: str, share: float) -> None:
+    bar.update(task, description=what, completed=share)
 
 
 def show(measurement: Measurement, console: Console) -> None:
@@ -85,7 +90,7 @@ def show(measurement: Measurement, console: Console) -> None:
         )  # fmt: skip
     terminal.print_table(console, table, ("in the file", "from", "every"))
     if len(answer["channels"]) > MOST_CHANNELS:
-        console.print(f"and {len(told['channels']) - MOST_CHANNELS} more channels (--json has all)")
+        console.print(f"and {len(answer['channels']) - MOST_CHANNELS} more channels (--json has all)")
     _show_ledger(measurement, console)
     for each in sorted(measurement.findings, key=lambda finding: finding.severity == sanity.NOTE):
         place = f"{each.start_s:.6g} to {each.end_s:.6g} s: " if each.end_s > each.start_s else ""
