@@ -13,6 +13,8 @@ The public names:
     StopRule    when a walk is done: steps, time or distance
     Quirks      where the firmware follows the one of 2016 instead of the appendix
     Profile     which boards and buses are real, bit rates and schedules of the buses; `load_profile` reads one
+    read        measured data of any format: channels, what became of every sample, what is odd
+    Measurement what `read` returns
     diagnose    the errors of a simulation by measured data: a `DiagnosisResult`
     identify    parameters from the recording of a bench: an `IdentificationResult`
     UserError   a mistake of the user, reported in one line; by what is wrong a TableError, ProfileError, ScenarioError,
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     from ranger_sim.ranger.robot import Ranger
     from ranger_sim.ranger.scenario import Scenario, StopRule
     from ranger_sim.sysid.api import diagnose, identify
+    from ranger_sim.sysid.reading import Measurement, read
     from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
 
 __all__ = [
@@ -60,6 +63,7 @@ __all__ = [
     "FaultError",
     "FirmwareError",
     "IdentificationResult",
+    "Measurement",
     "ModelError",
     "Profile",
     "ProfileError",
@@ -74,12 +78,14 @@ __all__ = [
     "diagnose",
     "identify",
     "load_profile",
+    "read",
 ]
 __version__ = "0.1.0"
 
 _PLACES = {
     "DiagnosisResult": ("sysid.results", "DiagnosisResult"),
     "IdentificationResult": ("sysid.results", "IdentificationResult"),
+    "Measurement": ("sysid.reading", "Measurement"),
     "Profile": ("harness.outside.profile", "Profile"),
     "Quirks": ("boards.quirks", "Quirks"),
     "Ranger": ("ranger.robot", "Ranger"),
@@ -89,6 +95,7 @@ _PLACES = {
     "diagnose": ("sysid.api", "diagnose"),
     "identify": ("sysid.api", "identify"),
     "load_profile": ("harness.outside.profile", "load"),
+    "read": ("sysid.reading", "read"),
 }
 
 

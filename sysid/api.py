@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import losses, model_file, pipeline, readers
+from ranger_sim.sysid import losses, model_file, pipeline
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.fit import Parameter
@@ -16,6 +16,7 @@ from ranger_sim.sysid.identification.motor import GEAR
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import machine_of
 from ranger_sim.sysid.preparation import parted, prepared
+from ranger_sim.sysid.reading import open_recording
 from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
 
 File = str | pathlib.Path | Dataset
@@ -123,7 +124,7 @@ def identify(
     A fit that is refused has a reason and no parameters. UserError for a mistake.
     """
     given = [Parameter(name, "", value, uncertainty=sd) for name, (value, sd) in (known or {}).items()]
-    return run.identification(bench, data, given, gear, model, accept_loss, mapping, seed, report).result
+    return run.identification(bench, data, given, gear, model, accept_loss, {"mapping": mapping}, seed, report).result
 
 
 def _several(files: File | Sequence[File]) -> Sequence[File]:
@@ -131,7 +132,7 @@ def _several(files: File | Sequence[File]) -> Sequence[File]:
 
 
 def _dataset(file: File, mapping: Mapping[str, str] | None, time_unit: str | None) -> Dataset:
-    return file if isinstance(file, Dataset) else readers.read(file, mapping, time_unit=time_unit)
+    return file if isinstance(file, Dataset) else open_recording(file, mapping, time_unit=time_unit)
 
 
 def _not_finite(value: Any, place: str = "") -> str:

@@ -12,6 +12,7 @@ A channel's name carries its unit as in the project's other boundaries: "hip_ang
 
 import dataclasses
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,14 @@ LOSSES = {
     "no_stamp": "rows without a stamp",
     "text": "values that have a text instead of a number (not available, error)",
     "not_finite": "values or stamps that are not numbers",
-    "cut_off": "frames that should be there: the file is cut off",
+    "cut_off": "rows or frames that should be there: the file is cut off",
     "not_frames": "lines of frames that the reader passed over",
+    "can_fd": "frames of CAN FD",
     "broken_frames": "frames that do not fit their message",
     "reversed_stamps": "stamps that go back and do not fit between the others either",
     "restarted_stamps": "stamps that begin again within the time of those before: several recordings in one file?",
     "duplicate_stamps": "stamps that come twice, with different values",
+    "clipped": "values cut off at a limit",
     "bit_flip": "single values with a wrong bit",
 }
 NOTHING_LOST = {
@@ -166,6 +169,8 @@ class Dataset:
     """The channels of one recording, by name; what was found, and what was mended.
 
     rows, losses: lines or frames of the file, and those left out of which nothing says whose samples they were.
+    lines: what became of every line of a text file: {"rows", "names", "comments" ...: number}.
+    layout: how the file was read: its format, and what `--assume` takes.
     """
 
     name: str
@@ -174,6 +179,8 @@ class Dataset:
     repairs: list[Repair] = dataclasses.field(default_factory=list)
     rows: int = 0
     losses: list[Loss] = dataclasses.field(default_factory=list)
+    lines: dict[str, int] = dataclasses.field(default_factory=dict)
+    layout: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.name = printable(self.name)  # a file's name may have bytes that are not UTF-8

@@ -28,6 +28,7 @@ KINDS = {
     "repeated": "a repeated sample is kept once",
     "wrap": "an overrun integer counts on",
     "bit_flip": "single wrong values are left out",
+    "clipped": "values that are cut off at a limit are left out",
     "dropped": "a channel with nothing in it is left out",
     # requested by name
     "converted": "another unit than was given",
@@ -44,6 +45,10 @@ def mend(dataset: Dataset, findings: list[Finding] | None = None, inputs: Collec
     A channel with fewer than FEWEST samples left is not in the result. UserError when no channel is left.
     """
     findings = sanity.inspect(dataset) if findings is None else findings
+    limits: dict[str, list[float]] = {}
+    for each in findings:
+        if each.kind == "saturation":
+            limits.setdefault(each.channel, []).append(each.size)
     flips = {each.channel for each in findings if each.kind == "bit_flip"}
     channels = {}
     repairs, kept_as_is = list(dataset.repairs), []
@@ -60,6 +65,7 @@ def mend(dataset: Dataset, findings: list[Finding] | None = None, inputs: Collec
                 kept_as_is.append(_not_repaired(channel, len(wrapped.places) + len(flipped)))
         else:
             channel = _without_bits(_unwrapped(channel, wrapped, repairs), flipped, repairs)
+            channel = _without_clipped(channel, limits.get(channel.name, []), repairs)
         channels[channel.name] = channel
     if not channels:
         raise DataError(f"{dataset.name}: no channel has {FEWEST} sound samples")
@@ -127,6 +133,17 @@ def _without_bits(channel: Channel, places: NDArray[np.intp], repairs: list[Repa
     mask = np.zeros(len(channel.value), dtype=bool)
     mask[places] = True
     return channel.without(mask, "bit_flip")
+
+
+def _without_clipped(channel: Channel, limits: list[float], repairs: list[Repair]) -> Channel:
+    """Without the values at a limit where they are cut off: the true ones are beyond it."""
+    mask = np.isin(channel.value, limits)
+    if not limits or not mask.any():
+        return channel
+    at = ", ".join(f"{each:.6g}" for each in limits)
+    text = f"{int(mask.sum())} values are left out: cut off at {at} {channel.unit}"
+    repairs.append(Repair(channel.name, "clipped", int(mask.sum()), text))
+    return channel.without(mask, "clipped")
 
 
 # --- asked for by name --------------------------------------------------------------------------------------

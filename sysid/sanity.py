@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import DataError
-from ranger_sim.sysid import order, wraps
+from ranger_sim.sysid import headlines, order, wraps
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
 
 NOTE, WARNING, FATAL = "note", "warning", "fatal"
@@ -22,6 +22,11 @@ KINDS = {
     "no_unit": "nothing says the unit",
     "unknown_unit": "the file says a unit that is not known",
     "unit_assumed": "nothing says the unit of the stamps, seconds are assumed",
+    "time_assumed": "which column is the time follows from its values only",
+    "time_of_rate": "the stamps follow from a rate above the table",
+    "dates_either_way": "day and month can be exchanged",
+    "names_again": "the names of the columns come again",
+    "cut_off": "the last row is cut off",
     "no_stamp": "rows without a stamp",
     "ragged": "rows with too many or too few cells",
     "unreadable": "cells that are not numbers",
@@ -31,6 +36,7 @@ KINDS = {
     "lost_frames": "frames that the file has, or should have, and that did not come out",
     "several_buses": "messages from several buses",
     "broken_frames": "frames that do not fit their message",
+    "dropouts": "the logger reports that it dropped data",
     "no_summary": "a walk's folder without its summary",
     "fell": "the robot fell in this walk",
     # of the stamps
@@ -40,6 +46,7 @@ KINDS = {
     "stamp_wrap": "the clock's counter ran over",
     "reversed_stamps": "stamps that go back",
     "duplicate_stamps": "stamps that come twice",
+    "rounded_stamps": "stamps are rounded so far that several samples have one",
     "gap": "no samples for a while",
     "slow_samples": "samples so far apart that the stamps may be in another unit",
     "clock_drift": "two clocks do not run alike",
@@ -49,14 +56,29 @@ KINDS = {
     "not_repaired": "a driving channel looks wrong and stays unchanged",
     "bit_flip": "single values that are wrong by a power of two of the finest step",
     "spike": "single values far from both neighbours",
+    "held": "it keeps each value for several rows",
+    "resampled": "it goes in straight lines between fewer samples",
+    "jump": "all channels jump at one row",
+    "mixed": "rows of two recordings in turn",
     "stuck": "a value stays constant while other channels move",
     "constant": "one value all the time",
     "saturation": "values cut off at a limit",
     "lag": "a channel comes later than a redundant one",
+    "pair": "an angle and its rate, or two channels of one unit, that do not fit each other",
     "wrong_unit": "values as of another unit than the given one",
     "noise": "from sample to sample it jumps, and nothing of that is in another channel",
 }
-DOUBTED = ("unknown_unit", "slow_samples", "wrong_unit", "stuck", "noise")
+DOUBTED = (
+    "jump",
+    "mixed",
+    "resampled",
+    "rounded_stamps",
+    "unknown_unit",
+    "slow_samples",
+    "wrong_unit",
+    "stuck",
+    "noise",
+)
 GAP_STEPS = 5.0  # of the median step; radio gaps of the robot's logs are 9 to 45 steps of 4 to 6 ms (C6.2)
 NAMED_PLACES = 6  # single findings of a kind in a channel; more become one finding
 SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a million samples
@@ -76,6 +98,11 @@ LAG_STEPS = 0.5  # of the sampling: smaller ones are the stamps' own rounding
 WHITE = 0.8  # half the mean square of neighbours' differences to the variance; 1 for white noise
 COMMON = 6.0  # deviations of a correlation with white noise; some hundred lags of some channels reach 4.5 by chance
 COMMON_LAGS, FEWEST_OF_NOISE = 50, 300  # samples
+SURE, FAR_STEPS, MOST_PAIRS = 0.01, 3.0, 30  # of pairs that only their units make
+QUANTITIES = (
+    "angle", "position", "pos", "rate", "speed", "velocity", "vel", "omega", "theta", "phi", "q", "dq", "v", "x", "w",
+    "rad", "m", "per", "s",
+)  # fmt: skip
 FEWEST = 30  # samples; with fewer, only stamps are checked
 SLOPES = {  # possible factor of a rate to the angle's derivative, and its meaning
     180.0 / math.pi: "the rate is in deg/s, or the angle in turns of rad",
@@ -89,6 +116,7 @@ SLOPES = {  # possible factor of a rate to the angle's derivative, and its meani
     1e-6: "the stamps are in us",
     -1.0: "one of the two counts the other way round",
 }
+SURE_SLOPES = tuple(slope for slope in SLOPES if slope != 6.0)  # which may be a gear
 SLOPE_TOLERANCE = 0.05
 ALIKE = 0.9  # correlation from which on a rate and a derivative are the same motion
 # (angle, rate) that show the same motion. The bench's speed is at the gearbox's output, its angle at the motor.
@@ -139,14 +167,68 @@ def _inspected(dataset: Dataset) -> list[Finding]:
     sound: dict[str, Channel] = {}
     for channel in dataset.channels.values():
         found += _stamps(channel)
+        found += headlines.of_stamps(channel)
         tidy = _tidied(channel)
         found += _not_finite(channel)
         if len(tidy.value) >= FEWEST:
             sound[channel.name] = tidy
     for channel in sound.values():
         found += _values(channel, sound)
+        found += headlines.of_values(channel)
     found += _between(sound)
     return found
+
+
+def of_recording(dataset: Dataset) -> list[Finding]:
+    """Oddities of all channels together, which only the import sees: later steps choose some of the channels."""
+    sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
+    with np.errstate(all="ignore"):
+        return list(headlines.of_all(sound))
+
+
+def pairs(dataset: Dataset) -> list[Finding]:
+    """What an angle and its rate, or two channels of one unit, show of each other, where only their units pair them.
+
+    A gear or a transmission between two channels is not known here, so that nothing depends on these findings.
+    """
+    with np.errstate(all="ignore"):
+        sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
+        moving = {name: each for name, each in sound.items() if np.ptp(each.value) > 0.0 and not _is_held(each.value)}
+        return list(_pairs(moving))
+
+
+def _pairs(channels: dict[str, Channel]) -> Iterator[Finding]:
+    for unit in ("rad", "m"):
+        positions = [each for each in channels.values() if each.unit == unit]
+        rates = [each for each in channels.values() if each.unit == f"{unit}/s"]
+        for rate in rates:
+            own = [each for each in positions if _stem(each.name) == _stem(rate.name)]
+            own = own or (positions if len(positions) == len(rates) == 1 else [])
+            if len(own) == 1 and (own[0].name, rate.name) not in DERIVATIVES:
+                yield from (
+                    dataclasses.replace(each, kind="pair")
+                    for each in _derivative(own[0], rate)
+                    if each.kind == "lag" or any(abs(each.size / slope - 1.0) < SURE for slope in SURE_SLOPES)
+                )
+    alike = [
+        (first, second)
+        for number, first in enumerate(channels.values())
+        for second in list(channels.values())[number + 1 :]
+        if first.unit == second.unit != "" and (first.name, second.name) not in REDUNDANT
+    ]
+    for first, second in alike[:MOST_PAIRS]:
+        late = lag_s(first, second)
+        step = max(float(np.median(np.diff(each.time_s))) for each in (first, second))
+        if late is not None and abs(late) >= FAR_STEPS * step:
+            text = f"it comes {abs(late) * 1e3:.3g} ms {'after' if late > 0.0 else 'before'} {first.name}"
+            ends = float(second.time_s[0]), float(second.time_s[-1])
+            yield Finding(second.name, "pair", *ends, late, "s", text, NOTE)
+
+
+def _stem(name: str) -> str:
+    """The name without its quantity and unit: "hip" of hip_angle_rad and of hip_rate_rad_per_s."""
+    words = [word for word in name.lower().split("_") if word not in QUANTITIES]
+    return "_".join(words)
 
 
 def stop_if_fatal(name: str, findings: list[Finding]) -> None:

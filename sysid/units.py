@@ -49,6 +49,12 @@ WHOLE: dict[str, tuple[str, str, float, float]] = {
     # numbers of states and the like
     **{each: ("", "", 1.0, 0.0) for each in ("enum", "bool", "boolean", "state", "flag", "none", "unitless")},
 }  # fmt: skip
+# whole words, where a unit is expected: in a name "second" may be the second of two
+SPELT_OUT = {
+    "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms", "milliseconds": "ms",
+    "volt": "V", "volts": "V", "ampere": "A", "amperes": "A", "amp": "A", "amps": "A", "watt": "W", "watts": "W",
+    "newton": "N", "newtons": "N", "radian": "rad", "radians": "rad",
+}  # fmt: skip
 AMBIGUOUS_ALONE = ("min", "h", "d")  # current_min is a minimum; units by themselves only behind a word for time
 WORDS_OF_NAMES = ("enum", "bool", "boolean", "state", "flag", "none", "unitless")  # walk_state is a name
 TIME_WORDS = ("t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "zeit")
@@ -95,6 +101,7 @@ class Unit:
 def unit_of(text: str) -> Unit | None:
     """The unit of `text` ("deg/s", "A s/rad", "N m", "1/K"), None for an unknown one."""
     text = text.strip()
+    text = SPELT_OUT.get(text.lower(), text)
     if not text or text == "-":
         return Unit()
     if text in WHOLE:

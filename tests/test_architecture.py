@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "boards": {"foundation", "firmware_sim", "datatable"},
     "harness": {"foundation", "datatable", "can_bus", "plant", "firmware_sim"},
     "ranger": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness"},
-    "sysid": {"foundation", "plant"},
+    "sysid": {"foundation", "datatable", "can_bus", "plant"},
     "tools": {"foundation", "datatable", "can_bus", "plant", "firmware_sim", "boards", "harness", "ranger", "sysid"},
 }
 # Folders that import any package and that no package imports.

@@ -181,6 +181,12 @@ COMMANDS = (
         ("ranger-sim fmu body.fmu --seed 3 --floor-roughness 1mm",),
     ),
     Command(
+        "read",
+        "tools.read.command",
+        "what a recording holds: channels, what became of every line, what is odd, which repairs are possible",
+        ("ranger-sim read run1.csv", "ranger-sim read log.blf --dbc net.dbc --plot run1.html"),
+    ),
+    Command(
         "identify",
         "tools.identify.command",
         "a bench's recording: motor and body parameters with confidence intervals",

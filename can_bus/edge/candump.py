@@ -36,6 +36,10 @@ def line_of_frame(interface: str, time_ns: int, identifier: int, flags: int, lo:
     return f"({seconds:010d}.{rest // 1000:06d}) {interface} {text}\n"
 
 
+class CanFdError(ValueError):
+    """A frame of CAN FD, which has no place in eight bytes."""
+
+
 class CandumpWriter:
     """Writes frames of one or more buses to a file. A context manager.
 
@@ -112,7 +116,7 @@ def frame_of_line(line: str) -> tuple[str, int, int, int, int, int]:
     if not mark:
         raise ValueError(f"frame {frame[:40]!r} has no #")
     if data.startswith("#"):
-        raise ValueError(f"frame {frame[:40]!r} is CAN FD; these logs are classic CAN")
+        raise CanFdError(f"frame {frame[:40]!r} is CAN FD; these logs are classic CAN")
     if len(name) not in (3, 8) or not _hexadecimal(name):
         raise ValueError(f"identifier {name[:20]!r} is not three or eight hexadecimal digits")
     identifier = int(name, 16)

@@ -6,15 +6,18 @@ file.
 """
 
 import calendar
+import contextlib
 import io
 import itertools
 import pathlib
 import re
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 
 import can
 
-from ranger_sim.can_bus.edge.candump import frame_of_line
+from ranger_sim.can_bus.edge import log_kinds
+from ranger_sim.can_bus.edge.candump import CanFdError, frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import DataError, UserError
@@ -23,6 +26,8 @@ Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (
 PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 SAVVYCAN_HEADER = "time stamp,id,extended,"
 BUSMASTER_HEADER = "***BUSMASTER"
+CONTAINER, CONTAINER_HEAD = 10, 32  # type and bytes of its head, of an object in a BLF file
+SMALL_CONTAINER, LARGEST_CONTAINER = 1 << 16, 1 << 28  # bytes; deflate makes at most a thousand of one
 SECOND_NS = 1_000_000_000
 
 
@@ -30,26 +35,36 @@ class RecordedFrames:
     """The frames of a recording, error frames left out. Iterating raises UserError for an unreadable file.
 
     Afterwards `read` is the number of frames in the file, or as stated by it, including error frames, and `losses` are
-    the frames that were not returned: (reason, count, position of the first); reason "cut_off" or "not_frames".
+    the frames that were not returned: (reason, count, position of the first); reason "cut_off", "not_frames" or
+    "can_fd".
     """
 
     def __init__(self, source: pathlib.Path) -> None:
         self.source = source
         self.read = 0
         self.losses: list[tuple[str, int, str]] = []
+        self.fd = 0
 
     def __iter__(self) -> Iterator[Frame]:
-        self.read, self.losses = 0, []
+        self.read, self.losses, self.fd = 0, [], 0
         try:
             for frame in _opened(self):
                 if not frame[3] & FLAG_ERROR:
                     yield frame
+            self.lose("can_fd", self.fd, "")
         except UserError:
             raise
         except Exception as error:  # readers of formats raise many types
             cause = error.strerror if isinstance(error, OSError) and error.strerror else error
             text = f"{self.source}: the recording cannot be read ({cause or type(error).__name__})"
             raise DataError(text) from None
+
+    def is_fd(self, message: can.Message) -> bool:
+        """True for a frame of CAN FD with more than eight bytes, which is counted; a shorter one becomes classic."""
+        too_long = message.is_fd and len(message.data) > 8
+        self.fd += too_long
+        message.is_fd = message.bitrate_switch = message.error_state_indicator = False
+        return too_long
 
     def lose(self, reason: str, count: int, where: str) -> None:
         """Record frames that are in the file and were not returned."""
@@ -65,27 +80,17 @@ def read_log(path: str | pathlib.Path) -> RecordedFrames:
     return RecordedFrames(pathlib.Path(path))
 
 
-def is_frame_table(path: pathlib.Path) -> bool:
-    """True for a .csv of frames: python-can's or SavvyCAN's."""
-    try:
-        with path.open(encoding="utf-8", errors="replace") as file:
-            first = file.readline(200).strip().lower()
-    except OSError:
-        return False
-    return first == PYTHON_CAN_HEADER or first.startswith(SAVVYCAN_HEADER)
-
-
 def _opened(log: RecordedFrames) -> Iterator[Frame]:
-    suffix = log.source.suffix.lower()
     if not log.source.is_file():
         raise FileNotFoundError(2, "no such file")  # sqlite would make one
-    if suffix == ".log":
+    kind = log_kinds.kind(log.source)
+    if kind in (log_kinds.CANDUMP, log_kinds.SCREEN, log_kinds.BUSMASTER):
         return _candump_or_busmaster(log)
-    if suffix == ".csv":
+    if kind in (log_kinds.PYTHON_CAN, log_kinds.SAVVYCAN) or log.source.suffix.lower() == ".csv":
         return _csv(log)
-    if suffix == ".asc":
+    if kind == log_kinds.ASC:
         return _by_lines(log, can.ASCReader, _asc_lines(log), ASC_FRAME)
-    if suffix == ".trc":
+    if kind == log_kinds.TRC:
         return _by_lines(log, can.TRCReader, _text_lines(log), TRC_FRAME)
     return _by_python_can(log)
 
@@ -113,12 +118,36 @@ TRC_FRAME = re.compile(
 
 def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
     """Formats whose reader takes a path."""
+    if log_kinds.kind(log.source) == log_kinds.BLF:
+        _refuse_bomb(log.source)
     with can.LogReader(log.source) as reader:
         for message in reader:
             log.read += 1
-            yield _frame(message)
+            if not log.is_fd(message):
+                yield _frame(message)
         if isinstance(reader, can.BLFReader):
             _count_blf(log, reader)
+
+
+def _refuse_bomb(path: pathlib.Path) -> None:
+    """UserError for a container that unpacks to more than any program writes: the reader has no limit."""
+    limit = LARGEST_CONTAINER
+    with path.open("rb") as file:
+        place = int.from_bytes(file.read(8)[4:8], "little")
+        while True:
+            file.seek(place)
+            head = file.read(CONTAINER_HEAD)
+            if len(head) < 16 or head[:4] != b"LOBJ":
+                return
+            size, kind = (int.from_bytes(head[at : at + 4], "little") for at in (8, 12))
+            if kind == CONTAINER and size > SMALL_CONTAINER and head[16:18] != b"\0\0":
+                unpacker = zlib.decompressobj()
+                with contextlib.suppress(zlib.error):  # a broken one is reported by the reader
+                    if len(unpacker.decompress(file.read(size - CONTAINER_HEAD), limit)) == limit:
+                        raise UserError(f"{path}: the container at byte {place} unpacks to more than {limit} bytes")
+            place += size + size % 4
+            if not size:
+                return
 
 
 def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
@@ -177,7 +206,8 @@ def _by_lines(
     try:
         for message in reader(given):
             given.waiting = 0
-            yield _frame(message)
+            if not log.is_fd(message):
+                yield _frame(message)
         given.settle()
     except (ValueError, IndexError) as error:
         if given.whole:
@@ -227,6 +257,9 @@ def _asc_lines(log: RecordedFrames) -> Iterator[str]:
         yield "\n" if "start of measurement" in line.lower() else line
 
 
+FD_MARK = re.compile("##[0-9A-Fa-f]")  # with the flags of a frame of CAN FD
+
+
 # --- formats of other programs ------------------------------------------------------------------------------------
 
 SCREEN = re.compile(  # candump on a screen: with or without stamps, -x, and the name of the interface
@@ -259,6 +292,11 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
         log.read += 1
         try:
             yield parse(line)
+        except CanFdError:
+            try:
+                yield parse(FD_MARK.sub("#", line))
+            except ValueError:
+                log.fd += 1
         except ValueError as error:
             if number == lines[-1][0] and not line.endswith("\n"):
                 log.lose("cut_off", 1, f"in line {number}")
@@ -307,7 +345,7 @@ def _stamp_ns(text: str) -> int:
 def _words(identifier: int, flags: int, length: int, data: list[str]) -> tuple[int, int, int, int]:
     """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError if they are not a classic frame."""
     if length > 8:
-        raise ValueError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
+        raise CanFdError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
     if len(data) != length or not all(re.fullmatch("[0-9A-Fa-f]{2}", byte) for byte in data):
         raise ValueError(f"frame {identifier:x} has {length} bytes and the data {' '.join(data)[:40]!r}")
     lo, hi = words_of_data(bytes.fromhex("".join(data)))

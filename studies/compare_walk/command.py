@@ -48,6 +48,7 @@ def parser(_command: str = "") -> cli.OneLineParser:
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
     datasets.add_options(command)
     add_verbosity(command)
+    datasets.add_accept_loss(command)
     command.set_defaults(run=run)
     return command
 

@@ -9,9 +9,9 @@ import pathlib
 import numpy as np
 from scipy.signal import butter, filtfilt
 
-from ranger_sim.sysid import readers
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.machines.ankle import Ankle, Prediction, predicted
+from ranger_sim.sysid.reading import open_recording
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DATA = pathlib.Path(os.environ.get("RANGER_SIM_DATA", ROOT.parent / "shared" / "data"))
@@ -23,7 +23,7 @@ WIDTH, HEIGHT = 1160, 400
 
 
 def recording(name):
-    data = named_for(readers.read(DATA / f"ranger_{name}.csv"), "ankle")
+    data = named_for(open_recording(DATA / f"ranger_{name}.csv"), "ankle")
     return data.table([each.name for each in Ankle.quantities if each.name in data])
 
 

@@ -4,15 +4,17 @@ import dataclasses
 import math
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.plant import terms
-from ranger_sim.sysid import losses, readers, repairs, sanity
+from ranger_sim.sysid import losses, repairs, sanity
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identification import coverage, legs, motor
 from ranger_sim.sysid.identification.registry import BENCHES, OF_TABLES, alone, bench_of, by_virtual_benches
+from ranger_sim.sysid.reading import open_recording
 from ranger_sim.sysid.results import FitResult, FittedParameter, IdentificationResult, LegBalance, Separability
 
 ALL = "all"
@@ -38,27 +40,30 @@ def identification(
     gear: float,
     model: str | pathlib.Path | None,
     accepted: float,
-    mapping: Mapping[str, str] | None,
+    how: Mapping[str, Any],
     seed: int,
     report: Report,
     before: Report | None = None,
 ) -> Identification:
-    """What `api.identify` returns, with its workings. before: is called with the identifiability before each fit."""
+    """What `api.identify` returns, with its workings.
+
+    how: of `reading.open_recording`. before: is called with the identifiability before each fit.
+    """
     if gear <= 0.0 or not math.isfinite(gear):
         raise UserError(f"--gear {gear!r}: it must be above 0")
     machine = machine_with(model, bench, data is not None, gear, report)
-    if data is None and mapping:
+    if data is None and how.get("mapping"):
         raise UserError("--map names columns of a file: --data is needed")
     if bench == ALL:
         if known:
             raise UserError("--known belongs to a single bench")
-        recordings = _of_all(data, mapping, accepted, machine, seed, report)
+        recordings = _of_all(data, how, accepted, machine, seed, report)
         fits = _tables(recordings, gear, before or report)
     else:
         one = bench_of(bench)
         recordings, by_bench = {}, {}
         if data is not None:
-            recordings[one.name] = recorded(one.name, data, mapping, report, accepted)
+            recordings[one.name] = recorded(one.name, data, how, report, accepted)
         elif known:
             recordings[one.name] = one.record(machine, seed)
         if recordings:
@@ -107,15 +112,15 @@ def machine_with(
 def recorded(
     bench: str,
     source: str | pathlib.Path | Dataset,
-    mapping: Mapping[str, str] | None,
+    how: Mapping[str, Any],
     report: Report,
     accepted: float = losses.ACCEPTED,
 ) -> Dataset:
     """A user's recording of a bench; anomalies in a series of samples are reported.
 
-    accepted: share of a channel's samples that may be lost. UserError if more are.
+    how: of `reading.open_recording`. accepted: share of a channel's samples that may be lost. UserError if more are.
     """
-    data = source if isinstance(source, Dataset) else readers.read(source, mapping)
+    data = source if isinstance(source, Dataset) else open_recording(source, **how)
     if bench in ("pendulum", "ankle-sine"):  # the others are single readings
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(data.name if isinstance(source, Dataset) else str(source), findings)
@@ -130,7 +135,7 @@ def recorded(
 
 def _of_all(
     data: str | pathlib.Path | Dataset | None,
-    mapping: Mapping[str, str] | None,
+    how: Mapping[str, Any],
     accepted: float,
     machine: coverage.Machine,
     seed: int,
@@ -145,7 +150,7 @@ def _of_all(
     lacking = [name for name in OF_TABLES if not (folder / f"{name}.csv").is_file()]
     if lacking:
         raise UserError(f"--data {data}: for all a folder is needed; {lacking[0]}.csv is not in it")
-    return {name: recorded(name, folder / f"{name}.csv", mapping, report, accepted) for name in OF_TABLES}
+    return {name: recorded(name, folder / f"{name}.csv", how, report, accepted) for name in OF_TABLES}
 
 
 def _tables(recordings: Mapping[str, Dataset], gear: float, tell: Report) -> dict[str, Fit]:

@@ -1,16 +1,15 @@
-"""Text tables: a header line with names and units, one row per sample.
+"""Text tables: names and units above, one row per sample below; any separator, decimal mark, encoding and stamps.
 
-Accepted: a byte order mark, UTF-16, comment lines (#, %, //), a line of units below the header, separators comma,
-semicolon, tab and spaces, decimal commas next to semicolons or tabs or in quotes, stamps in s, ms, us or ns, as dates
-and times in one column or two (stamps.py), as times of the day, or as a spreadsheet's days. An empty cell is a time
-without a sample of this channel; a cell that is not a number becomes "not a number" and a finding.
-Without a header the columns are column_1, column_2 ..., and `mapping` names them.
+`layout` finds how the table is written, by its first lines; `numerals` decides the decimal mark by all of its rows;
+then the rows are read a chunk at a time, so that a table of millions of rows needs the memory of its numbers only.
+Every line is accounted for (Dataset.lines). An empty cell is a time without a sample of this channel; a cell that is
+not a number becomes "not a number" and a finding.
 """
 
-import csv
+import dataclasses
 import pathlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,248 +17,526 @@ from numpy.typing import NDArray
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss, Repair
-from ranger_sim.sysid.readers import columns, stamps
+from ranger_sim.sysid.readers import columns, numerals, stamps, text_file
+from ranger_sim.sysid.readers import layout as layouts
 
-COMMENTS = ("#", "%", "//")
-EMPTY = ("", "-", "na", "n/a", "null", "none")
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
-DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-CLOCKS = ("datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock")  # in addition to those named time
 SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
-SNIFFED_CELLS = 50
+LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
+REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
 NAMED_LINES = 3  # number of a finding's places that are named
-LARGEST_BYTES = 2_000_000_000
-MOST_LINES = 3_000_000  # each is kept as text while it is read: some hundred bytes a line
+MOST_CELLS = 400_000_000  # 8 bytes each
+EVEN = 0.01  # of the usual step: what counts evenly without a name may be the time
+
+HEX, HEXADECIMAL = re.compile("(?:0[xX])?[0-9A-Fa-f]{4,16}"), 0.01  # of the cells of a column
+
+Progress = Callable[[str, float], None]
 
 
-def read(path: str | pathlib.Path, mapping: Mapping[str, str] | None = None, time_unit: str | None = None) -> Dataset:
-    """The channels of a text table. mapping: {column in the file: name of the channel}; time_unit: of a time column
-    whose name does not give it. UserError for a file that is not a table with a time column.
+def no_progress(what: str, share: float) -> None:
+    """Nothing is shown."""
+
+
+def read(
+    path: str | pathlib.Path,
+    mapping: Mapping[str, str] | None = None,
+    time_unit: str | None = None,
+    assumed: Mapping[str, str] | None = None,
+    progress: Progress = no_progress,
+) -> Dataset:
+    """The channels of a text table.
+
+    mapping: {column in the file: name of the channel}; time_unit: of a time column whose name does not give it;
+    assumed: parts of the layout that are given (layout.KEYS). UserError for a file that is not a table with a time
+    column, or that can be read in two ways.
     """
     path = pathlib.Path(path)
+    assumed = dict(assumed or {})
     dataset = Dataset(path.name, {})
-    lines = _lines(dataset, path)
-    separator, decimal_comma = _separator(lines)
-    rows = [(number, _cells(text, separator)) for number, text in lines]
-    if decimal_comma:
-        dataset.repairs.append(Repair("", "decimal_comma", len(rows), "decimal commas are read as points"))
-    names, unit_texts, rows = _header(dataset, rows, decimal_comma)
-    mapping = dict(mapping or {})
+    survey = text_file.survey(path, assumed.get("encoding", ""))
+    layout = layouts.of(path, survey, assumed)
+    rows = _Rows(path, survey, layout, "names" in assumed)
+    marks = _marks(path, rows, progress)
+    table = _parsed(rows, marks, assumed, progress)
+    if "," not in marks and "decimal" not in assumed and any(column.other_mark for column in table):
+        marks = _marks(path, rows, progress, every=True)  # commas that the first lines did not have
+        table = _parsed(rows, marks, assumed, progress)
+    _note_layout(dataset, layout, marks, rows, assumed)
+    return _channels(dataset, rows, table, dict(mapping or {}), time_unit, assumed)
+
+
+# --- rows ---------------------------------------------------------------------------------------------------
+
+
+class _Rows:
+    """The rows of a table, a chunk at a time; afterwards, what became of every line."""
+
+    def __init__(self, path: pathlib.Path, survey: text_file.Survey, layout: layouts.Layout, one_table: bool) -> None:
+        self.path, self.survey, self.layout, self.one_table = path, survey, layout, one_table
+        self.places = np.array([], dtype=np.int64)  # line numbers of the rows
+        self._start()
+
+    def _start(self) -> None:
+        self.lines: dict[str, int] = {}
+        self.ragged: list[int] = []
+        self.cut_off = 0
+        self.again: list[int] = []
+        self.kept = 0
+        self._odd: list[tuple[int, bool]] = []  # lines that are not rows, since the last row
+
+    def _count(self, what: str, number: int = 1) -> None:
+        self.lines[what] = self.lines.get(what, 0) + number
+
+    def __iter__(self) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+        """(line numbers (n,), the cells of n rows, all of the table's width)."""
+        self._start()
+        layout, width, separator = self.layout, len(self.layout.names), self.layout.separator
+        for number, lines in text_file.chunks(self.path, self.survey.encoding):
+            places: list[int] = []
+            rows: list[list[str]] = []
+            plain = '"' not in "".join(lines)
+            for place, line in enumerate(lines, number):
+                if place < layout.first_line:
+                    self._above(place, line)
+                    continue
+                cells = (
+                    (line.split() if separator == " " else line.split(separator))
+                    if plain
+                    else layouts.cells_of(line, separator)
+                )
+                if len(cells) == width or (len(cells) > width and not any(map(str.strip, cells[width:]))):
+                    if line[:1] in "#%/ \t" and layouts.is_comment(line) and not layouts.is_data(cells):
+                        self._count("comments")
+                        continue
+                    cells = [cell.strip() for cell in cells[:width]]
+                    if any(cells) and not self._ends_here(place, cells):
+                        self._settle()
+                        places.append(place)
+                        rows.append(cells)
+                    elif not any(cells):
+                        self._count("empty")
+                    continue
+                if layouts.is_blank(line):
+                    self._count("empty")
+                elif layouts.is_comment(line):
+                    self._count("comments")
+                elif not self._ends_here(place, [cell.strip() for cell in cells]):
+                    self._odd.append((place, layouts.is_data([cell.strip() for cell in cells])))
+            if rows:
+                self.kept += len(rows)
+                if self.kept * width > MOST_CELLS:
+                    raise DataError(f"{self.path}: a text table may have {MOST_CELLS} cells: split it, or use MF4")
+                yield np.array(places, dtype=np.int64), rows
+        last = self._odd.pop() if self._odd and not self.survey.ends and self._odd[-1][1] else None
+        if last:
+            self.cut_off = last[0]
+        for place, data in self._odd:  # behind the last row
+            if data:
+                self.ragged.append(place)
+            else:
+                self._count("footer")
+        self._count("rows", self.kept)
+
+    def _above(self, place: int, line: str) -> None:
+        layout = self.layout
+        what = "preamble"
+        if place == layout.names_line:
+            what = "names"
+        elif layout.names_line < place <= layout.units_line:
+            what = "units"
+        elif layouts.is_blank(line):
+            what = "empty"
+        elif layouts.is_comment(line):
+            what = "comments"
+        self._count(what)
+
+    def _settle(self) -> None:
+        """Lines that are not rows, between rows: left out."""
+        self.ragged += [place for place, _ in self._odd]
+        self._odd.clear()
+
+    def _ends_here(self, place: int, cells: list[str]) -> bool:
+        """True for a second row of names. UserError where it begins another table."""
+        if not cells or (cells[0] and (cells[0][0].isdigit() or cells[0][0] in "+-.")):
+            return False
+        if cells[: len(self.layout.names)] == list(self.layout.names):
+            self.again.append(place)
+            self._count("names again")
+            return True
+        if self.again and self.again[-1] == place - 1 and layouts.is_words(cells) and self.layout.units_line:
+            self._count("names again")
+            return True
+        named = len(cells) > 1 and layouts.is_words(cells) and any(map(layouts.is_time_name, cells))
+        if named and not self.one_table:
+            raise DataError(*layouts.several_tables(self.path, self.layout.names_line or 1, place))
+        if named:
+            self._count("another table")
+        return named
+
+
+# --- columns ------------------------------------------------------------------------------------------------
+
+
+class _Column:
+    """The cells of a column as numbers, and as stamps where it may have the time."""
+
+    def __init__(self, mark: str, may_be_time: bool) -> None:
+        self.mark, self.may_be_time = mark, may_be_time
+        self.values: list[Array] = []
+        self.present: list[NDArray[np.bool_]] = []
+        self.whole: list[NDArray[np.int64]] | None = [] if may_be_time else None
+        self.written: list[tuple[NDArray[np.int64], NDArray[np.int64]]] | None = [] if may_be_time else None
+        self.forms = stamps.Forms()
+        self.odd = 0
+        self.first_odd: tuple[int, int, str] | None = None  # row, line, cell
+        self.last_odd = 0
+        self.other_mark = False
+        self.finest = 1.0
+        self.unit_text = ""
+        self.first = ""
+        self.rows = 0
+
+    def add(self, cells: Sequence[str], places: NDArray[np.int64]) -> None:
+        """The next rows. cells (n,), line numbers (n,)."""
+        if self.may_be_time:
+            self._add_stamps(cells)
+        values, present, odd = numerals.numbers(cells, self.mark)
+        if odd and not self.may_be_time:
+            odd = self._with_units(cells, values, odd)
+        if odd:
+            self.odd += len(odd)
+            self.last_odd = self.rows + odd[-1]
+            self.other_mark = self.other_mark or any("," in cells[k] and numerals.is_number(cells[k]) for k in odd)
+            if self.first_odd is None:
+                self.first_odd = (self.rows + odd[0], int(places[odd[0]]), cells[odd[0]])
+        if not self.values:
+            self.first = next((cell for cell in cells if cell), "")
+        digit = numerals.last_digit(cells)
+        self.finest = min(self.finest, digit)
+        self.values.append(values)
+        self.present.append(np.ones(len(values), dtype=bool) if present is None else present)
+        self.rows += len(cells)
+
+    def _add_stamps(self, cells: Sequence[str]) -> None:
+        if self.written is not None:
+            both = stamps.both_ways(cells, self.forms)
+            if both is None:
+                self.written = None
+            else:
+                self.written.append(both)
+        if self.whole is not None:
+            try:
+                self.whole.append(np.array(list(map(int, cells)), dtype=np.int64))
+            except (ValueError, OverflowError):
+                self.whole = None
+
+    def _with_units(self, cells: Sequence[str], values: Array, odd: list[int]) -> list[int]:
+        """Numbers with their unit in the cell, one unit in the whole column; the rest of the odd cells."""
+        rest: list[int] = []
+        for k in odd:
+            found = numerals.WITH_UNIT.fullmatch(cells[k])
+            if found and (found[2] == self.unit_text or (not self.unit_text and self.odd == 0 and not rest)):
+                number = numerals.value_of(found[1], self.mark)
+                if np.isfinite(number) and (self.unit_text or units.unit_of(found[2]) is not None):
+                    self.unit_text = found[2]
+                    values[k] = number
+                    continue
+            rest.append(k)
+        return rest
+
+    def value(self) -> Array:
+        """All of its numbers (n,)."""
+        self.values = [np.concatenate(self.values)]
+        return self.values[0]
+
+    def has_cell(self) -> NDArray[np.bool_]:
+        """(n,): True where there is something."""
+        self.present = [np.concatenate(self.present)]
+        return self.present[0]
+
+    def whole_numbers(self) -> NDArray[np.int64] | None:
+        """All of its cells (n,), when each is a whole number."""
+        return np.concatenate(self.whole) if self.whole else None
+
+    def stamps(self, month_first: bool | None) -> stamps.Stamps | None:
+        """Its cells as dates or times of the day; None when most are not."""
+        if not self.written:
+            return None
+        day, month = (np.concatenate([each[way] for each in self.written]) for way in (0, 1))
+        return stamps.chosen(day, month, self.forms, month_first)
+
+
+def _marks(path: pathlib.Path, rows: _Rows, progress: Progress, every: bool = False) -> list[str]:
+    """The decimal mark of each column, by all rows. UserError where two are as good, or contradict each other."""
+    width = len(rows.layout.names)
+    if rows.layout.decimal:
+        return [rows.layout.decimal] * width
+    evidence = numerals.Evidence()
+    done = 0
+    for number, (_, cells) in enumerate(rows):
+        if not number and not every:
+            few = cells[: layouts.HEAD_LINES]
+            if not any("," in cell for row in few for cell in row) and rows.layout.separator == ",":
+                return ["."] * width
+            if not any("," in cell or numerals.EITHER_WAY.fullmatch(cell) for row in few for cell in row):
+                return ["."] * width
+        for column, part in enumerate(zip(*cells, strict=True)):
+            evidence.add(column, part)
+        done += len(cells)
+        progress("decimal mark", min(0.45, done / max(1, rows.survey.size / (8 * width))))
+    mark = evidence.mark()
+    if not mark:
+        cell = next(iter(evidence.example.values()))
+        first, second = (f"{numerals.value_of(cell, each):.10g}" for each in ".,")
+        raise DataError(
+            f"{path}: cells such as {cell!r} are {first} with a decimal point and {second} with a decimal comma, and "
+            "no row decides:",
+            f"  ranger-sim read {path} --assume decimal=point",
+            f"  ranger-sim read {path} --assume decimal=comma",
+        )
+    found = [evidence.of_column(column, mark) for column in range(width)]
+    if not all(found):
+        name = rows.layout.names[found.index("")]
+        raise DataError(
+            f"{path}: {name}: some numbers have a decimal point ({evidence.example['.']}), others a decimal comma "
+            f"({evidence.example[',']}); --assume decimal=point or decimal=comma leaves out the others"
+        )
+    return found
+
+
+def _parsed(rows: _Rows, marks: list[str], assumed: Mapping[str, str], progress: Progress) -> list[_Column]:
+    names, unit_texts = rows.layout.names, rows.layout.units
+    table = [
+        _Column(mark, _may_be_time(name, unit) or assumed.get("time") == name or names == layouts._numbered(len(names)))
+        for name, unit, mark in zip(names, unit_texts, marks, strict=True)
+    ]
+    if not any(column.may_be_time for column in table) and table:
+        for column in table:
+            column.may_be_time, column.whole, column.written = True, [], []
+    lines: list[NDArray[np.int64]] = []
+    for places, cells in rows:
+        for column, part in zip(table, zip(*cells, strict=True), strict=True):
+            column.add(part, places)
+        lines.append(places)
+        progress("rows", 0.45 + min(0.5, 0.5 * rows.kept / max(1, rows.survey.size / (8 * len(names)))))
+    rows.places = np.concatenate(lines) if lines else np.array([], dtype=np.int64)
+    return table
+
+
+def _may_be_time(name: str, unit_text: str | None) -> bool:
+    unit = units.unit_of(unit_text) if unit_text else units.split(name)[1]
+    return layouts.is_time_name(name) or (unit is not None and unit.numerator == ("s",) and not unit.denominator)
+
+
+# --- the dataset ----------------------------------------------------------------------------------------------
+
+
+def _note_layout(
+    dataset: Dataset, layout: layouts.Layout, marks: list[str], rows: _Rows, assumed: Mapping[str, str]
+) -> None:
+    if "," in marks:
+        dataset.repairs.append(Repair("", "decimal_comma", rows.kept, "decimal commas are read as points"))
+    if layout.encoding != "utf-8-sig":
+        text = f"the text is read as {layout.encoding}, it is not UTF-8"
+        dataset.repairs.append(Repair("", "encoding", 0, text))
+    if layout.names[-1] == f"column_{len(layout.names)}" and not layout.names_line:
+        count = len(layout.names)
+        text = f"the table has no names, its columns are column_1 to {layout.names[-1]}"
+        dataset.findings.append(Finding("", "no_header", 0.0, 0.0, float(count), "columns", text))
+    if rows.again:
+        text = f"the row of names comes again in line {_lines_text(rows.again)}: several recordings in one file?"
+        dataset.findings.append(Finding("", "names_again", 0.0, 0.0, float(len(rows.again)), "times", text))
+    of_layout = dataclasses.replace(layout, decimal="," if "," in marks else ".").as_assumptions()
+    dataset.layout = {"format": "text table", **of_layout, **assumed, "columns": list(layout.names)}
+    dataset.lines = dict(rows.lines)
+
+
+def _lines_text(numbers: Sequence[int]) -> str:
+    return ", ".join(str(each) for each in numbers[:NAMED_LINES]) + (" ..." if len(numbers) > NAMED_LINES else "")
+
+
+def _channels(
+    dataset: Dataset,
+    rows: _Rows,
+    table: list[_Column],
+    mapping: dict[str, str],
+    time_unit: str | None,
+    assumed: Mapping[str, str],
+) -> Dataset:
+    names = list(rows.layout.names)
     columns.check_mapping(dataset, mapping, names)
-    dataset.rows = len(rows)
-    cells, lost = _grid(dataset, rows, names)
-    time_columns, time_s = _time(dataset, names, unit_texts, cells, mapping, time_unit, decimal_comma)
+    if not rows.kept:
+        raise DataError(f"{dataset.name}: the table has no row below its header")
+    lost = _left_out(dataset, rows)
+    time_columns, time_s = _time(dataset, rows, table, mapping, time_unit, assumed)
     stamped = np.isfinite(time_s)
     if not stamped.all():
-        text = f"{int((~stamped).sum())} rows have no stamp and are left out"
-        dataset.repairs.append(Repair("", "no_stamp", int((~stamped).sum()), text))
-        dataset.findings.append(Finding("", "no_stamp", *columns.ends(time_s), float((~stamped).sum()), "rows", text))
-        lost += (Loss("no_stamp", int((~stamped).sum()), f"in line {rows[int(np.argmin(stamped))][0]}"),)
-    for index, name in enumerate(names):
-        if index in time_columns:
+        places = [int(each) for each in rows.places[~stamped][:NAMED_LINES]]
+        count = int((~stamped).sum())
+        text = f"{count} rows have no stamp and are left out (line {_lines_text(places)})"
+        dataset.repairs.append(Repair("", "no_stamp", count, text))
+        dataset.findings.append(Finding("", "no_stamp", *columns.ends(time_s), float(count), "rows", text))
+        lost += (Loss("no_stamp", count, f"in line {places[0]}"),)
+    for index, (name, column) in enumerate(zip(names, table, strict=True)):
+        if index in time_columns or index in rows.layout.ignored:
             continue
-        named = columns.label(dataset.name, name, unit_texts[index], mapping)
-        value, present, finest = _numbers(dataset, named.name, rows, cells[index], time_s, decimal_comma)
+        unit_text = rows.layout.units[index]
+        named = columns.label(dataset.name, name, unit_text or column.unit_text or unit_text, mapping)
+        value, present = column.value(), column.has_cell()
+        if column.odd and column.first_odd is not None:
+            _, line, cell = column.first_odd
+            text = f"{column.odd} cells are no numbers, the first in line {line}: {cell[:30]!r}"
+            begin, end = (
+                float(time_s[k]) if np.isfinite(time_s[k]) else 0.0 for k in (column.first_odd[0], column.last_odd)
+            )
+            dataset.findings.append(Finding(named.name, "unreadable", begin, end, float(column.odd), "samples", text))
         kept = present & stamped
-        if not np.isfinite(value[kept]).any():
-            text = f"{name}: has no number in it, left out"
+        if column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2]):
+            text = f"{name}: hexadecimal numbers such as {column.first_odd[2]!r} are not read, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
             continue
-        columns.add(dataset, name, named, time_s[kept], value[kept], finest, lost)
+        if not np.isfinite(value[kept]).any():
+            text = f"{name}: has no number in it, left out"
+            severity = "warning" if present.any() or not name.lower().startswith(REMARKS) else "note"
+            dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text, severity))
+            continue
+        whole = bool(kept.all())
+        finest = column.finest if column.finest < 1.0 or column.first else 0.0
+        columns.add(
+            dataset, name, named, time_s if whole else time_s[kept], value if whole else value[kept], finest, lost
+        )
+        column.values = []
     if not dataset.channels:
         called = " and ".join(names[index] for index in sorted(time_columns))
-        raise DataError(f"{path}: there is no channel except the time column {called}")
+        raise DataError(f"{rows.path}: there is no channel except the time column {called}")
     return dataset
 
 
-def _lines(dataset: Dataset, path: pathlib.Path) -> list[tuple[int, str]]:
-    """(line number, text) of every line that is neither empty nor a comment."""
-    try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise DataError(f"{path}: {path.stat().st_size} bytes, a text table may have {LARGEST_BYTES}")
-        content = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: the table cannot be read ({error.strerror or error})") from None
-    lines = content.count(b"\n")
-    if lines > MOST_LINES:
-        raise DataError(
-            f"{path}: {lines} lines, a text table may have {MOST_LINES}: thin it out or split it, or use MF4 (.mf4)"
-        )
-    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
-    try:
-        text = content.decode(encoding)
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-        encoding = "latin-1"
-    if "\0" in text:
-        raise DataError(f"{path}: this is not a text table, it has bytes of value 0")
-    if encoding != "utf-8-sig":
-        dataset.repairs.append(Repair("", "encoding", 0, f"the text is read as {encoding}, it is not UTF-8"))
-    found = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" \t\r,;")]
-    kept = [(number, line) for number, line in found if not line.lstrip().startswith(COMMENTS)]
-    if not kept and found:  # a header behind a comment mark, as numpy writes it, and no rows
-        raise DataError(f"{path}: the table has comment lines only")
-    if not kept:
-        raise DataError(f"{path}: the table is empty")
-    behind_mark = _header_in_comment(found, kept)
-    return ([behind_mark] if behind_mark else []) + kept
-
-
-def _header_in_comment(found: list[tuple[int, str]], kept: list[tuple[int, str]]) -> tuple[int, str] | None:
-    """The comment line just above numbers with a name for each column, as numpy.savetxt writes headers."""
-    separator, _ = _separator(kept)
-    first = _cells(kept[0][1], separator)
-    if not all(_is_number(cell) or not cell for cell in first):
-        return None
-    above = [(number, line) for number, line in found if number < kept[0][0]]
-    if not above:
-        return None
-    number, line = above[-1]
-    text = line.lstrip().lstrip("#%/").strip()
-    cells = _cells(text, separator)
-    return (number, text) if len(cells) == len(first) and not any(map(_is_number, cells)) else None
-
-
-def _separator(lines: list[tuple[int, str]]) -> tuple[str, bool]:
-    """(separator, True when numbers have decimal commas) of a table, by its first rows."""
-    some = [line for _, line in lines[:50]]
-    for separator in ("\t", ";"):
-        if all(separator in line for line in some):
-            cells = [cell.strip() for line in some[1:] or some for cell in line.split(separator)]
-            commas = sum(bool(DECIMAL_COMMA.fullmatch(cell)) for cell in cells)
-            points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
-            return separator, commas > 0 and points == 0
-    if any("," in line for line in some):
-        quoted = [cell for line in some if '"' in line for cell in _cells(line, ",")]
-        commas = sum(bool(DECIMAL_COMMA.fullmatch(cell)) for cell in quoted)
-        return ",", commas > 0 and not any("." in cell and NUMBER.fullmatch(cell) for cell in quoted)
-    return (" ", False) if any(" " in line.strip() for line in some[1:]) else (",", False)
-
-
-def _cells(text: str, separator: str) -> list[str]:
-    """One line's cells without the spaces around them."""
-    if separator == " ":
-        return text.split()
-    if '"' not in text:
-        return [cell.strip() for cell in text.split(separator)]
-    try:
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=separator, skipinitialspace=True))]
-    except (csv.Error, StopIteration):
-        return [cell.strip() for cell in text.split(separator)]
-
-
-def _is_number(cell: str) -> bool:
-    return bool(NUMBER.fullmatch(cell) or DECIMAL_COMMA.fullmatch(cell))
-
-
-def _header(
-    dataset: Dataset, rows: list[tuple[int, list[str]]], decimal_comma: bool
-) -> tuple[list[str], list[str | None], list[tuple[int, list[str]]]]:
-    """(names, text of a line of units for each, the rest of the rows)."""
-    number, first = rows[0]
-    if all(_is_number(cell) or cell.lower() in EMPTY or stamps.is_stamp(cell) for cell in first):
-        names = [f"column_{place}" for place in range(1, len(first) + 1)]
-        text = f"line {number} holds numbers: the table has no names, its columns are column_1 to {names[-1]}"
-        dataset.findings.append(Finding("", "no_header", 0.0, 0.0, float(len(names)), "columns", text))
-        return names, [None] * len(names), rows
-    names = [cell or f"column_{place}" for place, cell in enumerate(first, 1)]
-    while len(names) > 1 and not first[len(names) - 1] and all(len(r) < len(names) or not r[-1] for _, r in rows[1:]):
-        names.pop()  # separators at the ends of all lines
-    for name in names:
-        if names.count(name) > 1:
-            raise DataError(f"{dataset.name}:{number}: two columns are called {name[:60]}")
-    unit_texts: list[str | None] = [None] * len(names)
-    if len(rows) > 1:
-        second = [cell if units.unit_of(cell) is not None else cell.strip("[]()") for cell in rows[1][1]]
-        # a row without any number or stamp is a row of units, when it has a known one
-        if len(second) == len(names) and not any(_is_number(cell) or stamps.is_stamp(cell) for cell in second if cell):
-            if any(cell and units.unit_of(cell) is not None for cell in second):
-                return names, list(second), rows[2:]
-    return names, unit_texts, rows[1:]
-
-
-def _grid(
-    dataset: Dataset, rows: list[tuple[int, list[str]]], names: list[str]
-) -> tuple[list[list[str]], tuple[Loss, ...]]:
-    """(cells by column, rows that are left out because they are too long or too short)."""
+def _left_out(dataset: Dataset, rows: _Rows) -> tuple[Loss, ...]:
+    """Lines that should be rows and are not."""
     lost: tuple[Loss, ...] = ()
-    wrong = [number for number, cells in rows if not _fits(cells, len(names))]
-    if wrong:
-        some = ", ".join(str(number) for number in wrong[:NAMED_LINES]) + (" ..." if len(wrong) > NAMED_LINES else "")
-        text = f"{len(wrong)} rows do not have {len(names)} cells and are left out (line {some})"
-        dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(wrong)), "rows", text))
-        dataset.repairs.append(Repair("", "ragged", len(wrong), text))
-        lost = (Loss("ragged", len(wrong), f"in line {wrong[0]}"),)
-        rows[:] = [(number, cells) for number, cells in rows if _fits(cells, len(names))]
-    if not rows:
-        raise DataError(f"{dataset.name}: the table has no row below its header")
-    return [[cells[index] for _, cells in rows] for index in range(len(names))], lost
-
-
-def _fits(cells: list[str], count: int) -> bool:
-    return len(cells) == count or (len(cells) == count + 1 and not cells[-1])
+    width = len(rows.layout.names)
+    if rows.ragged:
+        count = len(rows.ragged)
+        text = f"{count} rows do not have {width} cells and are left out (line {_lines_text(rows.ragged)})"
+        dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(count), "rows", text))
+        dataset.repairs.append(Repair("", "ragged", count, text))
+        lost = (Loss("ragged", count, f"in line {rows.ragged[0]}"),)
+        dataset.lines["left out: ragged"] = count
+    if rows.cut_off:
+        text = f"the last line, {rows.cut_off}, is cut off and left out"
+        dataset.findings.append(Finding("", "cut_off", 0.0, 0.0, 1.0, "rows", text, "note"))
+        lost += (Loss("cut_off", 1, f"in line {rows.cut_off}"),)
+        dataset.lines["left out: cut off"] = 1
+    dataset.rows = rows.kept + len(rows.ragged) + bool(rows.cut_off)
+    return lost
 
 
 def _time(
     dataset: Dataset,
-    names: list[str],
-    unit_texts: list[str | None],
-    cells: list[list[str]],
+    rows: _Rows,
+    table: list[_Column],
     mapping: Mapping[str, str],
     time_unit: str | None,
-    decimal_comma: bool,
+    assumed: Mapping[str, str],
 ) -> tuple[set[int], Array]:
     """(indices of the time columns, stamps in s; NaN where a row has none)."""
-    split = [units.split(mapping.get(name, name)) for name in names]
-    candidates = [k for k, (stem, _) in enumerate(split) if stem.lower() in (*units.TIME_WORDS, *CLOCKS)]
-    if not candidates:
+    names = list(rows.layout.names)
+    called = [mapping.get(name, name) for name in names]
+    if "time" in assumed:
+        if assumed["time"] not in names:
+            raise DataError(
+                f"{dataset.name}: --assume time={assumed['time']}: unknown column (available: {', '.join(names)})"
+            )
+        candidates = [names.index(assumed["time"])]
+    else:
+        candidates = [k for k, name in enumerate(called) if layouts.is_time_name(name)]
+    step_s = rows.layout.above.step_s
+    in_time = [k for k in range(len(names)) if _may_be_time(called[k], rows.layout.units[k])]
+    if step_s and not any(np.isfinite(table[k].value()).any() or table[k].written for k in candidates or in_time):
+        text = f"no column has stamps: they are those of the rate above the table, {step_s:.6g} s apart"
+        dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, step_s, "s", text, "note"))
+        dataset.layout |= {"time": "rate", "time_unit": "s"}
+        return set(candidates), step_s * np.arange(rows.kept, dtype=np.float64)
+    month_first = {"month-first": True, "day-first": False}.get(assumed.get("dates", ""))
+    candidates = candidates or _unnamed_time(dataset, rows, table, called)
+    written = {k: found for k in candidates if (found := table[k].stamps(month_first)) is not None}
+    numbers = [k for k in candidates if k not in written]
+    if not written or (numbers and not any(each.has_time for each in written.values())):
+        index = (_with_unit_first(numbers, called, rows.layout.units) or candidates)[0]
+        unit = units.split(called[index])[1]
+        return {index, *written}, _counted(dataset, names[index], unit, rows, table[index], index, time_unit)
+    whole = [k for k in written if written[k].has_date and written[k].has_time]
+    chosen = whole[:1] or [k for k in written if written[k].has_date][:1]
+    if not whole:
+        chosen += [k for k in written if written[k].has_time and k not in chosen][:1]
+    time_ns = np.sum([written[k].time_ns for k in chosen], axis=0)
+    missing = np.any([written[k].time_ns == stamps.NONE for k in chosen], axis=0)
+    both = " and ".join(names[k] for k in chosen)
+    with_date = any(written[k].has_date for k in chosen)
+    first_ns = int(time_ns[~missing][0]) if with_date and not missing.all() else 0
+    text = f"{both}: {'dates are' if with_date else 'times of the day are'} read as seconds"
+    if with_date:
+        text += f", 0 is {np.datetime64(first_ns, 'ns')}"
+    dataset.repairs.append(Repair("", "dates", len(time_ns), text))
+    dataset.layout |= {"time": both, "time_unit": "dates" if with_date else "times of the day"}
+    if any(written[k].either_way for k in chosen):
+        text = f"{both}: day and month may be either way round; --assume dates=day-first or month-first decides"
+        dataset.findings.append(Finding("", "dates_either_way", 0.0, 0.0, 0.0, "", text))
+    return set(chosen) | set(written), np.where(missing, np.nan, (time_ns - first_ns) * 1e-9)
+
+
+def _with_unit_first(numbers: list[int], called: Sequence[str], unit_texts: Sequence[str | None]) -> list[int]:
+    """Columns of numbers, those first whose unit is known to be a time."""
+    return sorted(numbers, key=lambda k: units.split(called[k])[1] is None and not unit_texts[k])
+
+
+def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: Sequence[str]) -> list[int]:
+    """The only column that can be the time: in a unit of time, or dates, or counting evenly where none has a name."""
+    names = rows.layout.names
+    rising = [k for k, column in enumerate(table) if column.may_be_time and _rises(column)]
+    dated = [k for k, column in enumerate(table) if column.may_be_time and column.stamps(None) is not None]
+    timed = [k for k in rising if _may_be_time(called[k], rows.layout.units[k])]
+    found = timed or dated or ([k for k in rising if _is_even(table[k])] if not rows.layout.names_line else [])
+    if len(found) != 1 and not (found and found == dated):
         raise DataError(
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
             "--map NAME=t_s says which it is"
         )
-    written = {k: found for k in candidates if (found := stamps.of(cells[k])) is not None}
-    numbers = [k for k in candidates if k not in written]
-    if not written or (numbers and not any(each.has_time for each in written.values())):
-        index = (numbers or candidates)[0]
-        dates = set(written)
-        time_s = _counted(
-            dataset, names[index], split[index][1], unit_texts[index], cells[index], time_unit, decimal_comma
-        )
-        return {index, *dates}, time_s
-    whole = [k for k in written if written[k].has_date and written[k].has_time]
-    chosen = whole[:1] or [k for k in written if written[k].has_date][:1]
-    if not whole:
-        chosen += [k for k in written if written[k].has_time][:1]
-    time_ns = np.sum([written[k].time_ns for k in chosen], axis=0)
-    missing = np.any([written[k].time_ns == stamps.NONE for k in chosen], axis=0)
-    called = " and ".join(names[k] for k in chosen)
-    with_date = any(written[k].has_date for k in chosen)
-    first_ns = int(time_ns[~missing][0]) if with_date and not missing.all() else 0
-    text = f"{called}: {'dates are' if with_date else 'times of the day are'} read as seconds"
-    if with_date:
-        text += f", 0 is {np.datetime64(first_ns, 'ns')}"
-    dataset.repairs.append(Repair("", "dates", len(time_ns), text))
-    return set(chosen), np.where(missing, np.nan, (time_ns - first_ns) * 1e-9)
+    text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
+    dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))
+    return found
+
+
+def _rises(column: _Column) -> bool:
+    value = column.value()
+    return len(value) > 2 and bool(np.isfinite(value).all()) and bool((np.diff(value) > 0.0).all())
+
+
+def _is_even(column: _Column) -> bool:
+    """True for stamps of one rate; a count of the rows from 0 or 1 is none."""
+    steps = np.diff(column.value())
+    usual = float(np.median(steps))
+    return bool(np.abs(steps - usual).max() <= EVEN * usual) and not (column.whole and usual == 1.0)
 
 
 def _counted(
     dataset: Dataset,
     name: str,
     unit: units.Unit | None,
-    unit_text: str | None,
-    cells: list[str],
+    rows: _Rows,
+    column: _Column,
+    index: int,
     time_unit: str | None,
-    decimal_comma: bool,
 ) -> Array:
     """Stamps in s of a column of numbers; NaN where a row has none."""
+    unit_text = rows.layout.units[index] or column.unit_text
     said = units.unit_of(unit_text) if unit_text else None
     unit = said or unit or (units.unit_of(time_unit) if time_unit else None)
-    plain = _plain_numbers(cells, decimal_comma)
-    time_s = plain if plain is not None else np.array([_value(cell, decimal_comma) for cell in cells])
+    time_s = column.value()
     if len(time_s) and np.isfinite(time_s).mean() < 0.5:
-        first = next((cell for cell in cells if cell and not _is_number(cell)), "")
+        first = column.first_odd[2] if column.first_odd else ""
         raise DataError(
             f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
             "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
@@ -268,11 +545,12 @@ def _counted(
         unit = _assumed(dataset, name, time_s)
     if unit.numerator != ("s",) or unit.denominator:
         raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
+    dataset.layout |= {"time": name, "time_unit": unit_text if said else time_unit or f"{unit.factor:g} s"}
     if unit.factor == 1.0:
         return columns.from_zero(dataset, time_s)
     text = f"{name}: times {unit.factor:g}, now in s"
     dataset.repairs.append(Repair("", "si_unit", len(time_s), text))
-    whole = _whole_numbers(cells)
+    whole = column.whole_numbers()
     if whole is not None and len(whole) and float(whole[0]) * unit.factor >= columns.EPOCH_S:
         columns.from_zero(dataset, time_s[:1] * unit.factor)  # for its note; whole numbers are subtracted below
         return (whole - whole[0]) * unit.factor
@@ -280,7 +558,7 @@ def _counted(
 
 
 def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
-    """Unit of stamps without a given one: seconds, or a spreadsheet's days where seconds are impossible."""
+    """Unit of stamps without a given one: what their size can only be, else seconds."""
     steps = np.diff(time_s[np.isfinite(time_s)])
     usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
     ends = columns.ends(time_s)
@@ -290,74 +568,28 @@ def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
         )
         dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
         return units.Unit(("s",), (), 86400.0)
+    for spelling, factor in EPOCHS.items():
+        if all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends):
+            text = (
+                f"{name}: {ends[0]:.15g} is taken for {spelling} since 1970: of the years 1990 to 2100 in no other unit"
+            )
+            dataset.findings.append(Finding("", "unit_assumed", *ends, factor, "s", text, "note"))
+            return units.Unit(("s",), (), factor)
     text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
     if usual > SLOWEST_S:
         smaller = next((unit for unit in ("ms", "us", "ns") if usual * units.ATOMS[unit][1] <= SLOWEST_S), "ns")
         better = usual * units.ATOMS[smaller][1]
+        if usual > LONGEST_S or len(time_s) >= FEWEST:
+            raise DataError(
+                f"{dataset.name}: {name}: nothing says the unit of the stamps; in seconds samples would be "
+                f"{usual:.6g} s apart, in {smaller} {better:g} s:",
+                f"  ranger-sim read {dataset.name} --time-unit {smaller}",
+                f"  ranger-sim read {dataset.name} --time-unit s",
+            )
         text += f", which are {usual:.6g} s apart; --time-unit {smaller} would make them {better:g} s"
     dataset.findings.append(Finding("", "unit_assumed", *ends, 1.0, "s", text))
     return units.Unit(("s",))
 
 
-def _whole_numbers(cells: list[str]) -> NDArray[np.int64] | None:
-    """A column of whole numbers, exactly; None for any other."""
-    try:
-        return np.array(list(map(int, cells)), dtype=np.int64)
-    except (ValueError, OverflowError):
-        return None
-
-
-def _value(cell: str, decimal_comma: bool) -> float:
-    """The number of a cell; "not a number" for any other text."""
-    try:
-        return float(cell.replace(",", ".") if decimal_comma else cell) if "_" not in cell else float("nan")
-    except ValueError:
-        return float("nan")
-
-
-def _numbers(
-    dataset: Dataset,
-    channel: str,
-    rows: list[tuple[int, list[str]]],
-    cells: list[str],
-    time_s: Array,
-    decimal_comma: bool,
-) -> tuple[Array, np.ndarray, float]:
-    """(values, mask of those that exist, size of the last digit) of a column, with findings for unreadable cells."""
-    plain = _plain_numbers(cells, decimal_comma)
-    if plain is not None:
-        return plain, np.ones(len(plain), dtype=bool), _last_digit(cells)
-    present = np.array([cell.lower() not in EMPTY for cell in cells])
-    value = np.array([_value(cell, decimal_comma) for cell in cells])
-    odd = [i for i in np.flatnonzero(np.isnan(value) & present) if not re.fullmatch("[-+]?nan", cells[i].lower())]
-    if odd:
-        first = odd[0]
-        text = f"{len(odd)} cells are not numbers, the first in line {rows[first][0]}: {cells[first][:30]!r}"
-        place = [float(time_s[i]) if np.isfinite(time_s[i]) else 0.0 for i in (first, odd[-1])]
-        dataset.findings.append(Finding(channel, "unreadable", place[0], place[1], float(len(odd)), "samples", text))
-    return value, present, _last_digit(cells)
-
-
-def _plain_numbers(cells: list[str], decimal_comma: bool) -> Array | None:
-    """The values of a column in which every cell is a number, at once; None for any other."""
-    if decimal_comma or "_" in "".join(cells):
-        return None
-    try:
-        value = np.array(list(map(float, cells)))
-    except ValueError:
-        return None
-    return None if np.isnan(value).any() else value
-
-
-def _last_digit(cells: list[str]) -> float:
-    """Size of the finest written digit, from a sample of the cells; 0 for numbers with exponents."""
-    finest = 1.0
-    some = cells[:: max(1, len(cells) // 5000)]
-    written = [cell for cell in some if cell.lower() not in EMPTY]
-    for cell in written[:: max(1, len(written) // 500)]:
-        if "e" in cell.lower():
-            return 0.0
-        _, mark, digits = cell.replace(",", ".").partition(".")
-        if mark:
-            finest = min(finest, 10.0 ** -len(digits))
-    return finest
+EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100

@@ -82,6 +82,7 @@ def read(
         dataset.findings.append(Finding("", "ragged", 0.0, 0.0, float(len(odd)), "rows", text))
         dataset.repairs.append(Repair("", "ragged", len(odd), text))
         dataset.losses.append(Loss("ragged", len(odd), f"in line {odd[0]}"))
+    dataset.lines = {"rows": dataset.rows - len(odd), "left out: ragged": len(odd)}
     if not names:
         text = "the log has no names; what an id means depends on the robot's program of its day"
         dataset.findings.append(Finding("", "no_header", 0.0, 0.0, float(len(samples)), "columns", text))

@@ -8,30 +8,54 @@ way round, the way is taken that all rows allow and that takes less time from fi
 import calendar
 import dataclasses
 import re
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 DAY_NS, SECOND_NS = 86_400_000_000_000, 1_000_000_000
+FEW_DAYS = 3  # a recording takes no more; of two ways to read its dates, one that makes it shorter is right
 DATE = (
     r"(?P<year>\d{4})[-/.](?P<month>\d\d?)[-/.](?P<day>\d\d?)"
-    r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4})"
+    r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4}|\d\d)"
+    r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4})"
 )
 TIME = (
-    r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+    r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
     r"\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
 )
 STAMP = re.compile(rf"(?:(?P<date>{DATE})(?:[T ]\s*(?=\d))?)?(?P<time>{TIME})?")
+MONTHS = {
+    name: k % 12 + 1
+    for k, name in enumerate(
+        "jan feb mar apr may jun jul aug sep oct nov dec jan feb mrz apr mai jun jul aug sep okt nov dez".split()
+    )
+}  # English and German
+CENTURY = 2000
 NONE = np.iinfo(np.int64).min  # in an array: no stamp
 
 
 @dataclasses.dataclass(frozen=True)
 class Stamps:
-    """time_ns: shape (n,), NONE where a cell is not a stamp. has_date, has_time: what the cells hold."""
+    """time_ns: shape (n,), NONE where a cell is not a stamp. has_date, has_time: what the cells hold.
+
+    either_way: day and month can be exchanged in every cell, and the stamps are then not the same distances.
+    """
 
     time_ns: NDArray[np.int64]
     has_date: bool
     has_time: bool
+    either_way: bool = False
+
+
+@dataclasses.dataclass
+class Forms:
+    """What the cells of a column hold, as far as they are read: a date, a time, strokes between day and month."""
+
+    has_date: bool = False
+    has_time: bool = False
+    strokes: bool = False
+    seen: bool = False
 
 
 def is_stamp(cell: str) -> bool:
@@ -40,19 +64,35 @@ def is_stamp(cell: str) -> bool:
     return found is not None and bool(found["date"] or found["time"])
 
 
-def of(cells: list[str]) -> Stamps | None:
-    """The stamps of a column; None when most of its cells are not dates or times."""
+def both_ways(cells: Sequence[str], forms: Forms) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """The stamps of a part of a column (n,), day first and month first; None when most of its cells are not stamps."""
     found = [STAMP.fullmatch(cell) if cell else None for cell in cells]
     good = [each for each in found if each is not None and each[0]]
     if 2 * len(good) <= len(cells):
         return None
-    has_date, has_time = bool(good[0]["date"]), bool(good[0]["time"])
-    ways = [_all_of(found, month_first) for month_first in (False, True)]
+    if not forms.seen:
+        date = good[0]["date"] or ""
+        forms.has_date, forms.has_time = bool(date), bool(good[0]["time"])
+        forms.strokes, forms.seen = "/" in date, True
+    day = _all_of(found, False)
+    return day, _all_of(found, True) if any(each["first"] for each in good) else day
+
+
+def chosen(
+    day_first: NDArray[np.int64], month_first: NDArray[np.int64], forms: Forms, wanted: bool | None
+) -> Stamps | None:
+    """The stamps (n,) of a whole column; None when none is in the calendar. wanted: True for the month first."""
+    ways = (day_first, month_first)
     counts = [int((way != NONE).sum()) for way in ways]
-    spans = [np.ptp(way[way != NONE]) if count else 0 for way, count in zip(ways, counts, strict=True)]
-    usual = "/" in (good[0]["date"] or "")  # strokes and dots have the day first
-    best = min((0, 1), key=lambda way: (-counts[way], spans[way], bool(way) != usual))
-    return Stamps(ways[best], has_date, has_time) if counts[best] else None
+    if not max(counts):
+        return None
+    spans = [int(np.ptp(way[way != NONE])) if count else 0 for way, count in zip(ways, counts, strict=True)]
+    # strokes have the month first; dots, and everything else, the day
+    best = min((0, 1), key=lambda way: (-counts[way], spans[way], bool(way) != forms.strokes))
+    if wanted is not None:
+        best = int(wanted)
+    either = wanted is None and counts[0] == counts[1] and spans[0] != spans[1] and min(spans) > FEW_DAYS * DAY_NS
+    return Stamps(ways[best], forms.has_date, forms.has_time, either)
 
 
 def _all_of(found: list[re.Match[str] | None], month_first: bool) -> NDArray[np.int64]:
@@ -74,8 +114,14 @@ def _day(found: re.Match[str], month_first: bool) -> int | None:
     """Days since 1970; None for a date that is not in the calendar."""
     if found["year"]:
         year, month, day = (int(found[name]) for name in ("year", "month", "day"))
+    elif found["named"]:
+        if found["named"].lower() not in MONTHS:
+            return None
+        year, day = int(found["of_year"]), int(found["of_month"])
+        month = MONTHS[found["named"].lower()]
     else:
         year, first, second = (int(found[name]) for name in ("late", "first", "second"))
+        year += CENTURY if year < 100 else 0
         month, day = (first, second) if month_first else (second, first)
     if not 1 <= month <= 12 or not 1 <= day <= calendar.monthrange(max(year, 1), month)[1]:
         return None

@@ -16,7 +16,7 @@ from ranger_sim.harness.campaigns import plan
 from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.processes.control import ask
 from ranger_sim.plant import body_files
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 
 ROOT = pathlib.Path(__file__).parents[2]
 KINDS = {

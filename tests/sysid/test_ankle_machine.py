@@ -18,7 +18,7 @@ from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machines import ankle_motion
 from ranger_sim.sysid.machines.ankle import Ankle, predicted
 from ranger_sim.sysid.pipeline import diagnose
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 from ranger_sim.tools.cli import main
 
 GK, J_A = 34.0 * 0.018, 34.0**2 * 1.6e-6

@@ -10,10 +10,10 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
-from ranger_sim.sysid import readers
 from ranger_sim.sysid.benches import ankle_sine as bench
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.identification import ankle
+from ranger_sim.sysid.reading import open_recording
 
 FRICTIONLESS = dataclasses.replace(bench.MOTOR, constant_friction_Nm=0.0, viscous_friction_Nms=0.0, load_friction=0.0)
 
@@ -76,7 +76,7 @@ DATA = FOLDER / "ranger_foot_inertia_5.csv"
 
 @pytest.mark.skipif(not DATA.is_file(), reason="the robot's foot-inertia logs are not here (RANGER_SIM_DATA)")
 def test_the_robot_s_own_foot_is_found_and_its_misfit_is_in_the_interval():
-    data = readers.read(DATA)
+    data = open_recording(DATA)
     first = {
         name: dataclasses.replace(each, time_s=each.time_s[each.time_s < 1.6], value=each.value[each.time_s < 1.6])
         for name, each in data.channels.items()

@@ -14,7 +14,7 @@ import ranger_sim
 from ranger_sim import sysid
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import results
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 from ranger_sim.tools.cli import main
 from tests.sysid.test_diagnose import Cart, cart_file
 

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import channels, repairs, sanity, units
 from ranger_sim.sysid.dataset import Loss
-from ranger_sim.sysid.readers import columns, csv_file, read
-from ranger_sim.tools.recordings.datasets import open_recording
+from ranger_sim.sysid.readers import columns, csv_file
+from ranger_sim.sysid.reading import open_recording
+from ranger_sim.sysid.reading import open_recording as read
 from tests.boards.original_images import DATA
 from tests.examples import examples
 
@@ -226,7 +227,11 @@ def test_stamps_that_are_not_read_are_named(table):
         UserError, match=r"table.csv: time: stamps such as 'half past nine' are not read \(numbers, 2026"
     ):
         table("time,a_V\nhalf past nine,1\nten,2\n")
-    assert "--time-unit us would make them 0.01 s" in table("timestamp,a\n8123456,1\n8133456,2\n").findings[0].text
+    with pytest.raises(
+        UserError, match=r"samples would be 10000 s apart, in us 0.01 s:\n.*--time-unit us\n.*--time-unit s"
+    ):
+        table("timestamp,a\n8123456,1\n8133456,2\n")
+    assert "--time-unit ms would make them 0.002 s" in table("timestamp,a\n0,1\n2,2\n").findings[0].text
 
 
 def test_decimal_commas_in_quotes_are_read(table):
@@ -258,7 +263,11 @@ def test_the_cases_of_a_row_of_units_have_them():
         assert units_of == {"voltage": "V", "current": "A", "speed": "rad/s", "torque": "N m", "angle": "rad"}
     turning = read(CASES / "06-units-row" / "30_units2.csv")["Drehzahl"]
     assert turning.value == pytest.approx([2.0 * math.pi] * 3)
-    assert set(read(CASES / "09-index-as-unit" / "14_ulog.csv").channels) == {"xyz[0]", "xyz[1]", "noutputs"}
+    assert set(read(CASES / "09-index-as-unit" / "14_ulog.csv", time_unit="us").channels) == {
+        "xyz[0]",
+        "xyz[1]",
+        "noutputs",
+    }
 
 
 def test_the_separator_is_that_of_the_first_fifty_lines(table):
@@ -331,8 +340,8 @@ def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
         ("t_A,a_V\n0,1\n", "the time column t_A is in A, not in a time"),
         ("t_s,a_V\n0,x\n1,y\n", "no channel except"),
         (b"t_s,a_V\n0,\x00\n", "bytes of value 0"),
-        (b"\x89PNG\r\n\x1a\n\xff\xfe\x9c", "no row below|no time column|empty"),
-        (b"\xff\xfe\x00", "not a text table|no row|no time column|empty"),
+        (b"\x89PNG\r\n\x1a\n\xff\xfe\x9c", "no row below|no time column|empty|a picture"),
+        (b"\xff\xfe\x00", "not a text table|no row|no time column|empty|its text is not utf-16"),
     ],
 )
 def test_what_is_no_table_is_told_in_a_line(table, text, line):
@@ -593,10 +602,10 @@ def test_a_needed_channel_that_is_missing_is_told_with_what_names_it(table):
         channels.named_for(data, "bench")
 
 
-def test_a_table_of_more_lines_than_are_kept_in_memory_is_told_before_they_are(tmp_path, monkeypatch):
+def test_a_table_of_more_cells_than_fit_into_memory_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "long.csv"
-    path.write_text("t_s,x_m\n" + "".join(f"{n},1.5\n" for n in range(50)), encoding="utf-8")
+    path.write_text("t_s,x_m\n" + "".join(f"{k},{k}\n" for k in range(50)))
     assert len(csv_file.read(path)["x_m"].value) == 50
-    monkeypatch.setattr(csv_file, "MOST_LINES", 50)
-    with pytest.raises(UserError, match="51 lines, a text table may have 50: thin it out"):
+    monkeypatch.setattr(csv_file, "MOST_CELLS", 99)
+    with pytest.raises(UserError, match="a text table may have 99 cells: split it"):
         csv_file.read(path)

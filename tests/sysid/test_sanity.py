@@ -12,7 +12,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import channels, repairs, sanity
 from ranger_sim.sysid.dataset import Channel, Dataset
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 from tests.boards.original_images import DATA
 from tests.examples import examples
 

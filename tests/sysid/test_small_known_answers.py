@@ -11,7 +11,7 @@ from ranger_sim.sysid import gain, misfit, plausibility, signals
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machines.ankle import behind
 from ranger_sim.sysid.machines.motor_bench import stand_ins
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 
 # ---- features of a misfit
 

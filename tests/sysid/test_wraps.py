@@ -11,7 +11,7 @@ from ranger_sim.sysid import repairs, sanity, wraps
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.machine import Quantity
 from ranger_sim.sysid.machines import MACHINES, made
-from ranger_sim.sysid.readers import read
+from ranger_sim.sysid.reading import open_recording as read
 from tests.boards.original_images import DATA
 
 COUNT = 2.0 * math.pi / 8192.0

@@ -59,6 +59,7 @@ def register(commands: Any) -> None:
     command.add_argument("--json", metavar="FILE|-", help="the answer as JSON; - prints it and nothing else")
     datasets.add_options(command)
     add_verbosity(command)
+    datasets.add_accept_loss(command)
     command.set_defaults(run=run)
 
 

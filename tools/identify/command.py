@@ -32,7 +32,7 @@ def register(commands: Any) -> None:
     )
     command.add_argument("bench", metavar="BENCH", help=f"{', '.join(BENCHES)}, or all: tables 2 and 3")
     command.add_argument("--data", metavar="FILE", help="your recording; for all a folder with BENCH.csv of each")
-    command.add_argument("--map", action="append", default=[], metavar="OLD=NEW", help="name of a column of the file")
+    datasets.add_options(command)
     datasets.add_accept_loss(command)
     command.add_argument(
         "--known",

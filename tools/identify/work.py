@@ -20,9 +20,9 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
 from ranger_sim.sysid.identification import coverage
 from ranger_sim.sysid.identification.run import ALL, UNEXPLAINED, identification
-from ranger_sim.sysid.readers.columns import mapping_of
 from ranger_sim.tools.command_line import files, streams, terminal
 from ranger_sim.tools.identify import page
+from ranger_sim.tools.recordings import datasets
 
 EXIT_DONE, EXIT_REFUSED = 0, 1
 UNEXPLAINED_TEXT = (
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         options.gear,
         options.model,
         options.accept_loss,
-        mapping_of(options.map),
+        datasets.how_of(options),
         options.seed,
         report=lambda line: console.print(escape(line)),
         before=lambda line: console.print(f"[dim]{escape(line)}[/dim]"),

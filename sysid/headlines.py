@@ -1,0 +1,144 @@
+"""What happens to whole recordings between the machine and the file: joined, mixed, resampled, held, rounded.
+
+As in sanity.py nothing is changed here. Each check compares a channel with itself, so that it needs no model.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ranger_sim.sysid.dataset import Array, Channel, Finding
+
+NOTE = "note"
+FEWEST = 60  # samples
+# Rounded stamps: so many samples have the stamp of the one before, and the others are whole numbers of one step.
+SAME_PART, ROUNDED = 0.2, 0.02
+ROUND_STEPS_S = tuple(digit * 10.0**power for power in range(1, -7, -1) for digit in (5, 2, 1))
+# A join: every smooth channel steps at one row, farther than anywhere else by this factor, and goes on smoothly.
+JOIN, USUAL_PERCENT = 8.0, 99.5
+SMOOTH = 0.2  # largest usual step of a smooth channel to its range
+# Straight lines: kinks at one distance, and nothing between them but the rounding of the digits.
+LINES_PART, FEWEST_STEPS, DIGITS, SHARP = 0.8, 3, 2.5, 10.0
+POSITIONS = ("rad", "m")
+MOST_JOINS = 3
+MOST_HELD = 200
+MIXED = 3.0  # neighbours are so many times as far from each other as next neighbours
+
+
+def of_stamps(channel: Channel) -> Iterator[Finding]:
+    """Stamps that were rounded so far that several samples have one."""
+    finite = channel.time_s[np.isfinite(channel.time_s)]
+    steps = np.diff(finite)
+    if len(finite) < FEWEST or not len(steps) or np.mean(steps == 0.0) < SAME_PART or (steps < 0.0).any():
+        return
+    moved = steps[steps > 0.0]
+    if not len(moved):
+        return
+    from_begin = finite - finite[0]
+    rounded = next(
+        (each for each in ROUND_STEPS_S if np.abs(from_begin / each - np.round(from_begin / each)).max() < ROUNDED), 0.0
+    )
+    if not rounded:
+        return
+    even = (float(finite[-1] - finite[0]) + rounded) / len(finite)
+    different = 1 + len(moved)
+    if not 1.5 <= len(finite) / different:
+        return
+    text = (
+        f"stamps are rounded to {rounded:g} s: {len(finite)} samples have {different} different ones; evenly spread "
+        f"they would be {even:.4g} s apart"
+    )
+    yield Finding(channel.name, "rounded_stamps", float(finite[0]), float(finite[-1]), rounded, "s", text)
+
+
+def of_values(channel: Channel) -> Iterator[Finding]:
+    """A channel that holds its values over several rows, or goes from one to another in straight lines."""
+    value, time_s = channel.value, channel.time_s
+    if len(value) < FEWEST or not np.ptp(value) > 0.0:
+        return
+    ends = float(time_s[0]), float(time_s[-1])
+    changes = np.flatnonzero(np.diff(value) != 0.0)
+    held = _usual_distance(changes)
+    if held > 1 and len(changes) >= 20 and len(set(value.tolist())) > 20:
+        text = f"it has a new value every {held} rows only: held in between, sampled every {held * _step(time_s):.4g} s"
+        yield Finding(channel.name, "held", *ends, held * _step(time_s), "s", text, NOTE)
+        return
+    rounding = DIGITS * max(channel.resolution, 1e-9 * float(np.ptp(value)))
+    bends = np.abs(np.diff(value, 2))
+    kinks = np.flatnonzero(bends > rounding)
+    distance = _usual_distance(kinks)
+    if distance < FEWEST_STEPS or len(kinks) < 10 or float(np.median(bends[kinks])) < SHARP * rounding:
+        return
+    text = (
+        f"it goes in straight lines over {distance} rows each: resampled from samples "
+        f"{distance * _step(time_s):.4g} s apart"
+    )
+    yield Finding(channel.name, "resampled", *ends, distance * _step(time_s), "s", text)
+
+
+def _usual_distance(places: NDArray[np.intp]) -> int:
+    """The distance of most neighbours; 0 when they have none in common."""
+    if len(places) < 2:
+        return 0
+    steps = np.diff(places)
+    usual = int(np.median(steps))
+    return usual if usual <= MOST_HELD and np.mean(steps == usual) >= LINES_PART else 0
+
+
+def _step(time_s: Array) -> float:
+    return float(np.median(np.diff(time_s)))
+
+
+def of_all(channels: dict[str, Channel]) -> Iterator[Finding]:
+    """Recordings that were joined, or whose rows are mixed: what happens to all channels of one time base at a row."""
+    for group in _by_stamps(channels):
+        smooth = [channel for channel in group if _is_smooth(channel.value)]
+        yield from _joined(smooth)
+        yield from _mixed(group)
+
+
+def _by_stamps(channels: dict[str, Channel]) -> list[list[Channel]]:
+    """Channels of one time base together."""
+    groups: dict[tuple[int, float, float], list[Channel]] = {}
+    for channel in channels.values():
+        if len(channel.value) >= FEWEST and np.ptp(channel.value) > 0.0:
+            key = (len(channel.time_s), float(channel.time_s[0]), float(channel.time_s[-1]))
+            groups.setdefault(key, []).append(channel)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _is_smooth(value: Array) -> bool:
+    """True for what moves in steps that are small against its range, but for a few."""
+    steps = np.abs(np.diff(value))
+    return bool(np.percentile(steps, USUAL_PERCENT) < SMOOTH * np.ptp(value)) and bool(np.mean(steps == 0.0) < 0.5)
+
+
+def _joined(smooth: list[Channel]) -> Iterator[Finding]:
+    """Rows at which every position jumps, and another channel with it: what is driven may step, a position does not."""
+    jumping = {}
+    for channel in smooth:
+        steps = np.abs(np.diff(channel.value))
+        steps[np.diff(channel.time_s) > 3.0 * _step(channel.time_s)] = 0.0  # across a gap it may have moved
+        jumping[channel.name] = steps > JOIN * max(float(np.percentile(steps, USUAL_PERCENT)), 2.0 * channel.resolution)
+    positions = [channel.name for channel in smooth if channel.unit in POSITIONS]
+    if not positions or len(smooth) < 2:
+        return
+    at_all = np.all([jumping[name] for name in positions], axis=0)
+    places = np.flatnonzero(at_all & (np.sum(list(jumping.values()), axis=0) > 1))
+    for place in places if len(places) <= MOST_JOINS else ():
+        at, after = float(smooth[0].time_s[place]), float(smooth[0].time_s[place + 1])
+        names = [name for name, jumps in jumping.items() if jumps[place]]
+        text = f"{', '.join(names[:3])} jump at one row ({at:.6g} s): two recordings were joined there"
+        yield Finding("", "jump", at, after, float(len(names)), "channels", text)
+
+
+def _mixed(group: list[Channel]) -> Iterator[Finding]:
+    """Rows of two recordings in turn: next neighbours are alike, and neighbours are not, in every channel."""
+    for channel in group:
+        one, two = np.abs(np.diff(channel.value)), np.abs(channel.value[2:] - channel.value[:-2])
+        if not float(np.median(one)) > MIXED * float(np.median(two)):
+            return
+    text = "from row to row all channels go to and fro between two courses: two recordings are mixed in one file"
+    first = group[0]
+    yield Finding("", "mixed", float(first.time_s[0]), float(first.time_s[-1]), float(len(group)), "channels", text)

@@ -1,0 +1,223 @@
+"""Measured data of any kind, read in one place: every sample accounted for, what is odd found, repairs proposed.
+
+    measurement = read("run1.csv")
+    measurement["current_A"].value            # in SI, at measurement["current_A"].time_s
+    measurement.findings, measurement.proposals, measurement.ledger()
+
+`ranger-sim read` prints it; `diagnose`, `identify`, `panel` and `compare-walk` read by `open_recording`.
+"""
+
+import dataclasses
+import pathlib
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import DataError
+from ranger_sim.sysid import repairs, sanity
+from ranger_sim.sysid.dataset import LOSSES, Channel, Dataset, Finding, Loss, Repair
+from ranger_sim.sysid.readers import formats, frames
+from ranger_sim.sysid.readers.csv_file import Progress, no_progress
+from ranger_sim.sysid.recipe import Recipe
+
+EXIT_READ, EXIT_FINDINGS = 0, 1
+Path = str | pathlib.Path
+
+
+@dataclasses.dataclass(frozen=True)
+class Measurement:
+    """A recording as it was read. findings: of the file and of its channels; proposals: repairs that `mend` makes."""
+
+    dataset: Dataset
+    findings: list[Finding]
+    proposals: list[Repair]
+
+    def __getitem__(self, name: str) -> Channel:
+        return self.dataset[name]
+
+    @property
+    def channels(self) -> dict[str, Channel]:
+        """The channels by name, in SI, as they are in the file."""
+        return self.dataset.channels
+
+    @property
+    def matters(self) -> list[Finding]:
+        """The findings that may change a conclusion."""
+        return [each for each in self.findings if each.severity != sanity.NOTE]
+
+    @property
+    def exit_code(self) -> int:
+        """Of `ranger-sim read`: 1 with findings that matter."""
+        return EXIT_FINDINGS if self.matters else EXIT_READ
+
+    def ledger(self) -> dict[str, Any]:
+        """What became of every line and every sample: {"lines": {kind: number}, "channels": {channel: account}}."""
+        return {"lines": dict(self.dataset.lines), "channels": self.dataset.ledger()}
+
+    def mended(self) -> Dataset:
+        """The dataset with all proposals carried out."""
+        return repairs.mend(self.dataset, self.findings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For programs: JSON's types only."""
+        return {
+            "file": self.dataset.name,
+            "layout": self.dataset.layout,
+            "channels": {name: _described(channel) for name, channel in self.channels.items()},
+            "ledger": self.ledger(),
+            "changes": [dataclasses.asdict(each) for each in self.dataset.repairs],
+            "findings": [sanity.as_json(each) for each in self.findings],
+            "proposals": [
+                {**dataclasses.asdict(each), "share": self.share_of(each)} for each in self.proposals
+            ],
+        }  # fmt: skip
+
+    def share_of(self, proposal: Repair) -> float:
+        """The part of its channel's samples that a proposal changes: 0 to 1."""
+        count = len(self.channels[proposal.channel].value) if proposal.channel in self.channels else self.dataset.rows
+        return min(1.0, proposal.count / count) if count else 0.0
+
+
+def _described(channel: Channel) -> dict[str, Any]:
+    finite = channel.time_s[np.isfinite(channel.time_s)]
+    values = channel.value[np.isfinite(channel.value)]
+    steps = np.diff(finite)
+    return {
+        "unit": channel.unit,
+        "source": channel.source,
+        "samples": len(channel.value),
+        "start_s": float(finite[0]) if len(finite) else None,
+        "end_s": float(finite[-1]) if len(finite) else None,
+        "step_s": float(np.median(steps)) if len(steps) else None,
+        "least": float(values.min()) if len(values) else None,
+        "most": float(values.max()) if len(values) else None,
+        "resolution": channel.resolution,
+    }
+
+
+@overload
+def read(files: Path, **how: Any) -> Measurement: ...
+
+
+@overload
+def read(files: Sequence[Path], **how: Any) -> list[Measurement]: ...
+
+
+def read(files: Path | Sequence[Path], **how: Any) -> Measurement | list[Measurement]:
+    """One file or folder as a Measurement, a sequence of them as a list. how: as of `open_recording`.
+
+    UserError for a file that cannot be read, or can be read in two ways: the lines of the error are then commands.
+    """
+    if isinstance(files, str | pathlib.Path):
+        return inspected(open_recording(files, **how))
+    return [inspected(open_recording(each, **how)) for each in files]
+
+
+def inspected(dataset: Dataset) -> Measurement:
+    """A dataset with what is odd about it and the repairs that are possible."""
+    findings = [*sanity.inspect(dataset), *sanity.pairs(dataset)]
+    proposals: list[Repair] = []
+    if not any(each.severity == sanity.FATAL for each in findings):
+        proposals = repairs.mend(dataset, findings).repairs[len(dataset.repairs) :]
+    return Measurement(dataset, findings, proposals)
+
+
+def open_recording(
+    path: Path,
+    mapping: Mapping[str, str] | None = None,
+    databases: Sequence[Path] = (),
+    time_unit: str | None = None,
+    each_frame: Callable[[frames.Frame], None] | None = None,
+    buses: Collection[str] = (),
+    assume: Mapping[str, str] | None = None,
+    recipe: Recipe | Path | None = None,
+    progress: Progress = no_progress,
+) -> Dataset:
+    """The channels of a file or folder, in SI.
+
+    mapping: {name in the file: name of the channel}. databases: DBC files, for frames, of these `buses`; an MDF file is
+    read as frames when there are some. time_unit: of stamps whose column does not give it. assume: parts of a text
+    table's layout (readers.layout.KEYS). recipe: of `ranger-sim read --write-recipe`, in place of these. each_frame is
+    called with every frame. UserError for all that is wrong.
+    """
+    path = pathlib.Path(path)
+    mapping, assume = dict(mapping or {}), dict(assume or {})
+    if recipe is not None:
+        recipe = recipe if isinstance(recipe, Recipe) else Recipe.load(recipe)
+        mapping = {**recipe.mapping, **mapping}
+        assume = {**recipe.assume, **assume}
+        time_unit = time_unit or recipe.time_unit
+        databases, buses = databases or recipe.databases, buses or recipe.buses
+    dataset = _read(path, mapping, databases, time_unit, each_frame, buses, assume, progress)
+    if recipe is not None:
+        recipe.check(dataset)
+    dataset.findings += sanity.of_recording(dataset)
+    if mapping:
+        dataset.layout["map"] = mapping
+    return dataset
+
+
+def _read(
+    path: pathlib.Path,
+    mapping: Mapping[str, str],
+    databases: Sequence[Path],
+    time_unit: str | None,
+    each_frame: Callable[[frames.Frame], None] | None,
+    buses: Collection[str],
+    assume: Mapping[str, str],
+    progress: Progress,
+) -> Dataset:
+    known = formats.of(path)
+    if known.holds_frames or (databases and known.may_hold_frames):
+        if not databases:
+            raise DataError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
+        dataset = _decoded(path, mapping, databases, each_frame, buses)
+        dataset.layout |= {"dbc": [str(each) for each in databases], "bus": sorted(buses)}
+    else:
+        if buses:
+            raise DataError(f"--bus {' '.join(buses)}: {path} is not a recording of CAN frames, or --dbc is missing")
+        if assume and known.name != formats.TEXT_TABLE:
+            raise DataError(f"--assume {next(iter(assume))}=...: {path} is not a text table, but {known.name}")
+        dataset = formats.read(path, known, mapping, time_unit, assume, _robot_units(), progress)
+    dataset.layout = {"format": known.name, **dataset.layout}
+    return dataset
+
+
+def _decoded(
+    path: pathlib.Path,
+    mapping: Mapping[str, str],
+    databases: Sequence[Path],
+    each_frame: Callable[[frames.Frame], None] | None,
+    buses: Collection[str],
+) -> Dataset:
+    """The channels of recorded frames, with what became of the file's lines."""
+    from ranger_sim.can_bus.edge.logs import read_log  # python-can: a fifth of a second
+
+    log = read_log(path)
+
+    def passing() -> Iterator[frames.Frame]:
+        for frame in log:
+            if each_frame is not None:
+                each_frame(frame)
+            yield frame
+
+    dataset = frames.decode(path.name, passing(), databases, mapping, buses)
+    dataset.rows = log.read
+    for reason, count, where in log.losses:
+        loss = Loss(reason, count, where)
+        dataset.losses.append(loss)
+        text = f"{log.read} frames should be there, {loss.text}"
+        dataset.findings.append(Finding("", "lost_frames", 0.0, 0.0, float(count), "frames", text))
+    left_out = sum(loss.count for loss in dataset.losses if loss.reason in LOSSES)
+    dataset.lines = {"frames": log.read - left_out} | {
+        f"left out: {each.reason}": each.count for each in dataset.losses
+    }
+    return dataset
+
+
+def _robot_units() -> dict[str, str]:
+    """{variable: unit} of the robot's own table, which its text logs do not carry."""
+    from ranger_sim.datatable.generated import all_variables
+
+    return {name: all_variables.UNITS[number] for number, name in all_variables.NAMES.items()}

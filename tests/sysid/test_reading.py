@@ -1,0 +1,351 @@
+"""The import stage: ledger, findings, proposals, recipes, formats by content, and questions instead of guesses."""
+
+import gzip
+import json
+import math
+import struct
+import zlib
+
+import numpy as np
+import pytest
+import scipy.io
+
+import ranger_sim
+from ranger_sim.can_bus.edge import logs
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.readers import layout, text_file
+from ranger_sim.sysid.reading import open_recording, read
+from ranger_sim.sysid.recipe import Recipe
+from ranger_sim.tools.cli import main
+from tests.boards.original_images import DATA
+
+CASES = DATA.parent / "cases"
+needs_cases = pytest.mark.skipif(not CASES.exists(), reason=f"no cases in {CASES.name}/")
+needs_data = pytest.mark.skipif(not (DATA / "emps_run1.csv").exists(), reason=f"no measured data in {DATA.name}/")
+T = 0.01 * np.arange(200)
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text, name="table.csv"):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+def rows(form, count=200):
+    return "".join(form.format(k=k, t=0.01 * k, v=math.sin(0.1 * k), i=0.5 * math.cos(0.1 * k)) for k in range(count))
+
+
+# --- ledger -----------------------------------------------------------------------------------------------------
+
+
+def test_every_line_of_a_table_is_in_the_ledger(written):
+    text = "Bench 3\n\n# a comment\nt,a\ns,V\n" + rows("{t:.2f},{v:.4f}\n") + "torn\n9.0,1.0\nEnd of data\n"
+    measurement = read(written(text))
+    assert measurement.ledger()["lines"] == {
+        "preamble": 1, "empty": 1, "comments": 1, "names": 1, "units": 1, "footer": 1, "rows": 201,
+        "left out: ragged": 1,
+    }  # fmt: skip
+    assert sum(measurement.ledger()["lines"].values()) == text.count("\n")
+    account = measurement.ledger()["channels"]["a"]
+    assert (account["read"], account["kept"]) == (202, 201)
+    assert account["left_out"] == [{"reason": "ragged", "count": 1, "where": "in line 206"}]
+
+
+def test_a_recording_is_read_from_the_package_itself(written):
+    measurement = ranger_sim.read(written("t_s,a_mA\n" + rows("{t:.2f},{i:.4f}\n")))
+    assert isinstance(measurement, ranger_sim.Measurement)
+    assert measurement["a_A"].value == pytest.approx(0.5e-3 * np.cos(0.1 * np.arange(200)), abs=1e-7)
+    both = ranger_sim.read([written("t_s,a_V\n0,1\n1,2\n", name) for name in ("a.csv", "b.csv")])
+    assert [each.dataset.name for each in both] == ["a.csv", "b.csv"]
+
+
+def test_the_command_exits_with_what_was_found(written, capsys):
+    sound = written("t_s,a_V\n" + rows("{t:.2f},{v:.4f}\n"))
+    assert main(["read", str(sound)]) == 0
+    shuffled = written("t_s,a_V\n0.1,1\n0,2\n0.2,3\n0.3,4\n", "shuffled.csv")
+    assert main(["read", str(shuffled)]) == 1
+    assert "proposal: a_V: 1 samples came out of order and are sorted" in capsys.readouterr().out
+    assert main(["read", str(written("nothing\n", "none.csv"))]) == 2
+
+
+def test_the_answer_for_programs_has_channels_ledger_findings_and_proposals(written, capsys):
+    path = written("t_s,a_V\n0.1,1\n0,2\n0.2,3\n0.3,4\n")
+    assert main(["read", str(path), "--json", "-"]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["channels"]["a_V"]["samples"] == 4 and answer["ledger"]["lines"] == {"names": 1, "rows": 4}
+    assert [each["kind"] for each in answer["findings"]] == ["reversed_stamps"]
+    assert [(each["kind"], each["share"]) for each in answer["proposals"]] == [("sorted", 0.25)]
+
+
+def test_the_page_shows_every_channel_with_its_findings(written, tmp_path):
+    path = written("t_s,a_V,b_V\n" + rows("{t:.2f},{v:.4f},{i:.4f}\n") + "9.5,1,2\n")
+    assert main(["read", str(path), "--plot", str(tmp_path / "page.html")]) == 1
+    page = (tmp_path / "page.html").read_text()
+    assert page.count('class="figure"') == 2 and "no sample for 7.51 s" in page
+    assert main(["read", str(path), "--plot", str(tmp_path / "page.pdf")]) == 2
+
+
+# --- questions instead of guesses -------------------------------------------------------------------------------
+
+
+def test_numbers_that_can_be_read_either_way_are_a_question_with_both_commands(written):
+    text = "t_s;a_V\n0;1,234\n1;2\n2;1,5\n".replace("1,5", "7")
+    with pytest.raises(
+        UserError, match="'1,234' are 1234 with a decimal point and 1.234 with a decimal comma"
+    ) as error:
+        read(written(text))
+    assert len(error.value.args) == 3 and "--assume decimal=comma" in error.value.args[2]
+    assert read(written(text), assume={"decimal": "comma"})["a_V"].value.tolist() == [1.234, 2.0, 7.0]
+    assert read(written(text), assume={"decimal": "point"})["a_V"].value.tolist() == [1234.0, 2.0, 7.0]
+
+
+def test_all_rows_decide_and_not_the_first_ones(written):
+    text = "t_s;a_V\n" + "".join(f"{k};{1 + k % 5},{100 + k % 800}\n" for k in range(6000)) + "6000;1,5\n"
+    assert read(written(text))["a_V"].value[:2].tolist() == [1.1, 2.101]
+    late = "t_s;a_V\n" + "".join(f"{k};{k % 100}\n" for k in range(6000)) + '6000;"1,5"\n'
+    assert read(written(late))["a_V"].value[-1] == 1.5  # a comma behind the first chunk of lines
+
+
+def test_several_tables_are_a_question_and_one_of_them_is_read(written):
+    text = "t_s,a_V\n" + rows("{t:.2f},{v:.4f}\n") + "\ntime_s,b_A\n" + rows("{t:.2f},{i:.4f}\n", 50)
+    path = written(text)
+    with pytest.raises(UserError, match="names in line 1 and in line 203") as error:
+        read(path)
+    assert "--assume names=203" in error.value.args[2]
+    assert len(read(path, assume={"names": "203"})["b_A"].value) == 50
+
+
+def test_an_assumption_is_checked():
+    for text, line in (
+        ("decimal=x", "decimal is point or comma"), ("colour=red", "key=value is expected"), ("names=x", "number of"),
+    ):  # fmt: skip
+        with pytest.raises(UserError, match=line):
+            layout.assumptions([text])
+    assert layout.assumptions(["dates=day-first", "time=t"]) == {"dates": "day-first", "time": "t"}
+
+
+# --- limits -----------------------------------------------------------------------------------------------------
+
+
+def test_a_line_longer_than_any_tables_is_refused_before_it_is_kept(written, monkeypatch):
+    monkeypatch.setattr(text_file, "LONGEST_LINE", 10_000)
+    with pytest.raises(UserError, match="a line of more than 10000 characters"):
+        read(written("t_s,a_V\n0,1\n" + "1," * 6000))
+
+
+def test_a_compressed_table_is_refused_before_it_is_unpacked(written):
+    with pytest.raises(UserError, match=r"the file is compressed \(gzip\)"):
+        read(written(gzip.compress(bytes(10_000_000))))
+
+
+# --- recipes ----------------------------------------------------------------------------------------------------
+
+
+def test_a_recipe_reads_the_next_file_and_refuses_one_that_differs(written, tmp_path):
+    german = "Zeit;Strom [mA]\n" + rows("{t:.2f};{i:.4f}\n").replace(".", ",")
+    recipe = tmp_path / "lab.toml"
+    command = ["read", str(written(german)), "--time-unit", "s", "--map", "Strom [mA]=current_A"]
+    assert main([*command, "--write-recipe", str(recipe)]) == 0
+    assert Recipe.load(recipe).assume == {"encoding": "utf-8-sig", "separator": "semicolon", "decimal": "comma"}
+    again = read(written(german, "next.csv"), recipe=recipe)
+    assert again["current_A"].value == pytest.approx(0.5e-3 * np.cos(0.1 * np.arange(200)), abs=1e-6)
+    other = german.replace("Strom [mA]", "Strom [A]")
+    with pytest.raises(UserError, match=r"there is no such column|without the columns Strom \[mA\]"):
+        read(written(other), recipe=recipe)
+    more = "Zeit;Strom [mA];Last\n" + rows("{t:.2f};{i:.4f};1\n").replace(".", ",")
+    with pytest.raises(UserError, match="does not fit .*lab.toml: with the new columns Last"):
+        read(written(more), recipe=recipe)
+
+
+def test_a_recipe_with_a_mistake_is_one_line(tmp_path):
+    path = tmp_path / "lab.toml"
+    for text, line in (
+        ('colour = "red"', "unknown key 'colour'"),
+        ("columns = 3", "columns is int"),
+        ("[assume]\ndecimal = 1", "point"),
+    ):  # fmt: skip
+        path.write_text(text)
+        with pytest.raises(UserError, match=line):
+            Recipe.load(path)
+
+
+# --- formats ----------------------------------------------------------------------------------------------------
+
+SCOPES = {
+    "tektronix": "Model,MSO54\nHorizontal Units,s\nSample Interval,0.01\nVertical Units,V,A\nLabel,,\nTIME,CH1,CH2\n"
+    + rows("{t:.6e},{v:.6f},{i:.6f}\n"),
+    "rigol": "X,CH1,CH2,Start,Increment,\nSequence,VOLT,AMP,0.0,1.0e-02\n" + rows("{k},{v:.6f},{i:.6f},,\n"),
+    "keysight": "x-axis,1,2\nsecond,Volt,Ampere\n" + rows("{t:+.6E},{v:+.6E},{i:+.6E}\n"),
+    "siglent": "Record Length,Analog:200\nSample Interval,Analog:0.01\nHorizontal Units,s\n\nSource,CH1,CH2\n"
+    "Second,Volt,Ampere\n" + rows("{t:.8f},{v:.6f},{i:.6f}\n"),
+    "picoscope": "Zeit;Kanal A;Kanal B\n(s);(V);(A)\n\n" + rows("{t:.8f};{v:.8f};{i:.8f}\n").replace(".", ","),
+    "labview": "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+    "Y_Unit_Label\tVolts\tAmps\t\nX_Dimension\tTime\tTime\t\nDelta_X\t0.01\t0.01\t\n***End_of_Header***\t\t\t\n"
+    "X_Value\tVoltage\tCurrent\tComment\n" + rows("{t:.6f}\t{v:.6f}\t{i:.6f}\t\n"),
+    "labview without stamps": "LabVIEW Measurement\t\nX_Columns\tNo\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+    "Y_Unit_Label\tVolts\tAmps\t\nDelta_X\t0.01\t0.01\t\n***End_of_Header***\t\t\t\n"
+    "X_Value\tVoltage\tCurrent\tComment\n" + rows("\t{v:.6f}\t{i:.6f}\t\n"),
+    "yokogawa": '"Model","DL850"\n"TraceName","CH1","CH2"\n"BlockSize",200,200\n"VUnit","V","A"\n'
+    '"HResolution",0.01,0.01\n"HUnit","s","s"\n"Date","2026/11/05"\n\n' + rows("{v:.6f},{i:.6f}\n"),
+    "rate above": "Device;Logger 7\nSampling rate;100 Hz\n\nu [V];i [A]\n" + rows("{v:.6f};{i:.6f}\n"),
+}
+
+
+@pytest.mark.parametrize("kind", SCOPES)
+def test_an_export_of_an_instrument_has_its_stamps_and_units(kind, written):
+    volts, amperes = read(written(SCOPES[kind])).channels.values()
+    assert (volts.unit, amperes.unit) == ("V", "A")
+    assert volts.time_s == pytest.approx(T, abs=1e-8)
+    assert volts.value == pytest.approx(np.sin(0.1 * np.arange(200)), abs=1e-6)
+    assert amperes.value == pytest.approx(0.5 * np.cos(0.1 * np.arange(200)), abs=1e-6)
+
+
+def test_settings_next_to_the_data_of_an_older_tektronix_are_no_channels(written):
+    settings = ["Record Length,2.0e+02", "Sample Interval,1.0e-02", "Vertical Units,V", "Horizontal Units,s"]
+    lines = [f"{settings[k] if k < 4 else ','},,{0.01 * k:018.12f},{math.sin(0.1 * k):9.5f}," for k in range(200)]
+    measurement = read(written("\n".join(lines) + "\n"))
+    assert list(measurement.channels) == ["CH1"] and measurement["CH1"].unit == "V" and not measurement.matters
+    assert measurement["CH1"].time_s == pytest.approx(T)
+
+
+def test_variables_of_matlab_and_fields_of_a_structure_are_channels(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"t_s": T, "u_V": np.sin(T), "motor": {"i_mA": np.cos(T)}, "note": "bench"})
+    measurement = read(tmp_path / "a.mat")
+    assert measurement["u_V"].value == pytest.approx(np.sin(T)) and measurement["u_V"].time_s == pytest.approx(T)
+    assert measurement["motor.i_A"].value == pytest.approx(1e-3 * np.cos(T))
+    (tmp_path / "a.mat").write_bytes((tmp_path / "a.mat").read_bytes()[:900])
+    with pytest.raises(UserError, match="not a MATLAB file that scipy can read"):
+        read(tmp_path / "a.mat")
+
+
+def test_messages_of_mcap_are_channels_by_topic(tmp_path):
+    writer_module = pytest.importorskip("mcap.writer")
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = writer_module.Writer(file)
+        writer.start()
+        schema = writer.register_schema("motor", "jsonschema", b"{}")
+        channel = writer.register_channel("/motor", "json", schema)
+        for k in range(50):
+            data = json.dumps({"current_mA": 10.0 * k, "gains": [1, k]}).encode()
+            writer.add_message(channel, log_time=10_000_000 * k, publish_time=0, data=data)
+        writer.finish()
+    measurement = read(tmp_path / "a.mcap")
+    assert measurement["motor.current_A"].value == pytest.approx(0.01 * np.arange(50))
+    assert measurement["motor.gains[1]"].time_s == pytest.approx(0.01 * np.arange(50))
+
+
+def test_what_is_of_another_kind_is_named(written):
+    for content, line in (
+        (b"TDSm\x0e\0\0\0", "TDMS"), (b"\xd4\xc3\xb2\xa1\x02\0", "packet capture"), (b"%PDF-1.7\n", "a PDF"),
+    ):  # fmt: skip
+        with pytest.raises(UserError, match=line):
+            read(written(content))
+
+
+def test_frames_of_can_fd_are_left_out_and_counted(written):
+    path = written(
+        "(1.000000) can0 123#11\n(1.100000) can0 123##1112233445566778899\n(1.2) can0 123#22\n", "frames.txt"
+    )
+    log = logs.read_log(path)
+    assert [frame[4] for frame in log] == [0x11, 0x22]
+    assert log.read == 3 and log.losses == [("can_fd", 1, "")]
+
+
+# --- findings ---------------------------------------------------------------------------------------------------
+
+
+@needs_cases
+def test_every_case_of_a_stranger_is_right_or_refused_with_its_reason():
+    bus = CASES / "01-two-buses-one-id"
+    assert "can0.DRIVE.angle" in read(bus / "m_two_buses.log", databases=[bus / "m.dbc"]).channels
+    assert len(read(bus / "m_two_buses.log", databases=[bus / "m.dbc"], buses=["can1"]).channels) == 2
+    with pytest.raises(UserError, match="in us 0.01 s:.*\n.*--time-unit us"):
+        read(CASES / "09-index-as-unit" / "14_ulog.csv")
+    for path in sorted((CASES / "12-candump-screen").glob("*.*")) + sorted((CASES / "13-asc-variants").glob("*.asc")):
+        with pytest.raises(UserError, match=r"needs a DBC file \(--dbc FILE\)"):
+            read(path)
+    shuffled = read(CASES / "03-shuffled-stamps" / "g_shuffled_1.csv")
+    base = read(CASES / "03-shuffled-stamps" / "base_1.csv")
+    for name, channel in shuffled.mended().channels.items():
+        assert channel.value == pytest.approx(base[name].value)
+
+
+@pytest.fixture(scope="module")
+def positioning():
+    lines = (DATA / "emps_run1.csv").read_text().splitlines()
+    return lines[0], np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+
+
+def variant(kind, data):
+    """Run 1 of the positioning bench, spoilt."""
+    spoilt = data.copy()
+    if kind == "clipped":
+        spoilt[:, 1] = np.minimum(data[:, 1], 0.8 * np.abs(data[:, 1]).max())
+    elif kind == "joined":
+        spoilt = np.vstack([data[:12000], data[3000:15000]])
+        spoilt[:, 0] = 0.001 * np.arange(len(spoilt))
+    elif kind == "resampled":
+        for column in (1, 2, 3):
+            spoilt[:, column] = np.interp(data[:, 0], data[::10, 0], data[::10, column])
+    return spoilt
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [
+        ("clipped", "6712 for values cut off at a limit"),
+        ("joined", "jump at one row .* two recordings were joined there; nothing is concluded"),
+        ("resampled", "in straight lines over 10 rows each: resampled .* nothing is concluded"),
+    ],
+)
+def test_nothing_is_concluded_from_spoilt_runs_of_the_positioning_bench(kind, reason, positioning, written, capsys):
+    names, data = positioning
+    text = "".join(f"{t:.3f},{a:.6f},{b:.6f},{c:.6f}\n" for t, a, b, c in variant(kind, data).tolist())
+    arguments = ["diagnose", str(written(f"{names}\n{text}")), "--experiment", "positioning", "--holdout-part", "0.4"]
+    assert main(arguments) == 2
+    error = " ".join(capsys.readouterr().err.split())
+    assert reason.split(" .* ")[0] in error and "nothing is concluded" in error
+
+
+def test_a_command_that_reads_takes_the_same_options(written, capsys):
+    path = written("Zeit;u;i\n" + rows("{k};{v:.3f};{i:.3f}\n"))
+    assert main(["diagnose", str(path), "--experiment", "motor-bench", "--assume", "decimal=x"]) == 2
+    assert "decimal is point or comma" in capsys.readouterr().err
+
+
+def test_a_mapping_names_what_the_file_calls_otherwise(written):
+    dataset = open_recording(written("t_s,q\n" + rows("{t:.2f},{v:.3f}\n")), {"q": "hip_angle_deg"})
+    assert dataset["hip_angle_rad"].unit == "rad" and dataset.layout["map"] == {"q": "hip_angle_deg"}
+
+
+def test_a_rate_that_only_its_unit_pairs_with_an_angle_is_checked_against_it(written):
+    t = 0.01 * np.arange(1000)
+    angle, rate = np.sin(1.3 * t) + 0.3 * np.sin(5.0 * t), lambda t: 1.3 * np.cos(1.3 * t) + 1.5 * np.cos(5.0 * t)
+
+    def findings(shown):
+        table = "".join(f"{a:.2f},{b:.6f},{c:.6f}\n" for a, b, c in zip(t, angle, shown, strict=True))
+        return [each.text for each in read(written(f"t_s,arm_angle_rad,arm_speed_rad_per_s\n{table}")).matters]
+
+    assert findings(rate(t)) == findings(14.0 * rate(t)) == []  # the second may be behind a gear
+    (late,) = findings(rate(t - 0.03))
+    assert "comes 30 ms after arm_angle_rad" in late
+    (turned,) = findings(-rate(t))
+    assert "counts the other way round" in turned
+    (degrees,) = findings(180.0 / math.pi * rate(t))
+    assert "deg/s" in degrees
+
+
+def test_a_container_that_unpacks_without_end_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(logs, "LARGEST_CONTAINER", 1 << 20)
+    monkeypatch.setattr(logs, "SMALL_CONTAINER", 1 << 10)
+    packed = zlib.compress(bytes(1 << 21))
+    head = b"LOBJ" + struct.pack("<HHIIHHIII", 16, 1, 32 + len(packed), 10, 2, 0, 0, 1 << 16, 0)
+    path = tmp_path / "bomb.blf"
+    path.write_bytes(b"LOGG" + struct.pack("<I", 144) + bytes(136) + head + packed)
+    with pytest.raises(UserError, match="the container at byte 144 unpacks to more than 1048576"):
+        list(logs.read_log(path))

@@ -1,0 +1,1 @@
+"""`ranger-sim read`: what is in files of measured data, what became of every row, and what is odd about them."""
