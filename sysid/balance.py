@@ -91,7 +91,7 @@ class Balance(abc.ABC):
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """The joint's signals, or all channels but the response."""
-        joint = [name for name in ("angle", "rate", "acceleration") if name in recording.signals]
+        joint: list[str] = [name for name in ("angle", "rate", "acceleration") if name in recording.signals]
         names = joint or [each.name for each in self.quantities if each.name not in ("", self.response)]
         return {self.response: {name: recording.signals[name] for name in (*names, "t") if name in recording.signals}}
 

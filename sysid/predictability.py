@@ -70,7 +70,7 @@ def cosines(signals: Sequence[Mapping[str, Array]], seed: int) -> Cosines:
     together = np.vstack([np.column_stack([each[name] for name in names]) for each in signals])
     random = generator(seed, "cosines of the flexible predictor")
     count = len(names)
-    groups = [(one,) for one in range(count) for _ in range(PER_SIGNAL)]
+    groups: list[tuple[int, ...]] = [(one,) for one in range(count) for _ in range(PER_SIGNAL)]
     groups += [pair for pair in itertools.combinations(range(count), 2) for _ in range(PER_PAIR)]
     groups += [tuple(range(count))] * TOGETHER
     turns = np.zeros((count, len(groups)))

@@ -94,8 +94,12 @@ class Held:
             return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
         before = self.residual(named, without.values)
         after = self.residual([*named, candidate], extended.values)
-        won = sum(
-            _by_block(before[name] ** 2 - after[name] ** 2) / max(1, len(before[name])) for name in self.base.equations
+        won: Array = np.sum(
+            [
+                _by_block(before[name] ** 2 - after[name] ** 2) / max(1, len(before[name]))
+                for name in self.base.equations
+            ],
+            axis=0,
         )
         return float(np.mean(won)) > SURE * float(np.std(won, ddof=1)) / math.sqrt(len(won))
 
@@ -182,4 +186,5 @@ def _ratio(before: Array, after: Array, seed: int) -> tuple[float, float]:
 
 def _by_block(values: Array) -> Array:
     """(BLOCKS,) sums of values (n,) over equal parts of the recording."""
-    return np.bincount(np.arange(len(values)) * BLOCKS // max(1, len(values)), weights=values, minlength=BLOCKS)
+    places = np.arange(len(values)) * BLOCKS // max(1, len(values))
+    return np.asarray(np.bincount(places, weights=values, minlength=BLOCKS), dtype=float)
