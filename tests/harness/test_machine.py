@@ -132,7 +132,7 @@ def test_waiting_in_vain_says_what_was_nearest_and_why_it_ended(firmware):
 @pytest.mark.parametrize(
     ("wiring", "line"),
     [
-        (Wiring(can=[CanWire("MIDDLE", 1, 1)]), "there is no board 'MIDDLE', but LEFT, RIGHT"),
+        (Wiring(can=[CanWire("MIDDLE", 1, 1)]), "unknown board 'MIDDLE' .available: LEFT, RIGHT"),
         (Wiring(can=[CanWire("LEFT", 1, 2)]), "there are buses 1 to 1"),
         (Wiring(encoders=[EncoderWire(1, "LEFT", "a", "b")], names={"LEFT": {"a": 1, "b": 2}}), "the plant has 1"),
         (Wiring(encoders=[EncoderWire(0, "LEFT", "a", "c")], names={"LEFT": {"a": 1}}), "LEFT has no 'c', but a"),
