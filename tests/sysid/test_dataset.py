@@ -46,7 +46,7 @@ def test_only_the_time_that_all_channels_have_counts():
 @pytest.mark.parametrize(
     ("made", "names", "line"),
     [
-        (lambda: recording(channel("a_V", [0, 1], [0, 0])), ["b_V"], "recording: unknown channel 'b_V' .available: a"),
+        (lambda: recording(channel("a_V", [0, 1], [0, 0])), ["b_V"], "recording: unknown channel 'b_V' (available: a"),
         (lambda: recording(channel("a_V", [0], [0])), ["a_V"], "recording: a_V has 1 samples, at least 2 are needed"),
         (
             lambda: recording(channel("a_V", [0, 1], [0, 0]), channel("b_V", [5, 6], [0, 0])),

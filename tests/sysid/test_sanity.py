@@ -149,7 +149,7 @@ def test_held_commands_and_resting_channels_are_no_stuck_sensors():
 
 def test_data_without_anything_to_work_on_is_refused_in_a_line():
     empty = Dataset("nothing", {})
-    with pytest.raises(UserError, match="unknown channel 'nothing'"):
+    with pytest.raises(UserError, match="nothing: there is no channel"):
         sanity.stop_if_fatal("nothing", sanity.inspect(empty))
     with pytest.raises(UserError, match="swing: current_A: there is one sample only"):
         data = changed("current_A", lambda v: v[:1], lambda t: t[:1])

@@ -184,7 +184,7 @@ def test_a_part_that_a_board_lacks_is_reported_with_those_it_has():
     board = BoardAlone("MCSI")
     with pytest.raises(UserError, match="MCSI: unknown pin 'key_2' .available: led_"):
         board.pin("key_2")
-    with pytest.raises(UserError, match="MCSI has no analogue input 'angle'; it has motor_current, "):
+    with pytest.raises(UserError, match="MCSI: unknown analogue input 'angle' .available: motor_current, "):
         board.volts("angle", 1.0)
     with pytest.raises(UserError, match="MCSI: unknown word 'absolute_encoder' .available: none"):
         board.word("absolute_encoder", 1)
