@@ -438,8 +438,8 @@ class Supervisor:
         """Find processes that keep their turn, or are stopped, too long, and show the state."""
         now = wallclock.monotonic_s()
         passed_s, self.looked_s = min(now - self.looked_s, MOST_LOOK_S), now
-        for child in self.children.values():
-            self.look_at_stopped(child, passed_s)
+        for each in self.children.values():
+            self.look_at_stopped(each, passed_s)
         for name, block in self.blocks.items():
             child = self.children.get(name)
             if child is None or child.state != RUNNING:
