@@ -64,7 +64,10 @@ keys.help(by("keys"), by("signs"));
 
 // For tests and for a person at the browser's console.
 window.rangerPanel = {
-  plots: { ...plots, mark: () => state().mark_s, cursor: () => state().cursor_s, setMark: update.setMark },
+  plots: {
+    ...plots, mark: () => state().mark_s, cursor: () => state().cursor_s, setMark: update.setMark,
+    put: ({ id }, channel) => update.putChannel(id, channel), take: ({ id }, channel) => update.takeChannel(id, channel),
+  },
   keys: keys.bindings, shown: () => state().pictures, state: () => state().robot, span: () => state().span, held: () => state().held,
   channel: (name) => state().numbers.get(name), pose: () => state().pose,
 };

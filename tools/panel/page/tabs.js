@@ -25,8 +25,9 @@ export function makeTabs({ state, update, subscribe }) {
 
   subscribe(["hello", "view"], draw);
   draw(state());
-  // what is wider than its place is known when its view is drawn
-  subscribe(["view"], ({ view }) => queueMicrotask(() => reachable(by(`view-${view}`))));
+  // A view has another size when it is shown, filled or squeezed: what is wider than its place is known then.
+  const sizes = new ResizeObserver(() => reachable(by(`view-${state().view}`)));
+  for (const tab of tabs) sizes.observe(by(`view-${tab.dataset.view}`));
   for (const tab of tabs) tab.onclick = () => update.show(tab.dataset.view);
   bind("tabs", bar, {
     ArrowRight: () => goTab((here, count) => (here + 1) % count), ArrowLeft: () => goTab((here) => here - 1), Home: () => goTab(() => 0), End: () => goTab(() => -1),
