@@ -65,7 +65,7 @@ class RemoteBoards:
         }
         for name, remote in self.remotes.items():
             loop.replace(remote)
-            robot.boards[name].remote = True  # it does not run here
+            robot.boards[name].out_of_process = True  # it does not run here
         loop.watchers.append(ProcessReaper(self))
 
     def _board(self, name: str, stage: tuple[Any, Any]) -> Callable[[], int]:

@@ -176,7 +176,7 @@ def test_a_program_in_c_is_reported_with_its_end_and_the_lines_that_ran():
         ],
     )
     written = []
-    board = Made(apart=False, write_counts=lambda: written.append(1))
+    board = Made(out_of_process=False, write_counts=lambda: written.append(1))
     whole = Made(firmware={"MCH": made, "MCFO": made}, deaths=[], loop=Made(board=lambda name: board))
     reported = summary.firmware(whole, "MCH")
     assert (reported["name"], reported["folder"], reported["own_process"], reported["lost_s"], reported["why"]) == (
