@@ -140,8 +140,8 @@ def unclipped(machine: Machine, recording: Recording) -> Recording:
         share = float(np.mean(cut))
         if share > most:
             raise UserError(
-                f"{table.name}: {each.name}: {share:.1%} of its values are cut off at its largest or smallest one, at most "
-                f"{most:.0%} may be; nothing is concluded from such data"
+                f"{table.name}: {each.name}: {share:.1%} of its values are cut off at its largest or smallest one, "
+                f"at most {most:.0%} may be; nothing is concluded from such data"
             )
         rows |= cut
     if not np.any(rows):
