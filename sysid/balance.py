@@ -28,6 +28,8 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 
 AT_REST = 0.01  # of the fastest rate: about it the sign of the rate turns
+SHARPER = 4.0  # times; the base mixes the two signs
+CLOSE = 1.0 - 1e-12  # of a sign that is not infinitely far from its middle
 SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
 PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
 LIMITS = (0.5, 0.7, 0.85)  # of the largest input: where it may saturate
@@ -78,6 +80,9 @@ class Balance(abc.ABC):
         unknown = [name for name in columns if name not in {each.name for each in self.parameters}]
         if unknown:
             raise UserError(f"{self.name}: columns of {', '.join(unknown)}, which are not among its parameters")
+        if self.angle or self.rate:  # how abrupt a machine's sign is about standstill is never known: the base fits it
+            sharper = np.tanh(SHARPER * np.arctanh(np.clip(s["direction"], -CLOSE, CLOSE)))
+            columns["width of standstill@rate"] = sharper - s["direction"]
         unit = next(each.unit for each in self.quantities if each.name == self.response)
         made = Equation(self.response, "M", "mechanical", unit, table[self.response], columns, valid)
         return Recording(table, s, {self.response: made})

@@ -9,8 +9,21 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from scipy import ndimage
 
-from ranger_sim.sysid import bands, gain, held_out, intervals, likelihood, misfit, naming, plausibility, predictability
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import (
+    bands,
+    gain,
+    held_out,
+    intervals,
+    likelihood,
+    misfit,
+    naming,
+    plausibility,
+    predictability,
+    signals,
+)
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
@@ -25,6 +38,7 @@ BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most 
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
+MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
 
 
@@ -39,9 +53,9 @@ def diagnose(
 ) -> Diagnosis:
     """All findings but the printed answer. find: a known effect among the machine's."""
     progress("band", 0.1)
-    band, predictor = _band(machine, recordings, seed)
-    recordings = [band.of(each) for each in recordings]
-    held = [band.of(machine.prepare(table)) for table in holdout]
+    band, predictor = _band(machine, [unclipped(machine, each) for each in recordings], seed)
+    recordings = [unclipped(machine, band.of(each)) for each in recordings]
+    held = [unclipped(machine, band.of(machine.prepare(table))) for table in holdout]
     effects = machine.effects(recordings)
     had = [find(each, effects) for each in known]
     effects = [each for each in effects if all(each is not other.effect for other in had)]
@@ -111,6 +125,30 @@ def diagnose(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def unclipped(machine: Machine, recording: Recording) -> Recording:
+    """The recording without the rows in which a measured channel is cut off, and those that the band's filter reaches
+    from there. UserError where it is a large part of them, or where a simulator would have to follow the channel."""
+    table = recording.table
+    rows = np.zeros(len(table), dtype=bool)
+    most = MOST_CLIPPED_SIMULATED if recording.entries else MOST_CLIPPED
+    for each in machine.quantities:
+        if each.is_input or each.name not in table:
+            continue
+        cut = signals.clipped(table, table[each.name])
+        share = float(np.mean(cut))
+        if share > most:
+            raise UserError(
+                f"{table.name}: {each.name}: {share:.1%} of its values are cut off at its largest or smallest one, "
+                f"at most {most:.0%} may be; nothing is concluded from such data"
+            )
+        rows |= cut
+    if not np.any(rows):
+        return recording
+    away = ~ndimage.binary_dilation(rows, iterations=1 + math.ceil(2.0 * recording.width))
+    equations = {name: dataclasses.replace(each, valid=each.valid & away) for name, each in recording.equations.items()}
+    return dataclasses.replace(recording, equations=equations)
 
 
 def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple[bands.Band, predictability.Predictor]:

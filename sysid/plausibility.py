@@ -263,7 +263,7 @@ def _factor(known: Known, value: float, factor: float, simulated: bool) -> Findi
     far from the fit's start may then be an artefact.
     """
     text = (
-        f"it comes out as {value:.4g} {known.unit}, {factor:.3g} times the simulation's {known.value:.4g}: "
+        f"it comes out as {value:.4g} {known.unit}, {factor:.3g} times the model's {known.value:.4g}: "
         "another machine, or a channel in another unit"
     )
     if simulated and not any(word in known.name for word in MAY_BE_ANY):

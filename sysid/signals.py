@@ -16,6 +16,9 @@ from ranger_sim.sysid.dataset import Array, Table
 
 # Samples: no narrower is a Gaussian whose own derivative is taken; a slope is then right to a part in a thousand.
 NARROW = 0.75
+# Of a channel that is cut off: samples of one number in a stretch, stretches, part of the usual slope at which it
+# arrives there, and different numbers of a channel that has only states
+FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
 
 
 def per_run(table: Table, work: Callable[..., Array], *columns: Array) -> Array:
@@ -104,4 +107,31 @@ def resting(table: Table, rate: Array, share: float = 0.01, shortest_s: float = 
         for first, last in edges.reshape(-1, 2).tolist():
             if (last - first) * table.step_s >= shortest_s:
                 out[run.start + first : run.start + last] = True
+    return out
+
+
+def clipped(table: Table, column: Array) -> np.ndarray:
+    """True where a measured column is cut off at its largest or its smallest value.
+
+    It then arrives there at its usual slope and stays for three samples or more at one number; a machine that rests at
+    the end of its way slows down before. All False for less than two such stretches, and for few different numbers.
+    """
+    out = np.zeros(len(column), dtype=bool)
+    if len(np.unique(column)) <= FEW_NUMBERS:
+        return out
+    for extreme in (np.max(column), np.min(column)):
+        arrivals, found = [], []
+        for run in table.runs:
+            part = column[run]
+            slope = np.abs(np.diff(part))
+            edges = np.flatnonzero(np.diff(np.concatenate(([0], (part == extreme).astype(int), [0]))))
+            for first, last in edges.reshape(-1, 2).tolist():
+                if last - first >= FLAT and first >= FLAT and last < len(part):
+                    arrivals.append(float(np.mean(slope[first - FLAT : first])))
+                    found.append(slice(run.start + first, run.start + last))
+        moving = np.abs(np.diff(column))
+        usual = float(np.sqrt(np.mean(moving**2)))
+        if len(found) >= FEWEST_FLATS and float(np.median(arrivals)) > STEEP * usual:
+            for each in found:
+                out[each] = True
     return out

@@ -173,7 +173,8 @@ def _show(found: Diagnosis, console: Console) -> None:
             for name, value in cause["parameters"].items()
         )
         tied = f"; ties with {', '.join(cause['evidence']['ties'])}" if cause["evidence"]["ties"] else ""
-        console.print(f"{cause['name']} at {cause['at']}: {values}{tied}", highlight=False, soft_wrap=True)
+        form = f" ({cause['form']})" if cause.get("form") else ""
+        console.print(f"{cause['name']} at {cause['at']}{form}: {values}{tied}", highlight=False, soft_wrap=True)
         for line in predicted_ties.told(cause["evidence"]["predicted"]):
             console.print(f"  {line}", highlight=False, soft_wrap=True)
     if told["gain"] is not None:

@@ -1,0 +1,50 @@
+"""A channel that is cut off: its rows do not count, or the recording is refused; nothing is called sound by it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import signals
+from ranger_sim.sysid.pipeline import diagnose
+from tests.sysid.robot_joint import Joint
+from tests.sysid.test_scores_grow import run
+
+
+def cut(table, share):
+    """The current cut off at this share of its largest magnitude."""
+    current = table["current_A"]
+    limit = share * float(np.max(np.abs(current)))
+    return dataclasses.replace(table, columns=table.columns | {"current_A": np.clip(current, -limit, limit)})
+
+
+def test_the_rows_that_are_cut_off_are_found_and_no_others():
+    table = run(3, 0.5, "drag", 0.0)
+    assert not np.any(signals.clipped(table, table["current_A"]))
+    shorter = cut(table, 0.7)
+    limit = float(np.max(shorter["current_A"]))
+    found = signals.clipped(shorter, shorter["current_A"])
+    assert np.all(np.abs(shorter["current_A"][found]) == limit)
+    assert np.count_nonzero(found) > 0.8 * np.count_nonzero(np.abs(shorter["current_A"]) == limit)
+
+
+def test_a_machine_that_rests_at_the_end_of_its_way_is_not_cut_off():
+    table = run(3, 0.0, "drag", 0.0)
+    time_s = table.time_s
+    way = np.round(np.clip(1.0 - np.cos(0.8 * time_s), 0.0, 1.99999), 5)  # slows down towards each end, in counts
+    assert not np.any(signals.clipped(table, way))
+
+
+def test_an_inertia_is_right_where_a_tenth_of_the_current_is_cut_off():
+    """0.06 A s^2/rad; with the rows that are cut off it comes out a quarter too small."""
+    table = cut(run(5, 0.0, "drag", 0.0), 0.7)
+    found = diagnose(Joint(), [table])
+    value = found.result.evidence.parameters["inertia_As2_per_rad"]
+    assert value.ci95[0] < 0.06 < value.ci95[1] and not found.result.causes
+
+
+def test_a_recording_that_is_cut_off_for_half_of_its_rows_is_refused():
+    table = cut(run(5, 0.0, "drag", 0.0), 0.25)
+    with pytest.raises(UserError, match=r"joint 5: current_A: \d+\.\d% of its values are cut off"):
+        diagnose(Joint(), [table])
