@@ -7,7 +7,6 @@ ledger.
 """
 
 import dataclasses
-import math
 from collections.abc import Collection
 
 import numpy as np
@@ -115,10 +114,10 @@ def _unwrapped(channel: Channel, found: wraps.Wraps, repairs: list[Repair]) -> C
     """An overrun integer counted on by its span."""
     if not found.places:
         return channel
-    steps = np.diff(channel.value)
-    mended = channel.value.copy()
-    for place in found.places:
-        mended[place + 1 :] -= math.copysign(found.span, steps[place])
+    turns = np.zeros(len(channel.value))
+    places = np.array(found.places)
+    turns[places + 1] = np.sign(np.diff(channel.value)[places])
+    mended = channel.value - found.span * np.cumsum(turns)
     text = f"{found.span:.6g} {channel.unit} taken out at {len(found.places)} places where the integer ran over"
     repairs.append(Repair(channel.name, "wrap", len(found.places), text))
     return dataclasses.replace(channel, value=mended)

@@ -50,7 +50,8 @@ def of(value: Array, unit: str, quanta: tuple[float, ...]) -> Wraps:
     calm = np.setdiff1d(np.arange(len(steps)), jumps)  # steps of the motion itself
     sizes, reaches, blurs, sure = [], [], [], []
     for place in jumps:
-        before, after = calm[calm < place][-AROUND:], calm[calm > place][:AROUND]
+        here = int(np.searchsorted(calm, place))  # a jump is none of the calm steps
+        before, after = calm[max(0, here - AROUND) : here], calm[here : here + AROUND]
         near = np.abs(steps[np.concatenate((before, after))])
         reach = float(near.max()) if len(near) else 0.0
         top, bottom = max(value[place : place + 2]), min(value[place : place + 2])

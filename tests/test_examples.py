@@ -18,6 +18,11 @@ PRINTED = {
         r"^ff 72 61 6e 67 65 72$",
     ),
     "docs/how-to/co-simulation.md": (r"^fell at \d\.\d{3} s, -?\d\.\d\d A$",),
+    "docs/how-to/read.md": (
+        r"^\[0.1 0.3 0.2 0.4 0.5\] \{'names': 1, 'rows': 5, 'left out: ragged': 1\}$",
+        r"^\['ragged', 'reversed_stamps'\] \['sorted'\]$",
+        r"^\[0.1 0.2 0.3 0.4 0.5\]$",
+    ),
     "docs/how-to/can-tools.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$"),
     "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),

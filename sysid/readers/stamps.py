@@ -22,7 +22,7 @@ DATE = (
 )
 TIME = (
     r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
-    r"\s*(?P<zone>Z|[+-]\d\d:?\d\d)?"
+    r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d)?"
 )
 STAMP = re.compile(rf"(?:(?P<date>{DATE})(?:[T ]\s*(?=\d))?)?(?P<time>{TIME})?")
 MONTHS = {
@@ -32,6 +32,7 @@ MONTHS = {
     )
 }  # English and German
 CENTURY = 2000
+MINUTES = re.compile(r"\d\d?:\d\d[.,]\d{1,9}")  # minutes and seconds, as spreadsheets show short times
 NONE = np.iinfo(np.int64).min  # in an array: no stamp
 
 
@@ -58,15 +59,19 @@ class Forms:
     seen: bool = False
 
 
+def _match(cell: str) -> re.Match[str] | None:
+    return STAMP.fullmatch(f"00:{cell}" if MINUTES.fullmatch(cell) else cell)
+
+
 def is_stamp(cell: str) -> bool:
     """True for a date, a time of the day, or both."""
-    found = STAMP.fullmatch(cell)
+    found = _match(cell)
     return found is not None and bool(found["date"] or found["time"])
 
 
 def both_ways(cells: Sequence[str], forms: Forms) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
     """The stamps of a part of a column (n,), day first and month first; None when most of its cells are not stamps."""
-    found = [STAMP.fullmatch(cell) if cell else None for cell in cells]
+    found = [_match(cell) if cell else None for cell in cells]
     good = [each for each in found if each is not None and each[0]]
     if 2 * len(good) <= len(cells):
         return None
@@ -132,11 +137,12 @@ def _time_of_day_ns(found: re.Match[str]) -> int | None:
     """Nanoseconds since midnight, of UTC where the zone is given; None for a time that no clock shows."""
     hour, minute, second = int(found["h"]), int(found["m"]), int(found["s"] or 0)
     half = (found["half"] or "").lower()
-    if hour > (12 if half else 24) or minute > 59 or second > 60:
+    most = 12 if half else 24 if found["date"] else 99  # without a date it may be the time since the beginning
+    if hour > most or minute > 59 or second > 60:
         return None
     if half:
         hour = hour % 12 + (12 if half[0] == "p" else 0)
     zone = found["zone"] or "Z"
-    away = 0 if zone == "Z" else (int(zone[1:3]) * 60 + int(zone[-2:])) * (-1 if zone[0] == "-" else 1)
+    away = 0 if zone.isalpha() else (int(zone[1:3]) * 60 + int(zone[-2:])) * (-1 if zone[0] == "-" else 1)
     seconds = hour * 3600 + (minute - away) * 60 + second
     return seconds * SECOND_NS + int((found["part"] or "0").ljust(9, "0"))

@@ -349,3 +349,22 @@ def test_a_container_that_unpacks_without_end_is_refused(tmp_path, monkeypatch):
     path.write_bytes(b"LOGG" + struct.pack("<I", 144) + bytes(136) + head + packed)
     with pytest.raises(UserError, match="the container at byte 144 unpacks to more than 1048576"):
         list(logs.read_log(path))
+
+
+def test_topics_of_a_flight_log_are_channels_by_their_own_stamps(tmp_path):
+    pytest.importorskip("pyulog")
+
+    def message(kind, content):
+        return struct.pack("<HB", len(content), ord(kind)) + content
+
+    parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
+    parts.append(message("F", b"motor:uint64_t timestamp;float current;float[2] angle;"))
+    parts.append(message("A", struct.pack("<BH", 0, 0) + b"motor"))
+    for k in range(50):
+        parts.append(message("D", struct.pack("<HQfff", 0, 10_000 * k, 0.5 * k, 1.0, 2.0 * k)))
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(b"".join(parts))
+    measurement = read(path)
+    assert set(measurement.channels) == {"motor.current", "motor.angle[0]", "motor.angle[1]"}
+    assert measurement["motor.current"].value == pytest.approx(0.5 * np.arange(50))
+    assert measurement["motor.angle[1]"].time_s == pytest.approx(0.01 * np.arange(50))
