@@ -42,7 +42,8 @@ def test_every_name_of_the_front_is_there_and_documented():
 
 def test_a_name_that_is_not_in_the_front_says_what_is():
     with pytest.raises(
-        AttributeError, match=r"no attribute 'Robot'; it offers BusError, .*Measurement, .*Profile, ProfileError, Quirks, Ranger"
+        AttributeError,
+        match=r"no attribute 'Robot'; it offers BusError, .*Measurement, .*Profile, ProfileError, Quirks, Ranger",
     ):
         ranger_sim.Robot  # noqa: B018
 
