@@ -446,7 +446,7 @@ class SlotScheduler:
         self.set_leads()
 
     def set_leads(self) -> None:
-        """From each row's end back to its start: how far a place is ahead of the row's next task that may send."""
+        """From each row's end back to its start: how far each place is ahead of the next task that may send."""
         for row in range(self.row_count):
             lead = NEVER
             for place in range(self.row_starts[row + 1] - 2, self.row_starts[row] - 1, -1):

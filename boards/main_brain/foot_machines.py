@@ -21,6 +21,8 @@ class FootMachine:
     """inner: True for the inner ankles. `machine` is stepped after the hip machine, inner feet first.
 
     States 0 start ... 6 stop; the start state is startflipdown (inner) or startstance (outer).
+    More than 40 fields, because most are the ids of its variables in the data table, which compiled code then finds
+    without a dictionary.
     """
 
     store: DataStore

@@ -17,7 +17,11 @@ from ranger_sim.datatable.store import DataStore
 
 @cython.cclass
 class HipMachine:
-    """States 0 HI_starthold ... 9 stop; `machine` is stepped after the leg machine."""
+    """States 0 HI_starthold ... 9 stop; `machine` is stepped after the leg machine.
+
+    More than 40 fields, because most are the ids of its variables in the data table, which compiled code then finds
+    without a dictionary.
+    """
 
     store: DataStore
     # ids of the variables of the data table, by their names

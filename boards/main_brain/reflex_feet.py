@@ -21,6 +21,8 @@ class ReflexFootMachine:
     """inner: True for the inner ankles. `machine` is stepped after the hip machine, inner feet first.
 
     States 0 start ... 5 flipdown.
+    More than 40 fields, because most are the ids of its variables in the data table, which compiled code then finds
+    without a dictionary.
     """
 
     store: DataStore
