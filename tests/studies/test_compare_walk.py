@@ -298,7 +298,7 @@ def test_the_command_tells_what_differs_and_draws_it(tmp_path, capsys):
     [
         ((), ("0 whole strides", "at least 2")),
         (("--controller", "robust"), ("robust", "'record'", "'head-2015'")),
-        (("--map", "walk_fsm_state=other"), ("walk_state", "no channel")),
+        (("--map", "walk_fsm_state=other"), ("unknown channel", "walk_state")),
         (("--body", "nobody"), ("nobody",)),
     ],
 )
