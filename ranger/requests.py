@@ -56,13 +56,13 @@ def _board(value: Any) -> str:
 
 def _parameter(value: Any) -> str:
     if not isinstance(value, str):
-        raise RequestError(f"set: {shown(value)} is no name of a parameter")
+        raise RequestError(f"set: {shown(value)} is not the name of a parameter")
     return parameters.parameter(value).name
 
 
 def _fault(value: Any) -> str:
     if not isinstance(value, str):
-        raise RequestError(f"fault: {shown(value)} is no fault, as PLACE:MODE")
+        raise RequestError(f"fault: {shown(value)} is not a fault, as PLACE:MODE")
     return can_be_armed(CATALOGUE.typed(value)).text()
 
 
@@ -115,10 +115,10 @@ def admitted(line: bytes) -> Request:
     what = content.pop("do", None)
     fields = REQUESTS.get(what) if isinstance(what, str) else None
     if fields is None:
-        raise RequestError(f"{shown(what)} is no request; there are {', '.join(REQUESTS)}")
+        raise RequestError(f"{shown(what)} is not a request; there are {', '.join(REQUESTS)}")
     for name in content:
         if name not in fields:
-            raise RequestError(f"{what}: {shown(name)} is no field of it; it has {', '.join(fields) or 'none'}")
+            raise RequestError(f"{what}: {shown(name)} is not a field of it; it has {', '.join(fields) or 'none'}")
     found: dict[str, Any] = {}
     for name, check in fields.items():
         if name not in content:

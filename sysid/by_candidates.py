@@ -1,4 +1,4 @@
-"""Diagnosis in the noise that all candidates leave: for machines without a noise estimate of their own.
+"""Diagnosis in the noise that all candidates leave: for machines without their own noise estimate.
 
 The order: the band (`bands.py`), what can be predicted at all (`predictability.py`), causes by likelihood that
 held-out data do not refuse (`likelihood.py`), three errors (`three_numbers.py`), what would not have been seen.

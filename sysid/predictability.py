@@ -147,7 +147,7 @@ def test(regression: Regression, features: Mapping[str, Array], seed: int) -> li
 
 
 class _Fold:
-    """Features beside a base, fitted on some rows and held against others: every ridge by one decomposition."""
+    """Features added to a base, fitted on some rows and held against others: every ridge by one decomposition."""
 
     def __init__(self, features: Array, base: Array, fitted: np.ndarray, held: np.ndarray) -> None:
         scale = np.linalg.norm(base[fitted], axis=0)
@@ -165,7 +165,7 @@ class _Fold:
         self.turned = ((features[held] - self.base_held @ own) / self.size) @ self.vectors
 
     def missed(self, residuals: Array) -> tuple[Array, Array]:
-        """Residuals (n, m) beside the base, on the fitted rows and on the held ones."""
+        """Residuals (n, m) of the base, on the fitted rows and on the held ones."""
         own = self.basis @ residuals[self.fitted]
         return residuals[self.fitted] - self.base_fitted @ own, residuals[self.held] - self.base_held @ own
 
@@ -202,7 +202,7 @@ def _held_out(features: Array, base: Array, residuals: Array) -> Array:
 
 
 def learned(features: Array, base: Array, residual: Array) -> Array:
-    """(k,) coefficients of features beside the base's columns, at the ridge that predicts best on blocks left out.
+    """(k,) coefficients of features added to the base's columns, at the ridge that predicts best on blocks left out.
 
     All zero where no ridge predicts anything.
     """

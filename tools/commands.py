@@ -68,7 +68,7 @@ COMMANDS = (
     Command(
         "up",
         "tools.run.up",
-        "let Ranger walk in real time, each board a process of its own",
+        "let Ranger walk in real time, each board in a separate process",
         (
             "ranger-sim up --steps 20",
             "ranger-sim up --bus can1=socketcan:vcan0",

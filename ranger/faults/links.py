@@ -142,9 +142,9 @@ class DropOut(Fault):
         self.lines: dict[int, Any] = loop.wires[loop.place(board)].serial_lines
         self.imu_wire: Any = loop.serial_device if board == "UI" else None
         if not self.lines:
-            raise FaultError(f"fault {self.text()}: nothing is connected to this line, so nobody could miss its bytes")
+            raise FaultError(f"fault {self.text()}: nothing is connected to this line, so its bytes cannot be missed")
         if self.imu_wire is not None and not self.imu_wire.plugged:
-            raise FaultError(f"fault {self.text()}: another unit outside stands in the place of the emulated one")
+            raise FaultError(f"fault {self.text()}: another unit outside replaces the emulated one")
 
     def begin(self, now_ns: int) -> None:
         for uart, line in list(self.lines.items()):

@@ -196,7 +196,7 @@ class Restart(Fault):
         emulated(self.robot, self.name, self.where)
         if self.robot.polled:
             raise FaultError(
-                f"{self.where}: ends outside hold on to this board; start them with processes of their own"
+                f"{self.where}: ends outside hold on to this board; start them in separate processes"
             )
         self.back_ns = NEVER
         self.slots_before = 0

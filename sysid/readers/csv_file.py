@@ -386,7 +386,7 @@ def _channels(
         value, present = column.value(), column.has_cell()
         if column.odd and column.first_odd is not None:
             _, line, cell = column.first_odd
-            text = f"{column.odd} cells are no numbers, the first in line {line}: {cell[:30]!r}"
+            text = f"{column.odd} cells are not numbers, the first in line {line}: {cell[:30]!r}"
             begin, end = (
                 float(time_s[k]) if np.isfinite(time_s[k]) else 0.0 for k in (column.first_odd[0], column.last_odd)
             )

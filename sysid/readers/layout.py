@@ -40,7 +40,7 @@ KEYS = {  # --assume KEY=VALUE
 class Layout:
     """How a text table is read. Lines count from 1, 0: none; names: as in the file; units: text, None: none.
 
-    above: what the lines above say; ignored: columns that are no channels.
+    above: what the lines above say; ignored: columns that are not channels.
     """
 
     encoding: str

@@ -66,7 +66,7 @@ def _surveyed(path: pathlib.Path, file, size: int, encoding: str) -> Survey:  # 
     while block := file.read(CHUNK_BYTES):
         if not wide and (place := block.find(0)) >= 0:
             raise DataError(
-                f"{path}: this is no text table, it has bytes of value 0 (the first is byte {position + place + 1})"
+                f"{path}: this is not a text table, it has bytes of value 0 (the first is byte {position + place + 1})"
             )
         lines = block.replace(b"\r", b"\n").split(b"\n")
         longest = max(since_end + len(lines[0]), *map(len, lines[1:]), 0)

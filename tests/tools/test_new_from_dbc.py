@@ -1,4 +1,4 @@
-"""`ranger-sim new DIR --from FILE.dbc`: boards for the nodes of a DBC file that somebody else wrote."""
+"""`ranger-sim new DIR --from FILE.dbc`: boards for the nodes of a DBC file of another author."""
 
 import pathlib
 import re

@@ -65,7 +65,7 @@ def unseen(answer: dict[str, Any]) -> list[str]:
         for name, sizes in evidence["smallest_visible"].items()
     ]
     if evidence["cannot_be_seen"]:
-        lines.append(f"not to be told from the machine's own parameters: {', '.join(evidence['cannot_be_seen'])}")
+        lines.append(f"not distinguishable from the machine's own parameters: {', '.join(evidence['cannot_be_seen'])}")
     return lines
 
 

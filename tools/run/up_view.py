@@ -21,7 +21,7 @@ def print_processes(found: dict, console: Console) -> None:
     console.print(
         f"{found['paced_factor'] or 0.0:.2f} x real time by the wall clock, "
         f"{sum(each['turns_per_s'] for each in found['boards'].values()):.0f} turns per second of the robot's time"
-        + ("; frames or bytes came from outside: this run cannot be repeated" if found["asynchronous"] else ""),
+        + ("; frames or bytes arrived from outside: this run cannot be repeated" if found["asynchronous"] else ""),
         highlight=False,
     )
     for name, counts in found["outside"].items():
