@@ -38,7 +38,7 @@ stopped has only a SLOT_BEGAN, and a processor that begins anew counts its slots
 its outer one.
 
 **How to read it.** `newest()`: the rows that are kept, the oldest first, in one flat array. `sinks`: each is called as
-`sink(time_ns, rows)`, rows as bytes, whenever the ring is full and at `flush()`; it gets every row that came since it
+`sink(time_ns, rows)`, rows as bytes, whenever the ring is full and at `flush()`; it gets every row written since it
 was added to the list, once.
 """
 

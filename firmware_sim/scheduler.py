@@ -492,7 +492,7 @@ class SlotScheduler:
 
     @cython.ccall
     def tick(self, timer_time: cython.longlong) -> cython.bint:
-        """Timer tick (its hardware instant, ns): step to the next row. True: the old row was unfinished."""
+        """Timer tick (its hardware time, ns): step to the next row. True: the old row was unfinished."""
         overrun: cython.bint = False
         self.tick_time = timer_time
         self.divider_count += 1

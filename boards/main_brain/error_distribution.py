@@ -61,7 +61,7 @@ class ErrorRing:
 @cython.final
 @cython.cclass
 class ErrorDistribution:
-    """`distribute()` is the task. `totals`: {(board number, code): count} of everything that came through."""
+    """`distribute()` is the task. `totals`: {(board number, code): count} of all that it has passed on."""
 
     store: DataStore
     errors: "ErrorModule"

@@ -106,7 +106,7 @@ class Estimator:
     """update() once per slot. report(code): callable that receives each error noticed.
 
     More than 40 fields, because half are the numbers of its variables in the data table, which compiled code then finds
-    without a look into a dictionary.
+    without a dictionary access.
     """
 
     store: DataStore

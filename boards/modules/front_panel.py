@@ -47,7 +47,7 @@ BUZZER_CHANNEL = 5
 @cython.final
 @cython.cclass
 class FrontPanel(Peripheral):
-    """What a person sees, hears and presses, at the pins of `chip`. `ssp`: the device on its SSP, the lights."""
+    """The panel's lights, sound and keys, at the pins of `chip`. `ssp`: the device on its SSP, the lights."""
 
     display: CharacterDisplay
     ssp: LedDrivers

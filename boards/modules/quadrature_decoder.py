@@ -130,7 +130,7 @@ class QuadratureDecoder:
         self.position = (self.count * self.position_gain) >> self.position_shift
 
     def update_rate(self):
-        """Slot task: rate from the edge times that came since the last slot. Returns how many came, None for none.
+        """Slot task: rate from the edge times since the last slot. Returns their number, None for none.
 
         A change of direction needs two times in a row to be believed, the first one after power-up as well: if the
         second has not come yet, the first is left for the next slot. A zero or a single time of the other sign is a

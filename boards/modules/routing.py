@@ -87,7 +87,7 @@ class RoutingTable:
 
     @cython.ccall
     def subscribe(self, identifier: cython.longlong, channel: cython.longlong) -> cython.void:
-        """A remote frame came from `channel`: send `identifier` there too from now on."""
+        """A remote frame arrived from `channel`: send `identifier` there too from now on."""
         self.rows[identifier] |= 1 << channel
 
 
@@ -262,7 +262,7 @@ class Router:
         word1: cython.longlong,
         now: cython.longlong,
     ) -> cython.longlong:
-        """Learn where the frame came from and copy it to its destinations; return the number of copies."""
+        """Learn the frame's source and copy it to its destinations; return the number of copies."""
         mask: cython.longlong
         if not 0 <= identifier < IDENTIFIERS:
             self.unroutable += 1

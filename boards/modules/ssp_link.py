@@ -9,7 +9,7 @@ master and starts an exchange every 200 us; 496 bits at 3.0 Mbit/s take 165.3 us
 bits 11-14, and the remote bit in 15. The checksum is (1 + sum of the other 30) modulo 65536. Source:
 robot.md N1.6.
 
-Frames are put straight into the segment that will carry them, and are taken straight out of the one that came in.
+Frames are put straight into the segment that will carry them, and are taken straight out of the received one.
 
 Empty segments are one shared object per end and the others come round in a circle, so a segment that was handed over
 must not be written to: a fault makes its own with `corrupted_copy`. A circle is long enough for all that its end can
@@ -114,7 +114,7 @@ class MainBrainSspLink:
     """The slave's end: 16 segments each way, parsed and filled once per slot of the main brain.
 
     `report(code)` is called for every error; `last_id` is the highest identifier the data table has.
-    `parse()` leaves in `received` the first `segments` that came in, with `received_frames` frames each and `frames` in
+    `parse()` leaves in `received` the first received `segments`, with `received_frames` frames each and `frames` in
     all; so it stays until the next segment comes in.
     """
 

@@ -62,7 +62,7 @@ class Image:
         return f"{symbol.name}+{behind:#x}" if behind else symbol.name
 
     def address_of(self, name: str) -> int:
-        """Where a symbol is. UserError when the file has none of this name."""
+        """Where a symbol is. UserError when the file does not have it."""
         for symbol in self.symbols:
             if symbol.name == name:
                 return symbol.address

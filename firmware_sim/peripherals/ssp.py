@@ -52,7 +52,7 @@ class SspDevice(Peripheral):
 
     @cython.ccall
     def exchange(self, word: cython.longlong, time: cython.longlong) -> cython.longlong:
-        """The last bit of `word` is through at `time`; returns the word that came the other way."""
+        """The last bit of `word` is through at `time`; returns the received word."""
         return 0
 
 
@@ -71,7 +71,7 @@ class SspMaster(Peripheral):
 
     @cython.ccall
     def word(self, word: cython.longlong) -> cython.longlong:
-        """Send a word; returns the one that came the other way."""
+        """Send a word; returns the received one."""
         device: SspDevice = self.device
         device.bits = self.bits
         device.begin(self.chip.now)
@@ -182,7 +182,7 @@ class SspPort(Peripheral):
 
     @cython.ccall
     def take(self) -> SspSegment:
-        """The segment that came in last, or None when it has been taken already."""
+        """The segment received last, or None when it has been taken already."""
         if not self.untaken:
             return None
         self.untaken = False

@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import CampaignError
 
 
 class Store:
-    """The file `path`, opened for one writer. `results`: {key: result}; `repeated`: results that came again."""
+    """The file `path`, opened for one writer. `results`: {key: result}; `repeated`: results that arrived again."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self.path = path

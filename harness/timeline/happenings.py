@@ -8,7 +8,7 @@ STAMPS = ("armed", "activated", "acted", "ended", "cleared")
 
 
 def happenings(robot: Any) -> list[Instants]:
-    """Tracks of instant events: the steps, and the faults, if any."""
+    """Tracks of events without a length: the steps, and the faults, if any."""
     found = [Instants(("Steps",), steps(robot))]
     if robot.faults:
         found.append(Instants(("Faults",), faults(robot)))

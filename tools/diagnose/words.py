@@ -29,7 +29,7 @@ def sentence(found: Diagnosis) -> str:
 
 
 def nothing(answer: dict[str, Any]) -> str:
-    """What is said where nothing was found; a residual far above the noise is no proof of a sound machine."""
+    """The sentence for a diagnosis without a finding; a residual far above the noise does not prove a sound machine."""
     evidence = answer["evidence"]
     if above := evidence.get("above_noise_floor"):
         each = evidence["noise_floor"][above[0]]

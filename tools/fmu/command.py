@@ -106,7 +106,7 @@ def repack(source: zipfile.ZipFile, target: Any) -> None:
 
 
 def licence_of(distribution: str) -> str:
-    """The licence text that came with an installed distribution, else what its metadata says."""
+    """The licence text of an installed distribution, else what its metadata says."""
     try:
         found = importlib.metadata.distribution(distribution)
     except importlib.metadata.PackageNotFoundError:  # run from its sources
