@@ -1,7 +1,7 @@
 """Errors on held-out data: of the model, of the model with what was named, and of a black box.
 
 The machine's own parameters are fitted again on the held-out data, with and without what is added: friction of another
-day is no fault of the extension. What is added keeps its sizes from the training data; only the phase of a periodic
+day is not a fault of the extension. What is added keeps its sizes from the training data; only the phase of a periodic
 effect, and what an effect declares as free, is fitted. The black box is the flexible predictor (`predictability.py`),
 or the physics with a flexible rest, whichever is better there: it says how much of the error can be explained at all.
 """

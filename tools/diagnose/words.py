@@ -29,7 +29,7 @@ def sentence(found: Diagnosis) -> str:
 
 
 def nothing(answer: dict[str, Any]) -> str:
-    """What is said where nothing was found; a residual far above the noise is no proof of a sound machine."""
+    """What is said where nothing was found; a residual far above the noise does not prove a sound machine."""
     evidence = answer["evidence"]
     if above := evidence.get("above_noise_floor"):
         each = evidence["noise_floor"][above[0]]
@@ -65,7 +65,7 @@ def unseen(answer: dict[str, Any]) -> list[str]:
         for name, sizes in evidence["smallest_visible"].items()
     ]
     if evidence["cannot_be_seen"]:
-        lines.append(f"not to be told from the machine's own parameters: {', '.join(evidence['cannot_be_seen'])}")
+        lines.append(f"not separable from the machine's own parameters: {', '.join(evidence['cannot_be_seen'])}")
     return lines
 
 
