@@ -147,7 +147,7 @@ def test(regression: Regression, features: Mapping[str, Array], seed: int) -> li
 
 
 class _Fold:
-    """Features without the part that a base explains, fitted on some rows and held against others: every ridge by one decomposition."""
+    """Features less a base's part, fitted on some rows, held against others: each ridge by one decomposition."""
 
     def __init__(self, features: Array, base: Array, fitted: np.ndarray, held: np.ndarray) -> None:
         scale = np.linalg.norm(base[fitted], axis=0)
@@ -202,7 +202,7 @@ def _held_out(features: Array, base: Array, residuals: Array) -> Array:
 
 
 def learned(features: Array, base: Array, residual: Array) -> Array:
-    """(k,) coefficients of features together with the base's columns, at the ridge that predicts best on blocks left out.
+    """(k,) coefficients of features with the base's columns, at the ridge that predicts best on blocks left out.
 
     All zero where no ridge predicts anything.
     """
