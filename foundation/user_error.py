@@ -81,7 +81,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """`unknown board 'MHC' (available: MCH, MB)`; of more than FEW names `unknown frame 'MCH_ANGEL'; did you mean ...?`.
+    """`unknown board 'MHC' (available: MCH, MB)`; of more than FEW `unknown frame 'MCH_ANGEL'; did you mean ...?`.
 
     Without any of them where nothing is close and there are more than MOST_LISTED.
     """
