@@ -45,7 +45,8 @@ class Balance(abc.ABC):
     """response: the channel that the sum gives; angle, rate: channels of the joint, "" where there is none.
 
     Signals: the channels, `t` in seconds from the start, and for a joint `angle`, `rate`, `acceleration` and
-    `direction`, the sign of the rate, smooth about standstill. Rows at standstill do not count.
+    `direction`, the sign of the rate, smooth about standstill. Rows at standstill do not count, nor those about a
+    reversal or a jump of the response.
     """
 
     name: str
@@ -75,7 +76,8 @@ class Balance(abc.ABC):
         valid = np.ones(len(table), dtype=bool)
         if self.angle or self.rate:
             self._add_joint(table, s)
-            valid = ~signals.resting(table, s["rate"])
+            unsure = signals.near_jumps(table, table[self.response]) | signals.near_jumps(table, np.sign(s["rate"]))
+            valid = ~signals.resting(table, s["rate"]) & ~unsure
         columns = dict(self.columns(s))
         unknown = [name for name in columns if name not in {each.name for each in self.parameters}]
         if unknown:

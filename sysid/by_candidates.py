@@ -29,7 +29,7 @@ from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
-from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held
 
@@ -112,8 +112,8 @@ def diagnose(
         list(known),
         found.named,
         known_to,
-        _misfit(before),
-        _misfit(after),
+        _misfit(before, machine, found.base),
+        _misfit(after, machine, extended),
         plausibility.look(machine, extended, found.named, by_candidates=True),
         level=LEVEL,
         band_hz=band.edge_hz,
@@ -176,10 +176,30 @@ def _stamps(found: likelihood.Selection) -> list[Named]:
     return [each for each in lags if abs(found.with_named.values[each.coefficients[0]]) < limit_s]
 
 
-def _misfit(tests: Sequence[predictability.Predicted]) -> misfit.Misfit:
+def _over(machine: Machine, regression: Regression, name: str) -> str:
+    """The signal over whose cells the residual of an equation varies most, as a general test is named."""
+    general = [machine.generic(each).get(name, {}) for each in regression.recordings]
+    if not all(general):
+        return "the flexible predictor"
+    good, part = regression.good[name], regression.parts[name]
+    values = np.array([regression.values[each] for each in regression.names])
+    left = (part.response - part.measured @ values)[good]
+    shares = {}
+    for signal in general[0]:
+        column = np.concatenate(
+            [kept_rows(each, one[signal]) for each, one in zip(regression.recordings, general, strict=True)]
+        )[good]
+        _, place = np.unique(misfit.cells(column, misfit.SINGLE_CELLS), return_inverse=True)
+        means = np.bincount(place, left) / np.bincount(place)
+        shares[signal] = float(np.sum(means[place] ** 2))
+    return f"over {max(shares, key=lambda signal: shares[signal])}"
+
+
+def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regression: Regression) -> misfit.Misfit:
     """The tests as those of any machine; excess: the share of the residual's square that can be predicted."""
     made = [
-        misfit.Test(each.equation, "the flexible predictor", each.share * each.stretches, 1, each.p) for each in tests
+        misfit.Test(each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p)
+        for each in tests
     ]
     p = min(1.0, min((each.p for each in made), default=1.0) * len(made))
     return misfit.Misfit(made, p, max((each.share for each in tests), default=0.0))

@@ -15,9 +15,7 @@ from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
 GENERAL_LEVEL = 0.0001
-CONFIRMS = 0.01  # of the error on held-out data, by which a learned term must improve it
 LITTLE = 0.02  # of the residual's square: an integrator's own error is predictable too
-MUCH = 0.3  # of the residual's square: no chance, whatever held-out data with another motion show
 EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not named
 
 
@@ -73,20 +71,8 @@ class Diagnosis:
     @property
     def detected(self) -> bool:
         """Something is wrong."""
-        general = (
-            self.before.p < self.level and self.confirmed and (not self.by_candidates or self.before.excess > LITTLE)
-        )
+        general = self.before.p < self.level and (not self.by_candidates or self.before.excess > LITTLE)
         return general or bool(self.named) or self.doubts.forbid
-
-    @property
-    def confirmed(self) -> bool:
-        """False when held-out data are predicted no better by what was learned from little of the residual."""
-        if not self.errors or self.before.excess > MUCH:
-            return True
-        return any(
-            each.black_box is not None and each.black_box < (1.0 - CONFIRMS) * each.before
-            for each in self.errors.values()
-        )
 
     @property
     def explained(self) -> float:

@@ -148,14 +148,18 @@ def own_noise(regression: Regression) -> Noise:
 
 
 def surrogates(regression: Regression, seed: int, count: int = SURROGATES) -> Array:
-    """(N, count) recordings without any cause, in the regression's rows: noise as its own residual is."""
+    """(N, count) recordings without any cause, in the regression's rows: noise as its own residual is, and as large.
+
+    The power of slow noise scatters; what is compared is the part of it that a candidate explains by chance.
+    """
     out = np.zeros((regression.size, count))
     for name, own in own_noise(regression).whitening.items():
         raw = noise.surrogates(
             own.coefficients, own.deviation, len(regression.parts[name].response), count, seed, f"noise of {name}"
         )
         out[regression.rows[name]] = regression._scaled(name, raw)[regression.good[name]]
-    return out
+    left = out - regression.phi @ (regression.inverse @ (regression.z.T @ out))
+    return np.asarray(out * np.sqrt(regression.chi2 / np.maximum(np.sum(left**2, axis=0), 1e-300)))
 
 
 def score(chi2: Array | float, freedom: int, shapes: int, size: int) -> Array | float:

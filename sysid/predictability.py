@@ -20,7 +20,7 @@ from ranger_sim.sysid.regression import Regression, reduced
 
 SCALES = (0.3, 0.7, 1.5, 3.0)  # lengths of the cosines, in deviations of a signal
 PER_SIGNAL, PER_PAIR, TOGETHER = 12, 8, 24  # cosines over one signal, over two, over all
-RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)  # of the mean square of a feature; besides these an infinite one
+RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)  # of the mean square of a feature; and an infinite one
 BLOCKS = 10
 BEYOND = 0.02  # of a signal's training range, beyond which a row is outside of it
 WORTH = 0.05  # of the residual's square: less is not a reason for another band
@@ -147,7 +147,7 @@ def test(regression: Regression, features: Mapping[str, Array], seed: int) -> li
 
 
 class _Fold:
-    """Features added to a base, fitted on some rows and held against others: every ridge by one decomposition."""
+    """Features less a base's part, fitted on some rows, held against others: each ridge by one decomposition."""
 
     def __init__(self, features: Array, base: Array, fitted: np.ndarray, held: np.ndarray) -> None:
         scale = np.linalg.norm(base[fitted], axis=0)
@@ -165,7 +165,7 @@ class _Fold:
         self.turned = ((features[held] - self.base_held @ own) / self.size) @ self.vectors
 
     def missed(self, residuals: Array) -> tuple[Array, Array]:
-        """Residuals (n, m) of the base, on the fitted rows and on the held ones."""
+        """Residuals (n, m) less the base's part, on the fitted rows and on the held ones."""
         own = self.basis @ residuals[self.fitted]
         return residuals[self.fitted] - self.base_fitted @ own, residuals[self.held] - self.base_held @ own
 
@@ -202,7 +202,7 @@ def _held_out(features: Array, base: Array, residuals: Array) -> Array:
 
 
 def learned(features: Array, base: Array, residual: Array) -> Array:
-    """(k,) coefficients of features added to the base's columns, at the ridge that predicts best on blocks left out.
+    """(k,) coefficients of features with the base's columns, at the ridge that predicts best on blocks left out.
 
     All zero where no ridge predicts anything.
     """

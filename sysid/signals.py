@@ -16,6 +16,7 @@ from ranger_sim.sysid.dataset import Array, Table
 
 # Samples: no narrower is a Gaussian whose own derivative is taken; a slope is then right to a part in a thousand.
 NARROW = 0.75
+JUMP, JUMPS_BY = 0.1, 8.0  # of the range, and times the median change: larger is a jump
 # Of a channel that is cut off: samples of one number in a stretch, stretches, part of the usual slope at which it
 # arrives there, and different numbers of a channel that has only states
 FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
@@ -134,4 +135,20 @@ def clipped(table: Table, column: Array) -> np.ndarray:
         if len(found) >= FEWEST_FLATS and float(np.median(arrivals)) > STEEP * usual:
             for each in found:
                 out[each] = True
+    return out
+
+
+def near_jumps(table: Table, column: Array) -> np.ndarray:
+    """True within two samples of a jump: a change far above the usual one, by a tenth of the whole range at least.
+
+    What lies between two samples is not known there, and a slope over them belongs to neither of its sides.
+    """
+    out = np.zeros(len(column), dtype=bool)
+    change = np.abs(np.diff(column))
+    if not len(change):
+        return out
+    limit = max(JUMP * float(np.ptp(column)), JUMPS_BY * float(np.median(change)))
+    for run in table.runs:
+        for at in np.flatnonzero(change[run.start : run.stop - 1] > limit).tolist():
+            out[max(run.start, run.start + at - 1) : min(run.stop, run.start + at + 3)] = True
     return out

@@ -32,9 +32,9 @@ def book():
         Row("stribeck", *GUIDE, ("excess_N",), force(lambda p: sign * np.exp(-np.square(v / p["speed_m_per_s"]))),
             slow, **positive("excess_N")),
         Row("presliding", *GUIDE, ("friction_N",), force(lambda p: bend(v, p["slide_m"]) - sign),
-            [{"slide_m": way} for way in (1e-4, 3e-4, 1e-3, 3e-3, 0.01)], **positive("friction_N")),
+            [{"slide_m": way} for way in (1e-4, 3e-4, 1e-3, 3e-3, 0.01)], form="by the way", **positive("friction_N")),
         Row("presliding", *GUIDE, ("friction_N",), force(lambda p: -sign * np.exp(-np.square(v / p["speed_m_per_s"]))),
-            slow, **positive("friction_N")),
+            slow, form="by the speed", **positive("friction_N")),
         Row("sensor_lag", "drive", "timing", ("time_constant_s",), force(lambda p: -s["dF"])),
         # screws of 1 to 30 mm a turn, by half a millimetre
         Row("once_per_turn", *GUIDE, ("cosine_N", "sine_N"),
@@ -80,9 +80,8 @@ def test_the_balance_of_a_guide_is_force_against_mass_and_friction():
     assert np.array_equal(made.regimes["forward"], v > 0.0) and np.array_equal(made.regimes["backward"], v < 0.0)
     assert np.array_equal(made.regimes["fast"], np.abs(viscous) > 0.2 * top)
     assert np.array_equal(made.regimes["low speed"], ~made.regimes["fast"])
-    # both sides lie under 6 ms, one row in 8 ms counts, and nothing is whitened
-    assert (made.width, made.every, made.whitened) == (pytest.approx(3.0), 4, False)
-    assert Positioning().prepare(swung(0.01)).every == 1
+    # the diagnosis chooses the band
+    assert (made.width, made.every, made.noise_by_candidates) == (0.0, 1, True)
     assert Positioning(2.0).prepare(run).equations["force"].response == pytest.approx(2.0 * run["voltage_V"])
     generic = Positioning().generic(made)
     assert {name: list(each) for name, each in generic.items()} == {"force": ["v", "a", "x", "t"]}
