@@ -195,9 +195,7 @@ class Restart(Fault):
         self.where = f"fault {self.text()}"
         emulated(self.robot, self.name, self.where)
         if self.robot.polled:
-            raise FaultError(
-                f"{self.where}: ends outside hold on to this board; start them in separate processes"
-            )
+            raise FaultError(f"{self.where}: ends outside hold on to this board; start them in separate processes")
         self.back_ns = NEVER
         self.slots_before = 0
 

@@ -66,7 +66,7 @@ def test_the_text_names_wrong_answers_with_strength_and_number():
     assert f"    drag + stribeck: 4 #{truth['number']}" in text
 
 
-def test_an_answer_without_name_tells_whom_it_suspects():
+def test_an_answer_without_name_names_the_suspects():
     answer = UNSURE | {"evidence": {"suspects": ["cable_backlash at transmission"]}}
     text = confusion.text(*of((hidden("cable_backlash"), answer)))
     assert "no name (cable_backlash at transmission?)" in text
@@ -127,7 +127,7 @@ def test_a_run_leaves_truth_answers_and_tables_and_no_data(ran):
     assert figures["refit_only"][0] == figures["majority_label"][0]  # answers missing: none
 
 
-def test_an_interrupted_run_goes_on_and_a_finished_one_asks_nobody(ran, monkeypatch):
+def test_an_interrupted_run_goes_on_and_a_finished_one_asks_no_one(ran, monkeypatch):
     """Of three cases one has no answer yet: that one is asked, and the tables come out as they were."""
     before = {path: path.read_bytes() for path in ran.rglob("*.*") if path.suffix in (".json", ".txt", ".md")}
     lost = next((ran / "answers" / "refit_only").iterdir())
@@ -165,13 +165,13 @@ def test_a_folder_of_another_run_is_refused(ran, capsys):
         (["--cases", "0"], "1 or more"),
     ],
 )
-def test_what_cannot_be_run_is_said(arguments, said, tmp_path, capsys):
+def test_what_cannot_be_run_is_reported(arguments, said, tmp_path, capsys):
     with pytest.raises(SystemExit):
         benchmark.main(["--out", str(tmp_path), *arguments])
     assert said in capsys.readouterr().err
 
 
-def test_a_library_that_is_not_there_is_told(monkeypatch):
+def test_a_library_that_is_not_there_is_reported(monkeypatch):
     monkeypatch.setattr(benchmark.importlib.util, "find_spec", lambda name: None)
     methods, left_out = benchmark.methods_of(["refit_only", "sindy"])
     assert [method.name for method in methods] == ["refit_only"]

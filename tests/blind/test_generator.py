@@ -216,7 +216,7 @@ def test_an_experiment_without_effects_keeps_its_own_balances(experiment, monkey
     assert np.mean(np.abs(trajectory.I) > FLOWS_A) > 0.4
 
 
-def test_what_no_recording_can_tell_apart_is_a_tie_of_the_truth(monkeypatch):
+def test_what_no_recording_can_distinguish_is_a_tie_of_the_truth(monkeypatch):
     """Friction by direction is an offset of the load cell, also where only the current's offset is hidden; a torque
     ripple that goes with the voltage is not cogging, though both have the same period and phase.
     """
@@ -231,7 +231,7 @@ def test_what_no_recording_can_tell_apart_is_a_tie_of_the_truth(monkeypatch):
         assert (cosines[other] > TIE) is tied
 
 
-def test_a_size_is_told_in_the_catalogue_s_form(monkeypatch):
+def test_a_size_is_reported_in_the_catalogue_s_form(monkeypatch):
     """Drag with the square is the catalogue's own; friction by bristles is near a Gaussian of about its size."""
     monkeypatch.setattr(MOTOR_BENCH, "SAMPLES", 2000)
     told = {}
@@ -290,7 +290,7 @@ def test_no_pair_is_one_effect_twice():
     assert not any(pair in NO_PAIR for pair in pairs)
 
 
-def test_what_a_leg_does_faster_than_its_angle_tells_is_drowned():
+def test_what_a_leg_does_faster_than_its_angle_shows_is_drowned():
     """A torque at 0.5 Hz is judged by the current's noise; at 50 Hz by the acceleration, from the quieter of two rates.
 
     J times a rate's slope: from the angle J (2 pi f)^2 of its noise, from the back-EMF J 2 pi f of R I's noise over K.

@@ -97,7 +97,7 @@ def test_the_set_is_all_that_is_named_with_its_ties():
     assert found["size of the set"].cases == 3
 
 
-def test_a_tie_is_declared_when_truth_and_rival_stand_in_one_group():
+def test_a_tie_is_declared_when_truth_and_rival_are_in_one_group():
     truth = hidden("drag", ties=["stribeck"])
     answers = [named(("drag", ["stribeck"])), named(("stribeck", ["drag"])), named(("drag", ())), UNSURE]
     answers.append(named(("drag", ()), ("stribeck", ())))  # both at once is not a tie
@@ -141,7 +141,7 @@ def test_other_words_for_a_size_are_understood(cause, true, given, error, cases)
     assert found["coverage of 95 % intervals"].value in (1.0, None)
 
 
-def test_what_sits_in_a_sensor_may_be_said_to():
+def test_what_sits_in_a_sensor_may_be_named():
     found = figures([(hidden("sensor_offset", balance="E"), named(("sensor_offset", ()), subsystem="sensor"))])
     assert found["right subsystem"].value == 1.0
 
@@ -243,7 +243,7 @@ def test_a_coefficient_of_temperature_is_the_slope_over_its_base_parameter(cause
     assert found["coverage of 95 % intervals"].value == 1.0  # both signs of the coefficient: the ends stay in order
 
 
-def test_a_slope_over_the_current_squared_is_no_coefficient_of_temperature():
+def test_a_slope_over_the_current_squared_is_not_a_coefficient_of_temperature():
     given = {"ohm_per_heat": (0.02, 0.01, 0.03), "time_constant_s": (30.0, 30.0, 30.0)}
     answer = named(("resistance_temperature", (), given))
     answer["evidence"] = {"parameters": {"resistance_ohm": {"value": 1.3}}}

@@ -73,7 +73,7 @@ def test_an_error_frame_and_the_repeated_frame_are_reported():
     assert error[5] <= FIELD_DATA + 16 and error[6] > 0
 
 
-def test_telling_changes_no_message():
+def test_reporting_changes_no_message():
     messages = []
     for wants in (False, True):
         wired = Wired(3, seed=4)

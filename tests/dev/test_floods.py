@@ -40,7 +40,7 @@ def test_a_robot_under_floods_runs_as_fast_as_the_machine_can_hold(processors, s
     assert floods.speed_for(processors) == speed
 
 
-def test_every_flood_has_a_program_and_together_they_use_each_door():
+def test_every_flood_has_a_program_and_together_they_use_each_endpoint():
     doors = flooders.Doors("x")
     counts = {name: len(flooders.programs(name, doors)) for name in flooders.NAMES}
     assert set(flooders.FLOODS) < set(counts)

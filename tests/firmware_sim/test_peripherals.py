@@ -458,7 +458,7 @@ def test_a_full_receive_fifo_loses_the_new_byte_and_reports_it_once():
     assert [uart.RBR() for _ in range(17)] == [*range(16), 0]
 
 
-def test_bytes_that_came_as_a_group_are_taken_in_their_order():
+def test_bytes_that_arrived_as_a_group_are_taken_in_their_order():
     chip = chip_at()
     uart = Uart(chip, number=0, trigger=8)
     times = served(chip, UART_BYTE, 0)

@@ -96,7 +96,7 @@ def pty():
 # --- stamps ---------------------------------------------------------------------------------------------
 
 
-def test_bytes_that_came_in_are_stamped_one_after_the_other_after_the_poll():
+def test_bytes_that_arrived_are_stamped_one_after_the_other_after_the_poll():
     line, inbox = line_on(Paper(b"0123456789"))
     line.poll(5 * MS)
     assert inbox.messages == [

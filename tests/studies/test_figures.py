@@ -78,7 +78,7 @@ def test_a_sound_machine_has_nothing_wrong():
     assert not found["detected"] and found["causes"] == []
 
 
-def test_what_the_numbers_are_known_to_is_no_fault():
+def test_what_the_numbers_are_known_to_is_not_a_fault():
     """0.045 of a number known to 0.02 shows in a figure four times over its own error of 0.01."""
     found = diagnose(question({"b": 0.045}), machine(three), SEEDS).answer
     assert not found["detected"]
@@ -100,7 +100,7 @@ def alike(values):
     return {"x": a + b + c, "y": 2.0 * a - b - c, "bench_b": b, "bench_a": a}
 
 
-def test_a_tie_is_told_and_the_measurement_that_breaks_it_breaks_it():
+def test_a_tie_is_reported_and_the_measurement_that_breaks_it_breaks_it():
     benches = (Measurement("bench_a", 0.01, "look at a"), Measurement("bench_b", 0.01, "look at b"))
     asked = question({"b": 0.4}, ("x", "y"), alike, measurements=benches)
     found = diagnose(asked, machine(alike), SEEDS).answer
@@ -218,7 +218,7 @@ def test_every_run_is_asked_for_with_every_seed_and_the_answer_is_always_the_sam
     assert {point.seed for point in first} == set(SEEDS)
 
 
-def test_progress_is_told_to_the_end():
+def test_progress_is_reported_to_the_end():
     told = []
     diagnose(question({"a": 0.4}), machine(three), SEEDS, lambda *each: told.append(each))
     done = [each[0] for each in told]
@@ -277,7 +277,7 @@ def loaded(folder, text):
     return file.question(path, file.load(path), lambda name: {"body.a": 0.5, "body.b": 0.7}[name])
 
 
-def test_a_file_makes_the_question_that_stands_in_it(tmp_path):
+def test_a_file_makes_the_question_that_is_in_it(tmp_path):
     asked = loaded(tmp_path, FILE)
     (a,) = asked.candidates
     assert (a.value, a.moves) == (0.5, {"body.a": 1.0, "body.b": -1.0})  # the value is that of the first it moves
@@ -301,7 +301,7 @@ def test_a_file_makes_the_question_that_stands_in_it(tmp_path):
         ("title", "title =", "not valid TOML"),
     ],
 )
-def test_a_file_that_is_wrong_is_told_in_a_line(tmp_path, old, new, complaint):
+def test_a_file_that_is_wrong_is_reported_in_a_line(tmp_path, old, new, complaint):
     assert old in FILE
     with pytest.raises(UserError, match=complaint) as told:
         loaded(tmp_path, FILE.replace(old, new, 1))

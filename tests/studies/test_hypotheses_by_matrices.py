@@ -244,7 +244,7 @@ def objective(parameters, matrix, y, earlier=()):
     return _Objective(lambda v: y - matrix @ np.array([v[name] for name in names]), parameters, earlier, 1e-5)
 
 
-def test_what_is_known_before_stands_beside_the_data_as_rows():
+def test_what_is_known_before_is_next_to_the_data_as_rows():
     matrix, y = RNG.normal(size=(20, 3)), RNG.normal(size=20)
     asked = [
         Parameter("a", "", 2.0, uncertainty=0.5),
@@ -290,7 +290,7 @@ def test_what_is_known_before_stands_beside_the_data_as_rows():
         objective(asked, matrix, y, [SimpleNamespace(names=("a",), refused="why")])
 
 
-def test_nothing_known_before_is_no_row():
+def test_nothing_known_before_is_not_a_row():
     matrix, y = RNG.normal(size=(20, 2)), RNG.normal(size=20)
     made = objective([Parameter("a", "", 2.0), Parameter("b", "", 1.0)], matrix, y)
     assert made.rank == 0 and len(made.rows(made.start)) == 20 and made.weight == 1.0
@@ -311,7 +311,7 @@ def test_derivatives_stay_within_the_limits():
     assert min(seen) == 0.999999 and max(seen) == pytest.approx(1.001)
 
 
-def test_identifiability_is_told_by_singular_values_of_the_scaled_derivatives():
+def test_identifiability_is_reported_by_singular_values_of_the_scaled_derivatives():
     matrix = RNG.normal(size=(20, 3))
     asked = [Parameter("a", "", 2.0), Parameter("b", "", 0.5), Parameter("c", "", 0.0, -5.0, 5.0)]
     found = fit.identifiability(lambda v: matrix @ np.array([v["a"], v["b"], v["c"]]), asked)
@@ -349,7 +349,7 @@ def test_a_value_stands_on_a_limit_within_a_thousandth_of_its_error():
 # --- what was simulated -----------------------------------------------------------------------------------------------
 
 
-def test_outcomes_are_gathered_by_place_and_a_figure_of_no_run_is_told():
+def test_outcomes_are_gathered_by_place_and_a_figure_of_no_run_is_reported():
     runs = [
         [Outcome({"f": 1.0}, 10.0), Outcome({"f": 3.0, "g": 5.0}, 4.0, failed=True)],
         [Outcome({"f": 2.0}, 7.0, failed=True), Outcome({}, 1.0, failed=True)],

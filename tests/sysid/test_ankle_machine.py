@@ -179,7 +179,7 @@ def test_by_the_joint_alone_a_return_spring_is_named_with_the_tie_of_its_forms()
     assert "square" in forms
 
 
-def test_a_recording_that_does_not_say_what_the_ankle_was_to_do_is_told():
+def test_a_recording_that_does_not_say_what_the_ankle_was_to_do_is_reported():
     run = ankle_run(seconds=1.5)
     for missing, line in (
         ("joint_angle_rad", "ankle needs joint_angle_rad"),
@@ -199,7 +199,7 @@ def test_a_recording_that_does_not_say_what_the_ankle_was_to_do_is_told():
         (["--holdout-part", "0.5", "--holdout", "run.csv"], "--holdout-part 0.5: there are files to hold out already"),
     ],
 )
-def test_a_part_that_cannot_be_held_out_is_told(arguments, line, tmp_path, monkeypatch, capsys):
+def test_a_part_that_cannot_be_held_out_is_reported(arguments, line, tmp_path, monkeypatch, capsys):
     run = ankle_run(seconds=2.0)
     names = list(run.columns)
     rows = np.column_stack([run.time_s, *(run[name] for name in names)])
@@ -223,7 +223,7 @@ SLOW = DATA / "ranger_ankle_sine_slow.csv"
 
 
 @pytest.mark.skipif(not SLOW.is_file(), reason="the robot's sine logs are not here (RANGER_SIM_DATA)")
-def test_the_robot_s_ankle_has_a_return_spring_whose_form_the_slow_sine_does_not_tell():
+def test_the_robot_s_ankle_has_a_return_spring_whose_form_the_slow_sine_does_not_show():
     """First half against second; square and cube of the angle do equally well there (13.4 and 13.6 %)."""
     found = ranger_sim.diagnose(SLOW, "ankle", holdout_part=0.5).to_dict()
     assert not found["abstained"]

@@ -62,7 +62,7 @@ def test_foot_return_spring_and_friction_come_back():
     assert found.standard_errors["J_foot"] < 0.05 * 0.0013
 
 
-def test_a_log_in_pieces_too_short_to_use_is_told():
+def test_a_log_in_pieces_too_short_to_use_is_reported():
     data = bench.ankle_sine(seconds=0.6)
     with pytest.raises(UserError, match="ankle-sine needs a stretch of 1 s without a gap"):
         ankle.foot(data)

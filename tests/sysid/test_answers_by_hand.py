@@ -57,12 +57,12 @@ def test_what_is_named_explains_its_part_of_what_repeats():
         ((named(chi2=52.0),), 1e-9, 0.1, 90.0, False, True, False),
     ],
 )
-def test_something_is_wrong_and_what_it_is_can_be_said_or_not(names, p, after_p, excess, forbid, detected, doubtful):
+def test_something_is_wrong_and_what_it_is_can_be_named_or_not(names, p, after_p, excess, forbid, detected, doubtful):
     found = diagnosis(names, p, after_p, excess, forbid)
     assert (found.detected, found.doubtful) == (detected, doubtful)
 
 
-def test_a_value_is_told_with_two_errors_either_way():
+def test_a_value_is_reported_with_two_errors_either_way():
     regression = SimpleNamespace(values={"a": 3.0, "b": -1.0}, names=["b", "a"], covariance=np.diag([0.25, 4.0]))
     found = answer._value(regression, "a")
     assert found.value == 3.0 and found.ci95 == pytest.approx((3.0 - 3.92, 3.0 + 3.92))
@@ -80,7 +80,7 @@ def test_a_parameter_is_impossible_with_its_whole_interval_beyond_a_limit(low, h
     assert answer._impossible(found) == (["a"] if wrong else [])
 
 
-def test_what_the_model_had_is_told_beside_what_these_data_say():
+def test_what_the_model_had_is_printed_next_to_what_these_data_say():
     had = dataclasses.replace(named(), shape={"n": 1.0})
     was = KnownEffect("drag", "there", {"size": 0.5}, {"n": 1.0})
     regression = SimpleNamespace(
@@ -112,7 +112,7 @@ def plain(response, columns, **more):
 QUIET = SimpleNamespace(whitening={"one": Whitening(np.zeros(0), 0.5)}, shared={})
 
 
-def test_a_misfit_is_told_for_all_rows_and_each_regime_of_fifty():
+def test_a_misfit_is_reported_for_all_rows_and_each_regime_of_fifty():
     base, extra, noise = RNG.normal(size=(3, N))
     response = 2.0 * base + 3.0 * extra + 0.5 * noise
     few = np.arange(N) < 57  # 49 of them count: eight at the start do not
@@ -166,7 +166,7 @@ def test_a_shape_on_a_scale_is_tried_between_the_best_and_its_neighbours(best, w
 
 
 @pytest.mark.parametrize("pair", [False, True])
-def test_a_learned_table_is_least_squares_over_cells_beside_the_machine_s_own_columns(pair):
+def test_a_learned_table_is_least_squares_over_cells_next_to_the_machine_s_own_columns(pair):
     a, b, base, noise = RNG.normal(size=(4, N))
     response = 2.0 * base + np.where(a > 0.5, 3.0, -1.0) + 0.1 * noise
     one = plain(response, {"p": base, "still": np.zeros(N)})
@@ -210,7 +210,7 @@ def test_a_learned_table_is_least_squares_over_cells_beside_the_machine_s_own_co
     assert told["holdout_rms"] == [2.0, 1.0] and "holdout_rms" not in results.plain(found.result())
 
 
-def test_nothing_is_learned_where_no_test_over_signals_tells():
+def test_nothing_is_learned_where_no_test_over_signals_shows():
     one = plain(RNG.normal(size=N), {"p": RNG.normal(size=N)})
     regression = Regression([one], noise=QUIET)
     for tests in ([], [misfit.Test("one", "over t", 99.0, 1, 0.0)], [misfit.Test("port", "over a", 99.0, 1, 0.0)],
@@ -328,7 +328,7 @@ def test_what_the_simulator_cannot_have_says_why(cause, at, numbers, line):
         model_terms.term_of(BENCH, cause, at, numbers, {"resistance_ohm": 1.4, "torque_constant_Nm_per_A": 0.25})
 
 
-def test_other_places_have_no_gear_of_their_own():
+def test_other_places_have_no_separate_gear():
     ankle = SimpleNamespace(name="ankle", parameters=())
     assert model_terms.context_of(ankle, "inner_motor", {}).ratio == 1.0
     assert model_terms.context_of(ankle, "inner_motor", {}).motor is ANKLE_MOTOR
@@ -459,7 +459,7 @@ def test_a_time_base_is_the_finest_carrier_s_between_2_and_8_ms():
         timebase.even_table(one, ["hip_angle_rad"], ("hip_angle_rad",))
 
 
-def test_a_recording_of_which_all_but_moments_are_lost_is_told():
+def test_a_recording_of_which_all_but_moments_are_lost_is_reported():
     t = np.concatenate((0.5 * np.arange(5), 2.0 + 0.004 * np.arange(1, 11)))
     value = np.concatenate((10.0 * np.arange(5), 40.0 + 0.1 * np.arange(1, 11)))
     one = Dataset("d", {"hip_angle_rad": Channel("hip_angle_rad", "rad", t, value)})
@@ -468,7 +468,7 @@ def test_a_recording_of_which_all_but_moments_are_lost_is_told():
 
 
 @pytest.mark.parametrize(("rest", "told"), [(0.045, False), (0.055, True)])
-def test_a_parameter_is_told_alone_where_the_others_leave_a_twentieth_of_its_column(rest, told):
+def test_a_parameter_is_reported_alone_where_the_others_leave_a_twentieth_of_its_column(rest, told):
     one, two = RNG.normal(size=(2, N))
     one[8:] /= np.linalg.norm(one[8:])
     two[8:] -= one[8:] * (one[8:] @ two[8:])

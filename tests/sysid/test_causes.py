@@ -17,7 +17,7 @@ geometry inertia spring_value sensor_offset firmware_parameter
 """.split()
 
 
-def test_the_identifiers_stand_in_their_order():
+def test_the_identifiers_are_in_their_order():
     assert [cause.identifier for cause in causes.CAUSES.values()] == IDENTIFIERS
     assert {cause.number for cause in causes.CAUSES.values()} == set(range(1, causes.NUMBERS + 1))
 
@@ -45,7 +45,7 @@ def test_every_cause_names_known_balances_and_known_rivals():
         assert cause.key not in causes.rivals(cause)
 
 
-def test_a_cause_is_found_by_key_or_by_a_name_that_stands_at_one_place():
+def test_a_cause_is_found_by_key_or_by_a_name_that_is_at_one_place():
     assert causes.find("stribeck").number == 17
     assert causes.find("sensor_offset@gyro").number == 33
     with pytest.raises(UserError, match="sensor_offset: this cause has several places: sensor_offset@current"):

@@ -56,7 +56,7 @@ def test_only_the_time_that_all_channels_have_counts():
         (lambda: recording(channel("a_V", [0, 1], [0])), [], "channel a_V: (2,) stamps and (1,) values"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_in_a_line(made, names, line):
+def test_a_mistake_is_reported_in_a_line(made, names, line):
     with pytest.raises(UserError) as error:
         made().table(names)
     assert line in str(error.value)

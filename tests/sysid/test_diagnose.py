@@ -85,14 +85,14 @@ def test_a_cause_is_named_with_its_value_and_gains_on_a_run_that_was_not_seen():
     json.dumps(found, allow_nan=False)
 
 
-def test_what_the_data_cannot_tell_apart_is_a_tie():
+def test_what_the_data_cannot_distinguish_is_a_tie():
     found = diagnosed(slope=0.02)
     (cause,) = found["causes"]
     assert {cause["name"], *cause["tied_with"]} == {"floor", "sensor_offset"}
     assert found["next_experiment"]
 
 
-def test_what_the_model_has_already_is_no_finding():
+def test_what_the_model_has_already_is_not_a_finding():
     known = [KnownEffect("drag", "cart", {"quadratic": 0.021}, {})]
     found = diagnose(Cart(), [cart_run(1, drag=0.02)], known=known).answer
     assert not found["detected"] and found["causes"] == []
@@ -108,7 +108,7 @@ def test_a_known_effect_that_the_channels_cannot_show_is_a_mistake():
         diagnose(Cart(), [cart_run(1)], known=[KnownEffect("cogging", "cart", {"amplitude_Nm": 0.1}, {})])
 
 
-def test_progress_is_told_from_none_to_all():
+def test_progress_is_reported_from_none_to_all():
     told = []
     diagnose(Cart(), [cart_run(1, drag=0.02)], [cart_run(2)], progress=lambda what, share: told.append((what, share)))
     shares = [share for _, share in told]
@@ -143,7 +143,7 @@ def test_a_small_fault_is_found_as_often_as_its_size_says():
     assert sum(bool(each["causes"]) and each["causes"][0]["name"] == "drag" for each in found) >= 18
 
 
-def test_a_parameter_that_no_machine_can_have_is_told():
+def test_a_parameter_that_no_machine_can_have_is_reported():
     run = cart_run(1)
     backwards = Table(run.time_s, {"force_N": -run["force_N"], "v_m_per_s": run["v_m_per_s"]}, run.runs, run.name)
     found = diagnose(Cart(), [backwards]).answer
@@ -211,7 +211,7 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
         (["data.csv", "--experiment", "motor-bench"], "data.csv: motor-bench needs voltage_V"),
     ],
 )
-def test_a_mistake_is_told_in_a_line(arguments, line, own_machine, capsys):
+def test_a_mistake_is_reported_in_a_line(arguments, line, own_machine, capsys):
     cart_file(own_machine / "data.csv")
     assert main(["diagnose", *arguments]) == 2
     error = capsys.readouterr().err
@@ -240,7 +240,7 @@ def test_a_gear_that_none_has_is_refused_before_anything_is_read(gear, capsys):
         "\x00\x01\x02",
     ],
 )
-def test_data_that_say_nothing_are_told_in_a_line_and_never_blamed_on_a_cause(text, own_machine, capsys):
+def test_data_that_say_nothing_are_reported_in_a_line_and_never_blamed_on_a_cause(text, own_machine, capsys):
     (own_machine / "bad.csv").write_text(text, encoding="utf-8")
     assert main(["diagnose", "bad.csv", "--experiment", "my_cart:Cart"]) == 2
     error = capsys.readouterr().err

@@ -96,7 +96,7 @@ def test_the_speed_lies_under_a_gaussian_of_a_quarter_of_6_ms():
     assert made.signals["v"].max() == pytest.approx(0.01 / (0.0015 * math.sqrt(2.0 * math.pi)), rel=0.01)
 
 
-def test_a_guide_that_rests_or_has_no_voltage_is_told():
+def test_a_guide_that_rests_or_has_no_voltage_is_reported():
     rest = Table(
         TIME_S, {"position_m": np.full(len(TIME_S), 0.3), "voltage_V": TIME_S}, (slice(0, len(TIME_S)),), "log"
     )

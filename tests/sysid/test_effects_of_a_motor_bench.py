@@ -318,7 +318,7 @@ def test_balances_of_a_noiseless_bench_are_closed_by_its_own_numbers(measured):
         assert set(np.flatnonzero(~turning.valid)) == expected
 
 
-def test_a_bench_whose_signals_are_of_different_motions_is_told():
+def test_a_bench_whose_signals_are_of_different_motions_is_reported():
     run, true = driven()
     columns = run.columns
 
@@ -355,7 +355,7 @@ def test_rows_near_jumps_turns_and_ends_do_not_count():
         assert all(off[turn - 1 : turn + 3].all() for turn in turns if 20 < turn < len(run) - 20)
 
 
-def test_regimes_are_told_by_speed_its_change_and_the_power():
+def test_regimes_are_reported_by_speed_its_change_and_the_power():
     run, true = driven()
     made = MotorBench().prepare(run)
     s, moving = made.signals, made.equations["mechanical"].valid

@@ -105,7 +105,7 @@ def test_one_balance_is_enough_for_the_body_s_numbers_and_none_of_a_drive(equati
     assert all(each.cause == "resistance_temperature" for each in causes.made([recording("hip drive", "legs, outer")]))
 
 
-def test_a_lean_that_was_added_up_has_no_zero_of_its_own():
+def test_a_lean_that_was_added_up_has_no_separate_zero():
     added_up = recording("hip")
     del added_up.table.columns["outer_leg_angle_rad"]
     for recordings, there in (([recording("hip")], True), ([recording("hip"), added_up], False)):
@@ -133,7 +133,7 @@ def test_lengths_weights_and_stiffnesses_stay_positive_and_offsets_have_either_s
         assert all(found[key].admissible({key[2]: size}) for size in (-9.0, 9.0)), key
 
 
-def test_the_hip_s_motor_has_frictions_beside_the_base_model():
+def test_the_hip_s_motor_has_frictions_next_to_the_base_model():
     one = recording("hip")
     found = by_key(causes.made([one]))
     sign = np.tanh(20.0 * RATE)
@@ -245,7 +245,7 @@ def steps(contact=True, hertz=0.8, split=0.4, seconds=6.0, step_s=0.002):
     return Table(t, columns, (slice(0, len(t)),), "steps")
 
 
-def test_a_contact_tells_a_strike_13_ms_late_while_the_legs_are_apart():
+def test_a_contact_shows_a_strike_13_ms_late_while_the_legs_are_apart():
     found = strikes.find(steps())
     # outer feet at 0, 1.25, 2.5 s ..., inner ones between
     times = [each.time_s - 10.0 for each in found]
@@ -259,7 +259,7 @@ def test_a_contact_tells_a_strike_13_ms_late_while_the_legs_are_apart():
     assert len(strikes.find(again)) == len(found)
 
 
-def test_of_short_runs_nothing_is_told_and_each_run_has_its_own_number():
+def test_of_short_runs_nothing_is_reported_and_each_run_has_its_own_number():
     run = steps()
     cut = Table(run.time_s, run.columns, (slice(0, 19), slice(19, 1500), slice(1500, 3000)), "cut")
     found = strikes.find(cut)
@@ -280,7 +280,7 @@ def test_without_contacts_the_sharpest_jump_of_the_hip_s_rate_in_each_half_swing
     assert strikes.find(small) == []
 
 
-def test_a_leg_stands_between_two_strikes_of_different_legs_that_are_a_step_apart():
+def test_a_leg_is_in_stance_between_two_strikes_of_different_legs_that_are_a_step_apart():
     t = 0.01 * np.arange(600)
     table = Table(t, {}, (slice(0, 400), slice(400, 600)), "table")
     touches = [

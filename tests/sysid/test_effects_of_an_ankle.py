@@ -425,7 +425,7 @@ def test_a_prediction_is_judged_by_its_rms_over_what_the_law_leaves():
     assert shifted.nrmse == pytest.approx(0.5 / np.std([1.0, 3.0, -1.0, 3.0]))
 
 
-def test_a_rate_is_told_behind_the_law_s_filter_or_as_it_is():
+def test_a_rate_is_reported_behind_the_law_s_filter_or_as_it_is():
     values = RNG.normal(size=(M_STEPS, 2))
     assert RUN.shown(values) is values
     filtered = dataclasses.replace(RUN, drive=dataclasses.replace(DRIVE, filter_s=0.02))

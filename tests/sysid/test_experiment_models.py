@@ -469,7 +469,7 @@ def test_each_term_parameter_and_cause_of_an_experiment_is_that_of_the_second_bo
         assert found.channel == found.name.removeprefix("sensor of ") or not found.name.startswith("sensor of ")
 
 
-def test_a_place_is_told_for_causes_that_could_stand_at_several():
+def test_a_place_is_reported_for_causes_that_could_be_at_several():
     for name in SECOND_BOOK:
         model = experiment_models.MODELS[name]()
         assert set(model.places) <= set(model.causes)
@@ -504,7 +504,7 @@ PLACES = {
 }
 
 
-def test_causes_stand_at_their_most_usual_places():
+def test_causes_are_at_their_most_usual_places():
     assert {name: dict(make().places) for name, make in experiment_models.MODELS.items()} == PLACES
 
 

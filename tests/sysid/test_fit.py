@@ -79,7 +79,7 @@ def test_a_parameter_in_a_dead_zone_at_the_start_is_not_called_dead():
     assert identifiability(residual, [Parameter("threshold", "1", 1.0)]).names == ("threshold",)
 
 
-def test_two_parameters_with_the_same_effect_are_told_before_and_refused_after_the_fit():
+def test_two_parameters_with_the_same_effect_are_reported_before_and_refused_after_the_fit():
     x, y = noisy_line()
     told = []
     twins = [SLOPE, Parameter("gain", "1", 1.0, 0.1, 10.0)]
@@ -125,7 +125,7 @@ def test_an_impossible_value_is_refused_with_its_reason():
     assert fit(line(x, -y), [SLOPE, INTERCEPT], physical=physical).refused == "a resistance cannot be below 0"
 
 
-def test_what_an_earlier_fit_found_is_weighed_in_as_if_its_data_stood_beside_these():
+def test_what_an_earlier_fit_found_is_weighed_in_as_if_its_data_were_next_to_these():
     x, y = noisy_line(count=60)
     first = fit(line(x[:25], y[:25]), [SLOPE, INTERCEPT], 25, noise=0.1)
     second = fit(line(x[25:], y[25:]), [SLOPE, INTERCEPT], 35, noise=0.1, earlier=[first])
@@ -135,7 +135,7 @@ def test_what_an_earlier_fit_found_is_weighed_in_as_if_its_data_stood_beside_the
     assert second.covariance == pytest.approx(whole.covariance, rel=1e-6)
 
 
-def test_neighbours_of_an_autoregression_correlate_and_ends_of_runs_are_no_neighbours():
+def test_neighbours_of_an_autoregression_correlate_and_ends_of_runs_are_not_neighbours():
     values = autocorrelated(generator(3, "ar"), 20_000, 0.8)
     # standard error sqrt((1 - rho^2) / n) = 0.0042; five of them
     assert neighbours_correlation(values) == pytest.approx(0.8, abs=0.021)
@@ -192,7 +192,7 @@ def test_the_profile_of_what_has_no_upper_end_is_open_above():
         (lambda v: np.ones(9), [], "no parameter to fit"),
     ],
 )
-def test_what_cannot_be_fitted_is_told_in_a_line(residual, parameters, message):
+def test_what_cannot_be_fitted_is_reported_in_a_line(residual, parameters, message):
     with pytest.raises(UserError, match=message):
         fit(residual, parameters)
 

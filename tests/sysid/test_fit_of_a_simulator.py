@@ -132,7 +132,7 @@ def test_an_effect_that_acts_pushes_with_its_size_and_is_a_parameter():
     assert np.allclose(loose[:, 0], 1e-9 * np.sqrt(np.mean(X**2)), rtol=1e-9)
 
 
-def test_noises_sizes_and_starts_are_told_by_the_recording():
+def test_noises_sizes_and_starts_are_reported_by_the_recording():
     rough = [roughness(table(), column) for column in (2.0 * X, V + 0.5 * U)]
     fit = _Fit(Toy(), table())
     # a lattice of 0.6 has an error of 0.6 / sqrt(12) beside the channel's own noise

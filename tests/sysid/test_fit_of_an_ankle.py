@@ -156,7 +156,7 @@ def test_slopes_are_differences_of_what_is_missed(motor):
 
 
 @pytest.mark.parametrize("motor", [True, False])
-def test_slopes_of_torques_beside_the_base_are_differences_too(motor):
+def test_slopes_of_torques_next_to_the_base_are_differences_too(motor):
     """Motions with such torques are found to a millionth of a radian, so that they have to move it by more."""
     fit = fit_of(table(motor), extra={"square": lambda m: -(m.a**2)})
     effects = {(each.cause, each.at): each for each in Ankle().effects([ankle._recording(fit_of(table(motor)))])}
@@ -169,7 +169,7 @@ def test_slopes_of_torques_beside_the_base_are_differences_too(motor):
         assert np.max(np.abs(found - slopes[:, number])) < 0.05 * np.max(np.abs(found)), name
 
 
-def test_an_effect_shows_beside_the_motion_what_it_shows():
+def test_an_effect_shows_next_to_the_motion_what_it_shows():
     fit = fit_of(table())
     effects = {(each.cause, each.at): each for each in Ankle().effects([ankle._recording(fit)])}
     fit.acting = [
@@ -244,7 +244,7 @@ def test_a_loosened_fit_begins_anew_and_leaves_the_old_one():
     assert set(other.spread) == set(ankle.LOOSE) and other.cost() < fit.cost() + 1e9
 
 
-def test_effects_are_put_beside_a_fit_with_their_coefficients_free_or_fixed():
+def test_effects_are_put_next_to_a_fit_with_their_coefficients_free_or_fixed():
     fit = fit_of(table())
     effects = {(each.cause, each.at): each for each in Ankle().effects([ankle._recording(fit)])}
     scale = effects["sensor_scale", "joint_angle_rad"]
@@ -329,7 +329,7 @@ def test_what_an_effect_in_the_simulation_does_is_in_the_response_again():
     assert made.acting == {scale.key({}): (0.1,)}
 
 
-def test_a_law_that_fits_is_told_as_a_note():
+def test_a_law_that_fits_is_reported_as_a_note():
     run = table(low=0.2)
     (program, filtered) = ankle._recording(fit_of(run, of_program=True)).findings
     assert (program.channel, program.size, program.unit, program.severity) == ("target_angle_rad", 0.3, "rad", "note")

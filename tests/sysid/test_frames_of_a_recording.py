@@ -62,7 +62,7 @@ def test_signals_have_their_message_s_scale_and_length_and_the_recording_s_stamp
     assert not [each for each in found.findings if each.kind in ("unknown_frames", "broken_frames")]
 
 
-def test_frames_that_nobody_knows_and_those_that_do_not_fit_are_counted(dbc):
+def test_frames_of_unknown_senders_and_those_that_do_not_fit_are_counted(dbc):
     rows = [
         angle(1_000, 5),
         angle(2_000, 5, 1),
@@ -90,7 +90,7 @@ def test_stamps_of_the_epoch_begin_at_the_first_frame_that_was_one(dbc):
     assert late["ANGLE"].time_s.tolist() == [5.0]
 
 
-def test_recordings_and_files_that_say_nothing_are_told(dbc, tmp_path):
+def test_recordings_and_files_that_say_nothing_are_reported(dbc, tmp_path):
     with pytest.raises(UserError, match=r"log: none of its frames is a message of the DBC file \(1 others\)"):
         frames.decode("log", [angle(1, 1, identifier=9), angle(2, 1, flags=FLAG_ERROR)], [dbc])
     with pytest.raises(UserError, match="none.dbc: cannot be read"):

@@ -137,7 +137,7 @@ def test_an_effect_that_is_taken_back_leaves_the_simulator_as_it_was():
     assert response == pytest.approx(wanted, abs=1e-3 * float(np.ptp(wanted)))
 
 
-def test_a_recording_that_says_nothing_is_told_in_a_sentence():
+def test_a_recording_that_says_nothing_is_reported_in_a_sentence():
     run = log(1)
     still = Table(run.time_s, {"voltage_V": run["voltage_V"], "angle_rad": np.zeros(COUNT)}, run.runs, "still")
     with pytest.raises(UserError, match="still: angle_rad never changes; servo-arm can be judged in motion only"):

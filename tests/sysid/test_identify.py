@@ -60,7 +60,7 @@ def test_static_and_dynamic_friction_come_apart_where_they_differ():
         assert found.standard_errors[name] < 0.03 * true
 
 
-def test_unbalanced_legs_are_told_from_balanced_ones():
+def test_unbalanced_legs_are_distinguished_from_balanced_ones():
     body = BodyParameters(inner_hip_inertia_kg_m2=0.535, inner_mass_offset_kg_m=0.01)
     found = legs.joint(leg.level(body), leg.hang(body), leg.pendulum(body))
     told = {each.name: each for each in legs.balance(found)}
@@ -148,13 +148,13 @@ def test_a_torque_that_counts_the_other_way_is_refused_as_impossible():
         ("pendulum", lambda d: altered(d, "angle_rad", np.linspace(0.0, 1.0, 1200)), "less than two periods"),
     ],
 )
-def test_data_that_do_not_serve_a_bench_are_told_in_a_line(bench, change, message):
+def test_data_that_do_not_serve_a_bench_are_reported_in_a_line(bench, change, message):
     one = registry.BENCHES[bench]
     with pytest.raises(UserError, match=message):
         registry.alone(one, change(one.record(coverage.ROBOT, 1)))
 
 
-def test_a_constant_channel_is_told_and_not_fitted():
+def test_a_constant_channel_is_reported_and_not_fitted():
     data = motor.stall()
     flat = Channel("voltage_V", "V", data["voltage_V"].time_s, np.full(len(data["voltage_V"].value), 3.0))
     found = registry.alone(registry.BENCHES["stall"], Dataset("stall", data.channels | {"voltage_V": flat}))

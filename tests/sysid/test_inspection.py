@@ -5,7 +5,7 @@ import pytest
 from ranger_sim.sysid import causes, inspection
 
 
-def test_every_cause_tells_where_to_look_in_one_sentence():
+def test_every_cause_shows_where_to_look_in_one_sentence():
     for key in causes.CAUSES:
         text = inspection.LOOK_AT[key]
         assert text.endswith(".") and text.count(". ") == 0, key

@@ -28,7 +28,7 @@ from ranger_sim.tools import cli
 ELECTRIC = ("voltage_V", "current_A", "speed_rad_per_s")
 
 
-def test_every_cause_of_the_catalogue_is_in_an_experiment_and_every_channel_is_one_of_its_own():
+def test_every_cause_of_the_catalogue_is_in_an_experiment_and_every_channel_is_a_separate_one():
     found = {cause for name in MODELS for cause in model_of(name).causes}
     assert found == set(causes.CAUSES)
     assert set(MODELS) == set(channels.EXPERIMENTS)
@@ -246,6 +246,6 @@ def test_a_mistake_on_the_command_line_is_reported_in_one_line(capsys, arguments
     assert code == 2 and line in printed.err and printed.err.count("\n") == 1
 
 
-def test_a_channel_that_the_experiment_does_not_have_is_told():
+def test_a_channel_that_the_experiment_does_not_have_is_reported():
     with pytest.raises(UserError, match="leg-swing: unknown channel 'speed_rad_per_s'"):
         analyse("leg-swing", ["speed_rad_per_s"])

@@ -99,7 +99,7 @@ def test_without_the_voltage_the_current_drives_and_a_sound_leg_raises_no_alarm(
     assert not told(4, with_voltage=False)["detected"]
 
 
-def test_recordings_that_say_nothing_are_told_in_a_sentence():
+def test_recordings_that_say_nothing_are_reported_in_a_sentence():
     run = swing(5)
     columns = {name: run[name] for name in ("hip_angle_rad", "current_A", "voltage_V")}
     still = Table(run.time_s, columns | {"hip_angle_rad": np.full(SIZE, 0.1)}, run.runs, "still")

@@ -178,7 +178,7 @@ def test_the_walk_runs_with_the_written_file(cogging, tmp_path, capsys):
     assert str(path) in out.read_text(encoding="utf-8")
 
 
-def test_what_cannot_be_simulated_is_refused_or_left_out_by_the_user_and_told(cogging, tmp_path, capsys):
+def test_what_cannot_be_simulated_is_refused_or_left_out_by_the_user_and_reported(cogging, tmp_path, capsys):
     text = cogging[3].read_text(encoding="utf-8") + (
         '\n[[diagnosis.effect]]\ncause = "presliding"\nat = "hip_motor"\nno_form = "there is none"\n'
         "left_out = false\ncoefficients = { friction_Nm = 0.1 }\nshape = { slide_rad = 0.01 }\n"
@@ -196,7 +196,7 @@ def test_what_cannot_be_simulated_is_refused_or_left_out_by_the_user_and_told(co
     assert [each.cause for each in model_file.read(path, BENCH).effects] == ["cogging", "presliding"]
 
 
-def test_a_bench_has_the_models_motor_and_tells_what_has_no_part_in_it(tmp_path, capsys):
+def test_a_bench_has_the_models_motor_and_shows_what_has_no_part_in_it(tmp_path, capsys):
     path = tmp_path / "model.toml"
     path.write_text(
         '[[term]]\nform = "resistance_change"\nat = "hip_motor"\nchange_ohm = 0.3\n'
@@ -257,7 +257,7 @@ def test_springs_and_cables_of_a_model_are_felt_where_they_are_pulled():
         ("a = [", "not valid TOML"),
     ],
 )
-def test_what_is_wrong_in_a_model_file_is_told_in_a_line(text, line, tmp_path):
+def test_what_is_wrong_in_a_model_file_is_reported_in_a_line(text, line, tmp_path):
     path = tmp_path / "model.toml"
     if "diagnosis.effect" in text:
         text = "[diagnosis]\nexperiment = 'motor-bench'\n" + text

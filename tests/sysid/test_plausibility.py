@@ -33,20 +33,20 @@ def test_a_sound_run_raises_no_doubt():
     assert kinds(diagnose(Cart(), [cart_run(1, drag=0.02)]).answer) == []
 
 
-def test_a_sign_turned_round_is_no_machine_and_no_cause():
+def test_a_sign_turned_round_is_neither_a_machine_nor_a_cause():
     found = diagnose(Cart(), [changed(force_N=-cart_run(1, drag=0.02)["force_N"])]).answer
     assert "impossible" in kinds(found)
     assert found["detected"] and found["abstained"] and found["causes"] == []
     assert found["evidence"]["parameters_are_physical"] is False
 
 
-def test_a_channel_that_does_not_belong_to_the_others_is_told():
+def test_a_channel_that_does_not_belong_to_the_others_is_reported():
     noise = generator(3, "another channel").normal(size=SIZE)
     found = diagnose(Cart(), [changed(force_N=noise)]).answer
     assert "unexplained" in kinds(found) and found["abstained"] and found["causes"] == []
 
 
-def test_a_channel_in_another_unit_is_told_by_the_parameters():
+def test_a_channel_in_another_unit_is_reported_by_the_parameters():
     """Force in mN under the name of N: a mass of 1.1 t, within no limit of 10 kg; in 0.1 N: 11 kg, reported."""
     force = cart_run(1, drag=0.02)["force_N"]
     assert "impossible" in kinds(diagnose(Cart(), [changed(force_N=1000.0 * force)]).answer)
@@ -90,7 +90,7 @@ def doubts(table):
 
 @pytest.mark.parametrize("channel", ["voltage_V", "speed_rad_per_s"])
 @pytest.mark.parametrize("with_angle", [False, True])
-def test_a_voltage_or_a_speed_with_its_sign_turned_round_is_no_machine(bench, channel, with_angle):
+def test_a_voltage_or_a_speed_with_its_sign_turned_round_is_not_a_machine(bench, channel, with_angle):
     columns = {name: values for name, values in bench.columns.items() if with_angle or name != "motor_angle_rad"}
     turned = with_factors(Table(bench.time_s, columns, bench.runs), **{channel: -1.0})
     with pytest.raises(UserError, match="opposite signs|not the same motion|the other way round"):
@@ -160,12 +160,12 @@ def test_equations_that_share_a_parameter_contradict_each_other_at_another_sign_
         (1e-3, "turns 99[0-9] times as fast"),
     ],
 )
-def test_a_speed_in_another_unit_than_the_angle_is_no_slipping_pulley(bench, factor, line):
+def test_a_speed_in_another_unit_than_the_angle_is_not_a_slipping_pulley(bench, factor, line):
     with pytest.raises(UserError, match=line):
         MotorBench().prepare(with_factors(bench, speed_rad_per_s=factor))
 
 
-def test_a_speed_that_is_another_motion_than_the_angle_is_told(bench):
+def test_a_speed_that_is_another_motion_than_the_angle_is_reported(bench):
     noise = generator(1, "noise").normal(size=len(bench))
     with pytest.raises(UserError, match="not the same motion"):
         MotorBench().prepare(Table(bench.time_s, {**bench.columns, "speed_rad_per_s": noise}, bench.runs))
@@ -230,12 +230,12 @@ def test_a_scale_or_an_offset_that_no_sensor_has_is_another_signal(cause, coeffi
         (2.0, []),
     ],
 )
-def test_a_factor_between_two_equations_tells_the_units_that_would_do_it(factor, meant):
+def test_a_factor_between_two_equations_shows_the_units_that_would_do_it(factor, meant):
     assert plausibility.other_units(MotorBench(), factor) == meant
 
 
 @pytest.mark.parametrize(("few", "told"), [(20, []), (50, ["few_rows"])])
-def test_few_rows_are_told_below_what_the_machine_says_is_few(few, told):
+def test_few_rows_are_reported_below_what_the_machine_says_is_few(few, told):
     recording = Cart().prepare(cart_run(1))
     (name, equation), *_ = recording.equations.items()
     valid = np.zeros_like(equation.valid)

@@ -57,7 +57,7 @@ def test_the_nearest_form_of_the_other_cause_counts(bench):
     assert found["ties"][0]["behind"] == 12.0
 
 
-def test_a_tie_that_was_not_predicted_is_told(bench):
+def test_a_tie_that_was_not_predicted_is_reported(bench):
     found = predicted_ties.of(*bench, named("stribeck", "hip_motor", [("presliding", "hip_motor")]))
     assert [(each["with"], each["data"]) for each in found["ties"]] == [("presliding", predicted_ties.NOT_PREDICTED)]
     assert predicted_ties.told(found) == [
@@ -65,7 +65,7 @@ def test_a_tie_that_was_not_predicted_is_told(bench):
     ]
 
 
-def test_what_the_equations_do_not_have_is_told_as_not_tried(bench):
+def test_what_the_equations_do_not_have_is_reported_as_not_tried(bench):
     machine, recordings = bench
 
     class WithoutDeadTime(MotorBench):
@@ -76,7 +76,7 @@ def test_what_the_equations_do_not_have_is_told_as_not_tried(bench):
     assert found["ties"][0]["data"] == predicted_ties.NOT_TRIED
 
 
-def test_a_cause_that_these_channels_were_not_predicted_to_show_is_told(bench):
+def test_a_cause_that_these_channels_were_not_predicted_to_show_is_reported(bench):
     """A backlash between motor and output, without the motor's angle."""
     machine, (recording,) = bench
     table = recording.table

@@ -70,7 +70,7 @@ def test_a_unit_in_a_name_becomes_si(column, name, factor):
 @pytest.mark.parametrize(
     "column", ["current_min", "current_1", "position", "A", "state_x", "speed_furlongs", "gain_V_per"]
 )
-def test_what_is_no_unit_is_not_taken_for_one(column):
+def test_what_is_not_a_unit_is_not_taken_for_one(column):
     assert units.split(column) == (column, None)
 
 
@@ -279,7 +279,7 @@ def test_the_separator_is_that_of_the_first_fifty_lines(table):
     assert data["a_V"].value.tolist() == [float(k) for k in range(49)]
 
 
-def test_an_empty_cell_is_an_instant_without_a_sample(table):
+def test_an_empty_cell_is_a_time_without_a_sample(table):
     data = table("t_s,fast_V,slow_A\n0,1,5\n1,2,\n2,3,7\n")
     assert data["slow_A"].time_s.tolist() == [0.0, 2.0]
     assert data["fast_V"].time_s.tolist() == [0.0, 1.0, 2.0]
@@ -303,7 +303,7 @@ def test_a_table_without_names_is_named_by_the_mapping(table):
     assert [each.kind for each in data.findings] == ["no_header"]
 
 
-def test_a_pair_that_is_none_is_told():
+def test_a_pair_that_is_none_is_reported():
     assert columns.mapping_of(["a=b", "c = d"]) == {"a": "b", "c": "d"}
     for text in ("a", "=b", "a="):
         with pytest.raises(UserError, match="old=new is expected"):
@@ -347,7 +347,7 @@ def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
         (b"\xff\xfe\x00", "not a text table|no row|no time column|empty|its text is not utf-16"),
     ],
 )
-def test_what_is_no_table_is_told_in_a_line(table, text, line):
+def test_what_is_not_a_table_is_reported_in_a_line(table, text, line):
     with pytest.raises(UserError, match=line) as error:
         table(text)
     assert "\n" not in str(error.value)
@@ -532,7 +532,7 @@ def test_the_case_of_a_value_that_is_not_available():
     assert data["speed"].value[0] == pytest.approx(1000.0 * math.pi / 30)
 
 
-def test_a_broken_measurement_file_is_told_in_a_line(tmp_path):
+def test_a_broken_measurement_file_is_reported_in_a_line(tmp_path):
     path = tmp_path / "broken.mf4"
     for content in (b"", b"MDF     4.10    nothing of it is true" * 5, os.urandom(500)):
         path.write_bytes(content)
@@ -595,7 +595,7 @@ def test_the_measured_files_read_under_the_names_of_their_experiments(file, expe
     assert all(np.isfinite(each.value).all() for each in data.channels.values())
 
 
-def test_a_needed_channel_that_is_missing_is_told_with_what_names_it(table):
+def test_a_needed_channel_that_is_missing_is_reported_with_what_names_it(table):
     data = table("t_s,voltage_V,strom\n0,1,2\n1,2,3\n")
     with pytest.raises(UserError, match="motor-bench needs current_A .*--map NAME=current_A names it"):
         channels.named_for(data, "motor-bench")

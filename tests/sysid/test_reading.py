@@ -204,7 +204,7 @@ def test_an_export_of_an_instrument_has_its_stamps_and_units(kind, written):
     assert amperes.value == pytest.approx(0.5 * np.cos(0.1 * np.arange(200)), abs=1e-6)
 
 
-def test_settings_next_to_the_data_of_an_older_tektronix_are_no_channels(written):
+def test_settings_next_to_the_data_of_an_older_tektronix_are_not_channels(written):
     settings = ["Record Length,2.0e+02", "Sample Interval,1.0e-02", "Vertical Units,V", "Horizontal Units,s"]
     lines = [f"{settings[k] if k < 4 else ','},,{0.01 * k:018.12f},{math.sin(0.1 * k):9.5f}," for k in range(200)]
     measurement = read(written("\n".join(lines) + "\n"))

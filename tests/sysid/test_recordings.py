@@ -68,7 +68,7 @@ def holes(share):
     ],
     ids=["microamperes", "milliseconds", "holes", "a stuck sensor", "stamps of 50 ms", "two recordings"],
 )  # fmt: skip
-def test_data_that_are_not_what_they_are_said_to_be_are_refused(tmp_path, change, line):
+def test_data_that_are_not_what_they_are_declared_to_be_are_refused(tmp_path, change, line):
     with pytest.raises(UserError, match=line):
         prepared(bench(tmp_path / "a.csv", change), "motor-bench")
 

@@ -74,7 +74,7 @@ def test_intervals_hold_with_noise_that_remembers():
     assert stats.binom.ppf(1e-4, 200, 0.95) <= held <= 199
 
 
-def test_a_noisy_column_biases_least_squares_and_not_a_fit_by_its_stand_in():
+def test_a_noisy_column_biases_least_squares_and_not_a_fit_by_its_substitute():
     rng = generator(3, "errors in variables")
     truth = np.sin(np.arange(SIZE) * 0.02)
     measured, other = truth + 0.5 * rng.normal(size=SIZE), truth + 0.5 * rng.normal(size=SIZE)
@@ -116,7 +116,7 @@ def test_the_chi_square_of_a_real_column_is_its_size_over_its_noise():
     assert chi2 > 60.0
 
 
-def test_products_beside_the_base_are_those_of_the_whole_columns():
+def test_products_next_to_the_base_are_those_of_the_whole_columns():
     rng = generator(8, "products")
     x, other = np.sin(np.arange(SIZE) * 0.1), rng.normal(size=SIZE)
     made = Regression([recording(x + rng.normal(size=SIZE), {"slope": x}, {"slope": x + 0.1 * other})])
@@ -139,7 +139,7 @@ def sharing(seed, parameters):
     return Regression([Recording(table, {}, both)]), x
 
 
-def test_equations_that_share_noise_tell_by_how_much():
+def test_equations_that_share_noise_show_by_how_much():
     made, x = sharing(6, ("one", "other"))
     assert made.shared["one", "other"] == pytest.approx(0.5, abs=0.06)
     ones = np.ones((SIZE, 1))
@@ -162,14 +162,14 @@ def test_equations_that_share_noise_tell_by_how_much():
     assert inflation(columns) == pytest.approx(known, rel=1e-9)
 
 
-def test_a_parameter_of_two_equations_that_share_noise_is_known_as_well_as_they_tell_together():
+def test_a_parameter_of_two_equations_that_share_noise_is_known_as_well_as_they_show_together():
     """Of both with noise of variance 2, correlated by 1/2, the mean has (1 + 1/2) / 2 of the variance of one."""
     made, x = sharing(8, ("slope", "slope"))
     # 10 %: both variances and the correlation are estimated from these rows
     assert made.covariance[0, 0] == pytest.approx(0.75 * 2.0 / np.sum(x**2), rel=0.1)
 
 
-def test_products_of_columns_beside_the_base_are_those_of_the_rows():
+def test_products_of_columns_next_to_the_base_are_those_of_the_rows():
     rng = generator(5, "gram")
     x, other = np.sin(np.arange(SIZE) * 0.1), np.sin(np.arange(SIZE) * 0.23)
     made = Regression([recording(x + rng.normal(size=SIZE), {"slope": x}, {"slope": x + 0.1 * other})])

@@ -134,7 +134,7 @@ def test_values_their_covariance_and_the_residual_are_those_of_dense_matrices():
         assert found.rows[name] == found.rows_of(name) == rows
 
 
-def test_columns_of_an_effect_are_put_beside_the_base_as_by_matrices():
+def test_columns_of_an_effect_are_put_next_to_the_base_as_by_matrices():
     made, found, dense = prepared()
     widths = RNG.normal(size=(FIRST + SECOND, 2)), RNG.normal(size=(FIRST + SECOND, 2))
     both = [{"one": widths[0][:FIRST], "two": widths[1][:FIRST]}, {"one": widths[0][FIRST:]}]
@@ -192,7 +192,7 @@ def test_a_column_that_the_base_has_already_leaves_nothing():
     assert np.array_equal(free.gram(parts, free.shadow(parts)), np.zeros((1, 1)))
 
 
-def test_parameters_that_cannot_be_told_apart_or_stand_nowhere_are_named():
+def test_parameters_that_cannot_be_distinguished_or_are_nowhere_are_named():
     made = recordings()
     for each in made:
         e = each.equations["one"]
@@ -224,7 +224,7 @@ def test_a_parameter_needs_ten_samples_unless_it_is_known_before():
 # --- rows, repeats and noise ------------------------------------------------------------------------------------------
 
 
-def test_rows_are_kept_from_each_run_s_start_under_a_gaussian_of_their_own():
+def test_rows_are_kept_from_each_run_s_start_under_a_separate_gaussian():
     runs = (slice(0, 31), slice(31, 60))
     one = Recording(table(60, *runs), {}, {}, width=1.5, every=3)
     column = RNG.normal(size=(60, 2))
@@ -396,7 +396,7 @@ def left(response, *columns):
     return float(np.sum((response[8:] - matrix @ np.linalg.lstsq(matrix, response[8:], rcond=None)[0]) ** 2))
 
 
-def test_causes_are_taken_the_most_telling_first_with_what_they_are_worth():
+def test_causes_are_taken_the_most_informative_first_with_what_they_are_worth():
     near = A + 0.05 * E  # does nearly as well as A itself
     response = 3.0 * BASE + 1.0 * A + 0.5 * B + NOISE
     effects = [
@@ -504,7 +504,7 @@ def test_general_tests_are_chi_squares_of_their_groups_and_of_all_together():
 
 
 @pytest.mark.parametrize("periods", [300, 700])
-def test_a_line_in_the_spectrum_stands_over_the_median_beside_it(periods):
+def test_a_line_in_the_spectrum_stands_over_the_median_next_to_it(periods):
     rng = generator(11, "line")
     count = 8000
     response = rng.normal(size=count) + 0.15 * np.sin(2.0 * math.pi * periods * np.arange(count) / count)

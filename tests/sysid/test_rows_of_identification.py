@@ -236,7 +236,7 @@ def test_a_simulated_swing_s_rows_are_angles_less_the_encoder_s_zero():
     assert made.residual(values | {"outer_J_hip": 0.6}) != pytest.approx((one.angle_rad - 0.004 - motion) / ENCODER)
 
 
-def test_legs_stand_in_a_recording_by_its_column_and_need_fifty_samples_each():
+def test_legs_are_in_a_recording_by_its_column_and_need_fifty_samples_each():
     t = 0.02 * np.arange(120)
     shown = np.concatenate((np.cos(3.6 * t[:60]), np.sin(3.6 * t[60:])))
     inner = (np.arange(120) >= 60).astype(float)
@@ -337,7 +337,7 @@ def test_an_instrument_s_errors_are_unknowns_as_far_as_it_has_them():
     assert blocks.corrected("bench", shown, Instrument("a", "V", 0.1, 0.0, 0.0, 0.0, ""))[1] == ()
 
 
-def test_columns_are_there_finite_and_of_one_length_or_that_is_told():
+def test_columns_are_there_finite_and_of_one_length_or_that_is_reported():
     made = data("d", a=[1.0, 2.0], b=[1.0, math.nan])
     assert blocks.column(made, "a", "bench").tolist() == [1.0, 2.0]
     assert blocks.column(made, "c", "bench", 0.5).tolist() == [0.5, 0.5]

@@ -68,7 +68,7 @@ def test_sound_data_show_nothing():
     assert sanity.inspect(recording()) == []
 
 
-def test_every_kind_that_is_told_is_explained():
+def test_every_kind_that_is_reported_is_explained():
     told = {finding.kind for _, data, *_ in CASES for finding in sanity.inspect(data())}
     assert told <= set(sanity.KINDS)
     assert {kind for kind, *_ in CASES} <= told
@@ -139,7 +139,7 @@ def test_what_is_on_no_lattice_has_no_finest_step():
     assert sanity.lattice_step(generator(3, "lattice").normal(size=3000)) == 0.0
 
 
-def test_held_commands_and_resting_channels_are_no_stuck_sensors():
+def test_held_commands_and_resting_channels_are_not_stuck_sensors():
     time_s = np.arange(N) * 0.004
     command = np.repeat(generator(2, "commands").normal(size=8), N // 8)
     rest = np.where(time_s < 6.0, 0.0, np.sin(time_s - 6.0))  # rests, then moves
@@ -306,7 +306,7 @@ def test_an_angle_that_stands_while_its_own_rate_moves_is_stuck():
     assert "while speed_rad_per_s move" in told.text
 
 
-def test_a_channel_of_noise_that_has_nothing_in_common_with_the_others_is_told():
+def test_a_channel_of_noise_that_has_nothing_in_common_with_the_others_is_reported():
     noise = generator(6, "nobody's").normal(size=N)
     (told,) = found(changed("current_A", lambda v: noise), "noise")
     assert told.channel == "current_A" and "nothing of it is in any other channel" in told.text
@@ -324,7 +324,7 @@ def test_white_noise_that_drives_a_machine_is_none(late):
     assert found(data, "noise") == []
 
 
-def test_rows_in_disorder_are_told():
+def test_rows_in_disorder_are_reported():
     data = recording()
     order = generator(10, "disorder").permutation(N)
     for name, channel in data.channels.items():

@@ -77,7 +77,7 @@ def test_samples_half_a_second_apart_are_doubted(step_s, told):
     assert not of("slow_samples", states)
 
 
-def test_stamps_and_values_that_are_no_numbers_are_counted():
+def test_stamps_and_values_that_are_not_numbers_are_counted():
     t, value = T.copy(), WAVE.copy()
     t[[3, 5]] = math.nan
     value[10:13] = math.inf
@@ -141,7 +141,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("to_rate", "to_angle", "told"), MISTAKES)
-def test_each_mistake_of_units_between_an_angle_and_its_rate_is_told_by_its_factor(to_rate, to_angle, told):
+def test_each_mistake_of_units_between_an_angle_and_its_rate_is_reported_by_its_factor(to_rate, to_angle, told):
     found = of(
         "wrong_unit",
         channel("motor_angle_rad", to_angle(WAVE), "rad"),
@@ -248,7 +248,7 @@ def test_values_are_cut_off_where_they_are_entered_at_speed_twice_for_three_samp
         assert len(of("saturation", channel("current_A", some, "A"))) == told
 
 
-def test_one_value_all_the_time_is_told():
+def test_one_value_all_the_time_is_reported():
     (found,) = of("constant", channel("current_A", np.full(2000, 0.5), "A"))
     assert (found.severity, found.text) == ("note", "it is 0.5 all the time")
 
@@ -290,7 +290,7 @@ def recording():
     ("unit", "factor", "zero", "si"),
     [("mV", 1e-3, 0.0, "V"), ("deg", math.pi / 180, 0.0, "rad"), ("K", 1.0, -273.15, "C")],
 )
-def test_values_in_another_unit_are_converted_and_that_is_told(unit, factor, zero, si):
+def test_values_in_another_unit_are_converted_and_that_is_reported(unit, factor, zero, si):
     found = repairs.converted(recording(), "a", unit)
     assert found["a"].value == pytest.approx(WAVE * factor + zero, rel=1e-12) and found["a"].unit == si
     (repair,) = found.repairs
@@ -298,7 +298,7 @@ def test_values_in_another_unit_are_converted_and_that_is_told(unit, factor, zer
     assert np.array_equal(found["b"].value, RATE)
 
 
-def test_no_unit_is_no_conversion():
+def test_no_unit_is_not_a_conversion():
     for unit in ("furlongs", " "):
         with pytest.raises(UserError, match="unknown unit"):
             repairs.converted(recording(), "a", unit)
@@ -344,7 +344,7 @@ def test_a_sine_of_more_than_six_samples_a_period_moves_and_a_faster_one_is_take
 @pytest.mark.parametrize(
     ("ppm", "told"), [(99.0, False), (101.0, True), (-99.0, False), (-101.0, True), (9000.0, True)]
 )
-def test_a_clock_that_runs_off_by_more_than_a_hundred_parts_in_a_million_is_told(ppm, told):
+def test_a_clock_that_runs_off_by_more_than_a_hundred_parts_in_a_million_is_reported(ppm, told):
     found = of("clock_drift", channel("board_s", 3.0 + (1.0 + 1e-6 * ppm) * (T + 1.0), "s", T + 1.0))
     assert bool(found) == told
     if told:
@@ -367,13 +367,13 @@ def test_a_clock_s_drift_must_be_five_times_what_its_scatter_leaves_open(scatter
     assert bool(found) == (scatter_s == 4e-4)
 
 
-def test_what_is_no_clock_has_no_drift():
+def test_what_is_not_a_clock_has_no_drift():
     assert not of("clock_drift", channel("time_s", 1.02 * T, "s"))  # another rate altogether
     assert not of("clock_drift", channel("time_s", -T, "s")) and not of(
         "clock_drift", channel("x_rad", 1.001 * T, "rad")
     )
 
 
-def test_of_a_constant_channel_nothing_else_is_told():
+def test_of_a_constant_channel_nothing_else_is_reported():
     data = Dataset("data", {"current_A": channel("current_A", np.full(2000, 500.0), "A")})
     assert [each.kind for each in sanity.inspect(data)] == ["constant"]

@@ -48,7 +48,7 @@ def test_a_second_sensor_separates_what_one_could_not():
     assert "see_q" in told["see_q2"] and "see_q" in told["angle"] and "angle" in told["see_q"]
 
 
-def test_a_fault_in_two_equations_is_told_by_either():
+def test_a_fault_in_two_equations_is_reported_by_either():
     told = isolable(MOTOR, {"both": ["electric", "torque"], "see_t": ["see_t"], "see_q": ["see_q"]})
     assert told["both"] == {"see_t", "see_q"}  # without see_t the electric equation still shows it
     assert "both" in told["see_q"] and "both" not in told["see_t"]

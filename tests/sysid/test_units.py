@@ -104,7 +104,7 @@ def test_products_quotients_and_powers_multiply_their_factors(text, kind, suffix
 
 
 @pytest.mark.parametrize("text", ["furlong", "A/", "/per/s", "A per s per V", "m5", "per"])
-def test_what_is_no_unit_is_none(text):
+def test_what_is_not_a_unit_is_none(text):
     assert unit_of(text) is None
 
 

@@ -82,7 +82,7 @@ def test_rows_at_the_same_time_after_a_strike_are_repeats(table):
         assert set(stands[rows]) == {place % 2}
 
 
-def test_few_channels_are_told_what_they_lack():
+def test_what_few_channels_lack_is_reported():
     time_s = np.arange(0.0, 5.0, 0.004)
     columns = {"hip_angle_rad": 0.3 * np.sin(5.0 * time_s), "outer_leg_angle_rad": 0.2 * np.sin(5.0 * time_s)}
     few = Table(time_s, columns, (slice(0, len(time_s)),), "few.csv")
@@ -90,7 +90,7 @@ def test_few_channels_are_told_what_they_lack():
         Walk().prepare(few)
 
 
-def test_a_short_walk_is_told_how_much_of_it_counts(table):
+def test_how_much_of_a_short_walk_counts_is_reported(table):
     short = table.part(slice(0, int(4.0 / table.step_s)))
     with pytest.raises(UserError, match=r"s of walking are too short: .* has most rows .*, \d+ of at least \d+"):
         Walk().prepare(short)

@@ -143,7 +143,7 @@ def walked(contacts=True, seconds=6.0, step_s=0.004, sway=0.4):
     return Table(t, columns, (slice(0, len(t)),))
 
 
-def test_contact_sensors_tell_of_strikes_13_ms_late():
+def test_contact_sensors_report_strikes_13_ms_late():
     """robot.md N4.9: 5.5 ms of counting, and the sole's rise."""
     found = strikes.find(walked())
     assert [each.leg for each in found] == [1, 0] * 5
@@ -152,7 +152,7 @@ def test_contact_sensors_tell_of_strikes_13_ms_late():
     assert {each.run for each in found} == {0}
 
 
-def test_a_contact_with_the_legs_together_or_the_other_one_ahead_is_no_strike():
+def test_a_contact_with_the_legs_together_or_the_other_one_ahead_is_not_a_strike():
     """0.15 rad apart at the least, the touching leg ahead."""
     for sway, number in ((0.16, 10), (0.14, 0), (-0.4, 0)):
         table = walked(sway=sway)

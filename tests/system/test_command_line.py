@@ -232,7 +232,7 @@ def test_the_version_is_printed(command):
     assert (done.returncode, done.stdout) == (0, f"ranger-sim {__version__}\n")
 
 
-def test_every_command_has_a_help_of_its_own(capsys):
+def test_every_command_has_its_own_help(capsys):
     for name in (each.name for each in COMMANDS if each.module is not None):
         with pytest.raises(SystemExit) as left:
             cli.main([name, "--help"])

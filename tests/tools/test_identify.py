@@ -54,7 +54,7 @@ def test_the_command_line_names_the_benches_that_there_are():
     assert command.GEAR == motor.GEAR
 
 
-def test_identifiability_is_told_before_the_values(capsys):
+def test_identifiability_is_reported_before_the_values(capsys):
     assert main(["identify", "stall"]) == 0
     out = capsys.readouterr().out
     assert out.index("singular values") < out.index("95 % interval")

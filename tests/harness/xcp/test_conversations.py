@@ -70,7 +70,7 @@ def test_a_command_that_is_shorter_than_its_fields_is_a_mistake_of_syntax(code):
             assert answer == b"\xfe\x20"
 
 
-def test_a_packet_may_be_as_long_as_the_slave_said_and_no_longer():
+def test_a_packet_may_be_as_long_as_the_slave_allows_and_no_longer():
     slave = connected()
     assert slave.command(b"\xfd" + bytes(7), 0)[0] == 0xFF
     assert slave.command(b"\xfd" + bytes(8), 0) == b"\xfe\x21"

@@ -191,7 +191,7 @@ def test_a_block_that_is_broken_off_writes_nothing(slave, packets, answer):
     assert slave.memory.data == bytearray(range(16))
 
 
-def test_a_short_download_brings_its_address_where_a_packet_has_room():
+def test_a_short_download_brings_its_address_where_a_packet_has_space():
     slave = Slave(Bytes(), 248, 1400, FINE)
     say(slave, "FF00")
     assert say(slave, "ED 04 00 00 0C010000 05060708") == "FF"
@@ -217,7 +217,7 @@ def test_disconnect_stops_everything_and_is_the_last_answer(slave):
     assert say(slave, "FD") == ""
 
 
-def test_several_entries_are_written_by_one_command_where_a_packet_has_room():
+def test_several_entries_are_written_by_one_command_where_a_packet_has_space():
     slave = Slave(Bytes(), 248, 1400, FINE)
     say(slave, "FF00")
     for command in ("D6", "D500 0100", "D400 0000 01", "D300 0000 00 03", "E200 0000 00 00"):

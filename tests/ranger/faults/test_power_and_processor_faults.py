@@ -96,7 +96,7 @@ def test_every_board_comes_back_from_a_reset(robot, name):
         assert all(node.mode == OPERATING for node in bus.nodes)
 
 
-def test_a_router_that_begins_anew_sends_everybody_its_new_time(robot):
+def test_a_router_that_begins_anew_sends_each_board_its_new_time(robot):
     robot.inject("CSR.supply", "brown_out", START, off_ms=2)
     robot.run_for(0.1)
     times = {name: robot.board(name).time.ms for name in ("MCH", "MCFO", "MCFI", "MCSI", "UI")}

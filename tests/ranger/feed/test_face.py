@@ -62,7 +62,7 @@ def test_two_lines_six_lights_a_tone_and_the_processors_lights(shown):
     assert words[22:] == [440, 0, 0, GREEN_AND_BLUE]
 
 
-def test_a_key_is_seen_heard_and_reaches_the_main_brain(shown):
+def test_a_key_is_seen_received_and_reaches_the_main_brain(shown):
     robot, panel = shown
     robot.run_for(0.03)
     now = robot.loop.time

@@ -83,7 +83,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("experiment", MACHINES)
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_no_recording_is_told_in_a_line(case, experiment, tmp_path, capsys):
+def test_what_is_not_a_recording_is_reported_in_a_line(case, experiment, tmp_path, capsys):
     path = tmp_path / "bad.csv"
     content = REFUSED[case](*table_of(experiment))
     path.write_bytes(content if isinstance(content, bytes) else content.encode())

@@ -89,7 +89,7 @@ def test_the_check_refuses_what_is_not_so():
         check({key: value for key, value in told.items() if key != "abstained"}, SCHEMA)
 
 
-def test_causes_as_json_tell_identifier_number_and_meaning_of_each(capsys):
+def test_causes_as_json_show_identifier_number_and_meaning_of_each(capsys):
     assert main(["causes", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert [(each["identifier"], each["number"], each["meaning"]) for each in told] == [

@@ -85,7 +85,7 @@ def test_both_models_are_drawn_against_the_measurement(found):
     assert figures.gap(side) > 0.01
 
 
-def test_nothing_found_is_said_so():
+def test_nothing_found_is_reported():
     found = diagnose(Cart(), [cart_run(1)])
     said = text_of(page.render(found))
     assert said.count("Nothing found") == 2
@@ -103,7 +103,7 @@ def test_an_unknown_fault_is_drawn_where_the_general_tests_see_it_and_its_parame
     assert "The same run once more" in said
 
 
-def test_a_tie_names_both_and_tells_where_to_look_for_each():
+def test_a_tie_names_both_and_shows_where_to_look_for_each():
     found = diagnose(Cart(), [cart_run(1, slope=0.02)])
     said = text_of(page.render(found))
     assert "these data cannot decide" in said
@@ -118,7 +118,7 @@ def test_names_from_a_file_are_text_and_no_markup():
     assert "<script>alert(1)" not in html and "&lt;script&gt;alert(1)" in html
 
 
-def test_cosine_and_sine_are_told_as_an_amplitude():
+def test_cosine_and_sine_are_reported_as_an_amplitude():
     """3 cos x + 4 sin x has amplitude 5; its deviation is along that direction: sqrt((9 * 0.01 + 16 * 0.04) / 25)."""
 
     class Extended:
