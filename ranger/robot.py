@@ -60,7 +60,7 @@ from ranger_sim.ranger.records.strike_watch import StrikeWatch
 from ranger_sim.ranger.scenario import Scenario, StopRule
 
 if TYPE_CHECKING:
-    from ranger_sim.harness.processes.apart import RemoteBoards
+    from ranger_sim.harness.processes.remote_boards import RemoteBoards
 
 BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 GRID_NS = 20_000_000  # the operator acts on this grid, so that a run does not depend on how it is sliced
@@ -134,7 +134,7 @@ class Ranger(Machine):
         self.in_own_process: tuple[str, ...] = () if in_process else tuple(self.firmware)
         self.board_deadline_s = board_deadline_s
         self.processes: RemoteBoards | None = None
-        self.deaths: list[dict[str, Any]] = []  # boards whose process has ended (harness/processes/apart.py)
+        self.deaths: list[dict[str, Any]] = []  # boards whose process has ended (harness/processes/remote_boards.py)
         self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})
         for name in self.images:
             if name in self.firmware:
@@ -214,7 +214,7 @@ class Ranger(Machine):
         A program in C that runs in this process is monitored from now on.
         """
         if self.processes is None and self.in_own_process:
-            from ranger_sim.harness.processes.apart import RemoteBoards
+            from ranger_sim.harness.processes.remote_boards import RemoteBoards
 
             self.processes = RemoteBoards(self, self.in_own_process)
             self.deaths = self.processes.deaths

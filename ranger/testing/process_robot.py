@@ -1,6 +1,6 @@
 """The robot of the backend `processes`: every board has its own process, this one has body, buses and the test.
 
-A board that is lost ends the test (harness/processes/apart.py).
+A board that is lost ends the test (harness/processes/remote_boards.py).
 """
 
 from __future__ import annotations

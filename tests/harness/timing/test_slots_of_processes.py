@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from ranger_sim.harness.processes import activity, places
-from ranger_sim.harness.processes.apart import ProcessReaper
+from ranger_sim.harness.processes.remote_boards import ProcessReaper
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.ranger.testing.process_robot import ProcessRobot

@@ -13,7 +13,7 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.processes.apart import RemoteBoards
+from ranger_sim.harness.processes.remote_boards import RemoteBoards
 from ranger_sim.ranger.feed import FeedServer
 
 SECONDS = 0.1
