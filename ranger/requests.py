@@ -118,7 +118,7 @@ def admitted(line: bytes) -> Request:
         raise RequestError(f"{shown(what)} is not a request; there are {', '.join(REQUESTS)}")
     for name in content:
         if name not in fields:
-            raise RequestError(f"{what}: {shown(name)} is not a field of it; it has {', '.join(fields) or 'none'}")
+            raise RequestError(f"{what}: unknown field {shown(name)} (available: {', '.join(fields) or 'none'})")
     found: dict[str, Any] = {}
     for name, check in fields.items():
         if name not in content:

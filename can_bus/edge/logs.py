@@ -20,7 +20,7 @@ from ranger_sim.can_bus.edge import log_kinds
 from ranger_sim.can_bus.edge.candump import CanFdError, frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
-from ranger_sim.foundation.user_error import DataError, UserError
+from ranger_sim.foundation.user_error import BusError, DataError, UserError
 
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
 PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
@@ -144,7 +144,7 @@ def _refuse_bomb(path: pathlib.Path) -> None:
                 unpacker = zlib.decompressobj()
                 with contextlib.suppress(zlib.error):  # a broken one is reported by the reader
                     if len(unpacker.decompress(file.read(size - CONTAINER_HEAD), limit)) == limit:
-                        raise UserError(f"{path}: the container at byte {place} unpacks to more than {limit} bytes")
+                        raise BusError(f"{path}: the container at byte {place} unpacks to more than {limit} bytes")
             place += size + size % 4
             if not size:
                 return

@@ -37,7 +37,7 @@ from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import BusError
 
 
 @dataclass(frozen=True)
@@ -152,9 +152,9 @@ class Terminal:
 
             self.master, self.slave = os.openpty()
         except ImportError:
-            raise UserError(f"pseudo-terminal: {sys.platform} does not have them") from None
+            raise BusError(f"pseudo-terminal: {sys.platform} does not have them") from None
         except OSError as error:
-            raise UserError(f"pseudo-terminal: {error.strerror}") from None
+            raise BusError(f"pseudo-terminal: {error.strerror}") from None
         tty.setraw(self.slave)
         os.fchmod(self.slave, 0o600)
         os.set_blocking(self.master, False)
@@ -560,9 +560,9 @@ def listening_address(host: str, what: str, allow_network: bool) -> str:
     try:
         address = socket.gethostbyname(host)
     except OSError as error:
-        raise UserError(f"{what}: {host!r}: {error.strerror or error}") from None
+        raise BusError(f"{what}: {host!r}: {error.strerror or error}") from None
     if not loopback(address) and not allow_network:
-        raise UserError(
+        raise BusError(
             f"{what}: {host} is reached from beyond this machine, by anybody: give --allow-network if that is meant"
         )
     return address
@@ -577,7 +577,7 @@ def connected(address: str, whose: str, patience_s: float | None) -> socket.sock
         connection.connect(address)
         user = user_behind(connection)
         if not trusted(user):
-            raise UserError(f"{whose} belongs to user {user}, not to you: it is not trusted")
+            raise BusError(f"{whose} belongs to user {user}, not to you: it is not trusted")
     except BaseException:
         connection.close()
         raise

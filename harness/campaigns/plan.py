@@ -162,7 +162,7 @@ class Plan:
             return dataclasses.replace(self, sample=dataclasses.replace(self.sample, seed=seed))
         if self.search is not None:
             return dataclasses.replace(self, search=dataclasses.replace(self.search, seed=seed))
-        raise UserError(f"--seed {seed}: {self.path} has neither [sample] nor [search]; a census draws nothing")
+        raise CampaignError(f"--seed {seed}: {self.path} has neither [sample] nor [search]; a census draws nothing")
 
     def watch_key(self) -> dict[str, Any]:
         """The settings of monitoring that affect results."""
@@ -265,7 +265,7 @@ def of_data(data: dict[str, Any], path: str, walks: str = "") -> Plan:
     own, fields = machine_of(data, path)
     machine = own or walks
     if not machine:
-        raise UserError(f"{path}: [machine] is missing")
+        raise CampaignError(f"{path}: [machine] is missing")
     subject = subject_of(machine)
     module = module_of(data, path, subject)
     if not own:

@@ -138,11 +138,11 @@ class OwnMachine:
         """[band] of a plan, in the quantities' units. UserError for what it cannot be."""
         for name, value in band.items():
             if not is_number(value) or not 0.0 < value < math.inf:
-                raise UserError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
+                raise CampaignError(f"{path}: [band] {name} = {value!r}: a number above 0 is expected, in its unit")
         try:
             self.check_band(band)
         except UserError as error:
-            raise UserError(f"{path}: {error}") from None
+            raise CampaignError(f"{path}: {error}") from None
         return {name: float(value) for name, value in band.items()}
 
     @property

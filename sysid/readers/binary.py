@@ -30,10 +30,7 @@ def read(
 ) -> Dataset:
     """The channels of a file of one of KINDS. UserError for a file that its library cannot read, or without a time."""
     module_name, package = KINDS[kind]
-    try:
-        library = importlib.import_module(module_name)
-    except ImportError:
-        raise DataError(f"{path}: {kind} needs {package} (pip install '{package}')") from None
+    library = importlib.import_module(module_name)  # ModuleNotFoundError where it is not installed
     if path.stat().st_size > MOST_BYTES:
         raise DataError(f"{path}: {path.stat().st_size} bytes, a {kind} file may have {MOST_BYTES}")
     dataset = Dataset(path.name, {})

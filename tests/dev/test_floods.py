@@ -41,7 +41,7 @@ def test_a_robot_under_floods_runs_as_fast_as_the_machine_can_hold(processors, s
 
 
 def test_every_flood_has_a_program_and_together_they_use_each_endpoint():
-    doors = flooders.Doors("x")
+    doors = flooders.Endpoints("x")
     counts = {name: len(flooders.programs(name, doors)) for name in flooders.NAMES}
     assert set(flooders.FLOODS) < set(counts)
     nobody = set(flooders.PEACE_OF.values())
@@ -54,7 +54,7 @@ def test_every_flood_has_a_program_and_together_they_use_each_endpoint():
 
 def test_a_page_of_a_flood_speaks_as_a_browser_does():
     """The handshake of RFC 6455, 1.3, and a masked text of its 5.7 but for the mask."""
-    head = flooders.handshake(flooders.Doors("x", panel=80), "word", "http://a")
+    head = flooders.handshake(flooders.Endpoints("x", panel=80), "word", "http://a")
     assert head.startswith(b"GET /socket?token=word HTTP/1.1\r\nHost: 127.0.0.1:80\r\n") and head.endswith(b"\r\n\r\n")
     assert b"Sec-WebSocket-Version: 13\r\nOrigin: http://a\r\n" in head
     assert flooders.message("Hello") == b"\x81\x85\0\0\0\0Hello"
@@ -65,10 +65,10 @@ def test_a_sender_in_the_window_is_served_as_long_as_it_lasts():
     """The dearest client that keeps to the protocol, against a bus alone: it is never sent away."""
     with (
         hosted("can1", speed=50.0) as (name, host),
-        flooders.flooded(flooders.FRAMES_IN_WINDOW, flooders.Doors(name)),
+        flooders.flooded(flooders.FRAMES_IN_WINDOW, flooders.Endpoints(name)),
     ):
         (server,) = host.servers
-        listener = flooders.attached(flooders.Doors(name))
+        listener = flooders.attached(flooders.Endpoints(name))
         with listener:
             heard = 0
             while heard < 40_000:  # some 1,000 frames

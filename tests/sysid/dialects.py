@@ -443,7 +443,7 @@ def accidents() -> Iterator[tuple[str, Callable[[], Accident]]]:
         "words for numbers",
         lambda: Accident(
             table(lambda rows: [*rows[:100], rows[100].replace(rows[100].split(",")[1], "ERROR"), *rows[101:]]),
-            ("no numbers",),
+            ("not numbers",),
         ),
     )
     yield (
@@ -537,7 +537,7 @@ def accidents() -> Iterator[tuple[str, Callable[[], Accident]]]:
         "a channel stuck",
         lambda: Accident(
             data(lambda d: d["voltage"].__setitem__(slice(100, 260), d["voltage"][100])),
-            ("stands at", "no change"),
+            ("stays at", "no change"),
             same=False,
         ),
     )
@@ -548,7 +548,7 @@ def accidents() -> Iterator[tuple[str, Callable[[], Accident]]]:
     yield (
         "values that are no numbers",
         lambda: Accident(
-            data(lambda d: d["current"].__setitem__(slice(0, None, 5), np.nan)), ("no numbers",), same=False
+            data(lambda d: d["current"].__setitem__(slice(0, None, 5), np.nan)), ("not numbers",), same=False
         ),
     )
     yield (

@@ -41,6 +41,7 @@ class Toy(SimulatedMachine):
     outputs = (Output("y_m", "M", "mechanical", "m"), Output("z_m_per_s", "S", "sensor", "m/s"))
     ports = (Port("push", "N", "mechanical", "gate"), Port("shown", "m", "sensor"))
     noisy_inputs = {"u": 0.3}  # noqa: RUF012
+    parts = 1  # so that a step is one line of Euler
 
     def inputs(self, table):
         return {"u": table["u"], "d": table["d"]}

@@ -391,7 +391,7 @@ def test_a_robot_log_of_our_own_is_read_with_the_units_of_the_table(tmp_path):
     angle, current = all_variables.ID_OF["MCH_ANGLE"], all_variables.ID_OF["MCH_MOTOR_CURRENT"]
     for number, value, stamp in ((angle, 0.25, 0), (angle, 0.5, 2000), (angle, 0.75, 2004), (current, -1.5, 2003),
                                  (current, -1.5, 2003)):  # fmt: skip
-        log.hear(Point(number, word_of_float(value), stamp))
+        log.on_point(Point(number, word_of_float(value), stamp))
     log.close()
     data = open_recording(tmp_path / "session.txt", {"MCH_ANGLE": "hip_angle_rad"})
     assert (data["hip_angle_rad"].time_s.tolist(), data["hip_angle_rad"].value.tolist()) == ([2.0, 2.004], [0.5, 0.75])

@@ -68,7 +68,7 @@ def test_the_command_exits_with_what_was_found(written, capsys):
     assert main(["read", str(sound)]) == 0
     shuffled = written("t_s,a_V\n0.1,1\n0,2\n0.2,3\n0.3,4\n", "shuffled.csv")
     assert main(["read", str(shuffled)]) == 1
-    assert "proposal: a_V: 1 samples came out of order and are sorted" in capsys.readouterr().out
+    assert "proposal: a_V: 1 samples were out of order and are sorted" in capsys.readouterr().out
     assert main(["read", str(written("nothing\n", "none.csv"))]) == 2
 
 
@@ -154,7 +154,7 @@ def test_a_recipe_reads_the_next_file_and_refuses_one_that_differs(written, tmp_
     again = read(written(german, "next.csv"), recipe=recipe)
     assert again["current_A"].value == pytest.approx(0.5e-3 * np.cos(0.1 * np.arange(200)), abs=1e-6)
     other = german.replace("Strom [mA]", "Strom [A]")
-    with pytest.raises(UserError, match=r"there is no such column|without the columns Strom \[mA\]"):
+    with pytest.raises(UserError, match=r"unknown column|without the columns Strom \[mA\]"):
         read(written(other), recipe=recipe)
     more = "Zeit;Strom [mA];Last\n" + rows("{t:.2f};{i:.4f};1\n").replace(".", ",")
     with pytest.raises(UserError, match="does not fit .*lab.toml: with the new columns Last"):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim import datatable
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
@@ -48,7 +48,7 @@ class Event:
         """Its first time, s; not at the beginning, where it may have held for long. UserError if never."""
         channel = dataset.channels.get(self.channel) or dataset.channels.get(TRUTH + self.channel)
         if channel is None:
-            raise UserError(f"{dataset.name}: there is no channel {self.channel}")
+            raise UserError(f"{dataset.name}: {unknown('channel', self.channel, dataset.channels)}")
         is_so = {"=": np.equal, "<": np.less, ">": np.greater}[self.sign](channel.value, self.value)
         begins = np.flatnonzero(is_so[1:] & ~is_so[:-1]) + 1
         if not len(begins):

@@ -200,7 +200,7 @@ def test_a_broken_line_to_the_inertial_unit_loses_its_bytes():
     run = Run("UI.serial", "drop_out")
     assert run.fault.acted_count == 10 and run.fault.largest_difference == 31  # a packet per ms
     assert run.fault.cleared_ns > END_NS
-    with closing(Ranger(Scenario(seed=1))) as robot, pytest.raises(UserError, match="no receiver could miss"):
+    with closing(Ranger(Scenario(seed=1))) as robot, pytest.raises(UserError, match="so its bytes cannot be missed"):
         robot.inject("MB.serial", "drop_out")
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from ranger_sim import Ranger, Scenario
 from ranger_sim.firmware_sim.activity import COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
-from ranger_sim.harness.processes.remote_boards import RemoteBoards
 from ranger_sim.harness.processes.places import RING, RING_ROW
+from ranger_sim.harness.processes.remote_boards import RemoteBoards
 
 SECONDS = 0.3
 BOARDS = ("MCH", "MB", "CSR", "UI")

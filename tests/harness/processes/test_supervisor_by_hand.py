@@ -112,21 +112,21 @@ def stopped(alone, name="MCH", process=41):
 
 def pass_time(alone, seconds):
     """Let time pass, with a poll every fifth of a second; the first one has nothing to count."""
-    alone.look()
+    alone.check()
     for _ in range(round(seconds / 0.2)):
         alone.clock.now += 0.2
-        alone.look()
+        alone.check()
 
 
 def test_a_board_that_stays_stopped_ends_the_run_after_ten_seconds(alone):
-    alone.look()
+    alone.check()
     stopped(alone)
     pass_time(alone, 9.8)
     assert alone.killed == [] and plants(alone) == []
     pass_time(alone, 0.4)
     assert alone.killed == [(41, signal.SIGKILL)]
     assert plants(alone) == [{"do": "stop", "lost": "MCH"}]
-    assert alone.view.heard() == [
+    assert alone.view.received() == [
         "MCH (process 41) is stopped and has not replied for 10 s: it is killed, and the run ends"
     ]
     assert alone.blocks["MCH"].fault() == "its process was stopped (SIGSTOP) for 10 s"
@@ -136,7 +136,7 @@ def test_a_board_that_stays_stopped_ends_the_run_after_ten_seconds(alone):
 
 
 def test_the_body_that_stays_stopped_ends_the_run_as_well(alone):
-    alone.look()
+    alone.check()
     stopped(alone, PLANT, 42)
     pass_time(alone, 10.2)
     assert alone.killed == [(42, signal.SIGKILL)]
@@ -145,20 +145,20 @@ def test_the_body_that_stays_stopped_ends_the_run_as_well(alone):
 
 
 def test_a_suspended_machine_counts_as_one_second_of_a_stop(alone):
-    alone.look()
+    alone.check()
     stopped(alone)
     alone.clock.now += 3600.0
-    alone.look()
+    alone.check()
     pass_time(alone, 8.8)
     assert alone.killed == []
 
 
 def test_a_stopped_board_that_owes_no_reply_or_goes_on_does_not_end_the_run(alone):
-    alone.look()
+    alone.check()
     child = stopped(alone)
     pass_time(alone, 9.0)
     child.state = RUNNING
-    alone.look()
+    alone.check()
     child.state = STOPPED
     pass_time(alone, 9.0)
     alone.blocks["MCH"].words[places.ANSWERED] = 7  # the robot is paused

@@ -8,7 +8,7 @@ import pytest
 from ranger_sim.tools import cli
 from ranger_sim.tools.commands import COMMANDS
 
-FOR_DEVELOPERS = ["bench", "tune", "vm"]
+FOR_DEVELOPERS = ["bench"]
 
 
 @pytest.fixture(scope="module")

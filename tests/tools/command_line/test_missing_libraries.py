@@ -40,6 +40,8 @@ NEEDED = {
     "numpy": ["walk --time 50ms", "diagnose run.csv --experiment motor-bench"],
     "perfetto": ["walk --time 50ms --trace t.pftrace"],
     "plotly": ["walk --time 50ms --out o"],
+    "pyarrow": ["read t.parquet"],
+    "pyulog": ["read t.ulg"],
     "pythonfmu3": ["fmu b.fmu"],
     "rich": ["info", "walk --time 50ms"],
     "scipy": [
@@ -51,6 +53,7 @@ NEEDED = {
     "serial": ["up --time 50ms --daq-port /dev/nowhere"],
     "shtab": ["completion bash"],
     "starlette": ["panel"],
+    "threadpoolctl": ["diagnose run.csv --experiment motor-bench"],
     "uvicorn": ["panel"],
     "vcd": ["walk --time 50ms --trace t.vcd"],
     "websockets": ["panel --walk"],
@@ -62,6 +65,8 @@ OF_INTERPRETED_RUNS = {"cython"}  # compiled modules do without, and plain ones 
 def folder(tmp_path):
     (tmp_path / "few.toml").write_text(CAMPAIGN)
     (tmp_path / "hip.axf").write_bytes(b"\x7fELF")
+    (tmp_path / "t.parquet").write_bytes(b"PAR1")
+    (tmp_path / "t.ulg").write_bytes(b"ULog\x01\x12\x35")
     for name in ("run.csv", "run.mf4", "x.dbc"):
         (tmp_path / name).write_text("t,angle\n0,1\n")
     return tmp_path

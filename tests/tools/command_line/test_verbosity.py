@@ -10,7 +10,7 @@ from ranger_sim.tools import cli
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.commands import COMMANDS
 
-WITH_PROGRESS = ["walk", "up", "campaign", "diagnose", "diagnose-figures", "compare-walk"]
+WITH_PROGRESS = ["walk", "up", "campaign", "diagnose"]
 
 
 @pytest.mark.parametrize("name", WITH_PROGRESS)
