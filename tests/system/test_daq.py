@@ -104,7 +104,7 @@ def test_a_parameter_is_written_and_read_back(robot):
         (["--write", "MCH_ANGLE=1"], "MCH_ANGLE: not a parameter, it is published by MCH; the robot would refuse it"),
         (["--write", "C_F_ST_F_ANG=1e6"], "C_F_ST_F_ANG = 1e+06 is outside 0 to 100 A/rad"),
         (["--write", "C_F_ST_F_ANG"], "--write 'C_F_ST_F_ANG': NAME=VALUE with a number is expected"),
-        (["--fast", "MCH_ANGEL"], "did you mean MCH_ANGLE"),
+        (["--fast", "MCH_ANGEL"], "did you mean 'MCH_ANGLE'"),
         (["--fast", "XX*"], "'XX*': fits no variable"),
         (["--fast", "*"], "the link has 48"),
         (["--load", "no-such-file.txt"], "no-such-file.txt: No such file or directory"),
