@@ -41,7 +41,9 @@ myst_heading_anchors = 4
 suppress_warnings = ["myst.header"]  # headings may begin at any level
 nitpicky = True
 # classes of single boards and of other libraries are named in signatures and have no page here
-nitpick_ignore_regex = [("py:class", r"(ranger_sim\.boards|ranger_sim\.sysid\.dataset|can|numpy|collections|pathlib|rich)\..*")]
+nitpick_ignore_regex = [
+    ("py:class", r"(ranger_sim\.boards|ranger_sim\.sysid\.dataset|can|numpy|collections|pathlib|rich)\..*"),
+]
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
