@@ -154,9 +154,9 @@ class Fuzz:
         self.terminal = SlcanServer("can1", self.taps)
         self.tcp = SocketcandServer(buses, 0)
         self.control = ControlServer(name, admitted, self.obey)
-        self.doors: tuple[PeerServer[Any], ...] = (self.attach, self.terminal, self.tcp, self.control)
-        for door in self.doors:
-            door.clock = lambda: self.now_ns * 1e-9
+        self.servers: tuple[PeerServer[Any], ...] = (self.attach, self.terminal, self.tcp, self.control)
+        for server in self.servers:
+            server.clock = lambda: self.now_ns * 1e-9
         ways = {
             "attach": lambda: local(wire.SOCKET_PREFIX + name),
             "slcan": lambda: os.open(self.terminal.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK),
@@ -286,15 +286,15 @@ class Fuzz:
         """Advance a little time, and poll every endpoint."""
         self.now_ns += POLL_NS
         self.polls += 1
-        before = [door.worked for door in self.doors]
+        before = [server.worked for server in self.servers]
         for server in (self.attach, self.terminal, self.tcp):
             server.poll(self.now_ns)
         self.control.poll()
         self.bus.advance(self.now_ns)
         self.taps.poll(self.now_ns)
         self.inbox.clear()
-        for door, worked in zip(self.doors, before, strict=True):
-            self.check(door, door.worked - worked)
+        for server, worked in zip(self.servers, before, strict=True):
+            self.check(server, server.worked - worked)
         self.talk()
         for programs in self.hostile.values():
             for program in programs:
@@ -302,27 +302,27 @@ class Fuzz:
                     program.hear()
                     program.heard.clear()
 
-    def check(self, door: PeerServer[Any], worked: int) -> None:
+    def check(self, server: PeerServer[Any], worked: int) -> None:
         """Raise Finding when an endpoint has done or holds more than the table allows."""
-        limits = door.limits
+        limits = server.limits
         answer = 4 * 1024  # the longest single answer of any endpoint is below that
         most_out = limits.backlog + limits.unread + limits.burst * answer
         for what, is_so in (
             (f"{worked} requests in a poll", worked <= limits.burst),
-            (f"{len(door.peers)} peers", len(door.peers) <= limits.peers),
+            (f"{len(server.peers)} peers", len(server.peers) <= limits.peers),
             (
                 "a peer's input piles up",
-                self.most(door, "incoming") <= limits.longest + limits.read_bytes,
+                self.most(server, "incoming") <= limits.longest + limits.read_bytes,
             ),
-            ("a peer's answers pile up", self.most(door, "outgoing") <= most_out),
+            ("a peer's answers pile up", self.most(server, "outgoing") <= most_out),
             (f"{len(self.taps.taps)} clients on a bus", len(self.taps.taps) <= TAP_LIMIT),
         ):
             if not is_so:
-                raise Finding(f"{door.kind}: {what} (case {self.cases})")
+                raise Finding(f"{server.kind}: {what} (case {self.cases})")
 
     @staticmethod
-    def most(door: PeerServer[Any], buffer: str) -> int:
-        return max((len(getattr(peer, buffer)) for peer in door.peers), default=0)
+    def most(server: PeerServer[Any], buffer: str) -> int:
+        return max((len(getattr(peer, buffer)) for peer in server.peers), default=0)
 
     def talk(self) -> None:
         """Well-behaved programs send requests, are answered in time, and repeat. A disconnected one must have a
@@ -351,10 +351,10 @@ class Fuzz:
             "not_admitted": self.control.not_admitted,
             "frames": self.bus.counters.frames,
         }
-        for door in self.doors:
-            found[f"{door.kind}_requests"] = door.worked
-            for reason, count in door.sent_away.items():
-                found[f"{door.kind}_{reason}"] = count
+        for server in self.servers:
+            found[f"{server.kind}_requests"] = server.worked
+            for reason, count in server.sent_away.items():
+                found[f"{server.kind}_{reason}"] = count
         return found
 
     def close(self) -> None:
@@ -362,8 +362,8 @@ class Fuzz:
         for programs in (*self.hostile.values(), list(self.good.values())):
             for program in programs:
                 program.close()
-        for door in self.doors:
-            door.close()
+        for server in self.servers:
+            server.close()
 
 
 HELLO = wire.record(wire.HELLO, wire.HELLO_BODY.pack(wire.MAGIC, wire.VERSION, 0))  # for the channels alone

@@ -102,7 +102,7 @@ def test_a_message_without_a_sender_is_sent_by_a_board_that_the_file_does_not_na
     altered(dbc, "BO_ 800 Request: 1 GEARBOX", "BO_ 800 Request: 1 Vector__XXX")
     assert from_dbc.read(dbc, None).messages[2].sender == "TESTER"
     altered(dbc, "GEARBOX", "Tester")
-    assert from_dbc.read(dbc, None).messages[2].sender == "REST"
+    assert from_dbc.read(dbc, None).messages[2].sender == "TESTER_2"
 
 
 def test_a_single_node_gets_another_one_that_acknowledges(dbc):
@@ -114,6 +114,13 @@ def test_what_the_file_does_not_state_is_a_comment_at_its_place(dbc):
     program = from_dbc.program(from_dbc.read(dbc, None), "GEARBOX")
     assert re.search(r"send_request_message, 0, 0, 0\}, /\* TODO: the DBC file has no cycle time", program)
     assert "TODO: fill gear_state_message with the values that this board measures" in program
+
+
+def test_the_dbc_file_is_copied_byte_for_byte(dbc, tmp_path):
+    """Tools write these files as Windows-1252, and cantools reads them as that."""
+    dbc.write_bytes(dbc.read_text().replace('"C" ENGINE', '"\N{DEGREE SIGN}C" ENGINE').encode("cp1252"))
+    assert cli.main(["new", str(tmp_path / "net"), "--from", str(dbc)]) == 0
+    assert (tmp_path / "net" / "drive_train.dbc").read_bytes() == dbc.read_bytes()
 
 
 @pytest.mark.skipif(not COMPILER, reason="no C compiler here")

@@ -100,26 +100,26 @@ def write(project: pathlib.Path, name: str) -> None:
     generate.write(load_table(project / "table"), project / "table" / "generated")
 
 
-def files_of_dbc(dbc: pathlib.Path, bit_rate: int | None, name: str) -> dict[str, str]:
+def files_of_dbc(dbc: pathlib.Path, bit_rate: int | None, name: str) -> dict[str, bytes]:
     """The files of a project for the boards of a DBC file, with a copy of that file."""
     from ranger_sim.tools.new import from_dbc
 
     if bit_rate is not None and not 10_000 <= bit_rate <= 3_000_000:
         raise UserError(f"new --bit-rate {bit_rate}: 10000 to 3000000 bit/s")
     network = from_dbc.read(dbc, bit_rate)
-    files = from_dbc.files(network, name, dbc)
-    files[f"{network.stem}.dbc"] = dbc.read_bytes().decode("cp1252", "replace")
+    files = {path: text.encode("utf-8") for path, text in from_dbc.files(network, name, dbc).items()}
+    files[f"{network.stem}.dbc"] = dbc.read_bytes()  # as it is: the encoding of a DBC file is not written in it
     print(f"{dbc}: {len(network.nodes)} boards, {len(network.messages)} messages, {network.bit_rate} bit/s")
     for line in network.left_out:
         print(f"{dbc}: left out: {line}")
     return files
 
 
-def write_files(project: pathlib.Path, files: dict[str, str]) -> None:
-    """Write a project's files, {path: text}."""
-    for path, text in (files | WRITTEN).items():
+def write_files(project: pathlib.Path, files: dict[str, bytes]) -> None:
+    """Write a project's files, {path: content}."""
+    for path, content in (files | {path: text.encode("utf-8") for path, text in WRITTEN.items()}).items():
         (project / path).parent.mkdir(parents=True, exist_ok=True)
-        (project / path).write_text(text, encoding="utf-8", newline="")
+        (project / path).write_bytes(content)
 
 
 def take_over(project: pathlib.Path, folder: pathlib.Path) -> None:
