@@ -26,7 +26,6 @@ BEYOND = 0.02  # of a signal's training range, beyond which a row is outside of 
 WORTH = 0.05  # of the residual's square: less is not a reason for another band
 HIDDEN = 1e-4  # of an effect's square: when the base explains all but this, the data do not show it
 SURROGATES = 199  # and as many for every further equation, so that their least chance together stays the same
-SHORT = 20.0  # correlation times of the noise: with fewer of them nothing can be said
 MOST_ROWS = 3000  # that count in the test: slower than every n-th row nothing is lost below the band's edge
 
 

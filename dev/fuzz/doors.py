@@ -287,8 +287,8 @@ class Fuzz:
         self.now_ns += POLL_NS
         self.polls += 1
         before = [server.worked for server in self.servers]
-        for server in (self.attach, self.terminal, self.tcp):
-            server.poll(self.now_ns)
+        for bus_server in (self.attach, self.terminal, self.tcp):
+            bus_server.poll(self.now_ns)
         self.control.poll()
         self.bus.advance(self.now_ns)
         self.taps.poll(self.now_ns)
