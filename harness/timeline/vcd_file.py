@@ -12,7 +12,6 @@ import numpy as np
 
 from ranger_sim.harness.timeline.model import Events, Slices
 
-IDENTIFIER_BITS = 11
 Change = tuple[int, int, Any]  # ns, number of the variable, value
 
 

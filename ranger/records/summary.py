@@ -11,7 +11,6 @@ from ranger_sim.harness.records.vital_signs import alive, can
 
 JOULES_PER_WH = 3600.0
 COVERAGE = ("lines", "covered", "branches", "taken")
-SKIPPED_STEPS = 5  # the start is left out of means
 
 
 def of(robot: Any) -> dict:

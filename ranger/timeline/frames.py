@@ -21,7 +21,6 @@ from ranger_sim.harness.timeline.model import Slices
 
 FLAGS_MASK = (1 << TIMES_BUFFER_SHIFT) - 1
 BUFFER_MASK = 3
-NODE_MASK = 0xFFFF
 NUMPY_TYPES = {"f32": np.float32, "i32": np.int32, "u32": np.uint32}
 
 

@@ -28,7 +28,6 @@ STIFFNESS_A_per_rad = 11.219  # of the logs' runs
 DAMPING_As_per_rad = 1.634
 AMPLITUDE_rad = 0.85
 CENTRE_rad = 1.05  # the logs' sines run from 0.2 to 1.9 rad
-FREQUENCIES_HZ = (0.5, 1.0, 2.0)
 LOG_S = 0.004  # from one row to the next
 CURRENT_S = 0.052
 STEP_S = 0.0005

@@ -17,7 +17,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.benches.pulley import FRICTION_SCATTER, GRAVITY, MASS_STEP_KG, RADIUS_M
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.fit import Fit, Parameter
-from ranger_sim.sysid.identification.blocks import Block, column, corrected, length, same_rows, solve, start_at
+from ranger_sim.sysid.identification.blocks import Block, column, corrected, length, same_rows, solve
 from ranger_sim.sysid.instruments import CALLIPER_M, CURRENT_SENSOR, SHAFT_SPEED, TORQUE_CELL, VOLTMETER
 
 Array = NDArray[np.float64]
@@ -194,10 +194,3 @@ def joint(
 ) -> Fit:
     """All of table 3 from all three recordings at once."""
     return solve([stalled_block(stall), cantilever_block(cantilever, gear), pulley_block(pulley, gear)], tell=tell)
-
-
-def of_cantilever(data: Dataset, gear: float = GEAR, tell: Callable[[str], None] | None = None) -> Fit:
-    """All of table 3 from a cantilever recording alone."""
-    block = cantilever_block(data, gear)
-    rough = solve([power_block(data, gear)])
-    return solve([block], start_at(rough, block.parameters), tell=tell)
