@@ -1,6 +1,6 @@
 """Sets up everything that `make walk` or `make test` needs: environment, packages, compiled library, command.
 
-    python3 set_up.py walk      # what the package needs: every command of the README runs
+    python3 set_up.py walk      # the package and the extras of the README's commands
     python3 set_up.py all       # all of pyproject.toml: its extras, and packages for tests, lint and documents
     python3 set_up.py lint      # all packages, and nothing compiled: enough for `make lint`
 
@@ -22,6 +22,7 @@ import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
 LOG = HERE / "build" / "setup.log"
+EXTRAS_OF_A_WALK = ("report", "diagnose", "campaign", "panel")  # what the README's commands need
 
 
 class SetUpError(Exception):
@@ -34,11 +35,23 @@ def name_of(requirement):
 
 
 def for_a_walk(project):
-    """Names of the packages that every command needs, and pytest, for which the package is a plugin.
+    """Names of the packages that the README's commands need, and pytest, for which the package is a plugin.
 
     project: the content of pyproject.toml.
     """
-    return {name_of(each) for each in project["project"]["dependencies"]} | {"pytest"}
+    extras = project["project"]["optional-dependencies"]
+
+    def names(requirements):
+        for each in requirements:
+            own = re.match(r"ranger-sim\[(.+)\]", each)
+            if own:
+                for extra in own[1].split(","):
+                    yield from names(extras[extra])
+            else:
+                yield name_of(each)
+
+    parts = [project["project"]["dependencies"], *(extras[each] for each in EXTRAS_OF_A_WALK)]
+    return {name for part in parts for name in names(part)} | {"pytest"}
 
 
 def part_of_lock(lock, wanted):

@@ -14,42 +14,60 @@ PACKAGES = {"can": "python-can", "elftools": "pyelftools", "google": "protobuf",
 
 def missing(error: ModuleNotFoundError, command: str) -> str | None:
     """The message for a failed import, in a line; None if the missing module is not a library."""
+    package = package_of(error)
+    if package is None:
+        return None
+    return f"{command} needs the library {package}, which is not installed; this installs it: " + installs(
+        package, command
+    )
+
+
+def package_of(error: ModuleNotFoundError) -> str | None:
+    """The package of the library that an import did not find; None if the module is not a library's."""
     module = (error.name or "").partition(".")[0]
     if not module or module == "ranger_sim" or module in sys.stdlib_module_names:
         return None
-    package = PACKAGES.get(module, module)
-    return f"{command} needs the library {package}, which is not installed; this installs it: {installs(package)}"
+    return PACKAGES.get(module, module)
 
 
-def installs(package: str) -> str:
-    """The command that installs a package into this environment, with its whole extra if it belongs to one.
+def installs(package: str, command: str = "") -> str:
+    """The command that installs a package into this environment, as part of an extra of ours if it belongs to one.
 
-    `make setup` has the whole lock, but does not reinstall.
+    command: of several extras, the one of this command's name is meant. `make setup` has the whole lock, but does not
+    reinstall.
     """
-    requirements, extra = _requirements(package)
-    if extra and _made_by_make():
+    requirement, extras = _requirement(package)
+    if extras and _made_by_make():
         return "make setup" if pathlib.Path.cwd() == loading.CHECKOUT else f"make -C {loading.CHECKOUT} setup"
-    return " ".join([_shown(sys.executable), "-m pip install", *(f'"{each}"' for each in requirements)])
+    if extras:
+        requirement = f"ranger-sim[{command if command in extras else extras[0]}]"
+    return f'{_shown(sys.executable)} -m pip install "{requirement}"'
 
 
-def _requirements(package: str) -> tuple[list[str], str]:
-    """(requirements as pip takes them, extra) of a package of ours; for others, the package itself."""
-    try:
-        listed = importlib.metadata.requires("ranger-sim") or []
-    except importlib.metadata.PackageNotFoundError:
-        listed = []
+def _requirement(package: str) -> tuple[str, list[str]]:
+    """(requirement as pip takes it, our extras that have it) of a package; an extra that has another extra has its own."""
+    base: list[str] = []
     by_extra: dict[str, list[str]] = {}
-    own = ""
-    for line in listed:
+    for line in _listed():
         requirement, _, marker = line.partition(";")
         found = re.search(r"extra == ['\"](.+?)['\"]", marker)
-        extra = found[1] if found else ""
-        by_extra.setdefault(extra, []).append(requirement.strip())
-        if _name(requirement) == _name(package):
-            own = own or (extra or requirement.strip())
-    if own in by_extra and own:
-        return by_extra[own], own
-    return [own or package], ""
+        (by_extra.setdefault(found[1], []) if found else base).append(requirement.strip())
+
+    def has(extra: str) -> bool:
+        own = "".join(by_extra[extra])
+        parts = [part for found in re.findall(r"ranger-sim\[(.+?)\]", own) for part in found.split(",")]
+        return any(_name(each) == _name(package) for each in by_extra[extra]) or any(map(has, parts))
+
+    needed = [each for each in base if _name(each) == _name(package)]
+    return (needed or [package])[0], [] if needed else [each for each in by_extra if has(each)]
+
+
+def _listed() -> list[str]:
+    """The requirements of this package, with their extras, in the order of pyproject.toml."""
+    try:
+        return importlib.metadata.requires("ranger-sim") or []
+    except importlib.metadata.PackageNotFoundError:
+        return []
 
 
 def _name(requirement: str) -> str:

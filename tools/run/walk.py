@@ -27,7 +27,7 @@ from ranger_sim.ranger.firmware import native_boards
 from ranger_sim.ranger.names import RANGER
 from ranger_sim.ranger.scenario import Scenario, StopRule
 from ranger_sim.tools import faults
-from ranger_sim.tools.command_line import interrupts, streams, terminal
+from ranger_sim.tools.command_line import interrupts, libraries, streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.command_line.units import duration_text, figure, length_text
 from ranger_sim.tools.firmware import gdb_options
@@ -274,7 +274,7 @@ def finish(
         kept = "only the summary was kept" if json_file is not None or options.json else "nothing was kept"
         console.print(f"{kept}: --out runs/NAME keeps summary, logs and report there", highlight=False, soft_wrap=True)
         return True
-    name = SUMMARY if logs is None else REPORT
+    name = REPORT if REPORT in folder.files else SUMMARY
     if folder.files.get(name, "complete") == "complete":
         console.print(f"{pathlib.Path(name).stem}: {folder.path / name}", highlight=False, soft_wrap=True)
     return folder.is_complete
@@ -353,10 +353,16 @@ def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs |
     if logs is not None:
         with console.status("writing logs and report ..."):
             logs.finish()
-            with folder.file(REPORT) as path:
+            try:
                 from ranger_sim.tools.report import page  # half a second of imports
-
-                path.write_text(page.render(robot, summary), encoding="utf-8")
+            except ModuleNotFoundError as error:  # the records are complete without it
+                without = libraries.missing(error, REPORT)
+                if without is None:
+                    raise
+                console.print(without, highlight=False, soft_wrap=True)
+            else:
+                with folder.file(REPORT) as path:
+                    path.write_text(page.render(robot, summary), encoding="utf-8")
     folder.finish(summary)
 
 
