@@ -1,7 +1,9 @@
 # make walk: set up everything, then let Ranger walk 100 steps.   make test: set up everything, then run all tests.
 # make test-interpreted: the packages' own tests on the plain sources, where compiled modules run in `make test`; and nine
 #   scenarios compiled and interpreted, to the byte.
-# make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run.
+# make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run; then
+#   README and tutorial in order, in an environment that only their commands make.
+# make test-suites: other projects' CAN tests on our buses, and our tests that need other people's libraries.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (dev/vm/README.md).
 PYTHON ?= python3
 VENV   ?= .venv
@@ -9,7 +11,7 @@ STEPS  ?= 100
 RUN    := $(VENV)/bin/python
 SOURCES := $(shell find -L ranger_sim \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null) dev/declarations.py
 
-.PHONY: walk test test-interpreted test-vm docs lint setup bench lock clean
+.PHONY: walk test test-interpreted test-suites test-vm docs lint setup bench lock clean
 
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
@@ -44,7 +46,11 @@ test-interpreted: $(VENV)/.all
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site
 	$(RUN) -m pytest -q -n 2 $(PAGES)
+	$(RUN) -m dev.readme
 	@echo "build/site/docs/index.html"
+
+test-suites: $(VENV)/.all
+	$(RUN) -m dev.suites
 
 test-vm: $(VENV)/.all
 	$(RUN) -m tests.vm.run

@@ -41,6 +41,9 @@ WALKED = {
     "docs/how-to/c-firmware.md",
     "docs/how-to/machine.md",
     "docs/how-to/diagnose-in-python.md",
+    "docs/how-to/canopen.md",
+    "docs/how-to/j1939.md",
+    "docs/how-to/uds.md",
 }
 # Its examples, tests and a law beside them, are run in a project of their own: harness/testing/test_in_a_project.py.
 IN_A_PROJECT = "docs/testing.md"

@@ -1,0 +1,1 @@
+"""Other projects' test suites on our CAN interface: python -m dev.suites."""
