@@ -105,7 +105,7 @@ def in_order(page: pathlib.Path, folder: pathlib.Path, environment: Mapping[str,
 
 
 def pages(top: pathlib.Path) -> Iterator[Done]:
-    """README in the copy's top folder, then the tutorial in a folder of its own."""
+    """README in the copy's top folder, then the tutorial in a new folder."""
     environment = of_a_stranger()
     yield from in_order(top / "README.md", top, environment)
     lesson = top / "lesson"

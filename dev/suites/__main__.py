@@ -1,7 +1,7 @@
 """python -m dev.suites [NAME ...]: test suites of other projects, on python-can's `virtual` and on `ranger_sim`.
 
 The suites come as source packages from the package index, at the versions of SUITES, and run as they are, in an
-environment of their own with the packages of requirements.txt. Exit code 1 when a test fails on our bus that passes on
+separate environment with the packages of requirements.txt. Exit code 1 when a test fails on our bus that passes on
 `virtual` and is not in `EXPECTED`; also when one of EXPECTED passes. The name `libraries` runs our own tests that
 compare with other people's libraries (OUR_TESTS): there none may be skipped. --json FILE writes the numbers.
 """
@@ -192,7 +192,7 @@ def ours_beside_libraries(python: pathlib.Path, folder: pathlib.Path) -> list[st
     )
     cases = list(ElementTree.parse(report).getroot().iter("testcase"))
     wrong = [str(case.get("name")) for case in cases if list(case) and case.find("system-out") is None]
-    print(f"{LIBRARIES:12} {len(cases) - len(wrong)} of {len(cases)} of our tests beside other people's libraries")
+    print(f"{LIBRARIES:12} {len(cases) - len(wrong)} of {len(cases)} of our tests with other people's libraries")
     if wrong or done.returncode:
         print(done.stdout[-3000:])
     return wrong or [f"pytest ended with {done.returncode}"] * (done.returncode != 0)
