@@ -84,14 +84,14 @@ class Order:
         if firmware and self.backend in (VCAN, HARDWARE):
             raise UserError(f"backend {self.backend}: firmware in C runs on the backends {SIM} and {PROCESSES}")
         if self.backend == PROCESSES:
-            from ranger_sim.ranger.testing.process_robot import ProcessRobot
+            from ranger_sim.harness.testing.process_per_board import ProcessPerBoard
 
-            return ProcessRobot(self.scenario, self.log, self.quirks, profile, firmware)
+            return Ranger(self.scenario, self.log, self.quirks, profile, firmware, mode=ProcessPerBoard())
         if self.backend in (VCAN, HARDWARE):
-            from ranger_sim.ranger.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
+            from ranger_sim.ranger.testing.outside_robot import buses_of_profile, outside_robot, vcan_buses
 
             outside = vcan_buses() if self.backend == VCAN else buses_of_profile(profile)
-            return OutsideRobot(self.scenario, self.log, self.quirks, profile, outside, self.speed)
+            return outside_robot(self.scenario, self.log, self.quirks, profile, outside, self.speed)
         return Ranger(self.scenario, self.log, self.quirks, profile, firmware, bool(self.in_process))
 
 
