@@ -30,9 +30,9 @@ from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.machine import Machine
 from ranger_sim.harness.outside.profile import Profile
-from ranger_sim.harness.processes.guard import DEADLINE_S
 from ranger_sim.harness.processes.kinds import SET_WORD
 from ranger_sim.harness.processes.modes import InProcess, OwnProcesses
+from ranger_sim.harness.processes.settings import DEADLINE_S
 from ranger_sim.harness.timing.machine_slots import MachineSlots
 from ranger_sim.harness.waiting import Wanted
 from ranger_sim.plant import body_files

@@ -22,9 +22,9 @@ from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
-from ranger_sim.harness.processes.guard import DEADLINE_S, Guard
+from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.remote_board import RemoteBoard
-from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.settings import DEADLINE_S, Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.step_watch import StepWatch
 

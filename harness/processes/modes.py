@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes.guard import DEADLINE_S
+from ranger_sim.harness.processes.settings import DEADLINE_S
 from ranger_sim.harness.waiting import ErrorNoted
 
 if TYPE_CHECKING:
