@@ -84,26 +84,29 @@ class Ranger(Machine):
         self.scenario = scenario if scenario is not None else Scenario()
         self.profile = profile
         self.printed = printed
+
+        # the programs of the boards
         self.controller = controllers.load(self.scenario.controller)
         self.quirks = program(self.controller.program).switches(quirks if quirks is not None else Quirks())
-        self.body = body_files.load(self.scenario.body)
         self.programs_in_c = ProgramsInC(native_boards.built(firmware if firmware is not None else {}), printed)
         self.firmware = self.programs_in_c.firmware
         self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})
-        self.factory = factory_of(
-            self.scenario, Emulated(self.quirks, self.controller), self.programs_in_c, self.images
-        )
+        emulated = Emulated(self.quirks, self.controller)
+        self.factory = factory_of(self.scenario, emulated, self.programs_in_c, self.images)
+
+        # body, boards, buses; then the wires and the recorders
+        self.body = body_files.load(self.scenario.body)
         plant, boards, buses, started = parts_of(self.scenario, self.body, self.factory, profile)
         if mode is None and self.firmware and not in_process:
             mode = OwnProcesses(tuple(self.firmware), board_deadline_s)
-        memory = (all_variables.TABLE_SIZE, boards["MB"])
-        Machine.__init__(self, plant, boards, buses, wiring.RANGER, self.scenario.seed, log, memory, RANGER, mode=mode)
+        seed, memory = self.scenario.seed, (all_variables.TABLE_SIZE, boards["MB"])
+        Machine.__init__(self, plant, boards, buses, wiring.RANGER, seed, log, memory, RANGER, mode=mode)
         for name, messages in started.items():
             pass_on(messages, self.boards[name].outbox, self.start_ns)
+
+        # the operator at the keys, and what observes the walk
+        self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)
         self.loop.strikes = StrikeWatch(self.plant, self.boards["MB"])
-        self.operator = Operator(
-            self.controller.operator, self.plant, self.boards["UI"], self.start_ns, self.scenario.seed
-        )
         self.catalogue = CATALOGUE
 
     def new_board(self, name: str, power_up_ns: int, record: Any = None) -> Any:
