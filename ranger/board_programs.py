@@ -79,7 +79,7 @@ class InC:
         return board
 
     def waits_for_slots(self, board: Any) -> bool:
-        return bool(board.scheduler.announces)  # else its handlers may send
+        return bool(board.scheduler.names_transmitters)  # else its handlers may send
 
 
 @dataclasses.dataclass(frozen=True)
