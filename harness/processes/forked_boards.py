@@ -58,9 +58,11 @@ class ForkedBoards:
         self.guard = fork(Guard(self.blocks, self.children, self.watches, in_c, deadline_s).watch)
         loop = robot.loop
         show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
-        self.remotes = {
-            name: RemoteBoard(robot.boards[name], self.blocks[name], show, place[name], name == "MB") for name in names
-        }
+        self.remotes = {}
+        for name in names:
+            board = robot.boards[name]
+            follows_steps = board is loop.sampler.board  # its memory is sampled
+            self.remotes[name] = RemoteBoard(board, self.blocks[name], show, place[name], follows_steps)
         for name, remote in self.remotes.items():
             loop.replace(remote)
             robot.boards[name].out_of_process = True  # it does not run here
