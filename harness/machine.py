@@ -35,7 +35,6 @@ from ranger_sim.harness.records.recorder import Recorder
 from ranger_sim.harness.records.sampler import Sampler
 from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting, Wanted
-from ranger_sim.harness.wiring.imu_wire import ImuWire
 from ranger_sim.harness.wiring.wires import Wiring
 
 GRID_NS = 20_000_000  # actions from outside happen on this grid, so that a run does not depend on how it is sliced
@@ -146,6 +145,8 @@ class Machine:
         if (link := wiring.link) is not None:
             loop.connect_link(self._wired(link.master), self._wired(link.slave), link.exchange_ns, link.idle())
         if (imu := wiring.imu) is not None:
+            from ranger_sim.harness.wiring.imu_wire import ImuWire  # only here: it loads the unit of the body
+
             board = self._wired(imu.board)
             loop.connect_serial_device(ImuWire(self.plant.imu, board, imu.uart), board, imu.uart)
 
