@@ -182,6 +182,18 @@ class OptionalBuild(build_ext):
             os.chdir(HERE)
         return found
 
+    def build_extensions(self):
+        """All modules. A library is linked under another name: one that a killed linker left would look up to date."""
+        link = self.compiler.link_shared_object
+
+        def link_whole(objects, library, *arguments, **more):
+            unfinished = f"{library}.unfinished"
+            link(objects, unfinished, *arguments, **more)
+            os.replace(unfinished, library)
+
+        self.compiler.link_shared_object = link_whole
+        super().build_extensions()
+
     def build_extension(self, extension):
         """One module, or its library of this checkout if that is up to date; and how far the build is."""
         place = self.get_ext_filename(extension.name)

@@ -116,7 +116,7 @@ class HipBoard(MotorBoard):
                 Send("MCH_MAX_EXECUTION_TIME",  board.execution.longest_seconds,    2 * 276, 2 * 370),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("can_tx1", "can_transmit"),
+            transmitters=("can_tx1", "can_transmit"),
             last=(
                 Task(board.end_line,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
                 Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),

@@ -101,7 +101,7 @@ class InnerFeetBoard(AnkleBoard):
                 Task(board.motor_encoder_rezero,                                     2 * 161, 2 * 4800),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("can_tx2", "can_transmit"),
+            transmitters=("can_tx2", "can_transmit"),
             last=(
                 Task(board.end_line,             TRANSMIT_CYCLES, 100, 0, "", "can_transmit"),
                 Task(board.execution.record,         2 * 22,           60, 0, "", "execution_time_record"),

@@ -184,7 +184,7 @@ class UserInterfaceBoard(SatelliteBoard):
                 Send("UI_RC_3",               lambda: rc.width(3),                2 * 261, 2 * 400),
             )),
             extra_idle_call=self.quirks.occasional_idle_call,
-            speakers=("feed", "can_transmit"),
+            transmitters=("feed", "can_transmit"),
             last=(
                 Task(board.can.transmit,        cost=TRANSMIT_CYCLES, limit=100, name="can_transmit"),
                 Task(board.execution.record,    cost=2 * 22,   limit=60, name="record_execution_time"),

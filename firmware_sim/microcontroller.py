@@ -421,10 +421,10 @@ class Microcontroller(Chip):
     def earliest_transmit_ns(self) -> cython.longlong:
         """Earliest time (ns) at which the board can send on a bus, unless an urgent message arrives.
 
-        That is its next event, or later where its schedule names the tasks that send (`Schedule.speakers`).
+        That is its next event, or later where its schedule names the tasks that send (`Schedule.transmitters`).
         """
         time: cython.longlong = self.code_time
-        if not self.scheduler.announces or self.vic.pending != 0 or self.background is not None:
+        if not self.scheduler.names_transmitters or self.vic.pending != 0 or self.background is not None:
             return self.next_time
         if self.waiting and self.horizon > time:  # the condition that the task spins for is not met before that
             time = self.horizon

@@ -20,6 +20,7 @@ from ranger_sim.firmware_sim.calls import code_of, owner_of
 from ranger_sim.firmware_sim.counters import SlotCounters
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.numbers import integers
+from ranger_sim.foundation.renamed import renamed
 from ranger_sim.foundation.user_error import FirmwareError
 
 NORMAL_TASK: Final = 0
@@ -54,7 +55,7 @@ class Task:
     number: cython.longlong
     scheduler: "SlotScheduler"
     routine: object
-    speaks: cython.bint
+    transmits: cython.bint
     hits: cython.longlong
     name: str
     item: str
@@ -75,7 +76,7 @@ class Task:
         self.kind = NORMAL_TASK
         self.name = title
         self.item = item
-        self.speaks = True  # may send on a bus; a Schedule says otherwise, but not of a user's function
+        self.transmits = True  # may send on a bus; a Schedule may exclude it, but not for a user's function
         self.hits = 0
         # these count all other calls
         self.noted_calls = 0
@@ -118,7 +119,7 @@ class Task:
     @function.setter
     def function(self, function) -> None:
         self.set_routine(function)
-        self.speaks = True
+        self.transmits = True
         if self.scheduler is not None:
             self.scheduler.set_duration(self)
 
@@ -234,7 +235,7 @@ class Schedule:
     of tasks (or an Occasional) called once per pass, at the end of row `occasional_row`.
     `divider`: timer ticks per slot (the timer then runs at slot/divider). `completion_flag=False`: the
     runner keeps no DONE flag, so an overrun drops tasks without a report (main-brain scheduler).
-    `speakers`: names of those tasks in `every` and `last` that may put something on a bus (None: any of them);
+    `transmitters`: names of those tasks in `every` and `last` that may put something on a bus (None: any of them);
     tasks of rows and of the occasional list always may. To be named only where no interrupt handler and no main loop
     sends. It lets the rest of the robot run ahead of a board that sends nothing, and changes no result.
     `tick_slot`: VIC slot of the timer interrupt (or FIQ); `tick_cost`: its cycles.
@@ -249,7 +250,7 @@ class Schedule:
     rows: list
     last: list
     completion_flag: cython.bint
-    announces: cython.bint
+    names_transmitters: cython.bint
 
     def __init__(
         self,
@@ -266,8 +267,12 @@ class Schedule:
         tick_latency=None,
         slot_ns=None,
         extra_idle_call=True,
+        transmitters=None,
         speakers=None,
     ) -> None:
+        if speakers is not None:
+            renamed("Schedule.speakers", "transmitters")
+            transmitters = speakers
         self.slot_ns = slot_ns if slot_ns is not None else slot_us * 1000
         self.every = list(every)
         self.rows = [list(row) for row in rows]
@@ -292,15 +297,17 @@ class Schedule:
         for task in self.every + self.last + [task for row in self.rows for task in row]:
             if not isinstance(task, Task):
                 raise FirmwareError(f"schedule: {task!r} is not a Task")
-        self.announces = speakers is not None
-        if speakers is not None:
+        self.names_transmitters = transmitters is not None
+        if transmitters is not None:
             names = [task.name for task in self.every + self.last]
-            for name in speakers:
+            for name in transmitters:
                 if name not in names:
                     there = ", ".join(names)
-                    raise FirmwareError(f"schedule: speaker {name!r} is not a task of every slot (available: {there})")
+                    raise FirmwareError(
+                        f"schedule: transmitter {name!r} is not a task of every slot (available: {there})"
+                    )
             for task in self.every + self.last:
-                task.speaks = task.name in speakers
+                task.transmits = task.name in transmitters
 
     def row_tasks(self, row: cython.longlong) -> list:
         """Everything that a slot of this row runs, in order."""
@@ -341,7 +348,7 @@ class SlotScheduler:
     started: cython.bint
     row: cython.longlong
     row_count: cython.longlong
-    announces: cython.bint
+    names_transmitters: cython.bint
     tasks: list
     placed: list
     divider_count: cython.longlong
@@ -379,7 +386,7 @@ class SlotScheduler:
         self.slot_ns = schedule.slot_ns
         self.slot_cycles = slot_cycles
         self.divider = schedule.divider
-        self.announces = schedule.announces
+        self.names_transmitters = schedule.names_transmitters
         self.near_limit_cycles = slot_cycles * 9 // 10  # "approaching" is 90 % (chosen by us)
         self.histogram_step = max(1, slot_cycles // 20)
         self.histogram = [0] * 21  # HISTOGRAM_BINS
@@ -451,7 +458,7 @@ class SlotScheduler:
             lead = NEVER
             for place in range(self.row_starts[row + 1] - 2, self.row_starts[row] - 1, -1):
                 task = self.placed[place]
-                if task.speaks:
+                if task.transmits:
                     lead = 0
                 elif lead < NEVER:
                     lead += int(task.base_cycles * self.ns_per_cycle)

@@ -5,7 +5,9 @@ import warnings
 
 
 def renamed(old: str, new: str) -> None:
-    """DeprecationWarning at the line that calls the method `old`, which is now called `new`."""
-    interpreted = sys._getframe(1).f_code.co_name == old.rpartition(".")[2]  # a compiled method has no frame
+    """DeprecationWarning at the line that uses `old`, a method or an argument of its class, now called `new`."""
+    # a compiled function has no frame: then this one is the caller's
+    code = sys._getframe(1).f_code
+    interpreted = code.co_qualname in (old, f"{old.rpartition('.')[0]}.__init__")
     message = f"{old} is now {new}; the old name ends with the next version"
     warnings.warn(message, DeprecationWarning, stacklevel=3 if interpreted else 2)

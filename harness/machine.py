@@ -13,6 +13,7 @@ examples/servo is a whole one.
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.faults.error_rows import ErrorRows, StateWord
 from ranger_sim.harness.faults.fault import Fault, Place
 from ranger_sim.harness.names import Names
+from ranger_sim.harness.processes.modes import InProcess
 from ranger_sim.harness.records.logbook import Logbook
 from ranger_sim.harness.records.recorder import Recorder
 from ranger_sim.harness.records.sampler import Sampler
@@ -46,9 +48,14 @@ class Machine:
     "window" (the last seconds in memory) or "full" (on disk), `logbook`'s frames and samples.
     words: (how many, board): the memory of a board that the log keeps as well. names: of frames and errors, as
     `Names.of(load_table(folder))` has them; without, frames have only numbers. places: where faults can be.
+    mode: where its boards run.
+
+    `deaths`: of each board whose process has ended by itself, in order: {"board", "time_s", "how" its process ended,
+    "why"}, the last as far as its program or its records report it.
     """
 
-    backend = "sim"  # its execution backend; harness/testing/backends.py has the others
+    firmware: Mapping[str, Any] = MappingProxyType({})  # programs in C whose crashes are located, by board
+    printed: Any = None  # takes what these print
     lost = False  # a part of it that runs elsewhere is gone: it can pass no more time
 
     def __init__(
@@ -62,10 +69,14 @@ class Machine:
         words: tuple[int, Any] = (0, None),
         names: Names | None = None,
         places: Iterable[Place] = (),
+        mode: InProcess | None = None,
     ) -> None:
         self.plant = plant
         self.boards: dict[str, Any] = dict(boards)
         self.seed = seed
+        self.mode = mode if mode is not None else InProcess()
+        self.backend = self.mode.backend  # harness/testing/backends.py
+        self.deaths: list[dict[str, Any]] = []
         self.start_ns: int = plant.time_ns
         for number, name in enumerate(buses, start=1):
             if name != f"can{number}":
@@ -131,9 +142,16 @@ class Machine:
             self._wired(bridge.board)
             pins3 = [wiring.number(bridge.board, pin) for pin in bridge[2:]]
             loop.wires[place[bridge.board]].connect_drive(self._part("bridges", bridge.bridge), *pins3)
+        if (link := wiring.link) is not None:
+            loop.connect_link(self._wired(link.master), self._wired(link.slave), link.exchange_ns, link.idle())
+        if (imu := wiring.imu) is not None:
+            from ranger_sim.harness.wiring.imu_wire import ImuWire  # only here: it loads the unit of the body
+
+            board = self._wired(imu.board)
+            loop.connect_serial_device(ImuWire(self.plant.imu, board, imu.uart), board, imu.uart)
 
     def waits_for_slots(self, board: Any) -> bool:
-        """Whether the program of a board in `hear_in_slots` is known to wait for its tasks; subclasses override it."""
+        """Whether a board in `receive_in_slots` has a program that is known to wait for its tasks."""
         return True
 
     def _wired(self, name: str) -> Any:
@@ -151,11 +169,23 @@ class Machine:
 
     # --- passing time -------------------------------------------------------------------------------------
 
+    def start(self) -> None:
+        """Start a process for each board that is to have its own, if that has not been done."""
+        self.mode.start(self)
+
     def act(self, end_ns: int) -> None:
         """Act from outside; subclasses override it. Called once before each 20 ms of virtual time."""
 
     def run(self, stop: StopRule, slice_s: float = 1.0) -> bool:
         """Pass up to `slice_s` of virtual time; True when the stop rule is met or the machine can go no further."""
+        __tracebackhide__ = True
+        self.start()
+        with self.mode.passing_time(self):
+            done = self._run(stop, slice_s)
+        self.mode.after_run(self)
+        return done
+
+    def _run(self, stop: StopRule, slice_s: float) -> bool:
         if self.ended:
             return True
         loop = self.loop
@@ -198,15 +228,17 @@ class Machine:
         go no further before. It is checked between two steps of the plant.
         """
         __tracebackhide__ = True
-        waited = Waiting(self, self.condition(wanted))
+        wanted = self.condition(wanted)
         begun_ns, patience_ns = self.loop.time, duration_ns(within, "until: within")
         stop = StopRule(time_s=(begun_ns + patience_ns - self.start_ns) * 1e-9) if patience_ns else None
-        self.loop.watchers.append(waited)
-        try:
-            if stop is not None:
-                self.run(stop, patience_ns * 1e-9)
-        finally:
-            self.loop.watchers.remove(waited)
+        with self.mode.waiting_for(self, wanted):
+            waited = Waiting(self, wanted)
+            self.loop.watchers.append(waited)
+            try:
+                if stop is not None:
+                    self.run(stop, patience_ns * 1e-9)
+            finally:
+                self.loop.watchers.remove(waited)
         if not waited.met and not waited.wanted.met():
             passed = duration_text(self.loop.time - begun_ns)
             why = f"{self.end_word} ({self.ended}) after" if self.ended else "not within"
@@ -255,9 +287,10 @@ class Machine:
     # --- inspection and changes ---------------------------------------------------------------------------
 
     def board(self, name: str) -> Any:
-        """The board of this name. UserError for any other."""
+        """The board of this name. UserError for any other, or a board whose memory is in another process."""
         if name not in self.boards:
             raise UserError(unknown("board", name, self.boards))
+        self.mode.check_reach(name)
         return self.boards[name]
 
     def quantities(self) -> dict[str, float]:
@@ -270,10 +303,12 @@ class Machine:
         self, board: Any, task: str, function: Callable[[], int | None], cost: int, limit: int | None = None
     ) -> None:
         """Put your own function in a schedule entry of a board; it declares its cost in cycles."""
+        self.mode.check_replace(board, task)
         self.board(board).scheduler.replace(task, function, cost=cost, limit=limit)
 
     def counters(self) -> dict[str, Any]:
-        """Every board's counters, by its name; also of a board that runs in another process."""
+        """Every board's counters until now, by its name; also of a board that runs in another process."""
+        self.mode.fetch_counters()
         return {name: self.loop.board(name).counters() for name in self.boards}
 
     def slots(self, board: Any) -> Any:
@@ -317,7 +352,10 @@ class Machine:
 
         proof: it then also has `detected`, `detection_ms`, `reaction` and the rest of its `proof()`: a forked
         process is the machine without it, both are recorded from now on (2 MB a second each of Ranger), until `close`.
+
+        Processes of boards start now, so that a fault that would have to be inside one is refused.
         """
+        self.start()
         if isinstance(mode, str):
             fault = self.catalogue.fault(place, mode, at, until, parameters)
         else:
@@ -353,7 +391,8 @@ class Machine:
         return digest
 
     def close(self) -> None:
-        """Close the log's files, external connections, and the golden runs of faults."""
+        """Close the log's files, external connections, processes of boards, and the golden runs of faults."""
+        self.mode.close()
         self.logbook.close()
         for end in self.polled:
             end.close()

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from ranger_sim.boards.can_router import CanRouterBoard
@@ -20,6 +19,7 @@ from ranger_sim.firmware_sim.clock import seeded_crystal
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.firmware.native_firmware import Firmware
+from ranger_sim.ranger.firmware.programs_in_c import ProgramsInC
 
 # Boards are powered up together but their resets and start-up code differ: first slots spread over 2 ms.
 POWER_UP_SPREAD_NS = 2_000_000
@@ -63,21 +63,23 @@ class Emulated:
 
 @dataclasses.dataclass(frozen=True)
 class InC:
-    """A program in C, compiled for this computer. printing: takes what the program of a board prints meanwhile."""
+    """A program in C, compiled for this computer; one of the robot's `programs`."""
 
     firmware: Firmware
-    printing: Callable[[str], contextlib.AbstractContextManager[None]]
+    programs: ProgramsInC
 
     def board(self, name: str, crystal: Any, power_up_ns: int, record: Any) -> Any:
         from ranger_sim.ranger.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
-        with self.printing(name):
+        with self.programs.printing(name):
             board = RobotNativeBoard(name, self.firmware, crystal, power_up_ns, record)
         board.counts = self.firmware.counts
+        if record is None and self.programs.are_watched:  # it replaces another board
+            self.programs.watch(board)
         return board
 
     def waits_for_slots(self, board: Any) -> bool:
-        return bool(board.scheduler.announces)  # else its handlers may send
+        return bool(board.scheduler.names_transmitters)  # else its handlers may send
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,22 +100,23 @@ class OfImage:
 class BoardFactory:
     """Makes the boards of a robot. programs: by board; a board without an entry runs `emulated`.
 
-    seed: of the scenario; it chooses each board's crystal, and its power-up time after the robot's.
+    seed: of the scenario; it chooses each board's crystal, and its power-up time after the robot's, `start_ns`.
     """
 
-    def __init__(self, seed: int, emulated: Emulated) -> None:
+    def __init__(self, seed: int, start_ns: int, emulated: Emulated, programs: Mapping[str, Program]) -> None:
         self.seed = seed
+        self.start_ns = start_ns
         self.emulated = emulated
-        self.programs: dict[str, Program] = {}
+        self.programs = programs
 
     def program(self, name: str) -> Program:
         """What a board runs."""
         return self.programs.get(name, self.emulated)
 
-    def _drawn(self, name: str) -> tuple[Any, int]:
-        """(crystal, power-up time after the robot's in ns) of a board."""
-        stream = RandomStream(self.seed, f"board {name}")
-        return seeded_crystal(stream), stream.integer(POWER_UP_SPREAD_NS)
+    def first_board(self, name: str, record: Any = None) -> Any:
+        """The board that gets its power when the robot is switched on; otherwise as `board`."""
+        crystal, delay_ns = self._drawn(name)
+        return self.program(name).board(name, crystal, self.start_ns + delay_ns, record)
 
     def board(self, name: str, power_up_ns: int, record: Any = None) -> Any:
         """A new, unwired board with its own crystal, powered up at `power_up_ns`.
@@ -126,6 +129,7 @@ class BoardFactory:
         """A new crystal of a board, as it was bought."""
         return self._drawn(name)[0]
 
-    def first_power_up_ns(self, name: str, start_ns: int) -> int:
-        """When a board gets its power on a robot that is switched on at `start_ns`."""
-        return start_ns + self._drawn(name)[1]
+    def _drawn(self, name: str) -> tuple[Any, int]:
+        """(crystal, power-up time after the robot's in ns) of a board."""
+        stream = RandomStream(self.seed, f"board {name}")
+        return seeded_crystal(stream), stream.integer(POWER_UP_SPREAD_NS)

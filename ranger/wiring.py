@@ -5,7 +5,17 @@ Read a line from left to right in the direction of the signal.
 """
 
 from ranger_sim.boards import can_router, motor_board, user_interface
-from ranger_sim.harness.wiring.wires import AnalogInput, BridgeWire, CanWire, EncoderWire, EncoderWord, Wiring
+from ranger_sim.boards.modules import ssp_link
+from ranger_sim.harness.wiring.wires import (
+    AnalogInput,
+    BridgeWire,
+    CanWire,
+    EncoderWire,
+    EncoderWord,
+    ImuUart,
+    LinkWire,
+    Wiring,
+)
 from ranger_sim.plant import wiring_points as point
 
 # The order in which boards are advanced and their messages sorted within one time.
@@ -86,6 +96,9 @@ PINS = {**dict.fromkeys(("MCH", "MCFO", "MCFI", "MCSI"), motor_board.PINS), "UI"
 # The inertial unit is connected to UART 1 of the user interface board.
 IMU_BOARD, IMU_UART = "UI", user_interface.IMU_UART
 
+# The router asks the main brain for a segment.
+LINK = LinkWire("CSR", "MB", ssp_link.EXCHANGE_NS, ssp_link.empty_segment)
+
 MOTOR_BOARDS = ("MCH", "MCFO", "MCFI", "MCSI")
 RANGER = Wiring(
     receive_in_slots=RECEIVE_IN_SLOTS,
@@ -94,6 +107,8 @@ RANGER = Wiring(
     analog=ANALOG,
     words=WORDS,
     bridges=[BridgeWire(board, motor, "motor_watchdog", "low_side_2", "low_side_6") for board, motor in MOTORS.items()],
+    link=LINK,
+    imu=ImuUart(IMU_BOARD, IMU_UART),
     names={
         **dict.fromkeys(MOTOR_BOARDS, {**MOTOR_PINS, **motor_board.ANALOG, **WORD_REGISTERS}),
         "UI": PINS["UI"],

@@ -8,6 +8,7 @@ import pathlib
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
@@ -246,6 +247,32 @@ def test_a_build_compiles_and_rebuilds_a_changed_module_and_those_whose_view_of_
     changed = {name for name in later if later[name] != now[name]}
     assert "events" in changed and "numbers" not in changed
     assert how_it_runs(checkout)[1] == ""
+
+
+@needs_compiler
+@pytest.mark.skipif(os.name != "posix", reason="the linker of this test is a shell script")
+def test_a_library_that_was_half_written_when_the_build_was_killed_is_made_by_the_next_build(checkout):
+    build_in(checkout)
+    numbers = checkout / "foundation" / "numbers.py"
+    numbers.write_text(numbers.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
+    linker = checkout / "cc"
+    linker.write_text(
+        "#!/bin/sh\n"
+        'for each in "$@"; do\n'
+        '  case "$last $each" in\n'
+        '    "-o "*numbers.*so*) head -c 1000 /dev/zero > "$each"; kill -9 $PPID; exit 1;;\n'
+        "  esac\n"
+        '  last="$each"\n'
+        "done\n"
+        f'exec {CC} "$@"\n',
+        encoding="ascii",
+    )
+    linker.chmod(0o755)
+    killed = run(["setup.py", "-q", "build_ext", "--inplace"], checkout, CC=str(linker))
+    assert killed.returncode == -signal.SIGKILL
+    build_in(checkout)
+    files, reason = how_it_runs(checkout)
+    assert all(file.endswith(BUILT) for file in files) and reason == ""
 
 
 @needs_compiler

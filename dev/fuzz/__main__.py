@@ -19,8 +19,8 @@ CASES = 10_000
 TARGETS = {
     "can": "frames of every kind, and bytes that are none, from outside onto the buses of a walking robot",
     "channel": "damaged messages in the channel between a board's process and the body's",
-    "doors": "hostile programs at every endpoint: requests, connections, floods, unread answers; without a robot",
     "gdb": "hostile debuggers at the gdb port of a board that runs machine code",
+    "interfaces": "hostile programs at every endpoint: requests, connections, floods, unread answers; without a robot",
     "panel": "hostile programs at the panel's HTTP and WebSocket",
     "profiles": "profiles and bus schedules with pieces cut out, doubled and replaced",
     "requests": "requests of `ctl` that reach a walking robot, faults of every kind among them; viewers of the feed",

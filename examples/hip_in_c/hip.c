@@ -174,7 +174,7 @@ static const fw_task every_slot[] = {
     {mcu_led_update,         "mcu_led_update",        2 * 31,    130,       0, NULL},
     {joint_safety_check,     "dn_safety",             2 * 34,    140,       0, NULL},
     {error_update,           "error_update",          2 * 39,   5500, 2 * 213, "error"},
-    {can_link_feed,          "can_tx1",               2 * 5,     600,  2 * 35, "frame", .speaks = 1},
+    {can_link_feed,          "can_tx1",               2 * 5,     600,  2 * 35, "frame", .transmits = 1},
     {adcx_sequence_done,     "adcx_conversion_wait",  2 * 6,    6500,       0, NULL, .kind = FW_WAIT},
     {mc_compliant_control,   "mc_compliant_control",  2 * 735,  2100,       0, NULL},
 };
@@ -200,7 +200,7 @@ static const fw_task occasional[] = {
     {send_max_execution_time, "MCH_MAX_EXECUTION_TIME", SEND(276), 2 * 370, 0, NULL},
 };
 static const fw_task last[] = {
-    {end_line,               "can_transmit",          TRANSMIT_CYCLES, 100, 0, NULL, .speaks = 1},
+    {end_line,               "can_transmit",          TRANSMIT_CYCLES, 100, 0, NULL, .transmits = 1},
     {execution_time_record,  "execution_time_record", 2 * 22,           60, 0, NULL},
 };
 static const fw_tasks rows[MCH_ROWS] = {FW_TASKS(row_0), FW_TASKS(row_1), FW_TASKS(row_2), {NULL, 0}};
@@ -241,7 +241,7 @@ static const fw_schedule schedule = {
     .slot_ns = MCH_SLOT_US * 1000u,
     .tick_cost = 180 - IRQ_LATENCY, /* to the first function of the row, 3 us */
     .tick_vic_slot = 4,
-    .flags = FW_SPEAKERS_NAMED | (OCCASIONAL_IDLE_CALL ? 0 : FW_NO_IDLE_CALL),
+    .flags = FW_TRANSMITTERS_NAMED | (OCCASIONAL_IDLE_CALL ? 0 : FW_NO_IDLE_CALL),
     .first_slot_ns = SLOTS_BEGIN_NS,
     .every = FW_TASKS(every_slot),
     .rows = rows,

@@ -28,7 +28,7 @@ DECLARATIONS = """
 typedef int32_t (*fw_work)(void);
 typedef void (*fw_call)(void);
 typedef struct { fw_work function; const char *name; uint32_t cost; uint32_t limit; uint32_t per_item;
-                 const char *item; int kind; int32_t speaks; } fw_task;
+                 const char *item; int kind; int32_t transmits; } fw_task;
 typedef struct { const fw_task *tasks; uint32_t count; } fw_tasks;
 typedef struct { uint32_t after_ns; fw_call function; } fw_step;
 typedef struct { uint32_t slot_ns; uint32_t divider; uint32_t tick_cost; int32_t tick_vic_slot; uint32_t flags;

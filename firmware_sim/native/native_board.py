@@ -34,7 +34,7 @@ from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
 from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 # fw_schedule_flags and fw_kind of firmware.h
-SPEAKERS_NAMED, NO_COMPLETION_FLAG, NO_IDLE_CALL = 1, 2, 4
+TRANSMITTERS_NAMED, NO_COMPLETION_FLAG, NO_IDLE_CALL = 1, 2, 4
 WAIT = 1
 LER_OF_MATCH = 1  # PWMLER: bit n is match register n
 CMR_AT, CMR_CDO, CMR_STB1 = 0x2, 0x8, 0x20  # CxCMR
@@ -541,10 +541,10 @@ class NativeBoard(Microcontroller):
                 limit=given.occasional_limit,
                 extra_idle_call=not given.flags & NO_IDLE_CALL,
             )
-        speakers = None
-        if given.flags & SPEAKERS_NAMED:
-            lists = (given.every, given.last)
-            speakers = [text(each.tasks[i].name) for each in lists for i in range(each.count) if each.tasks[i].speaks]
+        transmitters = None
+        if given.flags & TRANSMITTERS_NAMED:
+            tasks = [each.tasks[i] for each in (given.every, given.last) for i in range(each.count)]
+            transmitters = [text(task.name) for task in tasks if task.transmits]
         schedule = Schedule(
             slot_ns=given.slot_ns,
             every=every,
@@ -556,7 +556,7 @@ class NativeBoard(Microcontroller):
             completion_flag=not given.flags & NO_COMPLETION_FLAG,
             tick_cost=given.tick_cost,
             tick_slot=given.tick_vic_slot,
-            speakers=speakers,
+            transmitters=transmitters,
         )
         hooks = {name: getattr(given, name) for name in ("on_tick", "on_overrun", "on_limit", "on_near_limit")}
         called = {name: hook for name, hook in hooks.items() if hook != ffi.NULL}

@@ -8,12 +8,18 @@ Boards that run here are in this process. Virtual time is released by the wall c
 time it stops, and frames from outside wait in the interface.
 """
 
-from typing import Any
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any
 
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
+
+if TYPE_CHECKING:
+    from ranger_sim.can_bus.edge.external_bus import ExternalBus
 
 SLICE_NS = 500_000  # virtual time between two readings of the wall clock: one slot of a motor board, as in `up`
 RESET = 1  # mode of a bus node
@@ -84,16 +90,23 @@ def put_outside(machine: Any, profile: Any, speed: float = 1.0) -> None:
 
     UserError when an interface cannot be opened.
     """
+    buses = {name: keywords for name, bus in profile.buses.items() if (keywords := bus.python_can()) is not None}
+    move_outside(machine, buses, profile.emulated(), speed)
+
+
+def move_outside(
+    machine: Any, buses: Mapping[str, Mapping[str, Any]], here: Collection[str], speed: float
+) -> list[ExternalBus]:
+    """Put buses on interfaces, {bus: keywords of python-can}; the boards `here` stay, the others are elsewhere."""
     from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener  # python-can: only where it is used
     from ranger_sim.harness.processes.outside import move_bus
 
     machine.pace = Pace(machine, speed)
     rates = {bus.name: bus.bitrate for bus in machine.buses}
-    here = profile.emulated()
     for name in machine.boards:
         if name not in here:
             leave_out(machine, name)
-    for name, bus in profile.buses.items():
-        keywords = bus.python_can()
-        if keywords is not None:
-            move_bus(machine, ExternalBus(name, rates[name], opener(name, keywords)), {}, here)
+    moved = [ExternalBus(name, rates[name], opener(name, dict(keywords))) for name, keywords in buses.items()]
+    for each in moved:
+        move_bus(machine, each, {}, tuple(here))
+    return moved

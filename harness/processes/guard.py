@@ -13,8 +13,8 @@ from typing import Any
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors
 from ranger_sim.harness.processes import kernel, places
+from ranger_sim.harness.processes.settings import DEADLINE_S
 
-DEADLINE_S = 10.0  # a turn takes some microseconds; the rest is for a busy machine
 CHECKS = 10  # checks in a deadline, each after a wait: a suspended machine costs one of them
 TRACED = "t"  # state of a process that a debugger holds
 STOPPED = ("T", TRACED)

@@ -55,8 +55,8 @@ class PlantRun:
         loop = robot.loop
         show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
         self.remotes = {
-            name: RemoteBoard(robot.boards[name], blocks[name], show, place, name == "MB")
-            for place, name in enumerate(robot.boards)
+            name: RemoteBoard(board, blocks[name], show, place, board is loop.sampler.board)
+            for place, (name, board) in enumerate(robot.boards.items())
         }
         for remote in self.remotes.values():
             loop.replace(remote)

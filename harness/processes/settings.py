@@ -5,6 +5,7 @@ import os
 
 from ranger_sim.foundation.user_error import UserError
 
+DEADLINE_S = 10.0  # for an answer of a board's process: it takes some microseconds; the rest is for a busy machine
 NEVER, ON_FAILURE = "never", "on-failure"
 SLOWEST, FASTEST = 1e-4, 1000.0  # times real time; chosen by us
 

@@ -25,9 +25,9 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
-from ranger_sim.harness.processes.guard import DEADLINE_S, is_awaited
+from ranger_sim.harness.processes.guard import is_awaited
 from ranger_sim.harness.processes.lateness import figures
-from ranger_sim.harness.processes.settings import ON_FAILURE, Settings
+from ranger_sim.harness.processes.settings import DEADLINE_S, ON_FAILURE, Settings
 from ranger_sim.harness.stop_rule import StopRule
 
 PLANT = "plant"

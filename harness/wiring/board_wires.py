@@ -268,8 +268,9 @@ class BoardWires(Outbox):
 
     def _check_early_transmit(self, time) -> None:
         raise UserError(
-            f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `speakers` none could be before"
-            f" {self.silent_until} ns: name the task that sends there; for a handler that sends, leave `speakers` out"
+            f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `transmitters` none could be "
+            f"before {self.silent_until} ns: name the task that sends there; for a handler that sends, leave "
+            "`transmitters` out"
         )
 
     def _to_bus_outside(self, kind, time, controller, b, c, d, e, f) -> None:

@@ -4,8 +4,8 @@ Read a line from left to right in the direction of the signal. Ranger's tables a
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from ranger_sim.foundation.user_error import UserError
 
@@ -53,6 +53,22 @@ class BridgeWire(NamedTuple):
     low_side_6: str = ""
 
 
+class LinkWire(NamedTuple):
+    """A synchronous serial link; every `exchange_ns` both boards exchange a segment. idle(): a segment without data."""
+
+    master: str
+    slave: str
+    exchange_ns: int
+    idle: Callable[[], Any]
+
+
+class ImuUart(NamedTuple):
+    """The plant's inertial unit on a UART of a board."""
+
+    board: str
+    uart: int
+
+
 @dataclasses.dataclass(frozen=True)
 class Wiring:
     """All wires of a machine. names: {board: {pin, input or register: its number}}; P0.n is pin n, P1.n pin 32 + n.
@@ -66,6 +82,8 @@ class Wiring:
     analog: Sequence[AnalogInput] = ()
     words: Sequence[EncoderWord] = ()
     bridges: Sequence[BridgeWire] = ()
+    link: LinkWire | None = None
+    imu: ImuUart | None = None
     receive_in_slots: Sequence[str] = ()
     names: Mapping[str, Mapping[str, int]] = dataclasses.field(default_factory=dict)
 

@@ -7,6 +7,7 @@ from typing import Any
 from ranger_sim import loading
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.harness.outside.machine import Elsewhere
 from ranger_sim.harness.records.vital_signs import alive, can
 
 JOULES_PER_WH = 3600.0
@@ -27,7 +28,8 @@ def of(robot: Any) -> dict:
     total = None if motor_power is None else motor_power + electronics_power
     weight_N = plant.parameters.total_mass_kg * plant.parameters.gravity_m_per_s2
     counters: dict[str, RangerCounters] = robot.counters()
-    failed = [name for name, board in counters.items() if not alive(robot, board)]
+    here = {name: board for name, board in counters.items() if not isinstance(robot.loop.board(name), Elsewhere)}
+    failed = [name for name, board in here.items() if not alive(robot, board)]
     return {
         "steps": plant.steps,
         "fell": bool(plant.fell),

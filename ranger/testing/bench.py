@@ -55,11 +55,11 @@ from ranger_sim.harness.testing.figures import Figure, Observed
 from ranger_sim.harness.testing.frames import Frame, FrameKeeper, frame_type
 from ranger_sim.harness.testing.wire import Wire
 from ranger_sim.ranger import wiring
+from ranger_sim.ranger.assembly import BUS_BIT_RATE
 from ranger_sim.ranger.board_programs import BOARD_CLASSES
 from ranger_sim.ranger.conditions import ConditionNotMetError
 from ranger_sim.ranger.firmware import native_boards
 from ranger_sim.ranger.names import RANGER
-from ranger_sim.ranger.robot import BUS_BIT_RATE
 from ranger_sim.ranger.testing.links import Link, link_of
 
 # A board or node runs at most this many bits ahead of a bus: a frame without data has passed its receivers after

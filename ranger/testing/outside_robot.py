@@ -7,58 +7,44 @@ stops, and frames from outside wait in the interface.
 from __future__ import annotations
 
 import socket
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.outside.machine import Pace, leave_out
+from ranger_sim.harness.outside.machine import move_outside
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
-from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.testing.backends import HARDWARE, VCAN, MissingError
 from ranger_sim.ranger import wiring
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
 
 
-class OutsideRobot(Ranger):
-    """`outside`: {bus: keywords of python-can}. The other buses stay inside. speed: virtual seconds per second."""
+def outside_robot(
+    scenario: Scenario,
+    log: str,
+    quirks: Quirks | None,
+    profile: Profile | None,
+    outside: Mapping[str, Mapping[str, Any]],
+    speed: float,
+) -> Ranger:
+    """`outside`: {bus: keywords of python-can}. The other buses stay inside. speed: virtual seconds per second.
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        log: str,
-        quirks: Quirks | None,
-        profile: Profile | None,
-        outside: dict[str, dict[str, Any]],
-        speed: float,
-    ) -> None:
-        from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener  # python-can: only where it is used
-
-        Ranger.__init__(self, scenario, log, quirks, profile)
-        self.backend = VCAN if profile is None else HARDWARE
-        self.pace = Pace(self, speed)
-        self.here = profile.emulated() if profile is not None else wiring.BOARDS
-        rates = {bus.name: bus.bitrate for bus in self.buses}
-        self.outside = [ExternalBus(name, rates[name], opener(name, each)) for name, each in outside.items()]
-        for name in set(wiring.BOARDS) - set(self.here):
-            leave_out(self, name)
-        try:
-            for each in self.outside:
-                move_bus(self, each, {}, self.here)
-        except UserError as reason:
-            self.close()
-            raise MissingError(f"backend {self.backend}: {reason}") from None
-        self.elsewhere: HardwareInTheLoop | None = None
-        if profile is not None and (profile.external() or profile.absent()):
-            self.elsewhere = HardwareInTheLoop(self, profile, self.outside)
-
-    def summary(self) -> dict:
-        """The summary of any robot; boards that are elsewhere have not failed."""
-        found = Ranger.summary(self)
-        found["failed_boards"] = [name for name in found["failed_boards"] if name in self.here]
-        return found
+    MissingError when an interface cannot be opened.
+    """
+    robot = Ranger(scenario, log, quirks, profile)
+    robot.backend = VCAN if profile is None else HARDWARE
+    here = profile.emulated() if profile is not None else wiring.BOARDS
+    try:
+        buses = move_outside(robot, outside, here, speed)
+    except UserError as reason:
+        robot.close()
+        raise MissingError(f"backend {robot.backend}: {reason}") from None
+    if profile is not None and (profile.external() or profile.absent()):
+        HardwareInTheLoop(robot, profile, buses)
+    return robot
 
 
 def vcan_buses() -> dict[str, dict[str, Any]]:

@@ -8,27 +8,23 @@ with contextlib.closing(new_robot(seed=3)) as robot:
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 import os
 import pathlib
 from collections.abc import Mapping
 from typing import Any
 
 from ranger_sim.boards.quirks import Quirks
-from ranger_sim.firmware_sim.native import coverage
-from ranger_sim.firmware_sim.native.coverage import FileCounts
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.outside.profile import load as load_profile
 from ranger_sim.harness.testing.backends import HARDWARE, PROCESSES, SIM, VCAN, check_backend
+from ranger_sim.harness.testing.counts import counting
 from ranger_sim.harness.testing.health import Expected, Health
 from ranger_sim.harness.testing.making import made
 from ranger_sim.ranger.firmware import native_boards
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
 
-ABOUT = "firmware.json"  # next to counts: their firmware
 SCENARIO_FIELDS = tuple(field.name for field in dataclasses.fields(Scenario))
 OTHERS = (
     "quirks", "profile", "warmed_up", "backend", "speed", "log", "trace",
@@ -84,39 +80,21 @@ class Order:
         if firmware and self.backend in (VCAN, HARDWARE):
             raise UserError(f"backend {self.backend}: firmware in C runs on the backends {SIM} and {PROCESSES}")
         if self.backend == PROCESSES:
-            from ranger_sim.ranger.testing.process_robot import ProcessRobot
+            from ranger_sim.harness.testing.process_per_board import ProcessPerBoard
 
-            return ProcessRobot(self.scenario, self.log, self.quirks, profile, firmware)
+            return Ranger(self.scenario, self.log, self.quirks, profile, firmware, mode=ProcessPerBoard())
         if self.backend in (VCAN, HARDWARE):
-            from ranger_sim.ranger.testing.outside_robot import OutsideRobot, buses_of_profile, vcan_buses
+            from ranger_sim.ranger.testing.outside_robot import buses_of_profile, outside_robot, vcan_buses
 
             outside = vcan_buses() if self.backend == VCAN else buses_of_profile(profile)
-            return OutsideRobot(self.scenario, self.log, self.quirks, profile, outside, self.speed)
+            return outside_robot(self.scenario, self.log, self.quirks, profile, outside, self.speed)
         return Ranger(self.scenario, self.log, self.quirks, profile, firmware, bool(self.in_process))
 
 
 def built(folder: str | os.PathLike, sanitize: bool = False, counts: str = "") -> Firmware:
     """A folder of firmware in C, compiled for a test."""
     firmware = native_boards.build(pathlib.Path(folder), sanitize, bool(counts))
-    if not counts:
-        return firmware
-    name = hashlib.blake2b(str(firmware.library.resolve()).encode(), digest_size=8).hexdigest()
-    place = pathlib.Path(counts) / name
-    place.mkdir(parents=True, exist_ok=True)
-    about = {"library": str(firmware.library.resolve()), "folder": str(firmware.folder.resolve())}
-    (place / ABOUT).write_text(json.dumps(about), encoding="utf-8")
-    return dataclasses.replace(firmware, counts=place)
-
-
-def counted(counts: pathlib.Path) -> list[FileCounts]:
-    """The lines of firmware that ran in all the tests that had `counts` as their folder."""
-    found = []
-    for about in sorted(counts.glob(f"*/{ABOUT}")):
-        about_build = json.loads(about.read_text(encoding="utf-8"))
-        found.append(
-            coverage.read(pathlib.Path(about_build["library"]), pathlib.Path(about_build["folder"]), about.parent)
-        )
-    return coverage.merged(found)
+    return counting(firmware, counts) if counts else firmware
 
 
 def order_of(wanted: Mapping[str, Any]) -> Order:

@@ -15,7 +15,7 @@ from ranger_sim.datatable.a2ml import COMMANDS
 from ranger_sim.datatable.addresses import address_of
 from ranger_sim.datatable.generate import GENERATED_FOLDER
 from ranger_sim.harness.xcp import can, slave, udp
-from ranger_sim.ranger.robot import BUS_BIT_RATE
+from ranger_sim.ranger.assembly import BUS_BIT_RATE
 from tests.datatable.a2ml_reader import Grammar
 
 TEXT = (GENERATED_FOLDER / "ranger.a2l").read_text(encoding="utf-8")

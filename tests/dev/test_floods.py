@@ -41,8 +41,8 @@ def test_a_robot_under_floods_runs_as_fast_as_the_machine_can_hold(processors, s
 
 
 def test_every_flood_has_a_program_and_together_they_use_each_endpoint():
-    doors = flooders.Endpoints("x")
-    counts = {name: len(flooders.programs(name, doors)) for name in flooders.NAMES}
+    endpoints = flooders.Endpoints("x")
+    counts = {name: len(flooders.programs(name, endpoints)) for name in flooders.NAMES}
     assert set(flooders.FLOODS) < set(counts)
     nobody = set(flooders.PEACE_OF.values())
     assert {name for name, count in counts.items() if count == 0} == nobody

@@ -374,7 +374,7 @@ def test_a_faulty_task_is_refused():
         Occasional((Wait(bool),))
 
 
-def speaking(**table):
+def transmitting(**table):
     """A log whose board runs a table of tasks "a" ... "f" of 600 cycles (10 us) each."""
     log = Log()
     task = {name: log.task(name, 600) for name in "abcdef"}
@@ -382,16 +382,16 @@ def speaking(**table):
     return log
 
 
-def test_a_schedule_that_names_no_speakers_promises_silence_only_until_the_next_event():
-    log = speaking()
+def test_a_schedule_that_names_no_transmitters_promises_silence_only_until_the_next_event():
+    log = transmitting()
     assert log.chip.earliest_transmit_ns() == log.chip.next_time == 0
     log.chip.advance(505_000)
     assert log.chip.earliest_transmit_ns() == log.chip.next_time > 505_000
 
 
-def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_them():
+def test_a_schedule_that_names_its_transmitters_promises_silence_until_the_next_of_them():
     """The tasks of rows always count: d of row 0; a, c and e are silent. Row 1 is empty."""
-    chip = speaking(speakers=("b",)).chip
+    chip = transmitting(transmitters=("b",)).chip
     assert chip.earliest_transmit_ns() == 10_000  # a before the first b of the slot that begins at 0
     chip.advance(TICK_NS + 5_000)
     assert chip.earliest_transmit_ns() == TICK_NS + 10_000  # a runs
@@ -405,7 +405,7 @@ def test_a_schedule_that_names_its_speakers_promises_silence_until_the_next_of_t
 
 def test_a_row_without_tasks_is_silent_and_the_row_after_it_is_not():
     log = Log()
-    log.start(rows=((log.task("a", 600),), (), (log.task("b", 600),)), speakers=())
+    log.start(rows=((log.task("a", 600),), (), (log.task("b", 600),)), transmitters=())
     chip = log.chip
     assert chip.earliest_transmit_ns() == 0  # a of row 0
     chip.advance(TICK_NS + 5_000)
@@ -425,7 +425,7 @@ def test_a_schedule_of_300_different_tasks_runs_each_in_every_slot():
 
 
 def test_a_replaced_function_may_send_whatever_the_schedule_declared():
-    log = speaking(speakers=("b",))
+    log = transmitting(transmitters=("b",))
     log.chip.advance(TICK_NS + 15_000)
     log.chip.scheduler.replace("c", lambda: None)
     assert log.chip.earliest_transmit_ns() == TICK_NS + 20_000
@@ -433,8 +433,8 @@ def test_a_replaced_function_may_send_whatever_the_schedule_declared():
 
 def test_a_sender_that_is_not_a_task_of_every_slot_is_refused():
     log = Log()
-    with pytest.raises(UserError, match=r"speaker 'x' is not a task of every slot \(available: a, b\)"):
-        Schedule(every=(log.task("a", 1),), last=(log.task("b", 1),), speakers=("x",))
+    with pytest.raises(UserError, match=r"transmitter 'x' is not a task of every slot \(available: a, b\)"):
+        Schedule(every=(log.task("a", 1),), last=(log.task("b", 1),), transmitters=("x",))
 
 
 def test_a_chip_ordered_to_stop_while_it_runs_stops_there_and_goes_on_later():

@@ -105,7 +105,7 @@ def test_a_users_function_may_send_from_any_task_and_from_any_moment_on(when_ms)
     robot.run(StopRule(time_s=when_ms * 1e-3), 1.0)
     board = robot.boards["MCH"]
     sent = board.can.queued
-    assert chatty(board).speaks
+    assert chatty(board).transmits
     robot.run(StopRule(time_s=0.01), 1.0)
     assert board.can.queued > sent + 15
 
@@ -114,17 +114,19 @@ def test_a_task_that_sends_though_its_schedule_says_it_does_not_is_named_as_a_mi
     """The others have gone on by then: what it sent would come too late for them."""
     robot = Ranger(Scenario())
     beat = chatty(robot.boards["MCH"])
-    beat.speaks = False
+    beat.transmits = False
     robot.boards["MCH"].scheduler.set_duration(beat)
-    with pytest.raises(UserError, match="MCH: a frame was sent at [0-9]+ ns, but by its schedule's `speakers` none"):
+    with pytest.raises(
+        UserError, match="MCH: a frame was sent at [0-9]+ ns, but by its schedule's `transmitters` none"
+    ):
         robot.run(StopRule(time_s=0.02), 1.0)
 
 
-def test_a_board_that_announces_when_it_speaks_gives_the_trace_of_one_that_does_not():
+def test_a_board_whose_schedule_names_its_transmitters_has_the_trace_of_one_without_names():
     expected = trace()
     robot = Ranger(Scenario())
     for board in robot.boards.values():
-        board.scheduler.announces = False
+        board.scheduler.names_transmitters = False
     robot.run(StopRule(time_s=RUN_S), 1.0)
     assert robot.trace_digest() == expected[0]
 

@@ -85,7 +85,7 @@ def robot(walked_s=40.0, cpu_s=8.0, steps=20, length_sum=7.0, time_sum_s=10.0):
         realtime_factor=lambda: 7.0,
         trace_digest=lambda: "abc",
         counters=lambda: {"MCH": counters([(error_table.AE_SPIKE, 3)]), "MB": counters()},
-        loop=Made(time=60 * S, strikes=Made(statistics=lambda: {"mean": 14.0})),
+        loop=Made(time=60 * S, board=lambda name: None, strikes=Made(statistics=lambda: {"mean": 14.0})),
     )
     return made
 

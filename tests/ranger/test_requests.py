@@ -12,10 +12,9 @@ from ranger_sim.can_bus.edge.peers import LIMITS
 from ranger_sim.datatable import parameters
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes.control import ControlServer, address
+from ranger_sim.harness.testing.process_per_board import ProcessPerBoard
 from ranger_sim.ranger.requests import Request, admitted
 from ranger_sim.ranger.robot import Ranger
-from ranger_sim.ranger.scenario import Scenario
-from ranger_sim.ranger.testing.process_robot import ProcessRobot
 
 LIMIT = LIMITS["control"]
 
@@ -88,7 +87,7 @@ def test_every_parameters_own_limits_are_admitted_and_the_next_number_beyond_is_
     assert checked > 100
 
 
-@pytest.mark.parametrize("kind", [Ranger, lambda: ProcessRobot(Scenario(), "none", None, None)])
+@pytest.mark.parametrize("kind", [Ranger, lambda: Ranger(mode=ProcessPerBoard())])
 def test_python_writes_a_parameter_by_the_same_check(kind):
     with contextlib.closing(kind()) as robot:
         robot.run_for(0.01)

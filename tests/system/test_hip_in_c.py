@@ -110,7 +110,7 @@ def test_its_schedule_is_the_python_boards_line_by_line(hip):
     ):
         tables = [
             [
-                (task.name, task.cost, task.limit, task.per_item, task.item, task.kind, task.speaks)
+                (task.name, task.cost, task.limit, task.per_item, task.item, task.kind, task.transmits)
                 for task in each.board("MCH").scheduler.schedule.all_tasks()
             ]
             for each in (robot, other)

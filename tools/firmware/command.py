@@ -13,7 +13,7 @@ from typing import Any
 from ranger_sim.firmware_sim.native import image_build, sanitizers
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
-from ranger_sim.harness.processes.guard import DEADLINE_S
+from ranger_sim.harness.processes.settings import DEADLINE_S
 from ranger_sim.ranger.firmware import native_boards
 from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.options import Option

@@ -36,7 +36,7 @@ def test_a_target_that_there_is_not_gets_one_line(capsys):
         command.main(["walls"])
     assert left.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1] == (
-        "python -m dev.fuzz: error: unknown target 'walls' (available: can, channel, doors, gdb, panel, profiles, "
+        "python -m dev.fuzz: error: unknown target 'walls' (available: can, channel, gdb, interfaces, panel, profiles, "
         "requests, serial, xcp)"
     )
 

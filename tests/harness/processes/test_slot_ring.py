@@ -7,8 +7,8 @@ import pytest
 
 from ranger_sim import Ranger, Scenario
 from ranger_sim.firmware_sim.activity import COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
+from ranger_sim.harness.processes.forked_boards import ForkedBoards
 from ranger_sim.harness.processes.places import RING, RING_ROW
-from ranger_sim.harness.processes.remote_boards import RemoteBoards
 
 SECONDS = 0.3
 BOARDS = ("MCH", "MB", "CSR", "UI")
@@ -45,7 +45,7 @@ def test_the_ring_has_every_slot_with_its_time_and_its_cycles(slow):
     with contextlib.closing(Ranger(Scenario(seed=4))) as robot:
         if slow:
             make_slow(robot)
-        apart = RemoteBoards(robot, BOARDS)
+        apart = ForkedBoards(robot, BOARDS)
         found, at = {name: [] for name in BOARDS}, dict.fromkeys(BOARDS, 0)
         try:
             for _ in range(round(SECONDS / 0.02)):
@@ -65,7 +65,7 @@ def test_the_ring_has_every_slot_with_its_time_and_its_cycles(slow):
 
 def test_a_reader_that_polls_too_rarely_gets_the_number_of_slots_missed():
     with contextlib.closing(Ranger(Scenario(seed=4))) as robot:
-        apart = RemoteBoards(robot, ("MCH",))
+        apart = ForkedBoards(robot, ("MCH",))
         try:
             robot.run_for(0.5)  # a thousand slots of 0.5 ms
             data, following, missed = apart.remotes["MCH"].slots_since(0)

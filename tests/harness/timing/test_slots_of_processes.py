@@ -7,10 +7,10 @@ import sys
 import pytest
 
 from ranger_sim.harness.processes import activity, places
-from ranger_sim.harness.processes.remote_boards import ProcessReaper
+from ranger_sim.harness.processes.forked_boards import ProcessReaper
+from ranger_sim.harness.processes.modes import InProcess
+from ranger_sim.harness.testing.process_per_board import ProcessPerBoard
 from ranger_sim.ranger.robot import Ranger
-from ranger_sim.ranger.scenario import Scenario
-from ranger_sim.ranger.testing.process_robot import ProcessRobot
 from ranger_sim.ranger.timeline import Timeline
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux (eventfd, pidfd)")
@@ -33,7 +33,7 @@ def test_recorded_before_or_after_the_processes_begin_the_slots_are_the_same(nam
     with contextlib.closing(Ranger()) as robot:
         alone, _ = slots_of(robot, name, begin_s)
         digest = robot.trace_digest()
-    with contextlib.closing(ProcessRobot(Scenario(), "none", None, None)) as robot:
+    with contextlib.closing(Ranger(mode=ProcessPerBoard())) as robot:
         apart, view = slots_of(robot, name, begin_s)
         assert robot.trace_digest() == digest
         view.assert_no_overrun()
@@ -97,7 +97,7 @@ def test_of_a_board_that_is_gone_nothing_comes():
 @pytest.mark.parametrize("last_s", [None, 0.05])
 def test_the_timeline_of_boards_in_processes_is_byte_for_byte_that_of_one_process(last_s, tmp_path):
     pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
-    for kind, robot in ((Ranger, Ranger()), (ProcessRobot, ProcessRobot(Scenario(), "none", None, None))):
+    for kind, robot in ((InProcess, Ranger()), (ProcessPerBoard, Ranger(mode=ProcessPerBoard()))):
         with contextlib.closing(robot):
             timeline = Timeline(robot, last_s)
             robot.run_for(0.15)

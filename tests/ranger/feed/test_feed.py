@@ -13,7 +13,7 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_CYCLES, COLUMN_KIND, COLUMN_START, SLOT_ENDED
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.feed import records
-from ranger_sim.harness.processes.remote_boards import RemoteBoards
+from ranger_sim.harness.processes.forked_boards import ForkedBoards
 from ranger_sim.ranger.feed import FeedServer
 
 SECONDS = 0.1
@@ -225,7 +225,7 @@ def test_a_viewer_sees_the_slots_of_boards_in_their_own_processes():
     with contextlib.closing(Ranger(Scenario(seed=3))) as robot:
         feed = FeedServer(robot, "feed-of-slots")
         robot.attach(feed)
-        apart = RemoteBoards(robot, names)
+        apart = ForkedBoards(robot, names)
         try:
             viewer = Viewer("feed-of-slots")
             found = watched(robot, viewer, 0.3)

@@ -9,8 +9,8 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.testing.backends import BACKENDS, OFFERS, MissingError, missing
+from ranger_sim.harness.testing.process_per_board import BoardLostError
 from ranger_sim.ranger.testing.outside_robot import vcan_buses
-from ranger_sim.ranger.testing.process_robot import BoardLostError
 from ranger_sim.ranger.testing.robots import assert_healthy, new_robot
 from tests.ranger.testing.project import pytest_in, write
 

@@ -12,7 +12,7 @@ import numpy as np
 from ranger_sim.foundation import json_text
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.ranger.robot import BUS_BIT_RATE
+from ranger_sim.ranger.assembly import BUS_BIT_RATE
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import columns, frames
 from ranger_sim.sysid.readers.run_folder import SUMMARY

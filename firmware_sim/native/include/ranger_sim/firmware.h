@@ -71,7 +71,7 @@ typedef struct fw_task {
     uint32_t per_item;
     const char *item;   /* what is counted ("frame"), or NULL */
     enum fw_kind kind;  /* left out: FW_TASK */
-    int32_t speaks;     /* counts only with FW_SPEAKERS_NAMED: this task of every slot may put something on a bus */
+    int32_t transmits;  /* counts only with FW_TRANSMITTERS_NAMED: this task of every slot may send on a bus */
 } fw_task;
 
 typedef struct fw_tasks {
@@ -90,8 +90,8 @@ typedef struct fw_step {
 } fw_step;
 
 enum fw_schedule_flags {
-    FW_SPEAKERS_NAMED = 1,    /* only tasks of rows, of the occasional list, and those with `speaks` put anything on a
-                                 bus; no interrupt handler does. Lets the rest of the robot run ahead, changes nothing */
+    FW_TRANSMITTERS_NAMED = 1, /* only tasks of rows, of the occasional list, and those with `transmits` send on a bus;
+                                  no interrupt handler does. Lets the rest of the robot run ahead, changes nothing */
     FW_NO_COMPLETION_FLAG = 2, /* an overrun drops tasks but calls nobody */
     FW_NO_IDLE_CALL = 4       /* n occasional tasks come round every n calls, not every n + 1 */
 };

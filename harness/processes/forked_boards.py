@@ -1,4 +1,4 @@
-"""Some boards of a robot, or all, each in a separate process; the rest of the robot is in this one and passes time.
+"""Some boards of a machine, or all, each in a forked process; the rest of the machine is in this one and passes time.
 
 It is the lockstep of this folder without a supervisor: virtual time, the same bytes as in one process. The processes
 start when time first passes, so that the boards may be changed before. A further process watches them
@@ -14,7 +14,7 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
 from ranger_sim.firmware_sim.native import crash
@@ -22,23 +22,22 @@ from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
-from ranger_sim.harness.processes.guard import DEADLINE_S, Guard
+from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.remote_board import RemoteBoard
-from ranger_sim.harness.processes.settings import Settings
+from ranger_sim.harness.processes.settings import DEADLINE_S, Settings
 from ranger_sim.harness.processes.stage import Stage
 from ranger_sim.harness.step_watch import StepWatch
 
 RESET = 1  # mode of a bus node
 
 
-class RemoteBoards:
-    """The boards `names` of the wired, never run `robot`, each in its process.
+class ForkedBoards:
+    """The boards `names` of the wired, never run `robot`, each in its process; one that ends goes into `robot.deaths`.
 
-    `deaths`: for each that has ended by itself, in order: {"board", "time_s", "how" its process ended, "why"}, the
-    last as far as its program or its records report it.
+    deadline_s: without an answer, after which a board's process is ended; 0: never.
     """
 
-    def __init__(self, robot: Any, names: tuple[str, ...]) -> None:
+    def __init__(self, robot: Any, names: tuple[str, ...], deadline_s: float = DEADLINE_S) -> None:
         self.robot = robot
         if not sys.platform.startswith("linux"):
             raise UserError(
@@ -52,17 +51,18 @@ class RemoteBoards:
         place = {name: number for number, name in enumerate(robot.boards)}
         self.blocks = {name: Block(name, place[name], words_shown(robot.boards[name])) for name in names}
         self.ended = False
-        self.deaths: list[dict[str, Any]] = []
         self.children = {name: fork(self._board(name, stage)) for name in names}
         self.numbers = tuple(self.children.values())  # of the processes, also of those that have ended
         self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
         in_c = frozenset(robot.firmware)
-        self.guard = fork(Guard(self.blocks, self.children, self.watches, in_c, robot.board_deadline_s).watch)
+        self.guard = fork(Guard(self.blocks, self.children, self.watches, in_c, deadline_s).watch)
         loop = robot.loop
         show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
-        self.remotes = {
-            name: RemoteBoard(robot.boards[name], self.blocks[name], show, place[name], name == "MB") for name in names
-        }
+        self.remotes = {}
+        for name in names:
+            board = robot.boards[name]
+            follows_steps = board is loop.sampler.board  # its memory is sampled
+            self.remotes[name] = RemoteBoard(board, self.blocks[name], show, place[name], follows_steps)
         for name, remote in self.remotes.items():
             loop.replace(remote)
             robot.boards[name].out_of_process = True  # it does not run here
@@ -92,7 +92,7 @@ class RemoteBoards:
                 how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
                 why = ": ".join(filter(None, (self.blocks[name].fault(), self._where(name))))
                 loop = self.robot.loop
-                self.deaths.append({"board": name, "time_s": self.robot.time_s, "how": how, "why": why})
+                self.robot.deaths.append({"board": name, "time_s": self.robot.time_s, "how": how, "why": why})
                 wires = loop.wires[loop.place(name)]
                 for controller, bus in enumerate(wires.buses):
                     if bus is not None:
@@ -107,11 +107,17 @@ class RemoteBoards:
             return crash.describe(firmware.library, firmware.folder, record)
         return ""
 
-    def asking(self, names: tuple[str, ...]) -> StepWatch:
-        """A watch that fetches the counters of these boards before each step."""
-        return Asking(self, names)
+    @contextlib.contextmanager
+    def asking(self, names: Sequence[str]) -> Iterator[None]:
+        """Within it, the counters of these boards are fetched before each step."""
+        asking = Asking(self, names)
+        self.robot.loop.watchers.append(asking)
+        try:
+            yield
+        finally:
+            self.robot.loop.watchers.remove(asking)
 
-    def fetch_counters(self, names: tuple[str, ...] | None = None) -> None:
+    def fetch_counters(self, names: Sequence[str] | None = None) -> None:
         """Bring boards to the present time and fetch their counters."""
         for name in names if names is not None else self.names:
             if name in self.remotes and not self.ended:
@@ -154,7 +160,7 @@ class RemoteBoards:
 class ProcessReaper(StepWatch):
     """Checks before each step for boards that are gone, so that they leave their buses by virtual time."""
 
-    def __init__(self, remote: RemoteBoards) -> None:
+    def __init__(self, remote: ForkedBoards) -> None:
         StepWatch.__init__(self)
         self.remote = remote
 
@@ -165,7 +171,7 @@ class ProcessReaper(StepWatch):
 class Asking(StepWatch):
     """Fetches these boards' counters before each step."""
 
-    def __init__(self, remote: RemoteBoards, names: tuple[str, ...]) -> None:
+    def __init__(self, remote: ForkedBoards, names: Sequence[str]) -> None:
         StepWatch.__init__(self)
         self.remote = remote
         self.names = names

@@ -140,7 +140,7 @@ class Fuzz:
     """`case()` is one case, `poll()` polls and checks; Finding as soon as a check fails."""
 
     def __init__(self, seed: int = 1) -> None:
-        self.stream: Any = RandomStream(seed, "doors fuzz")
+        self.stream: Any = RandomStream(seed, "doors fuzz")  # a name kept for the recorded seeds
         self.now_ns = 0
         self.cases = self.polls = self.admitted = 0
         self.limits = parameter_limits()
@@ -148,7 +148,7 @@ class Fuzz:
         self.inbox = EventQueue(64)
         self.bus.add_node("board", self.inbox, 1, STAGE_BUS * 256)
         self.taps = Taps(self.bus)
-        name = f"fuzz-doors-{os.getpid()}-{id(self)}"
+        name = f"fuzz-interfaces-{os.getpid()}-{id(self)}"
         buses = {"can1": self.taps}
         self.attach = AttachServer(name, buses)
         self.terminal = SlcanServer("can1", self.taps)
@@ -429,6 +429,6 @@ def run(cases: int, seed: int = 1) -> dict[str, int]:
                 fuzz.poll()
         except Exception as error:
             if not isinstance(error, Finding):
-                error.add_note(f"python -m dev.fuzz doors: seed {seed}, case {fuzz.cases}")
+                error.add_note(f"python -m dev.fuzz interfaces: seed {seed}, case {fuzz.cases}")
             raise
         return fuzz.counted()

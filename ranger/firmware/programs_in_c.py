@@ -1,0 +1,95 @@
+"""The programs in C of one robot: their trial, what they print, where they crash, and which of their lines ran."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import pathlib
+import tempfile
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ranger_sim.firmware_sim.native import coverage, crash
+from ranger_sim.firmware_sim.native.trial import tried
+from ranger_sim.harness.firmware.native_firmware import Firmware
+from ranger_sim.harness.firmware.printed import Printed
+
+
+class ProgramsInC:
+    """`firmware`: by board; those compiled for coverage have a folder for their counts.
+
+    printed: takes what they print; without it they print on standard output.
+    """
+
+    def __init__(self, firmware: dict[str, Firmware], printed: Printed | None) -> None:
+        self.printed = printed
+        self.folder: tempfile.TemporaryDirectory[str] | None = None  # of the counts, where none was chosen
+        self.are_watched = False
+        if any(each.coverage and each.counts is None for each in firmware.values()):
+            self.folder = tempfile.TemporaryDirectory(prefix="ranger-sim-counts-")
+            place = pathlib.Path(self.folder.name)
+            firmware = {
+                name: dataclasses.replace(each, counts=each.counts or place / name) if each.coverage else each
+                for name, each in firmware.items()
+            }
+        self.firmware = firmware
+
+    def try_each(self, new_board: Callable[[str, Any], Any]) -> None:
+        """Start each program once in a process that it may crash. UserError where it does.
+
+        new_board(name, record): a board whose program leaves its position in `record` when it ends its process.
+        """
+        for name, firmware in self.firmware.items():
+
+            def start(record: Any, name: str = name) -> None:
+                new_board(name, record).counters()
+
+            with self.printing(name):
+                tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+            if self.printed is not None:
+                self.printed.drop(name)  # its program will print that again
+
+    def printing(self, board: str) -> contextlib.AbstractContextManager[None]:
+        """Within it, output of programs in C in this process counts as output of `board`."""
+        return self.printed.during(board) if self.printed is not None else contextlib.nullcontext()
+
+    @contextlib.contextmanager
+    def running(self, loop: Any) -> Iterator[None]:
+        """Within it, the programs of this process run, and their crashes leave their position."""
+        here = [name for name in self.firmware if not loop.board(name).out_of_process]
+        if not self.are_watched:
+            self.are_watched = True
+            for name in here:
+                self.watch(loop.board(name))
+        try:
+            with self.printing("+".join(here)) if here else contextlib.nullcontext():
+                yield
+        finally:
+            if self.printed is not None:
+                self.printed.poll()
+
+    def watch(self, board: Any) -> None:
+        """Let the program of a board in this process record its position if it ends the process."""
+        firmware = self.firmware[board.name]
+        if board.counts is not None:
+            os.environ[coverage.PREFIX] = str(board.counts)  # for a crash, which writes them as well
+        board.leave_record_in(*crash.record_of(board.name, firmware.library, firmware.folder))
+
+    def finish(self, machine: Any) -> None:
+        """Let boards with programs compiled for coverage write which of their lines ran, where another process reads
+        that: before `machine` closes.
+        """
+        if self.folder is not None or machine.lost:
+            return
+        for name, firmware in self.firmware.items():
+            board = machine.loop.board(name)
+            if firmware.coverage and not board.out_of_process:
+                board.write_counts()
+            elif firmware.coverage:
+                machine.mode.fetch_counters((name,))
+
+    def close(self) -> None:
+        """Remove the folder of the counts, if it was made here."""
+        if self.folder is not None:
+            self.folder.cleanup()
