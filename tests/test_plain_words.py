@@ -108,6 +108,29 @@ def of_module(source: str, is_test: bool) -> Iterator[Text]:
                 yield "message", node.lineno, node.value
 
 
+SCRIPT_TEXT = re.compile(r"""//[^\n]*|/\*.*?\*/|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*'|`(?:[^`\\]|\\.)*`""", re.DOTALL)
+
+
+def of_script(source: str) -> Iterator[Text]:
+    """Comments and messages of a page's program: its strings of several words."""
+    for match in SCRIPT_TEXT.finditer(source):
+        text = re.sub(r"\$\{[^}]*\}|<[^>]*>", " {} ", match.group())
+        if re.search(r"\w\s+(?:\{\}\s+)*\w", text):
+            yield "message", source.count("\n", 0, match.start()) + 1, text.replace("`", "")
+
+
+def of_page(source: str) -> Iterator[Text]:
+    """Text of a page of HTML, without its style, program and tags."""
+    blank = re.sub(
+        r"<(script|style)\b.*?</\1>|\{[%{#].*?[%}#]\}|<[^>]*>",
+        lambda match: "\n" * match.group().count("\n") or " ",
+        source,
+        flags=re.DOTALL,
+    )
+    for number, line in enumerate(blank.splitlines(), 1):
+        yield "page", number, line
+
+
 @functools.cache
 def texts(package: str) -> list[tuple[pathlib.Path, Text]]:
     """Every text of a package; of the repository's own pages for the package "."."""
@@ -122,6 +145,13 @@ def texts(package: str) -> list[tuple[pathlib.Path, Text]]:
             found += ((path, each) for each in of_document(path.read_text(encoding="utf-8")))
         elif path.suffix == ".py":
             found += ((path, each) for each in of_module(path.read_text(encoding="utf-8"), package == "tests"))
+        elif path.suffix == ".js" and not path.name.startswith("uplot"):
+            found += ((path, each) for each in of_script(path.read_text(encoding="utf-8")))
+        elif path.name.endswith((".html", ".html.j2")):
+            found += ((path, each) for each in of_page(path.read_text(encoding="utf-8")))
+        elif path.suffix == ".j2":  # what `ranger-sim new` writes, names in it as well
+            lines = path.read_text(encoding="utf-8").splitlines()
+            found += ((path, ("template", number, line)) for number, line in enumerate(lines, 1))
     return found
 
 
@@ -176,6 +206,13 @@ def test_private_words_of_a_module_are_found_in_docstrings_messages_and_names_of
     ]
     assert sorted(found_in(of_module(MODULE, is_test=False))) == words
     assert ("message", 7, "is no") not in found_in(of_module(MODULE, is_test=True))
+
+
+def test_private_words_of_a_page_for_the_browser_are_found_in_its_text_and_messages():
+    page = "<style>\n.door {}\n</style><p>Nobody is\n<b>told</b>.</p>{% if told %}"
+    assert found_in(of_page(page)) == [("page", 3, "Nobody"), ("page", 4, "told")]
+    script = 'const heard = "door";\n// nobody waits\nreturn `the ${heard} ${n} doors`;'
+    assert found_in(of_script(script)) == [("message", 2, "nobody"), ("message", 3, "doors")]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
-// Draws the charts by Plotly and marks the cursor's instant in each of them.
+// Draws the charts by Plotly and marks the cursor's time in each of them.
 // walk: `series` arrays over `series.time_s` [s since power-up], `steps` done by then, `states` {machine: {names, runs
 // [[since, number]]}}, `charts` as charts.py describes them, `decimals`: those of each unit. colour(name): of the page's
-// style. onPoint(seconds, gone): the pointer stands on an instant, or has gone.
+// style. onPoint(seconds, gone): the pointer is on a time, or has left.
 function makeCharts(walk, colour, onPoint) {
   const time = walk.series.time_s, first = time[0], last = time[time.length - 1];
   const PX_PER_S = 180;     // a state of 0.1 s is wide enough for its name
@@ -72,7 +72,7 @@ function makeCharts(walk, colour, onPoint) {
     if (kind === "time") {
       Object.assign(made.xaxis, { range: [view.from, view.to], fixedrange: coarse, automargin: false,
                                   nticks: Math.max(3, plot.clientWidth / 90) });
-      made.yaxis.automargin = false;     // so that an instant is at the same place in all of them
+      made.yaxis.automargin = false;     // so that a time is at the same place in all of them
       made.shapes = bands(chart);
     } else if (kind === "slots") {
       Object.assign(made.yaxis, { autorange: "reversed", dtick: 1 });
@@ -140,7 +140,7 @@ function makeCharts(walk, colour, onPoint) {
     }
   }
 
-  // Mark the instant in every chart, and tell the values there.
+  // Mark the time in every chart, and show the values there.
   function mark(seconds, i) {
     if (!changing && (seconds < view.from || seconds > view.to)) show(seconds, seconds + view.to - view.from);
     for (const chart of charts) {
@@ -160,7 +160,7 @@ function makeCharts(walk, colour, onPoint) {
     }
   }
 
-  // The instant under the pointer, or null.
+  // The time under the pointer, or null.
   function pointed(chart, event) {
     const box = chart.plot.getBoundingClientRect(), { xaxis, yaxis } = chart.plot._fullLayout;
     const px = event.clientX - box.left - xaxis._offset, py = event.clientY - box.top - yaxis._offset;

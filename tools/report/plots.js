@@ -1,4 +1,4 @@
-// Unpacks the library and draws each figure of the page from the numbers that stand beside it.
+// Unpacks the library and draws each figure of the page from the numbers next to it.
 (async function () {
   "use strict";
   const complaint = document.getElementById("no-plots");

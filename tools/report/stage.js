@@ -1,4 +1,4 @@
-// Draws the robot at one instant of the recorded walk, sharp on any screen.
+// Draws the robot at one time of the recorded walk, sharp on any screen.
 // walk: series [rad, absolute, positive leaning forward; m], geometry {leg, radius {outer, inner}, eccentricity {outer,
 // inner}, heel, toe} in m and rad, footholds {x, height} in m. colour(name): of the page's style.
 function makeStage(canvas, walk, colour) {

@@ -27,7 +27,7 @@ function colourWords(rgb) {
 }
 
 export function makeFace({ subscribe }, { order }, box) {
-  box.innerHTML = '<p class="note" id="unseen" role="status"></p><div class="top"><div class="lcd" role="img" aria-label="display"></div><div><label><input type="checkbox" id="hear"> hear the buzzer</label><p class="note" id="tone"></p></div></div>' +
+  box.innerHTML = '<p class="note" id="unseen" role="status"></p><div class="top"><div class="lcd" role="img" aria-label="display"></div><div><label><input type="checkbox" id="hear"> sound of the buzzer</label><p class="note" id="tone"></p></div></div>' +
     '<div class="lights"></div><div class="lights leds"></div><div class="keys"></div>' +
     '<label class="stick">radio <input type="range" min="-1" max="1" step="0.05" value="0" aria-label="radio stick, left to right"> <output>0</output></label>';
   const lights = box.querySelector(".lights"), keys = box.querySelector(".keys"), lcd = box.querySelector(".lcd"), stick = box.querySelector(".stick input");

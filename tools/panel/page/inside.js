@@ -26,6 +26,6 @@ export function makeInside({ state, subscribe }, { order }) {
   // The time of slots and frames.
   function whenOf(now) {
     const seen = instant(now);
-    return seen === null ? "now; click a plot, or move its cursor by the arrow keys, and robot, slots and frames stand at that instant" : `at ${seen.toFixed(3)} s${isLive(now) ? "; Escape leads back to now" : ""}`;
+    return seen === null ? "now; click a plot, or move its cursor by the arrow keys, and robot, slots and frames are those of that time" : `at ${seen.toFixed(3)} s${isLive(now) ? "; Escape leads back to now" : ""}`;
   }
 }

@@ -25,7 +25,7 @@ export function makeNotes({ state, update, subscribe }, box, field) {
   by("note-form").onsubmit = (event) => {
     event.preventDefault();
     const text = field.value.trim(), { mark_s } = state();
-    if (!text || mark_s === null) { update.say(mark_s === null ? "click a plot first: the note stands at the mark" : "a note has a word or more"); return; }
+    if (!text || mark_s === null) { update.say(mark_s === null ? "click a plot first: the note belongs to the mark" : "a note has a word or more"); return; }
     update.addNote(text);
     field.value = "";
   };

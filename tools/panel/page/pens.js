@@ -1,4 +1,4 @@
-// What lines are drawn with: as many colours as can be told apart, also by who lacks a kind of cone (panel.css has them;
+// What lines are drawn with: as many colours as a reader can distinguish, also one who lacks a kind of cone (panel.css has them;
 // tests/colours.py found them), and a dash for each time they are used up. A dash goes along time, not along its line.
 export const COLOURS = 8;
 const DASHES = [
@@ -30,7 +30,7 @@ export function inkOf(colour, dash, wide, left) {
   return ink;
 }
 
-// Beside a name, one period of its line: a background as CSS has it.
+// Next to a name, one period of its line: a background as CSS has it.
 export function swatch(pen) {
   const colour = `var(--${colourOf(pen)})`, faint = `color-mix(in srgb, ${colour} ${100 * FAINT}%, transparent)`, dash = dashOf(pen);
   const pieces = [...dash].map((_, c) => `${isDrawn(dash, c) ? colour : faint} ${c}px ${c + 1}px`);

@@ -64,7 +64,7 @@ export function makeStage(canvas, colour) {
     context.strokeStyle = colour(side);
     context.lineCap = "round";
     stroke([at(...hip), at(ax, ay)], 6);
-    if (side === "inner") {   // hollow: told from the outer ones by more than their colour
+    if (side === "inner") {   // hollow: differs from the outer ones by more than its colour
       context.strokeStyle = colour("sky");
       stroke([at(...hip), at(ax, ay)], 2.5);
       context.strokeStyle = colour(side);

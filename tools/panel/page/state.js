@@ -134,7 +134,7 @@ export const updates = {
   pictureReceived: ({ span: before, newest_ms, pictures }, span, lost, now_ms) => ({ span, lost, pictures: pictures + 1, newest_ms: span[1] === before[1] ? newest_ms : now_ms }),
   poseReceived: (_, time, pose) => ({ pose, pose_s: time }),
   stateReceived: (_, robot) => ({ robot }),
-  // Values at the instant that was asked for; those of another are too late.
+  // Values at the requested time; those of another time are too late.
   valuesReceived: (state, values, time) => time === instant(state) ? { at_cursor: { time: state.cursor_s, values } } : {},
   valuesAtMarkReceived: ({ mark_s }, values, time) => time === mark_s ? { at_mark: values } : {},
 

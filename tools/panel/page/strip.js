@@ -52,7 +52,7 @@ export function makeColumns(channels, columns, column_s) {
   }
 
   // A trace of each channel, until `end` (s). Each holds from its first point on; the column in which that stands has
-  // what came before it as well. Returns the first column that may be another than it was.
+  // the points before it as well. Returns the first column that may be another than it was.
   function take(found, end) {
     const before = head ?? of(end);
     head = Math.max(0, of(end));
@@ -91,7 +91,7 @@ export function makeStrip(channels, columns, column_s, wide, tall) {
   let stale = 0;   // the first column that is not painted as it is now
 
   // Each column reaches the one before it, so that a line has no holes. `pens`: of each channel {colour, dash, least, most},
-  // what it is drawn with (pens.js) and what stands at the bottom and the top.
+  // what it is drawn with (pens.js) and the values at the bottom and the top.
   function paint(pens) {
     const head = numbers.head();
     for (let c = Math.max(stale, seen()); c <= head;) {   // in pieces that do not cross the ring's end

@@ -90,7 +90,7 @@ function lateBars(name, late) {
   return box;
 }
 
-// found: the supervisor's view; slots: of each board at the instant that is shown, where it tells them
+// found: the supervisor's view; slots: of each board at the time that is shown, where it reports them
 export function boards(found, slots, slots_us, ask) {
   const names = [...new Set([...Object.keys(found), ...Object.keys(slots).filter((name) => slots[name])])];
   if (!names.length) return note("nothing is known of the boards yet");
@@ -101,7 +101,7 @@ export function boards(found, slots, slots_us, ask) {
     const board = found[name], slot = slots[name], slot_us = slots_us[name], known = slot && slot.used_us !== null;
     const row = [name];
     if (supervised) row.push(board?.state);
-    row.push(known ? slotBar(name, slot, slot_us) : "not told", known ? time(slot.used_us) : "–", known ? `${(100 * (1 - slot.used_us / slot_us)).toFixed(0)} %` : "–");
+    row.push(known ? slotBar(name, slot, slot_us) : "not reported", known ? time(slot.used_us) : "–", known ? `${(100 * (1 - slot.used_us / slot_us)).toFixed(0)} %` : "–");
     if (paced) row.push(slot ? lateBars(name, slot.late) : "–");
     if (supervised) {
       const restart = Object.assign(document.createElement("button"), { type: "button", textContent: "Restart" });
@@ -131,7 +131,7 @@ export function frames(rows, filter) {
   const wanted = filter.trim().toUpperCase();
   const shown = rows.filter((row) => !wanted || row.name.toUpperCase().includes(wanted) || String(row.id) === wanted);
   if (!shown.length) return note("no frames");
-  return table("newest frames", ["#time", "#id", "name", "#value", "data", "#until then"], shown.map((row) =>
+  return table("newest frames", ["#time", "#id", "name", "#value", "data", "#total"], shown.map((row) =>
     [seconds(row.time_s), row.id, row.name, typeof row.value === "string" ? row.value : figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), whole(row.count)]));
 }
 
@@ -154,7 +154,7 @@ export function linkLists(rows) {
 }
 
 export function linkRows(rows) {
-  if (!rows.length) return note("nothing yet: the robot has not told its lists");
+  if (!rows.length) return note("nothing yet: the robot has not sent its lists");
   return table("variables on the fast and the medium list", ["variable", "list", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
     rows.map((row) => [row.name, row.list, rate(row.rate_hz), achieved(row, row.name), `${row.regular ? "" : "≥ "}${rate(row.promised_hz)}`, ...gaps(row)]));
 }

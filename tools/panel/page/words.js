@@ -1,4 +1,4 @@
-// Figures and plots in words: beside names, and for who has the page read aloud.
+// Figures and plots in words: next to names, and for users who have the page read aloud.
 
 export const figure = (value) => {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
