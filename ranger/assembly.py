@@ -16,7 +16,7 @@ from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.plant import body_files
 from ranger_sim.plant.ranger import RangerPlant
 from ranger_sim.ranger import wiring
-from ranger_sim.ranger.board_programs import BoardFactory, Emulated, InC, OfImage
+from ranger_sim.ranger.board_programs import BoardFactory, Emulated, InC, OfImage, Program
 from ranger_sim.ranger.firmware.programs_in_c import ProgramsInC
 from ranger_sim.ranger.scenario import Scenario
 
@@ -41,7 +41,7 @@ def factory_of(scenario: Scenario, emulated: Emulated, in_c: ProgramsInC, images
     for name, image in images.items():
         if name in in_c.firmware:
             raise UserError(f"{name} is to run both {in_c.firmware[name].folder} and {image.path}")
-    programs = {
+    programs: dict[str, Program] = {
         **{name: InC(firmware, in_c) for name, firmware in in_c.firmware.items()},
         **{name: OfImage(image) for name, image in images.items()},
     }
