@@ -569,7 +569,8 @@ def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
         dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
         return units.Unit(("s",), (), 86400.0)
     for spelling, factor in EPOCHS.items():
-        if all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends):
+        is_of_calendar = all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends)
+        if is_of_calendar and usual * factor <= EPOCH_STEP_S:
             text = (
                 f"{name}: {ends[0]:.15g} is taken for {spelling} since 1970: of the years 1990 to 2100 in no other unit"
             )
@@ -593,3 +594,4 @@ def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
 
 EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
+EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s

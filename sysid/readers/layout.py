@@ -33,7 +33,10 @@ KEYS = {  # --assume KEY=VALUE
     "names": "number of the line with the names, 0 for none",
     "dates": "day-first or month-first",
     "time": "name of the column of stamps",
+    "limits": "names of channels, with commas between, whose values at a limit are true",
+    "clock": "even: rounded stamps are those of an even clock",
 }
+OF_ANY_FORMAT = ("limits", "clock")  # of KEYS; the others say how a text table is written
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +80,7 @@ def assumptions(texts: Sequence[str]) -> dict[str, str]:
             "separator": tuple(SEPARATORS),
             "decimal": ("point", "comma"),
             "dates": ("day-first", "month-first"),
+            "clock": ("even",),
         }.get(key)
         if (allowed and value not in allowed) or (key == "names" and not value.isdecimal()):
             raise DataError(f"--assume {text!r}: {key} is {KEYS[key]}")

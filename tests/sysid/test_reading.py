@@ -119,6 +119,14 @@ def test_several_tables_are_a_question_and_one_of_them_is_read(written):
     assert len(read(path, assume={"names": "203"})["b_A"].value) == 50
 
 
+def test_microseconds_since_a_controllers_start_are_not_a_date(written):
+    stamps = "".join(f"{749_676_761 + 2000 * k},{k % 7}\n" for k in range(100))
+    with pytest.raises(UserError, match="in us 0.002 s:"):
+        read(written("time,a\n" + stamps))
+    dates = "".join(f"{1_749_676_761 + k // 10}.{k % 10},{k % 7}\n" for k in range(100))
+    assert read(written("time,a\n" + dates))["a"].time_s[-1] == pytest.approx(9.9, abs=1e-6)
+
+
 def test_an_assumption_is_checked():
     for text, line in (
         ("decimal=x", "decimal is point or comma"), ("colour=red", "key=value is expected"), ("names=x", "number of"),
