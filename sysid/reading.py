@@ -16,7 +16,7 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import DataError, unknown
 from ranger_sim.sysid import repairs, sanity
-from ranger_sim.sysid.dataset import LOSSES, Channel, Dataset, Finding, Loss, Repair
+from ranger_sim.sysid.dataset import Channel, Dataset, Finding, Loss, Repair
 from ranger_sim.sysid.readers import formats, frames, layout
 from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 from ranger_sim.sysid.recipe import Recipe
@@ -232,10 +232,9 @@ def _decoded(
         dataset.losses.append(loss)
         text = f"{log.read} frames should be there, {loss.text}"
         dataset.findings.append(Finding("", "lost_frames", 0.0, 0.0, float(count), "frames", text))
-    left_out = sum(loss.count for loss in dataset.losses if loss.reason in LOSSES)
-    dataset.lines = {"frames": log.read - left_out} | {
-        f"left out: {each.reason}": each.count for each in dataset.losses
-    }
+    of_log = log.ledger()
+    errors = of_log.pop("frames") - sum(dataset.lines.values())
+    dataset.lines |= ({"error frames": errors} if errors else {}) | of_log
     return dataset
 
 

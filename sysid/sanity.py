@@ -93,6 +93,7 @@ MOVES_PART = 0.2  # of a channel's whole range, within a stretch: less is rest
 MOVES_RATIO = 2.25
 CLIPPED_SAMPLES = 3  # in a row at the limit
 CLIPPED_RUNS = 2
+LEVELS = 20  # different values: with fewer, counts of a coarse instrument rest at the largest one as at any other
 FLAT_PART = 0.5  # zero steps in commands that are held, which cannot be distinguished from cut-off ones
 MOTIONS = ("rad", "m", "rad/s", "m/s")  # whose derivatives a model needs
 QUANTISED = 0.5  # of the noise that neighbours show: the part of rounding from which on steps are seen in a derivative
@@ -490,7 +491,7 @@ def _saturation(channel: Channel) -> Iterator[Finding]:
     """Stretches at the largest or smallest value that begin at speed: a turning point begins slowly."""
     value, time_s = channel.value, channel.time_s
     starts, lengths = equal_runs(value)
-    if len(lengths) < 20 or np.mean(np.diff(value) == 0.0) > 0.9:
+    if len(lengths) < 20 or np.mean(np.diff(value) == 0.0) > 0.9 or len(np.unique(value)) < LEVELS:
         return
     step = lattice_step(value)
     usual = float(np.median(np.abs(np.diff(value))[np.diff(value) != 0.0]))

@@ -66,6 +66,11 @@ class RecordedFrames:
         message.is_fd = message.bitrate_switch = message.error_state_indicator = False
         return too_long
 
+    def ledger(self) -> dict[str, int]:
+        """What became of the file's frames: {"frames": returned, or error frames; "left out: reason": number}."""
+        lost = sum(count for _, count, _ in self.losses)
+        return {"frames": self.read - lost} | {f"left out: {reason}": count for reason, count, _ in self.losses}
+
     def lose(self, reason: str, count: int, where: str) -> None:
         """Record frames that are in the file and were not returned."""
         if count > 0:
