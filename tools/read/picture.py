@@ -72,7 +72,6 @@ def thinned(channel: Channel) -> tuple[Array, Array]:
 def png(found: list[Measurement]) -> bytes:
     """The picture as bytes. UserError where matplotlib is missing."""
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure as Canvas
     except ImportError:
         raise UserError("--plot FILE.png needs matplotlib (pip install matplotlib); FILE.html needs nothing") from None
@@ -87,5 +86,5 @@ def png(found: list[Measurement]) -> bytes:
         axis.set_title(channel.name, fontsize=8, loc="left")
         axis.set_ylabel(channel.unit)
     file = io.BytesIO()
-    FigureCanvasAgg(canvas).print_png(file)
+    canvas.savefig(file, format="png")
     return file.getvalue()
