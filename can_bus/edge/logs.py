@@ -1,7 +1,7 @@
 """Recorded frames from any readable file, with a count of its lines.
 
 python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log and screen output, BUSMASTER's .log and SavvyCAN's
-.csv are read here. A library's reader skips unknown lines, so its frames are compared with the lines or objects of the
+.csv, and packet captures (pcap.py), are read here. A library's reader skips unknown lines, so its frames are compared with the lines or objects of the
 file.
 """
 
@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import can
 
-from ranger_sim.can_bus.edge import log_kinds
+from ranger_sim.can_bus.edge import log_kinds, pcap
 from ranger_sim.can_bus.edge.candump import CanFdError, frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
@@ -29,6 +29,7 @@ BUSMASTER_HEADER = "***BUSMASTER"
 CONTAINER, CONTAINER_HEAD = 10, 32  # type and bytes of its head, of an object in a BLF file
 SMALL_CONTAINER, LARGEST_CONTAINER = 1 << 16, 1 << 28  # bytes; deflate makes at most a thousand of one
 SECOND_NS = 1_000_000_000
+WORD_EXTENDED, WORD_REMOTE, WORD_ERROR = 1 << 31, 1 << 30, 1 << 29  # of SocketCAN's identifiers
 
 
 class RecordedFrames:
@@ -93,6 +94,8 @@ def _opened(log: RecordedFrames) -> Iterator[Frame]:
         return _candump_or_busmaster(log)
     if kind in (log_kinds.PYTHON_CAN, log_kinds.SAVVYCAN) or log.source.suffix.lower() == ".csv":
         return _csv(log)
+    if kind == log_kinds.PCAP:
+        return _captured(log)
     if kind == log_kinds.ASC:
         return _by_lines(log, can.ASCReader, _asc_lines(log), ASC_FRAME)
     if kind == log_kinds.TRC:
@@ -167,6 +170,31 @@ def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
         return
     log.read += max(missing, 1)
     log.lose("cut_off", max(missing, 1), where)
+
+
+def _captured(log: RecordedFrames) -> Iterator[Frame]:
+    """Frames of a packet capture of SocketCAN."""
+    broken, first = 0, 0
+    with log.source.open("rb") as file:
+        try:
+            for packet in pcap.packets(file, str(log.source)):
+                log.read += 1
+                word = packet.word
+                flags = (FLAG_EXTENDED if word & WORD_EXTENDED else 0) | (FLAG_REMOTE if word & WORD_REMOTE else 0)
+                identifier = word & (0x1FFFFFFF if word & WORD_EXTENDED else 0x7FF)
+                if not packet.is_whole and not word & WORD_REMOTE:
+                    broken, first = broken + 1, first or log.read
+                elif len(packet.data) > 8:
+                    log.fd += 1
+                elif word & WORD_ERROR:
+                    yield packet.bus, packet.time_ns, 0, FLAG_ERROR | 8, 0, 0
+                else:
+                    lo, hi = words_of_data(b"" if word & WORD_REMOTE else packet.data)
+                    yield packet.bus, packet.time_ns, identifier, flags | len(packet.data), lo, hi
+        except pcap.CutOffError:
+            log.read += 1
+            log.lose("cut_off", 1, f"packet {log.read}")
+    log.lose("not_frames", broken, f"packet {first}")
 
 
 class _Lines(io.TextIOBase):

@@ -38,9 +38,6 @@ BEGINNINGS = {
 }
 REFUSED = {
     b"TDSm": "a TDMS file: export it as CSV or as MDF (nptdms reads it)",
-    b"\xd4\xc3\xb2\xa1": "a packet capture: write the frames as a candump log (candump -L, or tshark)",
-    b"\xa1\xb2\xc3\xd4": "a packet capture: write the frames as a candump log (candump -L, or tshark)",
-    b"\x0a\x0d\x0d\x0a": "a packet capture: write the frames as a candump log (candump -L, or tshark)",
     b"\xd0\xcf\x11\xe0": "a workbook of an old Excel: export the sheet as CSV",
     b"%PDF": "a PDF",
     b"\x7fELF": "a program",
