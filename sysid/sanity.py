@@ -519,7 +519,8 @@ def _quantised(channel: Channel) -> Iterator[Finding]:
         return
     step, sample_s = lattice_step(channel.value), float(np.median(np.diff(channel.time_s)))
     bends = float(np.sqrt(np.mean(np.diff(channel.value, 2) ** 2)))
-    if not step > 0.0 or not sample_s > 0.0 or step / math.sqrt(12.0) < QUANTISED * bends / math.sqrt(6.0):
+    rounding, seen = step / math.sqrt(12.0), bends / math.sqrt(6.0)
+    if not step > 0.0 or not sample_s > 0.0 or not QUANTISED * seen <= rounding <= seen / QUANTISED:
         return
     noise = step / (math.sqrt(6.0) * sample_s)
     rate = float(np.std(_smooth(np.gradient(channel.value, channel.time_s))))

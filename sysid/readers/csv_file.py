@@ -17,13 +17,9 @@ from numpy.typing import NDArray
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss, Repair
-from ranger_sim.sysid.readers import columns, numerals, stamps, text_file
+from ranger_sim.sysid.readers import columns, numerals, stamps, text_file, time_column
 from ranger_sim.sysid.readers import layout as layouts
 
-SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
-FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
-SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
-LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
 REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
@@ -500,9 +496,10 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
     timed = [k for k in rising if _may_be_time(called[k], rows.layout.units[k])]
     found = timed or dated or ([k for k in rising if _is_even(table[k])] if not rows.layout.names_line else [])
     if len(found) != 1 and not (found and found == dated):
+        example = names[rising[0]] if rising else "NAME"
         raise DataError(
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
-            "--map NAME=t_s says which it is"
+            f"--map {example}=t_s says which it is" + (f" ({example} rises all the time)" if rising else "")
         )
     text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))
@@ -541,57 +538,8 @@ def _counted(
             f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
             "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
         )
-    if unit is None:
-        unit = _assumed(dataset, name, time_s)
-    if unit.numerator != ("s",) or unit.denominator:
-        raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
-    dataset.layout |= {"time": name, "time_unit": unit_text if said else time_unit or f"{unit.factor:g} s"}
-    if unit.factor == 1.0:
-        return columns.from_zero(dataset, time_s)
-    text = f"{name}: times {unit.factor:g}, now in s"
-    dataset.repairs.append(Repair("", "si_unit", len(time_s), text))
-    whole = column.whole_numbers()
-    if whole is not None and len(whole) and float(whole[0]) * unit.factor >= columns.EPOCH_S:
-        columns.from_zero(dataset, time_s[:1] * unit.factor)  # for its note; whole numbers are subtracted below
-        return (whole - whole[0]) * unit.factor
-    return columns.from_zero(dataset, time_s * unit.factor)
-
-
-def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
-    """Unit of stamps without a given one: what their size can only be, else seconds."""
-    steps = np.diff(time_s[np.isfinite(time_s)])
-    usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
-    ends = columns.ends(time_s)
-    if 0.0 < usual < FASTEST_S and all(SPREADSHEET_DAYS[0] < end < SPREADSHEET_DAYS[1] for end in ends):
-        text = (
-            f"{name}: {ends[0]:.10g} is taken for a spreadsheet's day: samples would be {usual:.3g} s apart otherwise"
-        )
-        dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
-        return units.Unit(("s",), (), 86400.0)
-    for spelling, factor in EPOCHS.items():
-        is_of_calendar = all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends)
-        if is_of_calendar and usual * factor <= EPOCH_STEP_S:
-            text = (
-                f"{name}: {ends[0]:.15g} is taken for {spelling} since 1970: of the years 1990 to 2100 in no other unit"
-            )
-            dataset.findings.append(Finding("", "unit_assumed", *ends, factor, "s", text, "note"))
-            return units.Unit(("s",), (), factor)
-    text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
-    if usual > SLOWEST_S:
-        smaller = next((unit for unit in ("ms", "us", "ns") if usual * units.ATOMS[unit][1] <= SLOWEST_S), "ns")
-        better = usual * units.ATOMS[smaller][1]
-        if usual > LONGEST_S or len(time_s) >= FEWEST:
-            raise DataError(
-                f"{dataset.name}: {name}: nothing says the unit of the stamps; in seconds samples would be "
-                f"{usual:.6g} s apart, in {smaller} {better:g} s:",
-                f"  ranger-sim read {dataset.name} --time-unit {smaller}",
-                f"  ranger-sim read {dataset.name} --time-unit s",
-            )
-        text += f", which are {usual:.6g} s apart; --time-unit {smaller} would make them {better:g} s"
-    dataset.findings.append(Finding("", "unit_assumed", *ends, 1.0, "s", text))
-    return units.Unit(("s",))
-
-
-EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
-EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
+    dataset.layout |= {"time": name}
+    time_s, _ = time_column.seconds(dataset, str(rows.path), name, time_s, column.whole_numbers(), unit)
+    factor = f"{unit.factor:g} s" if unit is not None else "assumed"
+    dataset.layout |= {"time_unit": unit_text if said else time_unit or factor}
+    return time_s

@@ -35,13 +35,13 @@ BEGINNINGS = {
     b"PAR1": Format("Parquet"),
     b"ULog\x01\x12\x35": Format("ULog"),
     b"\x89MCAP0\r\n": Format("MCAP"),
+    b"\x89HDF": Format("HDF5"),
+    b"TDSm": Format("TDMS"),
 }
 REFUSED = {
-    b"TDSm": "a TDMS file: export it as CSV or as MDF (nptdms reads it)",
     b"\xd0\xcf\x11\xe0": "a workbook of an old Excel: export the sheet as CSV",
     b"%PDF": "a PDF",
     b"\x7fELF": "a program",
-    b"\x89HDF": "an HDF5 file: export the channels as CSV or MDF (a .mat of version 7.3: save it with '-v7')",
     b"\x89PNG": "a picture",
 }
 MDF_ENDINGS = (".mf4", ".mdf", ".dat")

@@ -82,7 +82,10 @@ def decode(
         if bus not in seen:
             raise DataError(f"{name}: --bus {bus}: unknown bus (available: {', '.join(sorted(seen))})")
     if not samples or first_ns is None:
-        raise DataError(f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others)")
+        misfits = f", {sum(broken.values())} that do not fit their message" if broken else ""
+        raise DataError(
+            f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others{misfits})"
+        )
     lines["unknown identifiers"], lines["left out: broken_frames"] = sum(unknown.values()), sum(broken.values())
     dataset.lines = {what: number for what, number in lines.items() if number}
     of_message: dict[str, list[str]] = {}

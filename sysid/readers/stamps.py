@@ -18,7 +18,7 @@ FEW_DAYS = 3  # a recording takes no more; of two ways to read its dates, one th
 DATE = (
     r"(?P<year>\d{4})[-/.](?P<month>\d\d?)[-/.](?P<day>\d\d?)"
     r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4}|\d\d)"
-    r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4})"
+    r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4}|\d\d)"
 )
 TIME = (
     r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
@@ -123,6 +123,7 @@ def _day(found: re.Match[str], month_first: bool) -> int | None:
         if found["named"].lower() not in MONTHS:
             return None
         year, day = int(found["of_year"]), int(found["of_month"])
+        year += CENTURY if year < 100 else 0
         month = MONTHS[found["named"].lower()]
     else:
         year, first, second = (int(found[name]) for name in ("late", "first", "second"))

@@ -248,7 +248,7 @@ def test_messages_of_mcap_are_channels_by_topic(tmp_path):
 
 def test_what_is_of_another_kind_is_named(written):
     for content, line in (
-        (b"TDSm\x0e\0\0\0", "TDMS"), (b"\xd4\xc3\xb2\xa1\x02\0", "packet capture"), (b"%PDF-1.7\n", "a PDF"),
+        (b"\xd0\xcf\x11\xe0\0\0", "workbook of an old Excel"), (b"%PDF-1.7\n", "a PDF"),
     ):  # fmt: skip
         with pytest.raises(UserError, match=line):
             read(written(content))
