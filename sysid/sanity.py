@@ -28,6 +28,7 @@ KINDS = {
     "names_again": "the names of the columns come again",
     "cut_off": "the last row is cut off",
     "no_stamp": "rows without a stamp",
+    "form_changes": "rows have another form from a line on",
     "ragged": "rows with too many or too few cells",
     "unreadable": "cells that are not numbers",
     "text": "values of a measurement file that have a text instead of a number",

@@ -1,8 +1,8 @@
 """Recorded frames from any readable file, with a count of its lines.
 
-python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log and screen output, BUSMASTER's .log and SavvyCAN's
-.csv, and packet captures (pcap.py), are read here. A library's reader skips unknown lines, so its frames are compared with the lines or objects of the
-file.
+python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log and screen output, BUSMASTER's .log, SavvyCAN's
+.csv and packet captures (pcap.py) are read here. A library's reader skips unknown lines, so its frames are compared
+with the lines or objects of the file.
 """
 
 import calendar

@@ -2,8 +2,8 @@
 
 `layout` finds how the table is written, by its first lines; `numerals` decides the decimal mark by all of its rows;
 then the rows are read a chunk at a time, so that a table of millions of rows needs the memory of its numbers only.
-Every line is accounted for (Dataset.lines). An empty cell is a time without a sample of this channel; a cell that is
-not a number becomes "not a number" and a finding.
+Where a later row has another form, it is named with its line. Every line is accounted for (Dataset.lines). An empty
+cell is a time without a sample of this channel; a cell that is not a number becomes "not a number" and a finding.
 """
 
 import dataclasses
@@ -23,6 +23,7 @@ from ranger_sim.sysid.readers import layout as layouts
 REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
+THREE_DECIMALS = 1e-3  # last digit of numbers whose mark may be one of thousands
 EVEN = 0.01  # of the usual step: what counts evenly without a name may be the time
 
 HEX, HEXADECIMAL = re.compile("(?:0[xX])?[0-9A-Fa-f]{4,16}"), 0.01  # of the cells of a column
@@ -55,14 +56,24 @@ def read(
     rows = _Rows(path, survey, layout, "names" in assumed)
     marks = _marks(path, rows, progress)
     table = _parsed(rows, marks, assumed, progress)
-    if "," not in marks and "decimal" not in assumed and any(column.other_mark for column in table):
-        marks = _marks(path, rows, progress, every=True)  # commas that the first lines did not have
+    if "," not in marks and "decimal" not in assumed and any(column.may_have_other_mark for column in table):
+        marks = _marks(path, rows, progress, every=True)  # numbers that the first lines did not have
         table = _parsed(rows, marks, assumed, progress)
     _note_layout(dataset, layout, marks, rows, assumed)
     return _channels(dataset, rows, table, dict(mapping or {}), time_unit, assumed)
 
 
 # --- rows ---------------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class _Change:
+    """Rows of another form than those above. separator: in words, where another one gives the table's cells."""
+
+    line: int
+    rows: int
+    cells: int
+    separator: str
 
 
 class _Rows:
@@ -79,7 +90,9 @@ class _Rows:
         self.cut_off = 0
         self.again: list[int] = []
         self.kept = 0
-        self._odd: list[tuple[int, bool]] = []  # lines that are not rows, since the last row
+        self._odd: list[tuple[int, bool, int]] = []  # lines that are not rows, since the last row; their cells
+        self._other = ""  # the first of them
+        self.changes: list[_Change] = []
 
     def _count(self, what: str, number: int = 1) -> None:
         self.lines[what] = self.lines.get(what, 0) + number
@@ -118,7 +131,10 @@ class _Rows:
                 elif layouts.is_comment(line):
                     self._count("comments")
                 elif not self._ends_here(place, [cell.strip() for cell in cells]):
-                    self._odd.append((place, layouts.is_data([cell.strip() for cell in cells])))
+                    is_data = layouts.is_data([cell.strip() for cell in cells]) or _is_data_otherwise(line)
+                    self._odd.append((place, is_data, len(cells)))
+                    if len(self._odd) == 1 and not self._other:
+                        self._other = line
             if rows:
                 self.kept += len(rows)
                 if self.kept * width > MOST_CELLS:
@@ -127,7 +143,8 @@ class _Rows:
         last = self._odd.pop() if self._odd and not self.survey.ends and self._odd[-1][1] else None
         if last:
             self.cut_off = last[0]
-        for place, data in self._odd:  # behind the last row
+        self._note_change()
+        for place, data, _ in self._odd:  # behind the last row
             if data:
                 self.ragged.append(place)
             else:
@@ -149,8 +166,30 @@ class _Rows:
 
     def _settle(self) -> None:
         """Lines that are not rows, between rows: left out."""
-        self.ragged += [place for place, _ in self._odd]
-        self._odd.clear()
+        if self._odd:
+            self._note_change()
+            self.ragged += [place for place, *_ in self._odd]
+            self._odd.clear()
+
+    def _note_change(self) -> None:
+        """Keep where rows of another number of cells begin, when so many follow that they are no accident."""
+        rows = [(place, count) for place, data, count in self._odd if data]
+        if len(rows) >= layouts.SECOND_TABLE and len(self.changes) < NAMED_LINES:
+            first, count = rows[0]
+            self.changes.append(_Change(first, len(rows), count, self._separator_of_other()))
+        self._other = ""
+
+    def _separator_of_other(self) -> str:
+        """The separator, in words, by which the first line of another form has the table's number of cells; or ""."""
+        width = len(self.layout.names)
+        return next(
+            (
+                name
+                for name, sign in layouts.SEPARATORS.items()
+                if sign != self.layout.separator and len(layouts.cells_of(self._other, sign)) == width > 1
+            ),
+            "",
+        )
 
     def _ends_here(self, place: int, cells: list[str]) -> bool:
         """True for a second row of names. UserError where it begins another table."""
@@ -171,6 +210,12 @@ class _Rows:
         return named
 
 
+def _is_data_otherwise(line: str) -> bool:
+    """True for a row of nothing but numbers and stamps by any separator."""
+    split = (layouts.cells_of(line, sign) for sign in layouts.SEPARATORS.values() if sign in line)
+    return any(len(cells) > 1 and all(map(layouts.is_value, cells)) for cells in split)
+
+
 # --- columns ------------------------------------------------------------------------------------------------
 
 
@@ -188,7 +233,8 @@ class _Column:
         self.first_odd: tuple[int, int, str] | None = None  # row, line, cell
         self.last_odd = 0
         self.other_mark = False
-        self.finest = 1.0
+        self.finest, self.coarsest = 1.0, 0.0  # last digit of a part of the rows
+        self.form_changes = 0  # line from which on the stamps have another form
         self.unit_text = ""
         self.first = ""
         self.rows = 0
@@ -196,7 +242,7 @@ class _Column:
     def add(self, cells: Sequence[str], places: NDArray[np.int64]) -> None:
         """The next rows. cells (n,), line numbers (n,)."""
         if self.may_be_time:
-            self._add_stamps(cells)
+            self._add_stamps(cells, places)
         values, present, odd = numerals.numbers(cells, self.mark)
         if odd and not self.may_be_time:
             odd = self._with_units(cells, values, odd)
@@ -209,15 +255,23 @@ class _Column:
         if not self.values:
             self.first = next((cell for cell in cells if cell), "")
         digit = numerals.last_digit(cells)
-        self.finest = min(self.finest, digit)
+        self.finest, self.coarsest = min(self.finest, digit), max(self.coarsest, digit)
+        if present is not None and self.mark == "." and not self.other_mark:
+            self.other_mark = any("," in cell and numerals.EITHER_WAY.fullmatch(cell) for cell in cells)
         self.values.append(values)
         self.present.append(np.ones(len(values), dtype=bool) if present is None else present)
         self.rows += len(cells)
 
-    def _add_stamps(self, cells: Sequence[str]) -> None:
+    @property
+    def may_have_other_mark(self) -> bool:
+        """True when later rows may show that the decimal mark is the other one, as 1.234 below whole numbers does."""
+        return self.other_mark or (self.mark == "." and self.coarsest == 1.0 and self.finest == THREE_DECIMALS)
+
+    def _add_stamps(self, cells: Sequence[str], places: NDArray[np.int64]) -> None:
         if self.written is not None:
             both = stamps.both_ways(cells, self.forms)
             if both is None:
+                self.form_changes = int(places[0]) if self.written else 0
                 self.written = None
             else:
                 self.written.append(both)
@@ -270,15 +324,14 @@ def _marks(path: pathlib.Path, rows: _Rows, progress: Progress, every: bool = Fa
         return [rows.layout.decimal] * width
     evidence = numerals.Evidence()
     done = 0
-    for number, (_, cells) in enumerate(rows):
+    for number, (places, cells) in enumerate(rows):
         if not number and not every:
-            few = cells[: layouts.HEAD_LINES]
-            if not any("," in cell for row in few for cell in row) and rows.layout.separator == ",":
+            if not any("," in cell for row in cells for cell in row) and rows.layout.separator == ",":
                 return ["."] * width
-            if not any("," in cell or numerals.EITHER_WAY.fullmatch(cell) for row in few for cell in row):
+            if not any("," in cell or numerals.EITHER_WAY.fullmatch(cell) for row in cells for cell in row):
                 return ["."] * width
         for column, part in enumerate(zip(*cells, strict=True)):
-            evidence.add(column, part)
+            evidence.add(column, part, places)
         done += len(cells)
         progress("decimal mark", min(0.45, done / max(1, rows.survey.size / (8 * width))))
     mark = evidence.mark()
@@ -293,10 +346,12 @@ def _marks(path: pathlib.Path, rows: _Rows, progress: Progress, every: bool = Fa
         )
     found = [evidence.of_column(column, mark) for column in range(width)]
     if not all(found):
-        name = rows.layout.names[found.index("")]
+        column = found.index("")
+        point, comma = (evidence.first[column, each] for each in ".,")
         raise DataError(
-            f"{path}: {name}: some numbers have a decimal point ({evidence.example['.']}), others a decimal comma "
-            f"({evidence.example[',']}); --assume decimal=point or decimal=comma leaves out the others"
+            f"{path}: {rows.layout.names[column]}: some numbers have a decimal point ({point[1]!r}, first in line "
+            f"{point[0]}), others a decimal comma ({comma[1]!r}, first in line {comma[0]}); --assume decimal=point or "
+            "decimal=comma leaves out the others"
         )
     return found
 
@@ -413,6 +468,10 @@ def _left_out(dataset: Dataset, rows: _Rows) -> tuple[Loss, ...]:
     """Lines that should be rows and are not."""
     lost: tuple[Loss, ...] = ()
     width = len(rows.layout.names)
+    for change in rows.changes:
+        text = f"from line {change.line} on {change.rows} rows have another form than those above: {change.cells} cells"
+        text += f", or {width} between other separators ({change.separator})" if change.separator else f", not {width}"
+        dataset.findings.append(Finding("", "form_changes", 0.0, 0.0, float(change.line), "line", text))
     if rows.ragged:
         count = len(rows.ragged)
         text = f"{count} rows do not have {width} cells and are left out (line {_lines_text(rows.ragged)})"
@@ -457,6 +516,12 @@ def _time(
         return set(candidates), step_s * np.arange(rows.kept, dtype=np.float64)
     month_first = {"month-first": True, "day-first": False}.get(assumed.get("dates", ""))
     candidates = candidates or _unnamed_time(dataset, rows, table, called)
+    for k in candidates:
+        if table[k].form_changes:
+            raise DataError(
+                f"{rows.path}: {names[k]}: from line {table[k].form_changes} on the stamps have another form than "
+                f"{table[k].first!r} in the first row"
+            )
     written = {k: found for k in candidates if (found := table[k].stamps(month_first)) is not None}
     numbers = [k for k in candidates if k not in written]
     if not written or (numbers and not any(each.has_time for each in written.values())):

@@ -3,6 +3,7 @@
 import gzip
 import json
 import math
+import re
 import struct
 import zlib
 
@@ -108,6 +109,53 @@ def test_all_rows_decide_and_not_the_first_ones(written):
     assert read(written(text))["a_V"].value[:2].tolist() == [1.1, 2.101]
     late = "t_s;a_V\n" + "".join(f"{k};{k % 100}\n" for k in range(6000)) + '6000;"1,5"\n'
     assert read(written(late))["a_V"].value[-1] == 1.5  # a comma behind the first chunk of lines
+
+
+LONG = 25_000  # rows: beyond the first chunk, and far beyond the lines that decide the layout
+
+
+def long_table(later, first="{t:.2f};{v:.4f}\n", count=LONG, names="t_s;a_V\n"):
+    return names + rows(first, count) + "".join(later.format(k=k, t=0.01 * k, v=1.5) for k in range(count, count + 500))
+
+
+@pytest.mark.parametrize(
+    ("later", "reason"),
+    [
+        ("{t:.2f};{v:.4f};7\n", "from line 25002 on 500 rows have another form than those above: 3 cells, not 2"),
+        ("{t:.2f},{v:.4f}\n", r"from line 25002 on .*: 1 cells, or 2 between other separators \(comma\)"),
+        ("{t:.2f};--- {v}\n", "a_V: 500 cells are not numbers, the first in line 25002"),
+    ],
+)
+def test_rows_that_change_their_form_late_are_named_with_their_line(later, reason, written):
+    measurement = read(written(long_table(later)))
+    said = [f"{each.channel}: {each.text}" for each in measurement.matters]
+    assert any(re.search(reason, each) for each in said), said
+    assert sum(measurement.ledger()["lines"].values()) == LONG + 501
+
+
+def test_marks_and_stamps_that_change_late_are_refused_with_their_line(written):
+    with pytest.raises(
+        UserError, match=r"decimal point \('0.0000', first in line 2\), others a decimal comma .*first in line 25002"
+    ):
+        read(written(long_table("{k};1,{k:03d}5\n")))
+    dates = "".join(f"2026-11-05T09:{k // 60:02d}:{k % 60:02d};{k}\n" for k in range(3000))
+    with pytest.raises(UserError, match=r"from line 20001 on the stamps have another form than '2026-11-05T09:00:00'"):
+        read(written("Zeit;a_V\n" + dates * 7 + rows("{k};1\n", 20_000)))
+    late = read(written(long_table("2026-11-05T09:30:00;1\n")))
+    assert "500 rows have no stamp and are left out (line 25002" in late.matters[0].text
+
+
+def test_a_second_table_far_below_is_a_question_with_both_lines(written):
+    text = long_table("", count=LONG) + "\ntime_s;b_A;c_A\n" + rows("{t:.2f};{v:.4f};1\n", 50)
+    with pytest.raises(UserError, match="names in line 1 and in line 25003"):
+        read(written(text))
+
+
+def test_thousands_that_come_late_are_not_taken_for_decimals(written):
+    text = "t_s;a_V\n" + "".join(f"{k};{k // 25}\n" for k in range(LONG))
+    late = "".join(f"{LONG + k};{1000 + k:,}\n".replace(",", ".") for k in range(600))
+    measurement = read(written(text + late))
+    assert measurement["a_V"].value[-1] == 1599.0 and measurement["a_V"].value[LONG - 1] == 999.0
 
 
 def test_several_tables_are_a_question_and_one_of_them_is_read(written):
