@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from ranger_sim.can_bus.edge import log_kinds
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset
-from ranger_sim.sysid.readers import binary, csv_file, layout, measurement, robodaq, run_folder
+from ranger_sim.sysid.readers import binary, csv_file, layout, lvm, measurement, robodaq, run_folder
 from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 
 TEXT_TABLE = "text table"
@@ -26,6 +26,7 @@ class Format:
 FOLDER = Format("folder of a run")
 MDF = Format("MDF", may_hold_frames=True)
 ROBODAQ = Format("RoboDAQ log")
+LVM = Format("LabVIEW's .lvm")
 TABLE = Format(TEXT_TABLE)
 BEGINNINGS = {
     b"MDF     ": MDF,
@@ -37,6 +38,7 @@ BEGINNINGS = {
     b"\x89MCAP0\r\n": Format("MCAP"),
     b"\x89HDF": Format("HDF5"),
     b"TDSm": Format("TDMS"),
+    lvm.BEGINNING: LVM,
 }
 REFUSED = {
     b"\xd0\xcf\x11\xe0": "a workbook of an old Excel: export the sheet as CSV",
@@ -104,6 +106,8 @@ def read(
         return measurement.read(path, mapping)
     if known.name in binary.KINDS:
         return binary.read(path, known.name, mapping, time_unit)
+    if known is LVM:
+        return lvm.read(path, mapping)
     if known is ROBODAQ:
         return robodaq.read(path, mapping, variable_units)
     return csv_file.read(path, mapping, time_unit, assumed, progress)
