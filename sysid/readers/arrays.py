@@ -105,7 +105,10 @@ def _flattened(arrays: Arrays) -> dict[str, NDArray]:
 def _is_time(name: str, value: NDArray, mapping: Mapping[str, str]) -> bool:
     if len(value) < 2:
         return False
-    return layout.is_time_name(mapping.get(name, _last(name))) or (value.dtype.kind == "M" and _rises(value))
+    called = mapping.get(name, _last(name))
+    if value.dtype.kind == "M" or called.endswith(("_timestamps", "_timestamp")):  # DGM0_timestamps
+        return _rises(value) or layout.is_time_name(called)
+    return layout.is_time_name(called)
 
 
 def _last(name: str) -> str:
@@ -127,7 +130,8 @@ def _time_of(name: str, count: int, times: Mapping[str, NDArray]) -> str:
     nearest = sorted((each for each in alike if name.startswith(_group(each))), key=lambda each: -len(_group(each)))
     if nearest and (len(alike) == 1 or _group(nearest[0])):
         return nearest[0]
-    return alike[0] if len(alike) == 1 or (alike and nearest) else ""
+    same = all(np.array_equal(times[each], times[alike[0]]) for each in alike[1:])
+    return alike[0] if alike and same else ""
 
 
 def _stamps(

@@ -115,7 +115,7 @@ class _Rows:
                     else layouts.cells_of(line, separator)
                 )
                 if len(cells) == width or (len(cells) > width and not any(map(str.strip, cells[width:]))):
-                    if line[:1] in "#%/ \t" and layouts.is_comment(line) and not layouts.is_data(cells):
+                    if line[:1] in "#%/; \t" and layouts.is_comment(line) and not layouts.is_data(cells):
                         self._count("comments")
                         continue
                     cells = [cell.strip() for cell in cells[:width]]
@@ -244,7 +244,7 @@ class _Column:
         if self.may_be_time:
             self._add_stamps(cells, places)
         values, present, odd = numerals.numbers(cells, self.mark)
-        if odd and not self.may_be_time:
+        if odd and not self.written:
             odd = self._with_units(cells, values, odd)
         if odd:
             self.odd += len(odd)
@@ -419,6 +419,8 @@ def _channels(
     columns.check_mapping(dataset, mapping, names)
     if not rows.kept:
         raise DataError(f"{dataset.name}: the table has no row below its header")
+    if not rows.layout.names_line and not any(rows.layout.above.names):
+        _refuse_words(rows, table)
     lost = _left_out(dataset, rows)
     time_columns, time_s = _time(dataset, rows, table, mapping, time_unit, assumed)
     stamped = np.isfinite(time_s)
@@ -462,6 +464,17 @@ def _channels(
         called = " and ".join(names[index] for index in sorted(time_columns))
         raise DataError(f"{rows.path}: there is no channel except the time column {called}")
     return dataset
+
+
+def _refuse_words(rows: _Rows, table: list[_Column]) -> None:
+    """UserError for lines without names in which a column holds words: such lines are another program's records."""
+    for name, column in zip(rows.layout.names, table, strict=True):
+        if column.odd == column.rows and column.first_odd is not None and not column.written:
+            _, line, cell = column.first_odd
+            raise DataError(
+                f"{rows.path}:{line}: the table has no names, and its {name} holds words such as {cell[:30]!r}: these "
+                "are not rows of numbers (--assume names=LINE says where the names are)"
+            )
 
 
 def _left_out(dataset: Dataset, rows: _Rows) -> tuple[Loss, ...]:

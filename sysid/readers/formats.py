@@ -45,6 +45,9 @@ REFUSED = {
     b"%PDF": "a PDF",
     b"\x7fELF": "a program",
     b"\x89PNG": "a picture",
+    b"\x93NUMPY": "an array of NumPy without names: numpy.savetxt(FILE, array, header=...) writes a table",
+    b'{"': "a JSON file: write its channels as CSV",
+    b'[{"': "a JSON file: write its channels as CSV",
 }
 MDF_ENDINGS = (".mf4", ".mdf", ".dat")
 TEXT_ENDINGS = (".dat", ".log", ".asc", ".trc")  # of other programs as well, for tables

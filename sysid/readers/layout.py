@@ -17,6 +17,8 @@ from ranger_sim.sysid import units
 from ranger_sim.sysid.readers import numerals, preamble, stamps, text_file
 
 COMMENTS = ("#", "%", "//")
+REMARK = re.compile(r"\s*;\s+[A-Za-z][^;]*")  # a comment of sigrok's, and not a row that begins with an empty cell
+SETTING = re.compile(r"\w+\s*=\s*[-+\d.eE]+\s*\w*")  # behind the names of a Rigol: t0 = -1.0, tInc = 1e-6
 CLOCKS = (  # in addition to those of units.TIME_WORDS
     "datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock", "x_value", "second", "seconds", "sek",
     "x-axis", "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
@@ -90,7 +92,7 @@ def assumptions(texts: Sequence[str]) -> dict[str, str]:
 
 def is_time_name(name: str) -> bool:
     """True for what files call the column of stamps."""
-    stem = units.split(name)[0].lower().strip("\"'#: ").replace(" ", "_")
+    stem = units.split(name)[0].lower().strip("\"'#:_ ").replace(" ", "_")
     return stem in (*units.TIME_WORDS, *CLOCKS)
 
 
@@ -132,7 +134,12 @@ def is_words(cells: Sequence[str]) -> bool:
 
 def is_comment(line: str) -> bool:
     """True for a line behind a comment mark."""
-    return line.lstrip().startswith(COMMENTS)
+    return line.lstrip().startswith(COMMENTS) or REMARK.fullmatch(line) is not None
+
+
+def _bare(line: str) -> str:
+    """A line without its comment mark."""
+    return line.lstrip().lstrip(";" if REMARK.fullmatch(line) else "#%/").strip() if is_comment(line) else line
 
 
 def is_blank(line: str) -> bool:
@@ -211,7 +218,7 @@ def _attempt(separator: str, kept: list[tuple[int, str]]) -> _Attempt:
         counts = Counter(len(cells) for _, cells in attempt.rows)
     attempt.count = counts.most_common(1)[0][0]
     alike = [cells for _, cells in attempt.rows if len(cells) == attempt.count]
-    if attempt.count > 1 and not any(cells[-1] for cells in alike):  # a separator at the end of every line
+    while attempt.count > 1 and not any(cells[attempt.count - 1] for cells in alike):  # separators at every line's end
         attempt.count -= 1
         attempt.rows = [(place, _shorn(cells)) for place, cells in attempt.rows]
     attempt.data = {place for place, cells in attempt.rows if len(cells) == attempt.count and is_data(cells)}
@@ -274,12 +281,12 @@ def _names(
         text = next((text for place, text in head if place == line), None)
         if text is None:
             raise DataError(f"{path}: --assume names={line}: the names are looked for in the first {len(head)} lines")
-        bare = text.lstrip().lstrip("#%/").strip() if is_comment(text) else text
+        bare = _bare(text)
         return line + 1, line, _unique(path, line, _shorn(cells_of(bare, attempt.separator)), [])
     above = [(place, text) for place, text in head if place < run and not is_blank(text)]
     found: list[tuple[float, int, list[str]]] = []
     for place, text in above:
-        bare = text.lstrip().lstrip("#%/").strip() if is_comment(text) else text
+        bare = _bare(text)
         cells = _as_many(bare, attempt.separator, count)
         if cells is None or not is_words(cells) or (is_comment(text) and above[-1][0] != place):
             continue
@@ -329,6 +336,8 @@ def _counts_rows(attempt: _Attempt) -> bool:
 def _as_many(text: str, separator: str, count: int) -> list[str] | None:
     """The cells of a row of words when they are `count`, by this separator or, above aligned columns, another."""
     cells = _shorn(cells_of(text, separator))
+    while len(cells) > count and (not cells[-1] or SETTING.fullmatch(cells[-1])):
+        cells = cells[:-1]
     if len(cells) == count and count > 1 or (count == 1 and len(cells) == 1):
         return cells
     if separator == " ":

@@ -53,9 +53,9 @@ def _parts(cells: Sequence[str]) -> tuple[str, list[str]]:
     """(key in small letters, values) of a row; `key: value` in one cell is taken apart."""
     if not cells:
         return "", []
-    key, colon, value = cells[0].lstrip("#%/ ").partition(":")
+    key, colon, value = cells[0].lstrip("#%/; ").partition(":")
     if not colon:
-        key, colon, value = cells[0].lstrip("#%/ ").partition("=")
+        key, colon, value = cells[0].lstrip("#%/; ").partition("=")
     rest = [each for each in ([value.strip()] if colon else []) + [cell.strip() for cell in cells[1:]] if each]
     return key.strip().lower(), rest
 

@@ -21,6 +21,7 @@ DATE = (
     r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4}|\d\d)"
 )
 TIME = (
+    r"(?:(?P<days>\d{1,4}) days?,? )?"
     r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
     r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d)?"
 )
@@ -145,5 +146,6 @@ def _time_of_day_ns(found: re.Match[str]) -> int | None:
         hour = hour % 12 + (12 if half[0] == "p" else 0)
     zone = found["zone"] or "Z"
     away = 0 if zone.isalpha() else (int(zone[1:3]) * 60 + int(zone[-2:])) * (-1 if zone[0] == "-" else 1)
+    hour += 24 * int(found["days"] or 0)
     seconds = hour * 3600 + (minute - away) * 60 + second
     return seconds * SECOND_NS + int((found["part"] or "0").ljust(9, "0"))
