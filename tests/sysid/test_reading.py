@@ -13,7 +13,12 @@ import scipy.io
 
 import ranger_sim
 from ranger_sim.can_bus.edge import logs
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.api import diagnose
+from ranger_sim.sysid.dataset import Channel, Dataset
+from ranger_sim.sysid.machines import machine_of
+from ranger_sim.sysid.preparation import prepared
 from ranger_sim.sysid.readers import layout, text_file
 from ranger_sim.sysid.reading import open_recording, read
 from ranger_sim.sysid.recipe import Recipe
@@ -366,6 +371,44 @@ def test_nothing_is_concluded_from_spoilt_runs_of_the_positioning_bench(kind, re
     assert main(arguments) == 2
     error = " ".join(capsys.readouterr().err.split())
     assert reason.split(" .* ")[0] in error and "nothing is concluded" in error
+
+
+def prepared_run(written, names, data, **how):
+    text = "".join(f"{t:.3f},{a:.7f},{b:.7f},{c:.5f}\n" for t, a, b, c in data.tolist())
+    return prepared(open_recording(written(f"{names}\n{text}"), **how), machine_of("positioning"))
+
+
+@needs_data
+def test_a_cut_off_command_of_the_positioning_bench_is_refused_unless_its_limit_is_a_true_one(positioning, written):
+    names, data = positioning
+    spoilt = data[:8000].copy()
+    spoilt[:, 3] = np.minimum(spoilt[:, 3], 0.9 * spoilt[:, 3].max())
+    with pytest.raises(UserError, match=r"voltage_V: \d+ values are cut off .*--assume limits=voltage_V"):
+        prepared_run(written, names, spoilt)
+    sound = prepared_run(written, names, spoilt, assume={"limits": "motor_voltage_command_V"})
+    assert len(sound.table) == 8000
+
+
+@needs_data
+def test_shuffled_rows_of_the_positioning_bench_are_sorted_into_the_same_table(positioning, written):
+    names, data = positioning
+    base = prepared_run(written, names, data[:5000]).table
+    order = generator(3, "shuffled rows").permutation(5000)
+    shuffled = prepared_run(written, names, data[order])
+    assert {each.kind for each in shuffled.findings} >= {"reversed_stamps"}
+    for name, column in base.columns.items():
+        assert np.array_equal(shuffled.table[name], column)
+
+
+@needs_data
+def test_a_late_position_of_the_positioning_bench_is_named_as_a_lag(positioning):
+    late = positioning[1][:10_000].copy()
+    late[:, 1] = np.concatenate((np.full(30, late[0, 1]), late[:-30, 1]))
+    channels = {
+        name: Channel(name, unit, late[:, 0], late[:, column], resolution)
+        for name, unit, column, resolution in (("position_m", "m", 1, 1e-7), ("voltage_V", "V", 3, 1e-5))
+    }
+    assert "sensor_lag" in {each.name for each in diagnose([Dataset("late", channels)], "positioning").causes}
 
 
 def test_a_command_that_reads_takes_the_same_options(written, capsys):
