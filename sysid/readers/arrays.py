@@ -65,8 +65,8 @@ def channels(dataset: Dataset, arrays: Arrays, mapping: Mapping[str, str], time_
         some = ", ".join(flat)[:200] or "none with numbers"
         rising = next((name for name, value in flat.items() if len(value) > 2 and _rises(value)), "")
         raise DataError(
-            f"{dataset.name}: there is no time column among {some}; --map {rising or 'NAME'}=t_s says which it is"
-            + (f" ({rising} rises all the time)" if rising else "")
+            f"{dataset.name}: there is no time column among {some}; "
+            + (f"--map {rising}=time says which it is (it rises all the time)" if rising else "--map NAME=t_s says it")
         )
     stamps = _stamps(dataset, arrays, times, mapping, time_unit)
     used: set[str] = set()

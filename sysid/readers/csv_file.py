@@ -23,9 +23,12 @@ from ranger_sim.sysid.readers import layout as layouts
 REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
+NOT_MEASURED = 9.9e37  # what instruments write for an overflow and for no value (SCPI 1999, 7.2.1.5)
+SAME = 0.2  # of the rows with the date of the row above: another column may be finer
 THREE_DECIMALS = 1e-3  # last digit of numbers whose mark may be one of thousands
 EVEN = 0.01  # of the usual step: what counts evenly without a name may be the time
 
+HEX_NAME = re.compile(r"(?i)(?:^|[^a-z])hex(?:$|[^a-z])")
 HEX, HEXADECIMAL = re.compile("(?:0[xX])?[0-9A-Fa-f]{4,16}"), 0.01  # of the cells of a column
 
 Progress = Callable[[str, float], None]
@@ -195,6 +198,7 @@ class _Rows:
         """True for a second row of names. UserError where it begins another table."""
         if not cells or (cells[0] and (cells[0][0].isdigit() or cells[0][0] in "+-.")):
             return False
+        cells = [cells[0].lstrip("\ufeff"), *cells[1:]]  # of a file that was joined to another
         if cells[: len(self.layout.names)] == list(self.layout.names):
             self.again.append(place)
             self._count("names again")
@@ -234,6 +238,7 @@ class _Column:
         self.last_odd = 0
         self.other_mark = False
         self.finest, self.coarsest = 1.0, 0.0  # last digit of a part of the rows
+        self.padded = False  # whole numbers of one width, some of them with zeros in front
         self.form_changes = 0  # line from which on the stamps have another form
         self.unit_text = ""
         self.first = ""
@@ -246,6 +251,10 @@ class _Column:
         values, present, odd = numerals.numbers(cells, self.mark)
         if odd and not self.written:
             odd = self._with_units(cells, values, odd)
+        beyond = np.abs(values) >= NOT_MEASURED
+        if beyond.any():
+            values[beyond] = np.nan
+            odd = sorted({*odd, *np.flatnonzero(beyond).tolist()})
         if odd:
             self.odd += len(odd)
             self.last_odd = self.rows + odd[-1]
@@ -253,6 +262,8 @@ class _Column:
             if self.first_odd is None:
                 self.first_odd = (self.rows + odd[0], int(places[odd[0]]), cells[odd[0]])
         if not self.values:
+            one_width = len(set(map(len, cells))) == 1 and len(cells[0]) > 1
+            self.padded = one_width and any(cell[0] == "0" for cell in cells) and all(map(str.isdecimal, cells))
             self.first = next((cell for cell in cells if cell), "")
         digit = numerals.last_digit(cells)
         self.finest, self.coarsest = min(self.finest, digit), max(self.coarsest, digit)
@@ -376,8 +387,7 @@ def _parsed(rows: _Rows, marks: list[str], assumed: Mapping[str, str], progress:
 
 
 def _may_be_time(name: str, unit_text: str | None) -> bool:
-    unit = units.unit_of(unit_text) if unit_text else units.split(name)[1]
-    return layouts.is_time_name(name) or (unit is not None and unit.numerator == ("s",) and not unit.denominator)
+    return layouts.is_time_name(name) or _may_be_timed(name, unit_text)
 
 
 # --- the dataset ----------------------------------------------------------------------------------------------
@@ -445,8 +455,11 @@ def _channels(
             )
             dataset.findings.append(Finding(named.name, "unreadable", begin, end, float(column.odd), "samples", text))
         kept = present & stamped
-        if column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2]):
-            text = f"{name}: hexadecimal numbers such as {column.first_odd[2]!r} are not read, left out"
+        says_hex = bool(HEX_NAME.search(name)) and "." not in column.first
+        many = column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2])
+        if says_hex or many:
+            example = column.first_odd[2] if many and column.first_odd else column.first
+            text = f"{name}: hexadecimal numbers such as {example!r} are not read, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
             continue
         if not np.isfinite(value[kept]).any():
@@ -468,6 +481,12 @@ def _channels(
 
 def _refuse_words(rows: _Rows, table: list[_Column]) -> None:
     """UserError for lines without names in which a column holds words: such lines are another program's records."""
+    padded = next((column for column in table if column.padded), None)
+    if padded is not None and rows.layout.separator == "," and not rows.layout.decimal:
+        raise DataError(
+            f"{rows.path}: whole numbers such as {padded.first!r} between commas, and no names: these may be decimals "
+            "behind a comma, and then nothing says where a number ends (--assume decimal=point: they are whole numbers)"
+        )
     for name, column in zip(rows.layout.names, table, strict=True):
         if column.odd == column.rows and column.first_odd is not None and not column.written:
             _, line, cell = column.first_odd
@@ -541,6 +560,9 @@ def _time(
         index = (_with_unit_first(numbers, called, rows.layout.units) or candidates)[0]
         unit = units.split(called[index])[1]
         return {index, *written}, _counted(dataset, names[index], unit, rows, table[index], index, time_unit)
+    if (finer := _finer(numbers, called, rows.layout.units, table, list(written.values()))) is not None:
+        unit = units.split(called[finer])[1]
+        return {finer, *written}, _counted(dataset, names[finer], unit, rows, table[finer], finer, time_unit)
     whole = [k for k in written if written[k].has_date and written[k].has_time]
     chosen = whole[:1] or [k for k in written if written[k].has_date][:1]
     if not whole:
@@ -561,6 +583,24 @@ def _time(
     return set(chosen) | set(written), np.where(missing, np.nan, (time_ns - first_ns) * 1e-9)
 
 
+def _finer(
+    numbers: list[int],
+    called: Sequence[str],
+    unit_texts: Sequence[str | None],
+    table: list[_Column],
+    written: Sequence[stamps.Stamps],
+) -> int | None:
+    """A column of numbers in a unit of time that rises all the time, where the dates are the same for several rows."""
+    if not any(np.mean(np.diff(each.time_ns) == 0) > SAME for each in written if each.has_time):
+        return None
+    return next((k for k in numbers if _may_be_timed(called[k], unit_texts[k]) and _rises(table[k])), None)
+
+
+def _may_be_timed(name: str, unit_text: str | None) -> bool:
+    unit = units.unit_of(unit_text) if unit_text else units.split(name)[1]
+    return unit is not None and unit.numerator == ("s",) and not unit.denominator
+
+
 def _with_unit_first(numbers: list[int], called: Sequence[str], unit_texts: Sequence[str | None]) -> list[int]:
     """Columns of numbers, those first whose unit is known to be a time."""
     return sorted(numbers, key=lambda k: units.split(called[k])[1] is None and not unit_texts[k])
@@ -574,10 +614,10 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
     timed = [k for k in rising if _may_be_time(called[k], rows.layout.units[k])]
     found = timed or dated or ([k for k in rising if _is_even(table[k])] if not rows.layout.names_line else [])
     if len(found) != 1 and not (found and found == dated):
-        example = names[rising[0]] if rising else "NAME"
+        example = f"{names[rising[0]]}=time" if rising else "NAME=t_s"
         raise DataError(
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
-            f"--map {example}=t_s says which it is" + (f" ({example} rises all the time)" if rising else "")
+            f"--map {example} says which it is" + (" (it rises all the time)" if rising else "")
         )
     text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))

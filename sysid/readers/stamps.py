@@ -26,6 +26,9 @@ TIME = (
     r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d)?"
 )
 STAMP = re.compile(rf"(?:(?P<date>{DATE})(?:[T ]\s*(?=\d))?)?(?P<time>{TIME})?")
+COMPACT = re.compile(  # 20261105T093000.123, and without anything between
+    r"((?:19|20)\d\d)(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])[T _-]?([01]\d|2[0-3])([0-5]\d)([0-5]\d)[.,]?(\d{1,9})?Z?"
+)
 MONTHS = {
     name: k % 12 + 1
     for k, name in enumerate(
@@ -61,6 +64,9 @@ class Forms:
 
 
 def _match(cell: str) -> re.Match[str] | None:
+    if (packed := COMPACT.fullmatch(cell)) is not None:
+        year, month, day, hour, minute, second, part = packed.groups()
+        cell = f"{year}-{month}-{day} {hour}:{minute}:{second}" + (f".{part}" if part else "")
     return STAMP.fullmatch(f"00:{cell}" if MINUTES.fullmatch(cell) else cell)
 
 

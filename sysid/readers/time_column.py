@@ -9,6 +9,7 @@ from ranger_sim.sysid.dataset import Array, Dataset, Finding, Repair
 from ranger_sim.sysid.readers import columns
 
 SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
+EARLIEST_DAY, LATER_THAN_LONG = 0.01, 10.0  # parts of a day begin long after midnight; an oscilloscope's stamps about 0
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
 LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
@@ -50,7 +51,9 @@ def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Uni
     steps = np.diff(stamps[np.isfinite(stamps)])
     usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
     ends = columns.ends(stamps)
-    if 0.0 < usual < FASTEST_S and all(SPREADSHEET_DAYS[0] < end < SPREADSHEET_DAYS[1] for end in ends):
+    of_a_day = EARLIEST_DAY < ends[0] < 1.0 and 0.0 <= ends[1] - ends[0] < ends[0] / LATER_THAN_LONG
+    days = of_a_day or all(SPREADSHEET_DAYS[0] < end < SPREADSHEET_DAYS[1] for end in ends)
+    if 0.0 < usual < FASTEST_S and days:
         text = (
             f"{name}: {ends[0]:.10g} is taken for a spreadsheet's day: samples would be {usual:.3g} s apart otherwise"
         )

@@ -180,6 +180,42 @@ def test_microseconds_since_a_controllers_start_are_not_a_date(written):
     assert read(written("time,a\n" + dates))["a"].time_s[-1] == pytest.approx(9.9, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (rows("{t:.3f},{v:.3f}\n").replace(".", ","), "may be decimals behind a comma, and then nothing says where"),
+        ('t_s,note,a_V\n0,"one\ntwo",1\n1,"one\ntwo",2\n', ":2: a quoted cell goes on in the next line"),
+        (rows("step {k} {v:.3f}\n"), "has no names, and its column_1 holds words such as 'step'"),
+        ('{"t": 0, "u": 1}\n', "this is a JSON file"),
+    ],
+)
+def test_what_is_not_a_table_is_refused_with_its_reason(text, reason, written):
+    with pytest.raises(UserError, match=reason):
+        read(written(text))
+
+
+def test_the_finer_of_two_times_is_taken(written):
+    text = "Date,Time,t_s,a_V\n" + "".join(f"2026-11-05,09:30:{k // 100:02d},{0.01 * k:.2f},{k}\n" for k in range(200))
+    measurement = read(written(text))
+    assert measurement["a_V"].time_s == pytest.approx(T) and list(measurement.channels) == ["a_V"]
+
+
+def test_stamps_without_anything_between_are_dates_and_parts_of_a_day_are_not_seconds(written):
+    packed = "".join(f"20261105T0930{k // 100:02d}.{k % 100:02d},{k}\n" for k in range(200))
+    assert read(written("time,a_V\n" + packed))["a_V"].time_s == pytest.approx(T)
+    days = "".join(f"{0.395833333 + 0.01 * k / 86400.0:.12f},{k}\n" for k in range(200))
+    measurement = read(written("Time,a_V\n" + days))
+    assert np.diff(measurement["a_V"].time_s) == pytest.approx(np.full(199, 0.01), rel=1e-4)
+    assert "taken for a spreadsheet's day" in measurement.matters[0].text
+
+
+def test_marks_of_no_value_and_hexadecimal_columns_are_not_numbers(written):
+    cells = "".join(f"{0.01 * k:.2f},{'9.91E+37' if k % 30 == 5 else k},{10 + k % 3}E{k % 3}\n" for k in range(200))
+    measurement = read(written("t_s,a_V,id_hex\n" + cells))
+    assert list(measurement.channels) == ["a_V"] and np.isnan(measurement["a_V"].value[5::30]).all()
+    assert any("hexadecimal numbers such as '10E0'" in each.text for each in measurement.matters)
+
+
 def test_an_assumption_is_checked():
     for text, line in (
         ("decimal=x", "decimal is point or comma"), ("colour=red", "key=value is expected"), ("names=x", "number of"),
