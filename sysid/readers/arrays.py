@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Dataset, Finding
-from ranger_sim.sysid.readers import layout, time_column
+from ranger_sim.sysid.readers import columns, layout, time_column
 
 MOST_NAMED = 5
 NOTE = "note"
@@ -55,6 +55,7 @@ def channels(dataset: Dataset, arrays: Arrays, mapping: Mapping[str, str], time_
     What has none is a finding. UserError for a file without a time.
     """
     flat = _flattened(arrays)
+    columns.check_mapping(dataset, mapping, list(flat))
     for name in [each for each in flat if each in arrays.own_times]:
         yield Column(name, arrays.units.get(name, ""), arrays.own_times[name], flat.pop(name).astype(np.float64))
     if not flat and arrays.own_times:
@@ -92,8 +93,8 @@ def _flattened(arrays: Arrays) -> dict[str, NDArray]:
         if value.ndim == 1:
             found[name] = value
             continue
-        rows, columns_ = value.shape  # samples lie along the time, or along the longer side
-        if columns_ in lengths and rows not in lengths or (columns_ > rows and rows not in lengths):
+        rows, wide = value.shape  # samples lie along the time, or along the longer side
+        if wide in lengths and rows not in lengths or (wide > rows and rows not in lengths):
             value = value.T
         for column in range(value.shape[1]):
             found[f"{name}[{column}]"] = value[:, column]

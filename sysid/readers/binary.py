@@ -47,7 +47,8 @@ def read(
         said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         program = KINDS[kind].partition(".")[0]
         raise DataError(f"{path}: not a {kind} file that {program} can read ({said})") from None
-    columns.check_mapping(dataset, mapping, [name for name, *_ in found])
+    if kind in ("ULog", "MCAP"):
+        columns.check_mapping(dataset, mapping, [name for name, *_ in found])
     zero: float | None = None
     for name, unit, time_s, value in found:
         if zero is None and len(time_s):

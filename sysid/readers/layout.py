@@ -21,7 +21,7 @@ REMARK = re.compile(r"\s*;\s+[A-Za-z][^;]*")  # a comment of sigrok's, and not a
 SETTING = re.compile(r"\w+\s*=\s*[-+\d.eE]+\s*\w*")  # behind the names of a Rigol: t0 = -1.0, tInc = 1e-6
 CLOCKS = (  # in addition to those of units.TIME_WORDS
     "datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock", "x_value", "second", "seconds", "sek",
-    "x-axis", "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
+    "x-axis", "tout", "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
 )  # fmt: skip
 SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "space": " "}
 HEAD_LINES = 4000

@@ -8,7 +8,12 @@ from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Repair
 from ranger_sim.sysid.readers import columns
 
-SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
+DAYS = (  # of the years 1954 to 2119: of spreadsheets since 1900, of MATLAB since the year 0, of astronomers
+    (20_000.0, 80_000.0),
+    (713_960.0, 773_960.0),
+    (2_435_018.0, 2_495_018.0),
+)
+DAY_S = 86_400.0
 EARLIEST_DAY, LATER_THAN_LONG = 0.01, 10.0  # parts of a day begin long after midnight; an oscilloscope's stamps about 0
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
@@ -52,13 +57,11 @@ def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Uni
     usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
     ends = columns.ends(stamps)
     of_a_day = EARLIEST_DAY < ends[0] < 1.0 and 0.0 <= ends[1] - ends[0] < ends[0] / LATER_THAN_LONG
-    days = of_a_day or all(SPREADSHEET_DAYS[0] < end < SPREADSHEET_DAYS[1] for end in ends)
+    days = of_a_day or any(all(low < end < high for end in ends) for low, high in DAYS)
     if 0.0 < usual < FASTEST_S and days:
-        text = (
-            f"{name}: {ends[0]:.10g} is taken for a spreadsheet's day: samples would be {usual:.3g} s apart otherwise"
-        )
+        text = f"{name}: {ends[0]:.10g} is taken for days: samples would be {usual:.3g} s apart otherwise"
         dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
-        return units.Unit(("s",), (), 86400.0)
+        return units.Unit(("s",), (), DAY_S)
     for spelling, factor in EPOCHS.items():
         is_of_calendar = all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends)
         if is_of_calendar and usual * factor <= EPOCH_STEP_S:

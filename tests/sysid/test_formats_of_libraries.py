@@ -118,6 +118,23 @@ def test_every_element_of_a_structure_has_its_own_time(tmp_path):
     assert measurement["matrix[1]"].value == pytest.approx(I)  # samples lie along the longer side
 
 
+def test_a_time_without_a_usual_name_is_named_by_mapping(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"ans": np.stack([T, U, I])})
+    with pytest.raises(UserError, match=r"--map ans\[0\]=time says which it is \(it rises all the time\)"):
+        read(tmp_path / "a.mat")
+    measurement = read(tmp_path / "a.mat", mapping={"ans[0]": "t_s", "ans[1]": "u_mV"})
+    assert measurement["u_V"].value == pytest.approx(1e-3 * U) and measurement["u_V"].time_s == pytest.approx(T)
+    with pytest.raises(UserError, match=r"--map b=...: unknown column \(available: ans\[0\], ans\[1\]"):
+        read(tmp_path / "a.mat", mapping={"b": "t_s"})
+
+
+def test_stamps_in_days_of_matlab_are_days(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"time": 739_926.4 + T / 86_400.0, "u_V": U})
+    measurement = read(tmp_path / "a.mat")
+    assert measurement["u_V"].time_s == pytest.approx(T, abs=2e-5)
+    assert "739926.4 is taken for days" in measurement.matters[0].text
+
+
 def test_columns_of_parquet_with_dates_and_with_what_is_not_a_number(tmp_path):
     pyarrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     dates = BEGIN + (1e6 * T).astype("timedelta64[us]")

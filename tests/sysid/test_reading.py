@@ -206,7 +206,7 @@ def test_stamps_without_anything_between_are_dates_and_parts_of_a_day_are_not_se
     days = "".join(f"{0.395833333 + 0.01 * k / 86400.0:.12f},{k}\n" for k in range(200))
     measurement = read(written("Time,a_V\n" + days))
     assert np.diff(measurement["a_V"].time_s) == pytest.approx(np.full(199, 0.01), rel=1e-4)
-    assert "taken for a spreadsheet's day" in measurement.matters[0].text
+    assert "taken for days" in measurement.matters[0].text
 
 
 def test_marks_of_no_value_and_hexadecimal_columns_are_not_numbers(written):
