@@ -171,9 +171,11 @@ def even_clocks(dataset: Dataset) -> tuple[dict[str, even_clock.EvenClock], list
     for names in of_base.values():
         time_s = dataset[names[0]].time_s
         clock = even_clock.of(time_s)
+        if clock is None:
+            continue
         twice = np.diff(time_s) == 0.0
         alike = np.all([np.diff(dataset[name].value)[twice] == 0.0 for name in names], axis=0)
-        if clock is None or (twice.any() and alike.mean() > REPEATED):
+        if twice.any() and alike.mean() > REPEATED:
             continue
         count = int(np.count_nonzero(even_clock.changed(time_s, clock)))
         for name in names:

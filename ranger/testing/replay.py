@@ -52,7 +52,7 @@ def read_log(
     ledger: dict[str, dict[str, int]] = {}
     for file, wanted in files:
         log = read_frames(file)
-        frames = [made(time_ns, channel, *words) for channel, time_ns, *words in log]
+        frames = [made(row[1], row[0], *row[2:]) for row in log]
         names = _names(file, frames, wanted)
         chosen = [frame._replace(bus=names[frame.bus]) for frame in frames if frame.bus in names]
         _refuse_losses(file, log, accept_loss)

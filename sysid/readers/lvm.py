@@ -189,8 +189,8 @@ def read(path: pathlib.Path, mapping: Mapping[str, str] | None = None) -> Datase
         time_s, value = np.array(samples.time_s), np.array(samples.value)
         named = columns.label(dataset.name, name, samples.unit, mapping)
         if samples.odd:
-            line, cell = samples.first_odd
-            text = f"{samples.odd} cells are not numbers, the first in line {line}: {cell[:30]!r}"
+            place, cell = samples.first_odd
+            text = f"{samples.odd} cells are not numbers, the first in line {place}: {cell[:30]!r}"
             ends = columns.ends(time_s)
             dataset.findings.append(Finding(named.name, "unreadable", *ends, float(samples.odd), "samples", text))
         if not np.isfinite(value).any():

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import DataError
-from ranger_sim.sysid.dataset import Dataset, Finding
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers.arrays import Arrays
 
 UNITS = ("unit_string", "NI_UnitDescription", "Unit")
@@ -37,8 +37,12 @@ def read(dataset: Dataset, arrays: Arrays, library: Any, path: pathlib.Path, mos
             begin_s = float(each.properties.get(OFFSET, 0.0))
             if first is not None and START in each.properties:
                 begin_s += float((each.properties[START] - first) / np.timedelta64(1, "ns")) * 1e-9
-            arrays.own_times[name] = begin_s + step * np.arange(len(value))
+            arrays.own_times[name] = begin_s + step * np.arange(len(value), dtype=np.float64)
             arrays.add(name, value, unit)
         if file.file_status.incomplete_final_segment:
-            text = "the file is cut off: its last segment is incomplete"
-            dataset.findings.append(Finding("", "cut_off", 0.0, 0.0, 1.0, "segments", text))
+            statuses = (file.file_status.channel_statuses or {}).values()
+            missing = max(1, sum(each.expected_length - each.read_length for each in statuses))
+            dataset.rows += missing
+            dataset.losses.append(Loss("cut_off", missing, "in the last segment"))
+            text = f"the file is cut off: its last segment lacks {missing} samples"
+            dataset.findings.append(Finding("", "cut_off", 0.0, 0.0, float(missing), "samples", text))

@@ -54,6 +54,15 @@ def test_a_time_channel_of_tdms_gives_the_stamps(tdms):
         read(tdms(("g", "u_V", U), ("g", "i_A", I)))
 
 
+def test_a_tdms_file_that_is_cut_off_counts_what_is_missing(tdms):
+    path = tdms(("g", "u", U, {"wf_increment": 0.01}), ("g", "i", I, {"wf_increment": 0.01}))
+    path.write_bytes(path.read_bytes()[:-800])  # a hundred numbers
+    measurement = read(path)
+    account = measurement.ledger()["channels"][""]
+    assert account["left_out"][0]["reason"] == "cut_off" and account["read"] == 400 == account["kept"] + 100
+    assert "its last segment lacks 100 samples" in measurement.matters[0].text
+
+
 # --- HDF5 -------------------------------------------------------------------------------------------------------
 
 
