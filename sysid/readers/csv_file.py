@@ -175,7 +175,7 @@ class _Rows:
             self._odd.clear()
 
     def _note_change(self) -> None:
-        """Keep where rows of another number of cells begin, when so many follow that they are no accident."""
+        """Keep where rows of another number of cells begin, when so many follow that it is not an accident."""
         rows = [(place, count) for place, data, count in self._odd if data]
         if len(rows) >= layouts.SECOND_TABLE and len(self.changes) < NAMED_LINES:
             first, count = rows[0]

@@ -250,13 +250,10 @@ def _best(path: pathlib.Path, kept: list[tuple[int, str]]) -> _Attempt:
         elif _header_fits(best) and not _header_fits(other):
             continue
         else:
-            commands = " or ".join(
-                f"--assume separator={name}"
-                for name, sign in SEPARATORS.items()
-                if sign in (best.separator, other.separator)
-            )
+            signs = [name for name, sign in SEPARATORS.items() if sign in (best.separator, other.separator)]
             raise DataError(
-                f"{path}: its cells can be separated in two ways, {best.count} or {other.count} in a row: {commands}"
+                f"{path}: its cells can be separated in two ways, {best.count} or {other.count} in a row:",
+                *(f"  ranger-sim read {path} --assume separator={name}" for name in signs),
             )
     if best.share == 0.0:  # no row of numbers: as its first line is
         best = max(tried, key=lambda each: (len(each.rows[0][1]) > 1, each.separator != " ", each.count))

@@ -35,7 +35,7 @@ def seconds(
 
     path: of the file, for commands. whole: the stamps where all are whole numbers: floats would round those of a
     calendar. unit: None where nothing gives it. UserError for a unit of something else, and for stamps whose unit
-    cannot be told from their size.
+    does not follow from their size.
     """
     unit = unit or _assumed(dataset, path, name, stamps)
     if unit.numerator != ("s",) or unit.denominator:

@@ -61,7 +61,7 @@ def test_a_clock_is_even_on_both_sides_of_a_gap():
     assert np.abs(clock.time_s - time_s).max() < 2e-4
 
 
-def test_missing_rows_uneven_sampling_and_even_stamps_are_no_rounding():
+def test_missing_rows_uneven_sampling_and_even_stamps_are_not_taken_for_rounding():
     even = 0.01 * np.arange(400)
     assert even_clock.of(even) is None
     assert even_clock.of(np.delete(even, 100)) is None
