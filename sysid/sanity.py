@@ -188,9 +188,14 @@ def _inspected(dataset: Dataset) -> list[Finding]:
 
 def of_recording(dataset: Dataset) -> list[Finding]:
     """Oddities of all channels together, which only the import sees: later steps choose some of the channels."""
-    sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
     with np.errstate(all="ignore"):
-        return list(headlines.of_all(sound))
+        return list(headlines.of_all(_sound(dataset)))
+
+
+def _sound(dataset: Dataset) -> dict[str, Channel]:
+    """The channels with enough finite samples, in order."""
+    tidy = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
+    return {name: each for name, each in tidy.items() if len(each.value) >= FEWEST}
 
 
 def pairs(dataset: Dataset) -> list[Finding]:
@@ -199,8 +204,11 @@ def pairs(dataset: Dataset) -> list[Finding]:
     A gear or a transmission between two channels is not known here, so that nothing depends on these findings.
     """
     with np.errstate(all="ignore"):
-        sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
-        moving = {name: each for name, each in sound.items() if np.ptp(each.value) > 0.0 and not _is_held(each.value)}
+        moving = {
+            name: each
+            for name, each in _sound(dataset).items()
+            if np.ptp(each.value) > 0.0 and not _is_held(each.value)
+        }
         return list(_pairs(moving))
 
 

@@ -52,7 +52,7 @@ WHOLE: dict[str, tuple[str, str, float, float]] = {
 # whole words, where a unit is expected: in a name "second" may be the second of two
 SPELT_OUT = {
     "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms", "milliseconds": "ms",
-    "msec": "ms", "usec": "us",
+    "msec": "ms", "usec": "us", "hour": "h", "hours": "h", "minute": "min", "minutes": "min",
     "volt": "V", "volts": "V", "ampere": "A", "amperes": "A", "amp": "A", "amps": "A", "watt": "W", "watts": "W",
     "newton": "N", "newtons": "N", "radian": "rad", "radians": "rad",
 }  # fmt: skip

@@ -9,6 +9,7 @@ import calendar
 import contextlib
 import io
 import itertools
+import logging
 import pathlib
 import re
 import zlib
@@ -22,6 +23,7 @@ from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError, DataError, UserError
 
+logging.getLogger("can.io").addHandler(logging.NullHandler())  # a frame that is passed over is counted here
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
 PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 SAVVYCAN_HEADER = "time stamp,id,extended,"
@@ -197,6 +199,11 @@ def _captured(log: RecordedFrames) -> Iterator[Frame]:
     log.lose("not_frames", broken, f"packet {first}")
 
 
+LENGTH_BITS = 15  # of a frame's flags
+HALF_A_BYTE = re.compile(r"\s[0-9A-Fa-f]$")
+CUT_OFF = re.compile(r"\s*\d")  # a last line without an end that begins as frames do
+
+
 class _Lines(io.TextIOBase):
     """Lines of a file for a library's reader, with a count of those that must become frames."""
 
@@ -205,6 +212,7 @@ class _Lines(io.TextIOBase):
         self.log, self.lines, self.is_frame = log, iter(lines), is_frame
         self.number = 0
         self.waiting = 0  # the line that must become a frame and has not
+        self.line = ""
         self.whole = True  # the last line has its end
         self.lost: list[int] = []
 
@@ -214,15 +222,28 @@ class _Lines(io.TextIOBase):
         if not line:
             raise StopIteration
         self.number += 1
+        self.line = line
         self.whole = line.endswith("\n")
         if self.is_frame.match(line):
             self.log.read += 1
             self.waiting = self.number
+        elif not self.whole and CUT_OFF.match(line):
+            self.log.read += 1
+            self.log.lose("cut_off", 1, f"in line {self.number}")
         return line
 
     def readline(self, size: int | None = -1) -> str:  # type: ignore[override]
         """The next line, for readers that call this."""
         return next(self, "")
+
+    def is_torn(self, message: can.Message) -> bool:
+        """True for a frame with fewer bytes than it says, and for a last line that ends within a byte.
+
+        The library fills such a frame up with zeros.
+        """
+        if message.is_remote_frame or message.is_error_frame:
+            return False
+        return len(message.data) != message.dlc or (not self.whole and HALF_A_BYTE.search(self.line) is not None)
 
     def settle(self) -> None:
         """Count a line as lost if it did not become a frame before the next one."""
@@ -238,6 +259,8 @@ def _by_lines(
     given = _Lines(log, lines, is_frame)
     try:
         for message in reader(given):
+            if given.is_torn(message):
+                continue  # it is counted as lost with its line
             given.waiting = 0
             if not log.is_fd(message):
                 yield _frame(message)
@@ -321,10 +344,17 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
         parse = _busmaster_frame
     elif lines and SCREEN.match(lines[0][1]):
         parse = _ScreenLine([line for _, line in lines])
+    lengths: dict[tuple[str, int, int], int] = {}  # of the frames so far, in bytes
     for number, line in lines:
         log.read += 1
         try:
-            yield parse(line)
+            frame = parse(line)
+            which = (frame[0], frame[2], frame[3] & FLAG_EXTENDED)
+            if not line.endswith("\n") and frame[3] & LENGTH_BITS < lengths.get(which, 0):
+                log.lose("cut_off", 1, f"in line {number}")
+                return
+            lengths[which] = frame[3] & LENGTH_BITS
+            yield frame
         except CanFdError:
             try:
                 yield parse(FD_MARK.sub("#", line))

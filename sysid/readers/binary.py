@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import DataError, UserError
-from ranger_sim.sysid.dataset import Dataset, Finding
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import arrays, columns, hdf5, tdms
 from ranger_sim.sysid.readers.arrays import Arrays, Column
 
@@ -25,6 +25,7 @@ KINDS = {  # and the module that reads them
     "TDMS": "nptdms",
 }
 HDF5_INSIDE = b"MATLAB 7.3"  # a .mat file of this version is an HDF5 file
+ULOG_HEADER, ULOG_HEAD = 16, 3  # bytes of the file's header, and of a message's: its length, two bytes, and its type
 MOST_CELLS = 1000  # of an array of MATLAB's cells
 
 
@@ -127,12 +128,31 @@ def _ulog(dataset: Dataset, library: Any, path: pathlib.Path) -> Iterator[Column
         for name, value in each.data.items():
             if name != "timestamp":
                 yield Column(f"{each.name}{number}.{name}", "", time_s, np.asarray(value, dtype=np.float64))
+    if (where := _ends_within(path)) is not None:
+        dataset.losses.append(Loss("cut_off", 1, f"behind byte {where}"))
+        dataset.rows += 1
+        text = f"the file is cut off within a message that begins at byte {where}; nothing says how much is missing"
+        dataset.findings.append(Finding("", "cut_off", 0.0, 0.0, 1.0, "messages", text))
     if log.dropouts:
         count = len(log.dropouts)
         text = (
             f"the logger dropped data {count} times, {sum(each.duration for each in log.dropouts) / 1e3:.3g} s in all"
         )
         dataset.findings.append(Finding("", "dropouts", 0.0, 0.0, float(count), "times", text))
+
+
+def _ends_within(path: pathlib.Path) -> int | None:
+    """The byte at which a message begins that ends behind the file; None when the last one is whole."""
+    size = path.stat().st_size
+    place = ULOG_HEADER
+    with path.open("rb") as file:
+        while place < size:
+            file.seek(place)
+            end = place + ULOG_HEAD + int.from_bytes(file.read(2), "little")
+            if end > size:
+                return place
+            place = end
+    return None
 
 
 def _mcap(dataset: Dataset, library: Any, path: pathlib.Path) -> Iterator[Column]:

@@ -21,6 +21,7 @@ from ranger_sim.sysid.readers import columns, numerals, stamps, text_file, time_
 from ranger_sim.sysid.readers import layout as layouts
 
 REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
+ROWS_OF_ONE_FORM = 20  # rows above the last one, by whose decimals a number that is cut off is seen
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
 NOT_MEASURED = 9.9e37  # what instruments write for an overflow and for no value (SCPI 1999, 7.2.1.5)
@@ -104,7 +105,7 @@ class _Rows:
         """(line numbers (n,), the cells of n rows, all of the table's width)."""
         self._start()
         layout, width, separator = self.layout, len(self.layout.names), self.layout.separator
-        for number, lines in text_file.chunks(self.path, self.survey.encoding):
+        for number, lines, is_last in _with_last(text_file.chunks(self.path, self.survey.encoding)):
             places: list[int] = []
             rows: list[list[str]] = []
             plain = '"' not in "".join(lines)
@@ -138,6 +139,8 @@ class _Rows:
                     self._odd.append((place, is_data, len(cells)))
                     if len(self._odd) == 1 and not self._other:
                         self._other = line
+            if is_last and not self.survey.ends and places and places[-1] == number + len(lines) - 1:
+                self._leave_out_cut_off(places, rows)
             if rows:
                 self.kept += len(rows)
                 if self.kept * width > MOST_CELLS:
@@ -153,6 +156,13 @@ class _Rows:
             else:
                 self._count("footer")
         self._count("rows", self.kept)
+
+    def _leave_out_cut_off(self, places: list[int], rows: list[list[str]]) -> None:
+        """Take out a last row without a line end whose last number has fewer decimals than all above it have."""
+        above = {_decimals(row[-1]) for row in rows[-ROWS_OF_ONE_FORM - 1 : -1]}
+        if len(rows) > ROWS_OF_ONE_FORM and len(above) == 1 and _decimals(rows[-1][-1]) < min(above):
+            self.cut_off = places.pop()
+            rows.pop()
 
     def _above(self, place: int, line: str) -> None:
         layout = self.layout
@@ -212,6 +222,22 @@ class _Rows:
         if named:
             self._count("another table")
         return named
+
+
+def _with_last(chunks: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str], bool]]:
+    """The chunks, and whether it is the last one."""
+    before = None
+    for chunk in chunks:
+        if before is not None:
+            yield *before, False
+        before = chunk
+    if before is not None:
+        yield *before, True
+
+
+def _decimals(cell: str) -> int:
+    """Characters behind the decimal mark; -1 without one."""
+    return len(cell) - 1 - max(cell.rfind("."), cell.rfind(",")) if "." in cell or "," in cell else -1
 
 
 def _is_data_otherwise(line: str) -> bool:

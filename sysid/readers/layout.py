@@ -304,9 +304,11 @@ def _names(
                 f"{path}:{place}: {len(cells)} names, and the rows below have {count} cells"
                 + ("; are decimal commas between commas?" if attempt.separator == "," and count > len(cells) else "")
             )
-        if not attempt.data:  # nothing but names
+        if not attempt.data and is_words(attempt.rows[0][1]):  # nothing but names
             place, cells = attempt.rows[0]
             return place + 1, place, _unique(path, place, cells, [])
+        if not attempt.data:
+            return attempt.rows[0][0], 0, _numbered(count)
         return min(attempt.data), 0, _numbered(count)
     best = max(found, key=lambda each: each[0])[0]
     tied = [each for each in found if each[0] == best]

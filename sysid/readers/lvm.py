@@ -51,6 +51,11 @@ class _Reader:
         self.missing = 0
         self.state = "header of the file"
 
+    @property
+    def has_rows(self) -> bool:
+        """True among the rows of a segment."""
+        return self.state == "rows" and self.row > 0
+
     def count(self, what: str) -> None:
         self.lines[what] = self.lines.get(what, 0) + 1
 
@@ -59,7 +64,7 @@ class _Reader:
         stripped = line.strip()
         cells = [cell.strip() for cell in line.split(self.separator)]
         if self.state == "rows" and stripped and cells[0] in ("Channels", "Notes", "Test_Name", "UUT_S/N"):
-            self._end_of_segment()
+            self.end_of_segment()
             self.state = "header of a segment"
         if not stripped.strip(self.separator):
             self.count("empty")
@@ -155,7 +160,7 @@ class _Reader:
             samples.value.append(value)
         self.row += 1
 
-    def _end_of_segment(self) -> None:
+    def end_of_segment(self) -> None:
         """Samples that the segment should have; a file of one header goes on behind them."""
         self.missing += max(0, self.promised - self.row)
 
@@ -165,10 +170,18 @@ def read(path: pathlib.Path, mapping: Mapping[str, str] | None = None) -> Datase
     mapping = dict(mapping or {})
     survey = text_file.survey(path)
     reader = _Reader(path)
+    last = ""
     for first, lines in text_file.chunks(path, survey.encoding):
         for number, line in enumerate(lines, first):
-            reader.take(number, line)
-    reader._end_of_segment()
+            if last:
+                reader.take(number - 1, last)
+            last = line or "\n"
+    if survey.ends or not reader.has_rows:  # a row without a line end may be cut off in a number
+        reader.take(number, last)
+    else:
+        reader.lines["left out: cut off"] = 1
+        reader.missing += reader.row >= reader.promised
+    reader.end_of_segment()
     if not reader.channels:
         raise DataError(f"{path}: it has no segment with names of channels")
     dataset = Dataset(path.name, {}, lines=reader.lines)

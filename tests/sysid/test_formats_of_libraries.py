@@ -137,6 +137,12 @@ def test_a_time_without_a_usual_name_is_named_by_mapping(tmp_path):
         read(tmp_path / "a.mat", mapping={"b": "t_s"})
 
 
+def test_a_channel_without_any_number_is_a_finding_and_no_traceback(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"t_s": T, "u_V": U, "broken_A": np.full(200, np.nan)})
+    measurement = read(tmp_path / "a.mat")
+    assert ("not_finite", "fatal") in kinds(measurement) and len(measurement["u_V"].value) == 200
+
+
 def test_stamps_in_days_of_matlab_are_days(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"time": 739_926.4 + T / 86_400.0, "u_V": U})
     measurement = read(tmp_path / "a.mat")
