@@ -1,4 +1,4 @@
-"""All dialects and accidents of `tests/sysid/dialects.py`, read and judged: `python -m dev.dialects [--all]`."""
+"""All dialects, accidents and files of other writers in tests/sysid, judged: `python -m dev.dialects [--all]`."""
 
 import argparse
 import functools
@@ -6,7 +6,9 @@ import pathlib
 import tempfile
 from collections import Counter
 
-from tests.sysid import dialects
+from tests.sysid import dialects, strangers
+
+STRANGERS = "by other writers"
 
 
 def main() -> int:
@@ -14,7 +16,7 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--all", action="store_true", help="print the right ones as well")
     show_all = options.parse_args().all
-    scores: dict[str, Counter[str]] = {"dialects": Counter(), "accidents": Counter()}
+    scores: dict[str, Counter[str]] = {kind: Counter() for kind in ("dialects", "accidents", STRANGERS)}
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         cases = [
@@ -25,12 +27,16 @@ def main() -> int:
             ("accidents", title, functools.partial(dialects.judged_accident, make(), folder))
             for title, make in dialects.accidents()
         ]
+        for number, (title, stranger) in enumerate(strangers.strangers()):
+            own = folder / str(number)
+            own.mkdir()
+            cases.append((STRANGERS, title, functools.partial(strangers.judged, stranger, own)))
         for kind, title, judge in cases:
             verdict, reason = judge()
             scores[kind][verdict] += 1
             if show_all or verdict not in (dialects.RIGHT, dialects.REFUSED):
-                print(f"{kind[:-1]}: {title}: {verdict}: {' / '.join(reason.splitlines())[:300]}")
-    verdicts = (dialects.RIGHT, dialects.REFUSED, dialects.FALSELY, dialects.WRONG)
+                print(f"{kind}: {title}: {verdict}: {' / '.join(reason.splitlines())[:300]}")
+    verdicts = (dialects.RIGHT, dialects.REFUSED, dialects.FALSELY, dialects.WRONG, strangers.MISSING)
     print(f"| | all | {' | '.join(verdicts)} |")
     for kind, counts in scores.items():
         print(f"| {kind} | {counts.total()} | {' | '.join(str(counts[verdict]) for verdict in verdicts)} |")

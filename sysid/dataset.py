@@ -36,6 +36,7 @@ LOSSES = {
     "clipped": "values cut off at a limit",
     "bit_flip": "single values with a wrong bit",
 }
+CLIPPED = "clipped"  # of LOSSES
 NOTHING_LOST = {
     "repeated": "repeated samples, stamp and value",
     "never_written": "samples of a variable before it was written",
@@ -62,7 +63,9 @@ class Loss:
 class Channel:
     """One measured quantity. time_s, value: shape (n,). resolution: of one count in the channel's unit, 0: unknown.
 
-    losses: what was read of it and is left out.
+    losses: what was read of it and is left out. masked_s: (m,) stamps of the values that are left out because they are
+    cut off at a limit: nothing is interpolated there. limits_are_true: values at a limit are the machine's, not the
+    instrument's.
     """
 
     name: str
@@ -72,6 +75,8 @@ class Channel:
     resolution: float = 0.0
     source: str = ""
     losses: tuple[Loss, ...] = ()
+    masked_s: Array = dataclasses.field(default_factory=lambda: np.empty(0))
+    limits_are_true: bool = False
 
     def __post_init__(self) -> None:
         if self.time_s.shape != self.value.shape or self.time_s.ndim != 1:
@@ -100,7 +105,10 @@ class Channel:
         loss = Loss(reason, len(places), f"at {first:.6g} s" if np.isfinite(first) else "")
         kept = ~left_out
         losses = (*self.losses, loss)
-        return dataclasses.replace(self, time_s=self.time_s[kept], value=self.value[kept], losses=losses)
+        masked_s = np.concatenate((self.masked_s, self.time_s[places])) if reason == CLIPPED else self.masked_s
+        return dataclasses.replace(
+            self, time_s=self.time_s[kept], value=self.value[kept], losses=losses, masked_s=masked_s
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,12 +127,19 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class Repair:
-    """What was changed in a channel, and why."""
+    """What was changed in a channel, and why.
+
+    residual: how far the repaired samples are from what they should be, in `unit`; None where they are left out.
+    option: that carries it out, where it is not carried out without a request.
+    """
 
     channel: str
     kind: str
     count: int
     text: str
+    residual: float | None = None
+    unit: str = ""
+    option: str = ""
 
 
 @dataclasses.dataclass
@@ -210,7 +225,7 @@ class Dataset:
         return accounts
 
     def table(self, names: Iterable[str], longest_gap: float = 5.0) -> Table:
-        """These channels on the stamps of the densest of them, by straight lines, cut at gaps.
+        """These channels on the stamps of the densest of them, by straight lines, cut at gaps and at masked values.
 
         longest_gap: in median steps of a channel; what is farther apart is not bridged.
         """
@@ -229,7 +244,10 @@ class Dataset:
             steps = np.diff(channel.time_s)
             limit = longest_gap * float(np.median(steps)) if len(steps) else 0.0
             inside &= (time_s >= channel.time_s[0]) & (time_s <= channel.time_s[-1])
-            for number in np.flatnonzero(steps > limit):
+            bridged = steps <= limit
+            masked = np.searchsorted(channel.time_s, channel.masked_s) - 1  # the true values are beyond the limit
+            bridged[masked[(masked >= 0) & (masked < len(bridged))]] = False
+            for number in np.flatnonzero(~bridged):
                 low, high = channel.time_s[number], channel.time_s[number + 1]
                 inside &= ~((time_s > low) & (time_s < high))
                 cuts[min(np.searchsorted(time_s, high), len(time_s) - 1)] = True

@@ -8,13 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ranger_sim.sysid import even_clock
 from ranger_sim.sysid.dataset import Array, Channel, Finding
 
-NOTE = "note"
+NOTE, WARNING = "note", "warning"
 FEWEST = 60  # samples
-# Rounded stamps: so many samples have the stamp of the one before, and the others are whole numbers of one step.
-SAME_PART, ROUNDED = 0.2, 0.02
-ROUND_STEPS_S = tuple(digit * 10.0**power for power in range(1, -7, -1) for digit in (5, 2, 1))
+UNEVEN = 0.2  # of a step: rounding of stamps below it changes a rate by less than its own noise
 # A join: every smooth channel steps at one row, farther than anywhere else by this factor, and goes on smoothly.
 JOIN, USUAL_PERCENT = 8.0, 99.5
 SMOOTH = 0.2  # largest usual step of a smooth channel to its range
@@ -27,29 +26,25 @@ MIXED = 3.0  # neighbours are so many times as far from each other as next neigh
 
 
 def of_stamps(channel: Channel) -> Iterator[Finding]:
-    """Stamps that were rounded so far that several samples have one."""
+    """Stamps that were rounded: so far that several samples have one, or that their distances are uneven by it."""
     finite = channel.time_s[np.isfinite(channel.time_s)]
     steps = np.diff(finite)
-    if len(finite) < FEWEST or not len(steps) or np.mean(steps == 0.0) < SAME_PART or (steps < 0.0).any():
+    if len(finite) < FEWEST or not steps.any() or (steps < 0.0).any():
         return
-    moved = steps[steps > 0.0]
-    if not len(moved):
-        return
-    from_begin = finite - finite[0]
-    rounded = next(
-        (each for each in ROUND_STEPS_S if np.abs(from_begin / each - np.round(from_begin / each)).max() < ROUNDED), 0.0
-    )
-    if not rounded:
-        return
-    even = (float(finite[-1] - finite[0]) + rounded) / len(finite)
-    different = 1 + len(moved)
-    if not 1.5 <= len(finite) / different:
-        return
-    text = (
-        f"stamps are rounded to {rounded:g} s: {len(finite)} samples have {different} different ones; evenly spread "
-        f"they would be {even:.4g} s apart"
-    )
-    yield Finding(channel.name, "rounded_stamps", float(finite[0]), float(finite[-1]), rounded, "s", text)
+    ends = float(finite[0]), float(finite[-1])
+    clock = even_clock.of(finite)
+    different = 1 + int(np.count_nonzero(steps))
+    if np.mean(steps == 0.0) >= even_clock.SAME_PART and len(finite) >= 1.5 * different:
+        rounded = clock.rounding_s if clock is not None else even_clock.rounding(finite)
+        what = clock.text if clock is not None else f"stamps are rounded to {rounded:g} s, and no even clock fits them"
+        if rounded:
+            text = f"{what}; {len(finite)} samples have {different} different ones"
+            yield Finding(channel.name, "rounded_stamps", *ends, rounded, "s", text)
+    elif clock is not None:
+        share = clock.rounding_s / clock.step_s
+        text = f"{clock.text}; their distances are uneven by {share:.2g} of a step"
+        severity = NOTE if share < UNEVEN else WARNING
+        yield Finding(channel.name, "quantised_stamps", *ends, clock.rounding_s, "s", text, severity)
 
 
 def of_values(channel: Channel) -> Iterator[Finding]:

@@ -70,6 +70,7 @@ def prepared(
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
     inputs = {each.name for each in machine.quantities if each.is_input} - set(asked)
+    sanity.stop_if_input_is_clipped(dataset.name, findings, inputs)
     mended = repairs.mend(dataset, findings, inputs)
     losses.stop_if_too_many(mended, names, accepted)
     needed = [each.name for each in machine.quantities if each.needed]

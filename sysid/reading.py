@@ -14,10 +14,10 @@ from typing import Any, overload
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import DataError
+from ranger_sim.foundation.user_error import DataError, unknown
 from ranger_sim.sysid import repairs, sanity
-from ranger_sim.sysid.dataset import LOSSES, Channel, Dataset, Finding, Loss, Repair
-from ranger_sim.sysid.readers import formats, frames
+from ranger_sim.sysid.dataset import Channel, Dataset, Finding, Loss, Repair
+from ranger_sim.sysid.readers import formats, frames, layout
 from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 from ranger_sim.sysid.recipe import Recipe
 
@@ -27,7 +27,11 @@ Path = str | pathlib.Path
 
 @dataclasses.dataclass(frozen=True)
 class Measurement:
-    """A recording as it was read. findings: of the file and of its channels; proposals: repairs that `mend` makes."""
+    """A recording as it was read.
+
+    findings: of the file and of its channels; proposals: repairs that `mended` makes. Those with an option are made
+    elsewhere only when it is given; the others by `diagnose` and `identify` as well, but for inputs of the machine.
+    """
 
     dataset: Dataset
     findings: list[Finding]
@@ -57,6 +61,8 @@ class Measurement:
 
     def mended(self) -> Dataset:
         """The dataset with all proposals carried out."""
+        if any(each.kind == "even_clock" for each in self.proposals):
+            return repairs.mend(repairs.evenly_stamped(self.dataset))
         return repairs.mend(self.dataset, self.findings)
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,7 +125,9 @@ def inspected(dataset: Dataset) -> Measurement:
     findings = [*sanity.inspect(dataset), *sanity.pairs(dataset)]
     proposals: list[Repair] = []
     if not any(each.severity == sanity.FATAL for each in findings):
-        proposals = repairs.mend(dataset, findings).repairs[len(dataset.repairs) :]
+        even = bool(repairs.even_clocks(dataset)[1])
+        ready, found = (repairs.evenly_stamped(dataset), None) if even else (dataset, findings)
+        proposals = repairs.mend(ready, found).repairs[len(dataset.repairs) :]
     return Measurement(dataset, findings, proposals)
 
 
@@ -138,8 +146,8 @@ def open_recording(
 
     mapping: {name in the file: name of the channel}. databases: DBC files, for frames, of these `buses`; an MDF file is
     read as frames when there are some. time_unit: of stamps whose column does not give it. assume: parts of a text
-    table's layout (readers.layout.KEYS). recipe: of `ranger-sim read --write-recipe`, in place of these. each_frame is
-    called with every frame. UserError for all that is wrong.
+    table's layout, and what is known of the channels (readers.layout.KEYS). recipe: of `ranger-sim read
+    --write-recipe`, in place of these. each_frame is called with every frame. UserError for all that is wrong.
     """
     path = pathlib.Path(path)
     mapping, assume = dict(mapping or {}), dict(assume or {})
@@ -149,12 +157,27 @@ def open_recording(
         assume = {**recipe.assume, **assume}
         time_unit = time_unit or recipe.time_unit
         databases, buses = databases or recipe.databases, buses or recipe.buses
-    dataset = _read(path, mapping, databases, time_unit, each_frame, buses, assume, progress)
+    of_table = {key: value for key, value in assume.items() if key not in layout.OF_ANY_FORMAT}
+    dataset = _read(path, mapping, databases, time_unit, each_frame, buses, of_table, progress)
     if recipe is not None:
         recipe.check(dataset)
+    dataset = _assumed(dataset, assume)
     dataset.findings += sanity.of_recording(dataset)
     if mapping:
         dataset.layout["map"] = mapping
+    return dataset
+
+
+def _assumed(dataset: Dataset, assume: Mapping[str, str]) -> Dataset:
+    """The dataset with what is assumed of its channels, whatever its format. UserError for an unknown channel."""
+    names = [each.strip() for each in assume.get("limits", "").split(",") if each.strip()]
+    for name in names:
+        if name not in dataset:
+            raise DataError(f"--assume limits={name}: {unknown('channel', name, dataset.channels)}")
+        dataset.channels[name] = dataclasses.replace(dataset[name], limits_are_true=True)
+    if "clock" in assume:
+        dataset = repairs.evenly_stamped(dataset)
+    dataset.layout |= {key: assume[key] for key in layout.OF_ANY_FORMAT if key in assume}
     return dataset
 
 
@@ -209,10 +232,9 @@ def _decoded(
         dataset.losses.append(loss)
         text = f"{log.read} frames should be there, {loss.text}"
         dataset.findings.append(Finding("", "lost_frames", 0.0, 0.0, float(count), "frames", text))
-    left_out = sum(loss.count for loss in dataset.losses if loss.reason in LOSSES)
-    dataset.lines = {"frames": log.read - left_out} | {
-        f"left out: {each.reason}": each.count for each in dataset.losses
-    }
+    of_log = log.ledger()
+    errors = of_log.pop("frames") - sum(dataset.lines.values())
+    dataset.lines |= ({"error frames": errors} if errors else {}) | of_log
     return dataset
 
 

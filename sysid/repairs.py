@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import DataError
-from ranger_sim.sysid import order, sanity, units, wraps
-from ranger_sim.sysid.dataset import LOSSES, NOTHING_LOST, Channel, Dataset, Finding, Repair
+from ranger_sim.sysid import even_clock, order, sanity, units, wraps
+from ranger_sim.sysid.dataset import CLIPPED, LOSSES, NOTHING_LOST, Channel, Dataset, Finding, Repair
 
+EVEN_CLOCK = "--assume clock=even"
+REPEATED = 0.5  # of the samples with one stamp: as many with the same values are repeated rows
 FEWEST = 2  # samples that a channel must keep
 KINDS = {
     "stamp_wrap": "an overrun counter of the clock counts on",
@@ -30,6 +32,7 @@ KINDS = {
     "clipped": "values that are cut off at a limit are left out",
     "dropped": "a channel with nothing in it is left out",
     # requested by name
+    "even_clock": "rounded stamps, or stamps of blocks, become those of the even clock that explains them",
     "converted": "another unit than was given",
     "shifted": "a channel's stamps moved",
     "offset": "a constant added",
@@ -46,7 +49,7 @@ def mend(dataset: Dataset, findings: list[Finding] | None = None, inputs: Collec
     findings = sanity.inspect(dataset) if findings is None else findings
     limits: dict[str, list[float]] = {}
     for each in findings:
-        if each.kind == "saturation":
+        if each.kind == "saturation" and each.severity != sanity.NOTE:
             limits.setdefault(each.channel, []).append(each.size)
     flips = {each.channel for each in findings if each.kind == "bit_flip"}
     channels = {}
@@ -84,7 +87,9 @@ def _counted_on(channel: Channel, repairs: list[Repair]) -> Channel:
     """Stamps with an overrun counter's span added behind each overrun."""
     for place, span in wraps.of_clock(channel.time_s):
         text = f"{span:.9g} s added behind {channel.time_s[place]:.6g} s, where the counter ran over"
-        repairs.append(Repair(channel.name, "stamp_wrap", len(channel.time_s) - place - 1, text))
+        step = float(channel.time_s[place + 1] - channel.time_s[place]) + span
+        away = abs(step - float(np.nanmedian(np.abs(np.diff(channel.time_s)))))
+        repairs.append(Repair(channel.name, "stamp_wrap", len(channel.time_s) - place - 1, text, away, "s"))
     return dataclasses.replace(channel, time_s=wraps.counted_on(channel.time_s))
 
 
@@ -99,7 +104,9 @@ def _in_order(channel: Channel, repairs: list[Repair]) -> Channel:
             f"{found.moved} samples were out of order and are sorted by their stamps: {found.even:.2%} of the steps "
             f"are then {found.step_s:.4g} s"
         )
-        repairs.append(Repair(channel.name, "sorted", found.moved, text))
+        steps = np.diff(channel.time_s[found.kept])
+        uneven = float(np.sqrt(np.mean((steps[steps < 1.5 * found.step_s] - found.step_s) ** 2)))
+        repairs.append(Repair(channel.name, "sorted", found.moved, text, uneven, "s"))
     losses = channel.losses
     for reason, places in found.left_out.items():
         mask = np.zeros(len(channel.value), dtype=bool)
@@ -118,8 +125,14 @@ def _unwrapped(channel: Channel, found: wraps.Wraps, repairs: list[Repair]) -> C
     places = np.array(found.places)
     turns[places + 1] = np.sign(np.diff(channel.value)[places])
     mended = channel.value - found.span * np.cumsum(turns)
-    text = f"{found.span:.6g} {channel.unit} taken out at {len(found.places)} places where the integer ran over"
-    repairs.append(Repair(channel.name, "wrap", len(found.places), text))
+    text = f"{found.span:.6g} {channel.unit} taken out at {len(found.places)} places: {found.meaning}"
+    steps = np.diff(mended)
+    around = np.stack([np.clip(places + away, 0, len(steps) - 1) for away in (-1, 1)])
+    off = steps[places] - steps[around].mean(axis=0)  # the motion goes on as around the place
+    residual = float(np.sqrt(np.mean(off**2)))
+    # every value behind the first place changes, but for those where as many turns go back
+    count = int(np.count_nonzero(np.cumsum(turns)))
+    repairs.append(Repair(channel.name, "wrap", count, text, residual, channel.unit))
     return dataclasses.replace(channel, value=mended)
 
 
@@ -142,10 +155,66 @@ def _without_clipped(channel: Channel, limits: list[float], repairs: list[Repair
     at = ", ".join(f"{each:.6g}" for each in limits)
     text = f"{int(mask.sum())} values are left out: cut off at {at} {channel.unit}"
     repairs.append(Repair(channel.name, "clipped", int(mask.sum()), text))
-    return channel.without(mask, "clipped")
+    return channel.without(mask, CLIPPED)
+
+
+def even_clocks(dataset: Dataset) -> tuple[dict[str, even_clock.EvenClock], list[Repair]]:
+    """{channel: the even clock behind its stamps} and the repairs that these are, to be requested by their option.
+
+    Channels of one time base have one clock. Rows that are there twice, values and all, are not two samples.
+    """
+    of_base: dict[bytes, list[str]] = {}
+    for name, channel in dataset.channels.items():
+        of_base.setdefault(channel.time_s.tobytes(), []).append(name)
+    clocks: dict[str, even_clock.EvenClock] = {}
+    made = []
+    for names in of_base.values():
+        time_s = dataset[names[0]].time_s
+        clock = even_clock.of(time_s)
+        if clock is None:
+            continue
+        twice = np.diff(time_s) == 0.0
+        alike = np.all([np.diff(dataset[name].value)[twice] == 0.0 for name in names], axis=0)
+        if twice.any() and alike.mean() > REPEATED:
+            continue
+        count = int(np.count_nonzero(even_clock.changed(time_s, clock)))
+        for name in names:
+            clocks[name] = clock
+            made.append(Repair(name, "even_clock", count, clock.text, clock.residual_s, "s", EVEN_CLOCK))
+    return clocks, made
+
+
+def without_clipped_rows(dataset: Dataset, findings: list[Finding]) -> Dataset:
+    """A table of one row per sample without the rows in which a value is cut off at a limit."""
+    wrong: set[float] = set()
+    for each in findings:
+        if each.kind == "saturation" and each.severity != sanity.NOTE:
+            channel = dataset[each.channel]
+            wrong.update(channel.time_s[channel.value == each.size].tolist())
+    if not wrong:
+        return dataset
+    repairs = [*dataset.repairs]
+    channels = {}
+    for name, channel in dataset.channels.items():
+        mask = np.isin(channel.time_s, list(wrong))
+        repairs.append(Repair(name, "clipped", int(mask.sum()), "rows with a value that is cut off are left out"))
+        channels[name] = channel.without(mask, CLIPPED)
+    return dataclasses.replace(dataset, channels=channels, repairs=repairs)
 
 
 # --- asked for by name --------------------------------------------------------------------------------------
+
+
+def evenly_stamped(dataset: Dataset) -> Dataset:
+    """The channels with the stamps of the even clock that explains theirs. UserError when none explains any."""
+    clocks, made = even_clocks(dataset)
+    if not made:
+        raise DataError(f"{dataset.name}: {EVEN_CLOCK}: no even clock fits the stamps within their rounding")
+    channels = {
+        name: dataclasses.replace(channel, time_s=clocks[name].time_s) if name in clocks else channel
+        for name, channel in dataset.channels.items()
+    }
+    return dataclasses.replace(dataset, channels=channels, repairs=[*dataset.repairs, *made])
 
 
 def converted(dataset: Dataset, name: str, unit: str) -> Dataset:
@@ -163,7 +232,7 @@ def shifted(dataset: Dataset, name: str, later_s: float) -> Dataset:
     """The channel's stamps moved by `later_s`, for a lag that is known."""
     channel = dataset[name]
     text = f"its stamps are moved by {later_s:+g} s"
-    moved = dataclasses.replace(channel, time_s=channel.time_s + later_s)
+    moved = dataclasses.replace(channel, time_s=channel.time_s + later_s, masked_s=channel.masked_s + later_s)
     return _with(dataset, moved, "shifted", len(channel.value), text)
 
 

@@ -6,7 +6,7 @@ docs/robot.md C6 give the findings described there and no others; each has its r
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ KINDS = {
     "names_again": "the names of the columns come again",
     "cut_off": "the last row is cut off",
     "no_stamp": "rows without a stamp",
+    "form_changes": "rows have another form from a line on",
     "ragged": "rows with too many or too few cells",
     "unreadable": "cells that are not numbers",
     "text": "values of a measurement file that have a text instead of a number",
@@ -47,6 +48,7 @@ KINDS = {
     "reversed_stamps": "stamps that go back",
     "duplicate_stamps": "stamps that come twice",
     "rounded_stamps": "stamps are rounded so far that several samples have one",
+    "quantised_stamps": "stamps are rounded, so that their distances are uneven",
     "gap": "no samples for a while",
     "slow_samples": "samples so far apart that the stamps may be in another unit",
     "clock_drift": "two clocks do not run alike",
@@ -60,6 +62,7 @@ KINDS = {
     "resampled": "it goes in straight lines between fewer samples",
     "jump": "all channels jump at one row",
     "mixed": "rows of two recordings in turn",
+    "quantised": "the steps of its values are most of the noise of its derivative",
     "stuck": "a value stays constant while other channels move",
     "constant": "one value all the time",
     "saturation": "values cut off at a limit",
@@ -91,7 +94,11 @@ MOVES_PART = 0.2  # of a channel's whole range, within a stretch: less is rest
 MOVES_RATIO = 2.25
 CLIPPED_SAMPLES = 3  # in a row at the limit
 CLIPPED_RUNS = 2
+LEVELS = 20  # different values: with fewer, counts of a coarse instrument rest at the largest one as at any other
 FLAT_PART = 0.5  # zero steps in commands that are held, which cannot be distinguished from cut-off ones
+MOTIONS = ("rad", "m", "rad/s", "m/s")  # whose derivatives a model needs
+QUANTISED = 0.5  # of the noise that neighbours show: the part of rounding from which on steps are seen in a derivative
+DERIVATIVE_NOISE = 0.2  # of a derivative's own size
 DRIFT_PPM = 100.0  # quartz crystals differ by less
 LONGEST_LAG_S = 0.25
 LAG_STEPS = 0.5  # of the sampling: smaller ones are the stamps' own rounding
@@ -181,9 +188,14 @@ def _inspected(dataset: Dataset) -> list[Finding]:
 
 def of_recording(dataset: Dataset) -> list[Finding]:
     """Oddities of all channels together, which only the import sees: later steps choose some of the channels."""
-    sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
     with np.errstate(all="ignore"):
-        return list(headlines.of_all(sound))
+        return list(headlines.of_all(_sound(dataset)))
+
+
+def _sound(dataset: Dataset) -> dict[str, Channel]:
+    """The channels with enough finite samples, in order."""
+    tidy = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
+    return {name: each for name, each in tidy.items() if len(each.value) >= FEWEST}
 
 
 def pairs(dataset: Dataset) -> list[Finding]:
@@ -192,8 +204,11 @@ def pairs(dataset: Dataset) -> list[Finding]:
     A gear or a transmission between two channels is not known here, so that nothing depends on these findings.
     """
     with np.errstate(all="ignore"):
-        sound = {name: _tidied(each) for name, each in dataset.channels.items() if len(each.value) >= FEWEST}
-        moving = {name: each for name, each in sound.items() if np.ptp(each.value) > 0.0 and not _is_held(each.value)}
+        moving = {
+            name: each
+            for name, each in _sound(dataset).items()
+            if np.ptp(each.value) > 0.0 and not _is_held(each.value)
+        }
         return list(_pairs(moving))
 
 
@@ -236,6 +251,17 @@ def stop_if_fatal(name: str, findings: list[Finding]) -> None:
     for finding in findings:
         if finding.severity == FATAL:
             raise DataError(f"{name}: {finding.channel + ': ' if finding.channel else ''}{finding.text}")
+
+
+def stop_if_input_is_clipped(name: str, findings: list[Finding], inputs: Collection[str]) -> None:
+    """UserError for an input of the machine that is cut off at a limit: what drove the machine is then unknown."""
+    for finding in findings:
+        if finding.kind == "saturation" and finding.severity != NOTE and finding.channel in inputs:
+            raise DataError(
+                f"{name}: {finding.channel}: {finding.text}; it drives the machine, and what drove it beyond the limit "
+                f"is unknown; nothing is concluded (--assume limits={finding.channel}: the drive itself ends there; "
+                f"--repair {finding.channel}: these rows are left out)"
+            )
 
 
 def doubts(findings: list[Finding]) -> list[Finding]:
@@ -344,13 +370,14 @@ def _values(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Find
     overruns = wraps_of(channel)
     for place in overruns.places[:NAMED_PLACES]:
         size = abs(float(value[place + 1] - value[place]))
-        text = f"it jumps by {size:.6g} {channel.unit} against its motion: an integer ran over"
+        text = f"it jumps by {size:.6g} {channel.unit} against its motion: {overruns.meaning}"
         yield Finding(
             channel.name, "wrap", float(time_s[place]), float(time_s[place + 1]), size, channel.unit, text
         )  # fmt: skip
     yield from _spikes(channel, overruns.places)
     yield from _stuck(channel, all_channels)
     yield from _saturation(channel)
+    yield from _quantised(channel)
 
 
 def _size(channel: Channel) -> Iterator[Finding]:
@@ -473,7 +500,7 @@ def _saturation(channel: Channel) -> Iterator[Finding]:
     """Stretches at the largest or smallest value that begin at speed: a turning point begins slowly."""
     value, time_s = channel.value, channel.time_s
     starts, lengths = equal_runs(value)
-    if len(lengths) < 20 or np.mean(np.diff(value) == 0.0) > 0.9:
+    if len(lengths) < 20 or np.mean(np.diff(value) == 0.0) > 0.9 or len(np.unique(value)) < LEVELS:
         return
     step = lattice_step(value)
     usual = float(np.median(np.abs(np.diff(value))[np.diff(value) != 0.0]))
@@ -485,7 +512,35 @@ def _saturation(channel: Channel) -> Iterator[Finding]:
             continue
         ends = float(time_s[starts[fast[0]]]), float(time_s[starts[fast[-1]] + lengths[fast[-1]] - 1])
         text = f"{count} values are cut off at {limit:.6g} {channel.unit}, in {len(runs)} stretches"
-        yield Finding(channel.name, "saturation", *ends, limit, channel.unit, text)
+        if channel.limits_are_true:
+            text = f"{count} values are at the limit {limit:.6g} {channel.unit}, which is assumed to be a true one"
+        severity = NOTE if channel.limits_are_true else WARNING
+        yield Finding(channel.name, "saturation", *ends, limit, channel.unit, text, severity)
+
+
+def _quantised(channel: Channel) -> Iterator[Finding]:
+    """A motion whose derivative from sample to sample is mostly the steps of its own values.
+
+    Rounding to steps q adds noise of q / sqrt(12) to each value, and of q / (sqrt(6) dt) to a derivative. It counts
+    where other noise is not larger: that would hide the steps.
+    """
+    if channel.unit not in MOTIONS:
+        return
+    step, sample_s = lattice_step(channel.value), float(np.median(np.diff(channel.time_s)))
+    bends = float(np.sqrt(np.mean(np.diff(channel.value, 2) ** 2)))
+    rounding, seen = step / math.sqrt(12.0), bends / math.sqrt(6.0)
+    if not step > 0.0 or not sample_s > 0.0 or not QUANTISED * seen <= rounding <= seen / QUANTISED:
+        return
+    noise = step / (math.sqrt(6.0) * sample_s)
+    rate = float(np.std(_smooth(np.gradient(channel.value, channel.time_s))))
+    if not noise > DERIVATIVE_NOISE * rate:
+        return
+    ends = float(channel.time_s[0]), float(channel.time_s[-1])
+    text = (
+        f"its values are in steps of {step:.4g} {channel.unit}: from sample to sample that is {noise:.3g} "
+        f"{channel.unit}/s of noise in its derivative, which is {rate:.3g} {channel.unit}/s in all"
+    )
+    yield Finding(channel.name, "quantised", *ends, step, channel.unit, text, NOTE)
 
 
 def _rests_at(value: Array, limit: float) -> bool:

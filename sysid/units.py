@@ -24,7 +24,7 @@ ATOMS: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0), "mm": ("m", 1e-3), "cm": ("m", 1e-2), "um": ("m", 1e-6), "µm": ("m", 1e-6), "km": ("m", 1e3),
     "N": ("N", 1.0), "mN": ("N", 1e-3), "kN": ("N", 1e3),
     "Nm": ("Nm", 1.0), "mNm": ("Nm", 1e-3), "Nmm": ("Nm", 1e-3), "Ncm": ("Nm", 1e-2), "kNm": ("Nm", 1e3),
-    "kg": ("kg", 1.0), "Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "bar": ("Pa", 1e5),
+    "kg": ("kg", 1.0), "Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "bar": ("Pa", 1e5),
     "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3), "MHz": ("Hz", 1e6),
     "counts": ("counts", 1.0), "count": ("counts", 1.0), "K": ("K", 1.0),
 }  # fmt: skip
@@ -52,6 +52,7 @@ WHOLE: dict[str, tuple[str, str, float, float]] = {
 # whole words, where a unit is expected: in a name "second" may be the second of two
 SPELT_OUT = {
     "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms", "milliseconds": "ms",
+    "msec": "ms", "usec": "us", "hour": "h", "hours": "h", "minute": "min", "minutes": "min",
     "volt": "V", "volts": "V", "ampere": "A", "amperes": "A", "amp": "A", "amps": "A", "watt": "W", "watts": "W",
     "newton": "N", "newtons": "N", "radian": "rad", "radians": "rad",
 }  # fmt: skip

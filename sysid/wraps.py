@@ -17,6 +17,7 @@ CALM = 0.2  # of the jump: largest step of the motion around it
 STEADY = 0.2  # of the faster motion: the slower one, on the other side of the jump
 FEWEST_BITS, MOST_BITS = 8, 64  # of an integer that can run over
 FEWEST_OF_ONE_SPAN = 3  # overruns by one span, which is then a counter's, whatever its size
+TURN = 1e-6  # of a turn: what a span of whole turns is off by
 COUNTED = ("rad", "m", "counts", "s", "")  # units of what goes on and on
 SPANS_S = (  # of clocks: 16 to 32 bits of us, 10 us, ms and 10 ms; an hour, a day, a week
     *(2.0**bits * tick for bits in (16, 24, 31, 32) for tick in (1e-6, 1e-5, 1e-3, 1e-2)),
@@ -30,10 +31,16 @@ SHORTEST_CLOCK_S = 30.0
 
 @dataclasses.dataclass(frozen=True)
 class Wraps:
-    """places: samples behind which an integer ran over; span: how far, in the channel's unit."""
+    """places: samples behind which an integer ran over; span: how far, in the channel's unit. in_turns: an angle's."""
 
     places: tuple[int, ...] = ()
     span: float = 0.0
+    in_turns: bool = False
+
+    @property
+    def meaning(self) -> str:
+        """In words."""
+        return "an angle that begins again after a turn" if self.in_turns else "an integer ran over"
 
 
 def of(value: Array, unit: str, quanta: tuple[float, ...]) -> Wraps:
@@ -69,7 +76,9 @@ def of(value: Array, unit: str, quanta: tuple[float, ...]) -> Wraps:
     span = _span(chosen, blur, unit, quanta, len({bool(steps[p] > 0.0) for p in jumps}) == 1)
     if span == 0.0 or any(abs(size - span) > 2.0 * reach + blur for size, reach in zip(sizes, reaches, strict=True)):
         return Wraps()
-    return Wraps(tuple(int(place) for place in jumps), span)
+    turns = span / (2.0 * math.pi)
+    in_turns = unit == "rad" and turns > 0.5 and abs(turns - round(turns)) < TURN
+    return Wraps(tuple(int(place) for place in jumps), span, in_turns)
 
 
 def _against_motion(jump: float, before: Array, after: Array) -> bool:

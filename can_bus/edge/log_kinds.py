@@ -3,12 +3,14 @@
 import pathlib
 import re
 
+from ranger_sim.can_bus.edge import pcap
+
 SNIFFED_BYTES = 4096
 SNIFFED_LINES = 3
 BLF, SQLITE, ASC, TRC = "BLF", "python-can's SQLite", "ASC", "TRC"
 CANDUMP, SCREEN, BUSMASTER = "candump", "candump's screen output", "BUSMASTER"
-PYTHON_CAN, SAVVYCAN = "python-can's CSV", "SavvyCAN's CSV"
-MAGIC = {b"LOGG": BLF, b"SQLite format 3\0": SQLITE}
+PYTHON_CAN, SAVVYCAN, PCAP = "python-can's CSV", "SavvyCAN's CSV", "packet capture"
+MAGIC = {b"LOGG": BLF, b"SQLite format 3\0": SQLITE} | dict.fromkeys(pcap.BEGINNINGS, PCAP)
 FIRST_LINES = {
     PYTHON_CAN: re.compile(r"timestamp,arbitration_id,extended,remote,error,dlc,data\s*$"),
     SAVVYCAN: re.compile(r"time stamp,id,extended,", re.IGNORECASE),

@@ -1,14 +1,15 @@
 """Recorded frames from any readable file, with a count of its lines.
 
-python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log and screen output, BUSMASTER's .log and SavvyCAN's
-.csv are read here. A library's reader skips unknown lines, so its frames are compared with the lines or objects of the
-file.
+python-can reads .mf4, .asc, .blf, .trc, .csv and .db; candump's .log and screen output, BUSMASTER's .log, SavvyCAN's
+.csv and packet captures (pcap.py) are read here. A library's reader skips unknown lines, so its frames are compared
+with the lines or objects of the file.
 """
 
 import calendar
 import contextlib
 import io
 import itertools
+import logging
 import pathlib
 import re
 import zlib
@@ -16,12 +17,13 @@ from collections.abc import Callable, Iterable, Iterator
 
 import can
 
-from ranger_sim.can_bus.edge import log_kinds
+from ranger_sim.can_bus.edge import log_kinds, pcap
 from ranger_sim.can_bus.edge.candump import CanFdError, frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError, DataError, UserError
 
+logging.getLogger("can.io").addHandler(logging.NullHandler())  # a frame that is passed over is counted here
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
 PYTHON_CAN_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 SAVVYCAN_HEADER = "time stamp,id,extended,"
@@ -29,6 +31,7 @@ BUSMASTER_HEADER = "***BUSMASTER"
 CONTAINER, CONTAINER_HEAD = 10, 32  # type and bytes of its head, of an object in a BLF file
 SMALL_CONTAINER, LARGEST_CONTAINER = 1 << 16, 1 << 28  # bytes; deflate makes at most a thousand of one
 SECOND_NS = 1_000_000_000
+WORD_EXTENDED, WORD_REMOTE, WORD_ERROR = 1 << 31, 1 << 30, 1 << 29  # of SocketCAN's identifiers
 
 
 class RecordedFrames:
@@ -66,6 +69,11 @@ class RecordedFrames:
         message.is_fd = message.bitrate_switch = message.error_state_indicator = False
         return too_long
 
+    def ledger(self) -> dict[str, int]:
+        """What became of the file's frames: {"frames": returned, or error frames; "left out: reason": number}."""
+        lost = sum(count for _, count, _ in self.losses)
+        return {"frames": self.read - lost} | {f"left out: {reason}": count for reason, count, _ in self.losses}
+
     def lose(self, reason: str, count: int, where: str) -> None:
         """Record frames that are in the file and were not returned."""
         if count > 0:
@@ -88,6 +96,8 @@ def _opened(log: RecordedFrames) -> Iterator[Frame]:
         return _candump_or_busmaster(log)
     if kind in (log_kinds.PYTHON_CAN, log_kinds.SAVVYCAN) or log.source.suffix.lower() == ".csv":
         return _csv(log)
+    if kind == log_kinds.PCAP:
+        return _captured(log)
     if kind == log_kinds.ASC:
         return _by_lines(log, can.ASCReader, _asc_lines(log), ASC_FRAME)
     if kind == log_kinds.TRC:
@@ -164,6 +174,36 @@ def _count_blf(log: RecordedFrames, reader: can.BLFReader) -> None:
     log.lose("cut_off", max(missing, 1), where)
 
 
+def _captured(log: RecordedFrames) -> Iterator[Frame]:
+    """Frames of a packet capture of SocketCAN."""
+    broken, first = 0, 0
+    with log.source.open("rb") as file:
+        try:
+            for packet in pcap.packets(file, str(log.source)):
+                log.read += 1
+                word = packet.word
+                flags = (FLAG_EXTENDED if word & WORD_EXTENDED else 0) | (FLAG_REMOTE if word & WORD_REMOTE else 0)
+                identifier = word & (0x1FFFFFFF if word & WORD_EXTENDED else 0x7FF)
+                if not packet.is_whole and not word & WORD_REMOTE:
+                    broken, first = broken + 1, first or log.read
+                elif len(packet.data) > 8:
+                    log.fd += 1
+                elif word & WORD_ERROR:
+                    yield packet.bus, packet.time_ns, 0, FLAG_ERROR | 8, 0, 0
+                else:
+                    lo, hi = words_of_data(b"" if word & WORD_REMOTE else packet.data)
+                    yield packet.bus, packet.time_ns, identifier, flags | len(packet.data), lo, hi
+        except pcap.CutOffError:
+            log.read += 1
+            log.lose("cut_off", 1, f"packet {log.read}")
+    log.lose("not_frames", broken, f"packet {first}")
+
+
+LENGTH_BITS = 15  # of a frame's flags
+HALF_A_BYTE = re.compile(r"\s[0-9A-Fa-f]$")
+CUT_OFF = re.compile(r"\s*\d")  # a last line without an end that begins as frames do
+
+
 class _Lines(io.TextIOBase):
     """Lines of a file for a library's reader, with a count of those that must become frames."""
 
@@ -172,6 +212,7 @@ class _Lines(io.TextIOBase):
         self.log, self.lines, self.is_frame = log, iter(lines), is_frame
         self.number = 0
         self.waiting = 0  # the line that must become a frame and has not
+        self.line = ""
         self.whole = True  # the last line has its end
         self.lost: list[int] = []
 
@@ -181,15 +222,28 @@ class _Lines(io.TextIOBase):
         if not line:
             raise StopIteration
         self.number += 1
+        self.line = line
         self.whole = line.endswith("\n")
         if self.is_frame.match(line):
             self.log.read += 1
             self.waiting = self.number
+        elif not self.whole and CUT_OFF.match(line):
+            self.log.read += 1
+            self.log.lose("cut_off", 1, f"in line {self.number}")
         return line
 
     def readline(self, size: int | None = -1) -> str:  # type: ignore[override]
         """The next line, for readers that call this."""
         return next(self, "")
+
+    def is_torn(self, message: can.Message) -> bool:
+        """True for a frame with fewer bytes than it says, and for a last line that ends within a byte.
+
+        The library fills such a frame up with zeros.
+        """
+        if message.is_remote_frame or message.is_error_frame:
+            return False
+        return len(message.data) != message.dlc or (not self.whole and HALF_A_BYTE.search(self.line) is not None)
 
     def settle(self) -> None:
         """Count a line as lost if it did not become a frame before the next one."""
@@ -205,6 +259,8 @@ def _by_lines(
     given = _Lines(log, lines, is_frame)
     try:
         for message in reader(given):
+            if given.is_torn(message):
+                continue  # it is counted as lost with its line
             given.waiting = 0
             if not log.is_fd(message):
                 yield _frame(message)
@@ -288,10 +344,17 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
         parse = _busmaster_frame
     elif lines and SCREEN.match(lines[0][1]):
         parse = _ScreenLine([line for _, line in lines])
+    lengths: dict[tuple[str, int, int], int] = {}  # of the frames so far, in bytes
     for number, line in lines:
         log.read += 1
         try:
-            yield parse(line)
+            frame = parse(line)
+            which = (frame[0], frame[2], frame[3] & FLAG_EXTENDED)
+            if not line.endswith("\n") and frame[3] & LENGTH_BITS < lengths.get(which, 0):
+                log.lose("cut_off", 1, f"in line {number}")
+                return
+            lengths[which] = frame[3] & LENGTH_BITS
+            yield frame
         except CanFdError:
             try:
                 yield parse(FD_MARK.sub("#", line))

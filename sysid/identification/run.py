@@ -125,7 +125,11 @@ def recorded(
         findings = sanity.inspect(data)
         sanity.stop_if_fatal(data.name if isinstance(source, Dataset) else str(source), findings)
         if bench == "ankle-sine":  # the legs of a pendulum may have separate stamps
-            data = repairs.mend(data, findings, [each for each in data.channels if each.startswith(("target", "cmd"))])
+            inputs = [each for each in data.channels if each.startswith(("target", "cmd"))]
+            sanity.stop_if_input_is_clipped(data.name, findings, inputs)
+            data = repairs.mend(data, findings, inputs)
+        else:
+            data = repairs.without_clipped_rows(data, findings)
         for finding in data.findings if bench == "ankle-sine" else findings:
             if finding.severity != "note":
                 report(f"{data.name}: {finding.channel}: {finding.text}")

@@ -1,4 +1,4 @@
-"""Binary files that a library reads: MATLAB's .mat, Parquet, ULog and MCAP. A missing library is one line."""
+"""Binary files that a library reads: MATLAB, Parquet, ULog, MCAP, HDF5 and TDMS. A missing library is one line."""
 
 import importlib
 import json
@@ -10,40 +10,46 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import DataError, UserError
-from ranger_sim.sysid import units
-from ranger_sim.sysid.dataset import Array, Dataset, Finding
-from ranger_sim.sysid.readers import columns, layout
+from ranger_sim.sysid.dataset import Dataset, Finding, Loss
+from ranger_sim.sysid.readers import arrays, columns, hdf5, tdms
+from ranger_sim.sysid.readers.arrays import Arrays, Column
 
 MOST_BYTES = 2_000_000_000  # of a file, and of what it unpacks to
 MOST_MESSAGES = 20_000_000
-Column = tuple[str, str, Array, Array]  # name, unit, stamps in s, values
-KINDS = {
-    "MATLAB": ("scipy.io", "scipy"),
-    "Parquet": ("pyarrow.parquet", "pyarrow"),
-    "ULog": ("pyulog", "pyulog"),
-    "MCAP": ("mcap.reader", "ranger-sim[mcap]"),
+KINDS = {  # and the module that reads them
+    "MATLAB": "scipy.io",
+    "Parquet": "pyarrow.parquet",
+    "ULog": "pyulog",
+    "MCAP": "mcap.reader",
+    "HDF5": "h5py",
+    "TDMS": "nptdms",
 }
+HDF5_INSIDE = b"MATLAB 7.3"  # a .mat file of this version is an HDF5 file
+ULOG_HEADER, ULOG_HEAD = 16, 3  # bytes of the file's header, and of a message's: its length, two bytes, and its type
+MOST_CELLS = 1000  # of an array of MATLAB's cells
 
 
 def read(
     path: pathlib.Path, kind: str, mapping: Mapping[str, str] | None = None, time_unit: str | None = None
 ) -> Dataset:
     """The channels of a file of one of KINDS. UserError for a file that its library cannot read, or without a time."""
-    module_name, package = KINDS[kind]
-    library = importlib.import_module(module_name)  # ModuleNotFoundError where it is not installed
+    with path.open("rb") as file:
+        kind = "HDF5" if file.read(len(HDF5_INSIDE)) == HDF5_INSIDE else kind
+    library = importlib.import_module(KINDS[kind])  # ModuleNotFoundError where it is not installed
     if path.stat().st_size > MOST_BYTES:
         raise DataError(f"{path}: {path.stat().st_size} bytes, a {kind} file may have {MOST_BYTES}")
     dataset = Dataset(path.name, {})
     mapping = dict(mapping or {})
-    reader = {"MATLAB": _matlab, "Parquet": _parquet, "ULog": _ulog, "MCAP": _mcap}[kind]
     try:
-        found = list(reader(dataset, library, path, mapping, time_unit))
+        found = list(_columns(dataset, library, path, kind, mapping, time_unit))
     except UserError:
         raise
     except Exception as error:  # a broken file raises many kinds of exceptions in a library
         said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-        raise DataError(f"{path}: not a {kind} file that {package} can read ({said})") from None
-    columns.check_mapping(dataset, mapping, [name for name, *_ in found])
+        program = KINDS[kind].partition(".")[0]
+        raise DataError(f"{path}: not a {kind} file that {program} can read ({said})") from None
+    if kind in ("ULog", "MCAP"):
+        columns.check_mapping(dataset, mapping, [name for name, *_ in found])
     zero: float | None = None
     for name, unit, time_s, value in found:
         if zero is None and len(time_s):
@@ -55,99 +61,78 @@ def read(
     return dataset
 
 
-def _of_table(
-    dataset: Dataset, table: Mapping[str, Any], mapping: Mapping[str, str], time_unit: str | None
+def _columns(
+    dataset: Dataset, library: Any, path: pathlib.Path, kind: str, mapping: Mapping[str, str], time_unit: str | None
 ) -> Iterator[Column]:
-    """The columns of equal length of a table, one of which is the time."""
-    numeric = {}
-    for name, value in table.items():
-        flat = np.asarray(value)
-        if flat.dtype.kind == "M":
-            numeric[name] = flat.astype("datetime64[ns]").astype(np.int64)
-        elif flat.dtype.kind in "fiub":
-            numeric[name] = flat
-    times = [name for name in numeric if layout.is_time_name(mapping.get(name, name))]
-    if not times:
-        some = ", ".join(numeric)[:200] or "none with numbers"
-        raise DataError(f"{dataset.name}: there is no time column among {some}; --map NAME=t_s says which it is")
-    time = times[0]
-    stamps = numeric.pop(time)
-    unit = units.split(mapping.get(time, time))[1] or (units.unit_of(time_unit) if time_unit else None)
-    if np.asarray(table[time]).dtype.kind == "M":
-        time_s = (stamps - stamps[0]) * 1e-9
+    if kind == "ULog":
+        return _ulog(dataset, library, path)
+    if kind == "MCAP":
+        return _mcap(dataset, library, path)
+    found = Arrays(str(path))
+    if kind == "MATLAB":
+        _matlab(found, library, path)
+    elif kind == "Parquet":
+        _parquet(found, library, path)
+    elif kind == "HDF5":
+        hdf5.read(found, library, path, MOST_BYTES // 8)
     else:
-        if unit is None:
-            text = f"{time}: nothing says the unit of the stamps; seconds are assumed"
-            dataset.findings.append(Finding("", "unit_assumed", 0.0, 0.0, 1.0, "s", text))
-        time_s = stamps.astype(float) * (unit.factor if unit is not None else 1.0)
-    dataset.layout |= {"time": time}
-    for name, value in numeric.items():
-        if len(value) == len(time_s):
-            yield name, "", time_s, value.astype(float)
+        tdms.read(dataset, found, library, path, MOST_BYTES // 8)
+    return arrays.channels(dataset, found, mapping, time_unit)
 
 
-def _matlab(
-    dataset: Dataset, library: Any, path: pathlib.Path, mapping: Mapping[str, str], time_unit: str | None
-) -> Iterator[Column]:
-    with path.open("rb") as file:
-        if b"MATLAB 7.3" in file.read(128):
-            raise DataError(f"{path}: a .mat file of version 7.3 (HDF5): save it in MATLAB with '-v7'")
-    count = sum(math.prod(shape) for _, shape, _ in library.whosmat(path))
+def _matlab(found: Arrays, library: Any, path: pathlib.Path) -> None:
+    contents = library.whosmat(path)
+    count = sum(math.prod(shape) for _, shape, _ in contents)
     if 8 * count > MOST_BYTES:
         raise DataError(f"{path}: it unpacks to {count} numbers, allowed are {MOST_BYTES // 8}")
     variables = library.loadmat(path, squeeze_me=True, struct_as_record=True)
-    table: dict[str, Any] = {}
+    found.other += [name for name, _, kind in contents if name not in variables or kind == "opaque"]
     for name, value in variables.items():
-        if name.startswith("__"):
-            continue
-        _flatten(table, name, np.asarray(value))
-    longest = [each for each in table.values() if len(each) > 1]
-    counts = {len(each) for each in longest}
-    times = [name for name in table if layout.is_time_name(mapping.get(name, name.rpartition(".")[2]))]
-    if times and times[0] not in mapping:
-        mapping = {**mapping, times[0]: times[0].rpartition(".")[2]}
-        table = {times[0]: table[times[0]], **table}
-    for _ in counts:
-        yield from _of_table(dataset, table, mapping, time_unit)
-        return
-    raise DataError(f"{path}: it has no variable with more than one number")
+        if not name.startswith("__") and name not in found.other:
+            _flatten(found, name, np.asarray(value))
 
 
-def _flatten(table: dict[str, Any], name: str, value: np.ndarray) -> None:
+def _flatten(found: Arrays, name: str, value: np.ndarray) -> None:
+    """The fields of a structure, of each of its elements where there are several, and the elements of a cell array."""
     if value.dtype.names:
-        record = value.reshape(-1)[0]
-        for field in value.dtype.names:
-            _flatten(table, f"{name}.{field}", np.asarray(record[field]))
-    elif value.ndim == 1 and value.dtype.kind in "fiub":
-        table[name] = value
-    elif value.ndim == 2 and value.dtype.kind in "fiub":
-        for column in range(value.shape[1]):
-            table[f"{name}[{column}]"] = value[:, column]
+        for place, record in enumerate(value.reshape(-1)):
+            element = name if value.size == 1 else f"{name}({place + 1})"
+            for field in value.dtype.names:
+                _flatten(found, f"{element}.{field}", np.asarray(record[field]))
+    elif value.dtype.kind == "O" and value.size < MOST_CELLS:
+        for place, cell in enumerate(value.reshape(-1)):
+            _flatten(found, name if value.size == 1 else f"{name}{{{place + 1}}}", np.asarray(cell))
+    else:
+        found.add(name, value)
 
 
-def _parquet(
-    dataset: Dataset, library: Any, path: pathlib.Path, mapping: Mapping[str, str], time_unit: str | None
-) -> Iterator[Column]:
+def _parquet(found: Arrays, library: Any, path: pathlib.Path) -> None:
     file = library.ParquetFile(path)
     size = sum(file.metadata.row_group(k).total_byte_size for k in range(file.metadata.num_row_groups))
     if size > MOST_BYTES:
         raise DataError(f"{path}: it unpacks to {size} bytes, allowed are {MOST_BYTES}")
     table = file.read()
-    yield from _of_table(
-        dataset, {name: table.column(name).to_numpy() for name in table.column_names}, mapping, time_unit
-    )
+    for field in table.schema:
+        column = table.column(field.name)
+        if str(field.type).startswith("decimal"):
+            column = column.cast("float64")
+        unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", errors="replace")
+        found.add(field.name, column.to_numpy(), unit)
 
 
-def _ulog(
-    dataset: Dataset, library: Any, path: pathlib.Path, mapping: Mapping[str, str], time_unit: str | None
-) -> Iterator[Column]:
+def _ulog(dataset: Dataset, library: Any, path: pathlib.Path) -> Iterator[Column]:
     log = library.ULog(str(path))
     for each in log.data_list:
         time_s = np.asarray(np.asarray(each.data["timestamp"], dtype=np.int64) * 1e-6, dtype=np.float64)
         number = f".{each.multi_id}" if each.multi_id else ""
         for name, value in each.data.items():
             if name != "timestamp":
-                yield f"{each.name}{number}.{name}", "", time_s, np.asarray(value, dtype=np.float64)
+                yield Column(f"{each.name}{number}.{name}", "", time_s, np.asarray(value, dtype=np.float64))
+    if (where := _ends_within(path)) is not None:
+        dataset.losses.append(Loss("cut_off", 1, f"behind byte {where}"))
+        dataset.rows += 1
+        text = f"the file is cut off within a message that begins at byte {where}; nothing says how much is missing"
+        dataset.findings.append(Finding("", "cut_off", 0.0, 0.0, 1.0, "messages", text))
     if log.dropouts:
         count = len(log.dropouts)
         text = (
@@ -156,9 +141,21 @@ def _ulog(
         dataset.findings.append(Finding("", "dropouts", 0.0, 0.0, float(count), "times", text))
 
 
-def _mcap(
-    dataset: Dataset, library: Any, path: pathlib.Path, mapping: Mapping[str, str], time_unit: str | None
-) -> Iterator[Column]:
+def _ends_within(path: pathlib.Path) -> int | None:
+    """The byte at which a message begins that ends behind the file; None when the last one is whole."""
+    size = path.stat().st_size
+    place = ULOG_HEADER
+    with path.open("rb") as file:
+        while place < size:
+            file.seek(place)
+            end = place + ULOG_HEAD + int.from_bytes(file.read(2), "little")
+            if end > size:
+                return place
+            place = end
+    return None
+
+
+def _mcap(dataset: Dataset, library: Any, path: pathlib.Path) -> Iterator[Column]:
     """Messages in JSON, or in protobuf with its description in the file: every number of every topic."""
     series: dict[str, tuple[list[int], list[float], str]] = {}
     other: set[str] = set()
@@ -191,7 +188,7 @@ def _mcap(
     begin = begin if begin * 1e-9 > columns.EPOCH_S else 0
     for name, (stamps, values, unit) in series.items():
         time_s = np.asarray((np.array(stamps, dtype=np.int64) - begin) * 1e-9, dtype=np.float64)
-        yield name, unit, time_s, np.array(values, dtype=np.float64)
+        yield Column(name, unit, time_s, np.array(values, dtype=np.float64))
 
 
 def _message_class(schema: Any) -> Any:

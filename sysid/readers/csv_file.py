@@ -2,8 +2,8 @@
 
 `layout` finds how the table is written, by its first lines; `numerals` decides the decimal mark by all of its rows;
 then the rows are read a chunk at a time, so that a table of millions of rows needs the memory of its numbers only.
-Every line is accounted for (Dataset.lines). An empty cell is a time without a sample of this channel; a cell that is
-not a number becomes "not a number" and a finding.
+Where a later row has another form, it is named with its line. Every line is accounted for (Dataset.lines). An empty
+cell is a time without a sample of this channel; a cell that is not a number becomes "not a number" and a finding.
 """
 
 import dataclasses
@@ -17,18 +17,19 @@ from numpy.typing import NDArray
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import units
 from ranger_sim.sysid.dataset import Array, Dataset, Finding, Loss, Repair
-from ranger_sim.sysid.readers import columns, numerals, stamps, text_file
+from ranger_sim.sysid.readers import columns, numerals, stamps, text_file, time_column
 from ranger_sim.sysid.readers import layout as layouts
 
-SPREADSHEET_DAYS = (20_000.0, 80_000.0)  # of the years 1954 to 2119
-FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
-SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
-LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
 REMARKS = ("comment", "remark", "note", "kommentar", "bemerkung")  # columns that are usually empty
+ROWS_OF_ONE_FORM = 20  # rows above the last one, by whose decimals a number that is cut off is seen
 NAMED_LINES = 3  # number of a finding's places that are named
 MOST_CELLS = 400_000_000  # 8 bytes each
+NOT_MEASURED = 9.9e37  # what instruments write for an overflow and for no value (SCPI 1999, 7.2.1.5)
+SAME = 0.2  # of the rows with the date of the row above: another column may be finer
+THREE_DECIMALS = 1e-3  # last digit of numbers whose mark may be one of thousands
 EVEN = 0.01  # of the usual step: what counts evenly without a name may be the time
 
+HEX_NAME = re.compile(r"(?i)(?:^|[^a-z])hex(?:$|[^a-z])")
 HEX, HEXADECIMAL = re.compile("(?:0[xX])?[0-9A-Fa-f]{4,16}"), 0.01  # of the cells of a column
 
 Progress = Callable[[str, float], None]
@@ -59,14 +60,24 @@ def read(
     rows = _Rows(path, survey, layout, "names" in assumed)
     marks = _marks(path, rows, progress)
     table = _parsed(rows, marks, assumed, progress)
-    if "," not in marks and "decimal" not in assumed and any(column.other_mark for column in table):
-        marks = _marks(path, rows, progress, every=True)  # commas that the first lines did not have
+    if "," not in marks and "decimal" not in assumed and any(column.may_have_other_mark for column in table):
+        marks = _marks(path, rows, progress, every=True)  # numbers that the first lines did not have
         table = _parsed(rows, marks, assumed, progress)
     _note_layout(dataset, layout, marks, rows, assumed)
     return _channels(dataset, rows, table, dict(mapping or {}), time_unit, assumed)
 
 
 # --- rows ---------------------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class _Change:
+    """Rows of another form than those above. separator: in words, where another one gives the table's cells."""
+
+    line: int
+    rows: int
+    cells: int
+    separator: str
 
 
 class _Rows:
@@ -83,7 +94,9 @@ class _Rows:
         self.cut_off = 0
         self.again: list[int] = []
         self.kept = 0
-        self._odd: list[tuple[int, bool]] = []  # lines that are not rows, since the last row
+        self._odd: list[tuple[int, bool, int]] = []  # lines that are not rows, since the last row; their cells
+        self._other = ""  # the first of them
+        self.changes: list[_Change] = []
 
     def _count(self, what: str, number: int = 1) -> None:
         self.lines[what] = self.lines.get(what, 0) + number
@@ -92,7 +105,7 @@ class _Rows:
         """(line numbers (n,), the cells of n rows, all of the table's width)."""
         self._start()
         layout, width, separator = self.layout, len(self.layout.names), self.layout.separator
-        for number, lines in text_file.chunks(self.path, self.survey.encoding):
+        for number, lines, is_last in _with_last(text_file.chunks(self.path, self.survey.encoding)):
             places: list[int] = []
             rows: list[list[str]] = []
             plain = '"' not in "".join(lines)
@@ -106,7 +119,7 @@ class _Rows:
                     else layouts.cells_of(line, separator)
                 )
                 if len(cells) == width or (len(cells) > width and not any(map(str.strip, cells[width:]))):
-                    if line[:1] in "#%/ \t" and layouts.is_comment(line) and not layouts.is_data(cells):
+                    if line[:1] in "#%/; \t" and layouts.is_comment(line) and not layouts.is_data(cells):
                         self._count("comments")
                         continue
                     cells = [cell.strip() for cell in cells[:width]]
@@ -122,7 +135,12 @@ class _Rows:
                 elif layouts.is_comment(line):
                     self._count("comments")
                 elif not self._ends_here(place, [cell.strip() for cell in cells]):
-                    self._odd.append((place, layouts.is_data([cell.strip() for cell in cells])))
+                    is_data = layouts.is_data([cell.strip() for cell in cells]) or _is_data_otherwise(line)
+                    self._odd.append((place, is_data, len(cells)))
+                    if len(self._odd) == 1 and not self._other:
+                        self._other = line
+            if is_last and not self.survey.ends and places and places[-1] == number + len(lines) - 1:
+                self._leave_out_cut_off(places, rows)
             if rows:
                 self.kept += len(rows)
                 if self.kept * width > MOST_CELLS:
@@ -131,12 +149,20 @@ class _Rows:
         last = self._odd.pop() if self._odd and not self.survey.ends and self._odd[-1][1] else None
         if last:
             self.cut_off = last[0]
-        for place, data in self._odd:  # behind the last row
+        self._note_change()
+        for place, data, _ in self._odd:  # behind the last row
             if data:
                 self.ragged.append(place)
             else:
                 self._count("footer")
         self._count("rows", self.kept)
+
+    def _leave_out_cut_off(self, places: list[int], rows: list[list[str]]) -> None:
+        """Take out a last row without a line end whose last number has fewer decimals than all above it have."""
+        above = {_decimals(row[-1]) for row in rows[-ROWS_OF_ONE_FORM - 1 : -1]}
+        if len(rows) > ROWS_OF_ONE_FORM and len(above) == 1 and _decimals(rows[-1][-1]) < min(above):
+            self.cut_off = places.pop()
+            rows.pop()
 
     def _above(self, place: int, line: str) -> None:
         layout = self.layout
@@ -153,13 +179,36 @@ class _Rows:
 
     def _settle(self) -> None:
         """Lines that are not rows, between rows: left out."""
-        self.ragged += [place for place, _ in self._odd]
-        self._odd.clear()
+        if self._odd:
+            self._note_change()
+            self.ragged += [place for place, *_ in self._odd]
+            self._odd.clear()
+
+    def _note_change(self) -> None:
+        """Keep where rows of another number of cells begin, when so many follow that it is not an accident."""
+        rows = [(place, count) for place, data, count in self._odd if data]
+        if len(rows) >= layouts.SECOND_TABLE and len(self.changes) < NAMED_LINES:
+            first, count = rows[0]
+            self.changes.append(_Change(first, len(rows), count, self._separator_of_other()))
+        self._other = ""
+
+    def _separator_of_other(self) -> str:
+        """The separator, in words, by which the first line of another form has the table's number of cells; or ""."""
+        width = len(self.layout.names)
+        return next(
+            (
+                name
+                for name, sign in layouts.SEPARATORS.items()
+                if sign != self.layout.separator and len(layouts.cells_of(self._other, sign)) == width > 1
+            ),
+            "",
+        )
 
     def _ends_here(self, place: int, cells: list[str]) -> bool:
         """True for a second row of names. UserError where it begins another table."""
         if not cells or (cells[0] and (cells[0][0].isdigit() or cells[0][0] in "+-.")):
             return False
+        cells = [cells[0].lstrip("\ufeff"), *cells[1:]]  # of a file that was joined to another
         if cells[: len(self.layout.names)] == list(self.layout.names):
             self.again.append(place)
             self._count("names again")
@@ -173,6 +222,28 @@ class _Rows:
         if named:
             self._count("another table")
         return named
+
+
+def _with_last(chunks: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str], bool]]:
+    """The chunks, and whether it is the last one."""
+    before = None
+    for chunk in chunks:
+        if before is not None:
+            yield *before, False
+        before = chunk
+    if before is not None:
+        yield *before, True
+
+
+def _decimals(cell: str) -> int:
+    """Characters behind the decimal mark; -1 without one."""
+    return len(cell) - 1 - max(cell.rfind("."), cell.rfind(",")) if "." in cell or "," in cell else -1
+
+
+def _is_data_otherwise(line: str) -> bool:
+    """True for a row of nothing but numbers and stamps by any separator."""
+    split = (layouts.cells_of(line, sign) for sign in layouts.SEPARATORS.values() if sign in line)
+    return any(len(cells) > 1 and all(map(layouts.is_value, cells)) for cells in split)
 
 
 # --- columns ------------------------------------------------------------------------------------------------
@@ -192,7 +263,9 @@ class _Column:
         self.first_odd: tuple[int, int, str] | None = None  # row, line, cell
         self.last_odd = 0
         self.other_mark = False
-        self.finest = 1.0
+        self.finest, self.coarsest = 1.0, 0.0  # last digit of a part of the rows
+        self.padded = False  # whole numbers of one width, some of them with zeros in front
+        self.form_changes = 0  # line from which on the stamps have another form
         self.unit_text = ""
         self.first = ""
         self.rows = 0
@@ -200,10 +273,14 @@ class _Column:
     def add(self, cells: Sequence[str], places: NDArray[np.int64]) -> None:
         """The next rows. cells (n,), line numbers (n,)."""
         if self.may_be_time:
-            self._add_stamps(cells)
+            self._add_stamps(cells, places)
         values, present, odd = numerals.numbers(cells, self.mark)
-        if odd and not self.may_be_time:
+        if odd and not self.written:
             odd = self._with_units(cells, values, odd)
+        beyond = np.abs(values) >= NOT_MEASURED
+        if beyond.any():
+            values[beyond] = np.nan
+            odd = sorted({*odd, *np.flatnonzero(beyond).tolist()})
         if odd:
             self.odd += len(odd)
             self.last_odd = self.rows + odd[-1]
@@ -211,17 +288,27 @@ class _Column:
             if self.first_odd is None:
                 self.first_odd = (self.rows + odd[0], int(places[odd[0]]), cells[odd[0]])
         if not self.values:
+            one_width = len(set(map(len, cells))) == 1 and len(cells[0]) > 1
+            self.padded = one_width and any(cell[0] == "0" for cell in cells) and all(map(str.isdecimal, cells))
             self.first = next((cell for cell in cells if cell), "")
         digit = numerals.last_digit(cells)
-        self.finest = min(self.finest, digit)
+        self.finest, self.coarsest = min(self.finest, digit), max(self.coarsest, digit)
+        if present is not None and self.mark == "." and not self.other_mark:
+            self.other_mark = any("," in cell and numerals.EITHER_WAY.fullmatch(cell) for cell in cells)
         self.values.append(values)
         self.present.append(np.ones(len(values), dtype=bool) if present is None else present)
         self.rows += len(cells)
 
-    def _add_stamps(self, cells: Sequence[str]) -> None:
+    @property
+    def may_have_other_mark(self) -> bool:
+        """True when later rows may show that the decimal mark is the other one, as 1.234 below whole numbers does."""
+        return self.other_mark or (self.mark == "." and self.coarsest == 1.0 and self.finest == THREE_DECIMALS)
+
+    def _add_stamps(self, cells: Sequence[str], places: NDArray[np.int64]) -> None:
         if self.written is not None:
             both = stamps.both_ways(cells, self.forms)
             if both is None:
+                self.form_changes = int(places[0]) if self.written else 0
                 self.written = None
             else:
                 self.written.append(both)
@@ -274,15 +361,14 @@ def _marks(path: pathlib.Path, rows: _Rows, progress: Progress, every: bool = Fa
         return [rows.layout.decimal] * width
     evidence = numerals.Evidence()
     done = 0
-    for number, (_, cells) in enumerate(rows):
+    for number, (places, cells) in enumerate(rows):
         if not number and not every:
-            few = cells[: layouts.HEAD_LINES]
-            if not any("," in cell for row in few for cell in row) and rows.layout.separator == ",":
+            if not any("," in cell for row in cells for cell in row) and rows.layout.separator == ",":
                 return ["."] * width
-            if not any("," in cell or numerals.EITHER_WAY.fullmatch(cell) for row in few for cell in row):
+            if not any("," in cell or numerals.EITHER_WAY.fullmatch(cell) for row in cells for cell in row):
                 return ["."] * width
         for column, part in enumerate(zip(*cells, strict=True)):
-            evidence.add(column, part)
+            evidence.add(column, part, places)
         done += len(cells)
         progress("decimal mark", min(0.45, done / max(1, rows.survey.size / (8 * width))))
     mark = evidence.mark()
@@ -297,10 +383,12 @@ def _marks(path: pathlib.Path, rows: _Rows, progress: Progress, every: bool = Fa
         )
     found = [evidence.of_column(column, mark) for column in range(width)]
     if not all(found):
-        name = rows.layout.names[found.index("")]
+        column = found.index("")
+        point, comma = (evidence.first[column, each] for each in ".,")
         raise DataError(
-            f"{path}: {name}: some numbers have a decimal point ({evidence.example['.']}), others a decimal comma "
-            f"({evidence.example[',']}); --assume decimal=point or decimal=comma leaves out the others"
+            f"{path}: {rows.layout.names[column]}: some numbers have a decimal point ({point[1]!r}, first in line "
+            f"{point[0]}), others a decimal comma ({comma[1]!r}, first in line {comma[0]}); --assume decimal=point or "
+            "decimal=comma leaves out the others"
         )
     return found
 
@@ -325,8 +413,7 @@ def _parsed(rows: _Rows, marks: list[str], assumed: Mapping[str, str], progress:
 
 
 def _may_be_time(name: str, unit_text: str | None) -> bool:
-    unit = units.unit_of(unit_text) if unit_text else units.split(name)[1]
-    return layouts.is_time_name(name) or (unit is not None and unit.numerator == ("s",) and not unit.denominator)
+    return layouts.is_time_name(name) or _may_be_timed(name, unit_text)
 
 
 # --- the dataset ----------------------------------------------------------------------------------------------
@@ -368,6 +455,8 @@ def _channels(
     columns.check_mapping(dataset, mapping, names)
     if not rows.kept:
         raise DataError(f"{dataset.name}: the table has no row below its header")
+    if not rows.layout.names_line and not any(rows.layout.above.names):
+        _refuse_words(rows, table)
     lost = _left_out(dataset, rows)
     time_columns, time_s = _time(dataset, rows, table, mapping, time_unit, assumed)
     stamped = np.isfinite(time_s)
@@ -392,8 +481,11 @@ def _channels(
             )
             dataset.findings.append(Finding(named.name, "unreadable", begin, end, float(column.odd), "samples", text))
         kept = present & stamped
-        if column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2]):
-            text = f"{name}: hexadecimal numbers such as {column.first_odd[2]!r} are not read, left out"
+        says_hex = bool(HEX_NAME.search(name)) and "." not in column.first
+        many = column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2])
+        if says_hex or many:
+            example = column.first_odd[2] if many and column.first_odd else column.first
+            text = f"{name}: hexadecimal numbers such as {example!r} are not read, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
             continue
         if not np.isfinite(value[kept]).any():
@@ -413,10 +505,31 @@ def _channels(
     return dataset
 
 
+def _refuse_words(rows: _Rows, table: list[_Column]) -> None:
+    """UserError for lines without names in which a column holds words: such lines are another program's records."""
+    padded = next((column for column in table if column.padded), None)
+    if padded is not None and rows.layout.separator == "," and not rows.layout.decimal:
+        raise DataError(
+            f"{rows.path}: whole numbers such as {padded.first!r} between commas, and no names: these may be decimals "
+            "behind a comma, and then nothing says where a number ends (--assume decimal=point: they are whole numbers)"
+        )
+    for name, column in zip(rows.layout.names, table, strict=True):
+        if column.odd == column.rows and column.first_odd is not None and not column.written:
+            _, line, cell = column.first_odd
+            raise DataError(
+                f"{rows.path}:{line}: the table has no names, and its {name} holds words such as {cell[:30]!r}: these "
+                "are not rows of numbers (--assume names=LINE says where the names are)"
+            )
+
+
 def _left_out(dataset: Dataset, rows: _Rows) -> tuple[Loss, ...]:
     """Lines that should be rows and are not."""
     lost: tuple[Loss, ...] = ()
     width = len(rows.layout.names)
+    for change in rows.changes:
+        text = f"from line {change.line} on {change.rows} rows have another form than those above: {change.cells} cells"
+        text += f", or {width} between other separators ({change.separator})" if change.separator else f", not {width}"
+        dataset.findings.append(Finding("", "form_changes", 0.0, 0.0, float(change.line), "line", text))
     if rows.ragged:
         count = len(rows.ragged)
         text = f"{count} rows do not have {width} cells and are left out (line {_lines_text(rows.ragged)})"
@@ -461,12 +574,21 @@ def _time(
         return set(candidates), step_s * np.arange(rows.kept, dtype=np.float64)
     month_first = {"month-first": True, "day-first": False}.get(assumed.get("dates", ""))
     candidates = candidates or _unnamed_time(dataset, rows, table, called)
+    for k in candidates:
+        if table[k].form_changes:
+            raise DataError(
+                f"{rows.path}: {names[k]}: from line {table[k].form_changes} on the stamps have another form than "
+                f"{table[k].first!r} in the first row"
+            )
     written = {k: found for k in candidates if (found := table[k].stamps(month_first)) is not None}
     numbers = [k for k in candidates if k not in written]
     if not written or (numbers and not any(each.has_time for each in written.values())):
         index = (_with_unit_first(numbers, called, rows.layout.units) or candidates)[0]
         unit = units.split(called[index])[1]
         return {index, *written}, _counted(dataset, names[index], unit, rows, table[index], index, time_unit)
+    if (finer := _finer(numbers, called, rows.layout.units, table, list(written.values()))) is not None:
+        unit = units.split(called[finer])[1]
+        return {finer, *written}, _counted(dataset, names[finer], unit, rows, table[finer], finer, time_unit)
     whole = [k for k in written if written[k].has_date and written[k].has_time]
     chosen = whole[:1] or [k for k in written if written[k].has_date][:1]
     if not whole:
@@ -487,6 +609,24 @@ def _time(
     return set(chosen) | set(written), np.where(missing, np.nan, (time_ns - first_ns) * 1e-9)
 
 
+def _finer(
+    numbers: list[int],
+    called: Sequence[str],
+    unit_texts: Sequence[str | None],
+    table: list[_Column],
+    written: Sequence[stamps.Stamps],
+) -> int | None:
+    """A column of numbers in a unit of time that rises all the time, where the dates are the same for several rows."""
+    if not any(np.mean(np.diff(each.time_ns) == 0) > SAME for each in written if each.has_time):
+        return None
+    return next((k for k in numbers if _may_be_timed(called[k], unit_texts[k]) and _rises(table[k])), None)
+
+
+def _may_be_timed(name: str, unit_text: str | None) -> bool:
+    unit = units.unit_of(unit_text) if unit_text else units.split(name)[1]
+    return unit is not None and unit.numerator == ("s",) and not unit.denominator
+
+
 def _with_unit_first(numbers: list[int], called: Sequence[str], unit_texts: Sequence[str | None]) -> list[int]:
     """Columns of numbers, those first whose unit is known to be a time."""
     return sorted(numbers, key=lambda k: units.split(called[k])[1] is None and not unit_texts[k])
@@ -500,9 +640,10 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
     timed = [k for k in rising if _may_be_time(called[k], rows.layout.units[k])]
     found = timed or dated or ([k for k in rising if _is_even(table[k])] if not rows.layout.names_line else [])
     if len(found) != 1 and not (found and found == dated):
+        example = f"{names[rising[0]]}=time" if rising else "NAME=t_s"
         raise DataError(
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
-            "--map NAME=t_s says which it is"
+            f"--map {example} says which it is" + (" (it rises all the time)" if rising else "")
         )
     text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))
@@ -541,55 +682,8 @@ def _counted(
             f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
             "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
         )
-    if unit is None:
-        unit = _assumed(dataset, name, time_s)
-    if unit.numerator != ("s",) or unit.denominator:
-        raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
-    dataset.layout |= {"time": name, "time_unit": unit_text if said else time_unit or f"{unit.factor:g} s"}
-    if unit.factor == 1.0:
-        return columns.from_zero(dataset, time_s)
-    text = f"{name}: times {unit.factor:g}, now in s"
-    dataset.repairs.append(Repair("", "si_unit", len(time_s), text))
-    whole = column.whole_numbers()
-    if whole is not None and len(whole) and float(whole[0]) * unit.factor >= columns.EPOCH_S:
-        columns.from_zero(dataset, time_s[:1] * unit.factor)  # for its note; whole numbers are subtracted below
-        return (whole - whole[0]) * unit.factor
-    return columns.from_zero(dataset, time_s * unit.factor)
-
-
-def _assumed(dataset: Dataset, name: str, time_s: Array) -> units.Unit:
-    """Unit of stamps without a given one: what their size can only be, else seconds."""
-    steps = np.diff(time_s[np.isfinite(time_s)])
-    usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
-    ends = columns.ends(time_s)
-    if 0.0 < usual < FASTEST_S and all(SPREADSHEET_DAYS[0] < end < SPREADSHEET_DAYS[1] for end in ends):
-        text = (
-            f"{name}: {ends[0]:.10g} is taken for a spreadsheet's day: samples would be {usual:.3g} s apart otherwise"
-        )
-        dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
-        return units.Unit(("s",), (), 86400.0)
-    for spelling, factor in EPOCHS.items():
-        if all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends):
-            text = (
-                f"{name}: {ends[0]:.15g} is taken for {spelling} since 1970: of the years 1990 to 2100 in no other unit"
-            )
-            dataset.findings.append(Finding("", "unit_assumed", *ends, factor, "s", text, "note"))
-            return units.Unit(("s",), (), factor)
-    text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
-    if usual > SLOWEST_S:
-        smaller = next((unit for unit in ("ms", "us", "ns") if usual * units.ATOMS[unit][1] <= SLOWEST_S), "ns")
-        better = usual * units.ATOMS[smaller][1]
-        if usual > LONGEST_S or len(time_s) >= FEWEST:
-            raise DataError(
-                f"{dataset.name}: {name}: nothing says the unit of the stamps; in seconds samples would be "
-                f"{usual:.6g} s apart, in {smaller} {better:g} s:",
-                f"  ranger-sim read {dataset.name} --time-unit {smaller}",
-                f"  ranger-sim read {dataset.name} --time-unit s",
-            )
-        text += f", which are {usual:.6g} s apart; --time-unit {smaller} would make them {better:g} s"
-    dataset.findings.append(Finding("", "unit_assumed", *ends, 1.0, "s", text))
-    return units.Unit(("s",))
-
-
-EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
+    dataset.layout |= {"time": name}
+    time_s, _ = time_column.seconds(dataset, str(rows.path), name, time_s, column.whole_numbers(), unit)
+    factor = f"{unit.factor:g} s" if unit is not None else "assumed"
+    dataset.layout |= {"time_unit": unit_text if said else time_unit or factor}
+    return time_s

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from ranger_sim.can_bus.edge import log_kinds
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset
-from ranger_sim.sysid.readers import binary, csv_file, layout, measurement, robodaq, run_folder
+from ranger_sim.sysid.readers import binary, csv_file, layout, lvm, measurement, robodaq, run_folder
 from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 
 TEXT_TABLE = "text table"
@@ -26,6 +26,7 @@ class Format:
 FOLDER = Format("folder of a run")
 MDF = Format("MDF", may_hold_frames=True)
 ROBODAQ = Format("RoboDAQ log")
+LVM = Format("LabVIEW's .lvm")
 TABLE = Format(TEXT_TABLE)
 BEGINNINGS = {
     b"MDF     ": MDF,
@@ -35,17 +36,18 @@ BEGINNINGS = {
     b"PAR1": Format("Parquet"),
     b"ULog\x01\x12\x35": Format("ULog"),
     b"\x89MCAP0\r\n": Format("MCAP"),
+    b"\x89HDF": Format("HDF5"),
+    b"TDSm": Format("TDMS"),
+    lvm.BEGINNING: LVM,
 }
 REFUSED = {
-    b"TDSm": "a TDMS file: export it as CSV or as MDF (nptdms reads it)",
-    b"\xd4\xc3\xb2\xa1": "a packet capture: write the frames as a candump log (candump -L, or tshark)",
-    b"\xa1\xb2\xc3\xd4": "a packet capture: write the frames as a candump log (candump -L, or tshark)",
-    b"\x0a\x0d\x0d\x0a": "a packet capture: write the frames as a candump log (candump -L, or tshark)",
     b"\xd0\xcf\x11\xe0": "a workbook of an old Excel: export the sheet as CSV",
     b"%PDF": "a PDF",
     b"\x7fELF": "a program",
-    b"\x89HDF": "an HDF5 file: export the channels as CSV or MDF (a .mat of version 7.3: save it with '-v7')",
     b"\x89PNG": "a picture",
+    b"\x93NUMPY": "an array of NumPy without names: numpy.savetxt(FILE, array, header=...) writes a table",
+    b'{"': "a JSON file: write its channels as CSV",
+    b'[{"': "a JSON file: write its channels as CSV",
 }
 MDF_ENDINGS = (".mf4", ".mdf", ".dat")
 TEXT_ENDINGS = (".dat", ".log", ".asc", ".trc")  # of other programs as well, for tables
@@ -107,6 +109,8 @@ def read(
         return measurement.read(path, mapping)
     if known.name in binary.KINDS:
         return binary.read(path, known.name, mapping, time_unit)
+    if known is LVM:
+        return lvm.read(path, mapping)
     if known is ROBODAQ:
         return robodaq.read(path, mapping, variable_units)
     return csv_file.read(path, mapping, time_unit, assumed, progress)

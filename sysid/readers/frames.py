@@ -44,9 +44,20 @@ def decode(
     broken: dict[tuple[str, str], int] = {}
     first_ns: int | None = None
     seen: set[str] = set()
+    lines = {
+        "frames": 0,
+        "other buses": 0,
+        "remote requests": 0,
+        "unknown identifiers": 0,
+        "left out: broken_frames": 0,
+    }
     for bus, time_ns, identifier, flags, lo, hi in frames:
         seen.add(bus)
-        if flags & (FLAG_ERROR | FLAG_REMOTE) or (buses and bus not in buses):
+        if buses and bus not in buses:
+            lines["other buses"] += 1
+            continue
+        if flags & (FLAG_ERROR | FLAG_REMOTE):
+            lines["remote requests"] += 1
             continue
         first_ns = time_ns if first_ns is None else first_ns
         message = messages.get(identifier | (EXTENDED_BIT if flags & FLAG_EXTENDED else 0))
@@ -59,6 +70,7 @@ def decode(
         except Exception:  # too short, or a multiplexer's value that has no signals: of many kinds
             broken[bus, message.name] = broken.get((bus, message.name), 0) + 1
             continue
+        lines["frames"] += 1
         for signal, value in decoded.items():
             key = (bus, message.name, signal)
             if key not in samples:
@@ -70,7 +82,12 @@ def decode(
         if bus not in seen:
             raise DataError(f"{name}: --bus {bus}: unknown bus (available: {', '.join(sorted(seen))})")
     if not samples or first_ns is None:
-        raise DataError(f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others)")
+        misfits = f", {sum(broken.values())} that do not fit their message" if broken else ""
+        raise DataError(
+            f"{name}: none of its frames is a message of the DBC file ({sum(unknown.values())} others{misfits})"
+        )
+    lines["unknown identifiers"], lines["left out: broken_frames"] = sum(unknown.values()), sum(broken.values())
+    dataset.lines = {what: number for what, number in lines.items() if number}
     of_message: dict[str, list[str]] = {}
     for bus, message, _ in samples:
         of_message.setdefault(message, [])

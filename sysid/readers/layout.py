@@ -17,9 +17,11 @@ from ranger_sim.sysid import units
 from ranger_sim.sysid.readers import numerals, preamble, stamps, text_file
 
 COMMENTS = ("#", "%", "//")
+REMARK = re.compile(r"\s*;\s+[A-Za-z][^;]*")  # a comment of sigrok's, and not a row that begins with an empty cell
+SETTING = re.compile(r"\w+\s*=\s*[-+\d.eE]+\s*\w*")  # behind the names of a Rigol: t0 = -1.0, tInc = 1e-6
 CLOCKS = (  # in addition to those of units.TIME_WORDS
     "datetime", "date_time", "date", "utc", "datum", "uhrzeit", "clock", "x_value", "second", "seconds", "sek",
-    "x-axis", "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
+    "x-axis", "tout", "local_time", "abs_time", "rel_time", "time_stamp", "zeitstempel", "datum_uhrzeit", "time_of_day",
 )  # fmt: skip
 SEPARATORS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "space": " "}
 HEAD_LINES = 4000
@@ -33,7 +35,10 @@ KEYS = {  # --assume KEY=VALUE
     "names": "number of the line with the names, 0 for none",
     "dates": "day-first or month-first",
     "time": "name of the column of stamps",
+    "limits": "names of channels, with commas between, whose values at a limit are true",
+    "clock": "even: rounded stamps are those of an even clock",
 }
+OF_ANY_FORMAT = ("limits", "clock")  # of KEYS; the others say how a text table is written
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +82,7 @@ def assumptions(texts: Sequence[str]) -> dict[str, str]:
             "separator": tuple(SEPARATORS),
             "decimal": ("point", "comma"),
             "dates": ("day-first", "month-first"),
+            "clock": ("even",),
         }.get(key)
         if (allowed and value not in allowed) or (key == "names" and not value.isdecimal()):
             raise DataError(f"--assume {text!r}: {key} is {KEYS[key]}")
@@ -86,7 +92,7 @@ def assumptions(texts: Sequence[str]) -> dict[str, str]:
 
 def is_time_name(name: str) -> bool:
     """True for what files call the column of stamps."""
-    stem = units.split(name)[0].lower().strip("\"'#: ").replace(" ", "_")
+    stem = units.split(name)[0].lower().strip("\"'#:_ ").replace(" ", "_").removesuffix("_in")
     return stem in (*units.TIME_WORDS, *CLOCKS)
 
 
@@ -128,7 +134,12 @@ def is_words(cells: Sequence[str]) -> bool:
 
 def is_comment(line: str) -> bool:
     """True for a line behind a comment mark."""
-    return line.lstrip().startswith(COMMENTS)
+    return line.lstrip().startswith(COMMENTS) or REMARK.fullmatch(line) is not None
+
+
+def _bare(line: str) -> str:
+    """A line without its comment mark."""
+    return line.lstrip().lstrip(";" if REMARK.fullmatch(line) else "#%/").strip() if is_comment(line) else line
 
 
 def is_blank(line: str) -> bool:
@@ -207,7 +218,7 @@ def _attempt(separator: str, kept: list[tuple[int, str]]) -> _Attempt:
         counts = Counter(len(cells) for _, cells in attempt.rows)
     attempt.count = counts.most_common(1)[0][0]
     alike = [cells for _, cells in attempt.rows if len(cells) == attempt.count]
-    if attempt.count > 1 and not any(cells[-1] for cells in alike):  # a separator at the end of every line
+    while attempt.count > 1 and not any(cells[attempt.count - 1] for cells in alike):  # separators at every line's end
         attempt.count -= 1
         attempt.rows = [(place, _shorn(cells)) for place, cells in attempt.rows]
     attempt.data = {place for place, cells in attempt.rows if len(cells) == attempt.count and is_data(cells)}
@@ -239,13 +250,10 @@ def _best(path: pathlib.Path, kept: list[tuple[int, str]]) -> _Attempt:
         elif _header_fits(best) and not _header_fits(other):
             continue
         else:
-            commands = " or ".join(
-                f"--assume separator={name}"
-                for name, sign in SEPARATORS.items()
-                if sign in (best.separator, other.separator)
-            )
+            signs = [name for name, sign in SEPARATORS.items() if sign in (best.separator, other.separator)]
             raise DataError(
-                f"{path}: its cells can be separated in two ways, {best.count} or {other.count} in a row: {commands}"
+                f"{path}: its cells can be separated in two ways, {best.count} or {other.count} in a row:",
+                *(f"  ranger-sim read {path} --assume separator={name}" for name in signs),
             )
     if best.share == 0.0:  # no row of numbers: as its first line is
         best = max(tried, key=lambda each: (len(each.rows[0][1]) > 1, each.separator != " ", each.count))
@@ -270,12 +278,12 @@ def _names(
         text = next((text for place, text in head if place == line), None)
         if text is None:
             raise DataError(f"{path}: --assume names={line}: the names are looked for in the first {len(head)} lines")
-        bare = text.lstrip().lstrip("#%/").strip() if is_comment(text) else text
+        bare = _bare(text)
         return line + 1, line, _unique(path, line, _shorn(cells_of(bare, attempt.separator)), [])
     above = [(place, text) for place, text in head if place < run and not is_blank(text)]
     found: list[tuple[float, int, list[str]]] = []
     for place, text in above:
-        bare = text.lstrip().lstrip("#%/").strip() if is_comment(text) else text
+        bare = _bare(text)
         cells = _as_many(bare, attempt.separator, count)
         if cells is None or not is_words(cells) or (is_comment(text) and above[-1][0] != place):
             continue
@@ -286,6 +294,7 @@ def _names(
         found.append((3.0 * named + full + known - 2.0 * are_units, place, cells))
     _refuse_second_table(path, attempt, [each for each in found if each[0] >= 3.0], run)
     if not found:
+        _refuse_long_cells(path, head)
         words = [(place, cells) for place, cells in attempt.rows if place < run and is_words(cells)]
         if words and len(words[-1][1]) > 1 and words[-1][0] == max(p for p, _ in attempt.rows if p < run):
             place, cells = words[-1]
@@ -295,9 +304,11 @@ def _names(
                 f"{path}:{place}: {len(cells)} names, and the rows below have {count} cells"
                 + ("; are decimal commas between commas?" if attempt.separator == "," and count > len(cells) else "")
             )
-        if not attempt.data:  # nothing but names
+        if not attempt.data and is_words(attempt.rows[0][1]):  # nothing but names
             place, cells = attempt.rows[0]
             return place + 1, place, _unique(path, place, cells, [])
+        if not attempt.data:
+            return attempt.rows[0][0], 0, _numbered(count)
         return min(attempt.data), 0, _numbered(count)
     best = max(found, key=lambda each: each[0])[0]
     tied = [each for each in found if each[0] == best]
@@ -314,6 +325,13 @@ def _names(
     return line + 1, line, _unique(path, line, cells, group)
 
 
+def _refuse_long_cells(path: pathlib.Path, head: list[tuple[int, str]]) -> None:
+    """UserError for a quoted cell that goes on in the next line."""
+    place = next((place for place, text in head if text.count('"') % 2), 0)
+    if place:
+        raise DataError(f"{path}:{place}: a quoted cell goes on in the next line: tables have one line for each row")
+
+
 def _counts_rows(attempt: _Attempt) -> bool:
     """True when the first cells are the numbers of the rows, which R writes without a name."""
     first = [cells[0] for place, cells in attempt.rows if place in attempt.data]
@@ -325,6 +343,8 @@ def _counts_rows(attempt: _Attempt) -> bool:
 def _as_many(text: str, separator: str, count: int) -> list[str] | None:
     """The cells of a row of words when they are `count`, by this separator or, above aligned columns, another."""
     cells = _shorn(cells_of(text, separator))
+    while len(cells) > count and (not cells[-1] or SETTING.fullmatch(cells[-1])):
+        cells = cells[:-1]
     if len(cells) == count and count > 1 or (count == 1 and len(cells) == 1):
         return cells
     if separator == " ":

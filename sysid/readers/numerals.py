@@ -58,23 +58,25 @@ class Evidence:
     """The evidence of a table's cells for the decimal mark.
 
     only: {column: {mark: cells that are numbers with this mark only}}; either: {column: {mark: [cells with it that are
-    numbers either way, whole numbers below 1,000, longer ones]}}; example: {mark: a cell with it}.
+    numbers either way, whole numbers below 1,000, longer ones]}}; example: {mark: a cell with it}; first: {(column,
+    mark): line and cell of the first of `only`}.
     """
 
     def __init__(self) -> None:
         self.only: dict[int, dict[str, int]] = {}
         self.either: dict[int, dict[str, list[int]]] = {}
         self.example: dict[str, str] = {}
+        self.first: dict[tuple[int, str], tuple[int, str]] = {}
 
-    def add(self, column: int, cells: Sequence[str]) -> None:
-        """Count the cells of a column."""
+    def add(self, column: int, cells: Sequence[str], lines: NDArray[np.int64]) -> None:
+        """Count the cells of a column, (n,), which are in these lines."""
         only = self.only.setdefault(column, {".": 0, ",": 0})
         either = self.either.setdefault(column, {".": [0, 0, 0], ",": [0, 0, 0]})
         joined = "\n".join(cells)
         for mark, other in (".,", ",."):
             if only[mark] > DECIDED and other not in joined:
                 return  # nothing in it could be the other's
-        for cell in cells:
+        for place, cell in enumerate(cells):
             found = EITHER_WAY.fullmatch(cell)
             if found:
                 either[found[1]][0] += 1
@@ -88,6 +90,7 @@ class Evidence:
             if len(good) == 1:
                 only[good[0]] += 1
                 self.example.setdefault(good[0], cell)
+                self.first.setdefault((column, good[0]), (int(lines[place]), cell))
 
     def mark(self) -> str:
         """The decimal mark of the table, "" where both are as good."""

@@ -1,4 +1,4 @@
-"""What oscilloscopes, LabVIEW and loggers write above a table: the sampling, units and names of its columns."""
+"""What oscilloscopes and loggers write above a table: the sampling, units and names of its columns."""
 
 import dataclasses
 import re
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from ranger_sim.sysid import units
 from ranger_sim.sysid.readers import numerals
 
-INTERVAL = ("sample interval", "sampling interval", "sample period", "delta_x", "increment", "hresolution", "time step")
+INTERVAL = ("sample interval", "sampling interval", "sample period", "increment", "hresolution", "time step")
 RATE = ("sample rate", "sampling rate", "samplerate", "sampling frequency", "sample frequency", "abtastrate")
 TIME_UNIT = ("horizontal units", "hunit")
-UNITS = ("vertical units", "vunit", "y_unit_label")
+UNITS = ("vertical units", "vunit")
 NAMES = ("tracename",)
 RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "sa/s": 1.0, "ks/s": 1e3}
 
@@ -36,8 +36,6 @@ def of(rows: Sequence[Sequence[str]]) -> Preamble:
             names = tuple(rest)
         elif key in UNITS and rest:
             unit_texts = tuple(each.rpartition(":")[2].strip() for each in rest)
-        elif key == "x_dimension" and rest and rest[0] == "Time":  # LabVIEW's are in seconds
-            time_unit = "s"
         elif key in TIME_UNIT and rest:
             time_unit = rest[0]
         elif key in INTERVAL and rest:
@@ -55,9 +53,9 @@ def _parts(cells: Sequence[str]) -> tuple[str, list[str]]:
     """(key in small letters, values) of a row; `key: value` in one cell is taken apart."""
     if not cells:
         return "", []
-    key, colon, value = cells[0].lstrip("#%/ ").partition(":")
+    key, colon, value = cells[0].lstrip("#%/; ").partition(":")
     if not colon:
-        key, colon, value = cells[0].lstrip("#%/ ").partition("=")
+        key, colon, value = cells[0].lstrip("#%/; ").partition("=")
     rest = [each for each in ([value.strip()] if colon else []) + [cell.strip() for cell in cells[1:]] if each]
     return key.strip().lower(), rest
 

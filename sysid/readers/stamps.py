@@ -18,13 +18,17 @@ FEW_DAYS = 3  # a recording takes no more; of two ways to read its dates, one th
 DATE = (
     r"(?P<year>\d{4})[-/.](?P<month>\d\d?)[-/.](?P<day>\d\d?)"
     r"|(?P<first>\d\d?)[-/.](?P<second>\d\d?)[-/.](?P<late>\d{4}|\d\d)"
-    r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4})"
+    r"|(?P<of_month>\d\d?)[- .]+(?P<named>[A-Za-z]{3})[a-z]*[- .,]+(?P<of_year>\d{4}|\d\d)"
 )
 TIME = (
+    r"(?:(?P<days>\d{1,4}) days?,? )?"
     r"(?P<h>\d\d?):(?P<m>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d{1,9}))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
     r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d)?"
 )
 STAMP = re.compile(rf"(?:(?P<date>{DATE})(?:[T ]\s*(?=\d))?)?(?P<time>{TIME})?")
+COMPACT = re.compile(  # 20261105T093000.123, and without anything between
+    r"((?:19|20)\d\d)(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])[T _-]?([01]\d|2[0-3])([0-5]\d)([0-5]\d)[.,]?(\d{1,9})?Z?"
+)
 MONTHS = {
     name: k % 12 + 1
     for k, name in enumerate(
@@ -60,6 +64,9 @@ class Forms:
 
 
 def _match(cell: str) -> re.Match[str] | None:
+    if (packed := COMPACT.fullmatch(cell)) is not None:
+        year, month, day, hour, minute, second, part = packed.groups()
+        cell = f"{year}-{month}-{day} {hour}:{minute}:{second}" + (f".{part}" if part else "")
     return STAMP.fullmatch(f"00:{cell}" if MINUTES.fullmatch(cell) else cell)
 
 
@@ -123,6 +130,7 @@ def _day(found: re.Match[str], month_first: bool) -> int | None:
         if found["named"].lower() not in MONTHS:
             return None
         year, day = int(found["of_year"]), int(found["of_month"])
+        year += CENTURY if year < 100 else 0
         month = MONTHS[found["named"].lower()]
     else:
         year, first, second = (int(found[name]) for name in ("late", "first", "second"))
@@ -144,5 +152,6 @@ def _time_of_day_ns(found: re.Match[str]) -> int | None:
         hour = hour % 12 + (12 if half[0] == "p" else 0)
     zone = found["zone"] or "Z"
     away = 0 if zone.isalpha() else (int(zone[1:3]) * 60 + int(zone[-2:])) * (-1 if zone[0] == "-" else 1)
+    hour += 24 * int(found["days"] or 0)
     seconds = hour * 3600 + (minute - away) * 60 + second
     return seconds * SECOND_NS + int((found["part"] or "0").ljust(9, "0"))

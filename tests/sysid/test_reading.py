@@ -3,6 +3,7 @@
 import gzip
 import json
 import math
+import re
 import struct
 import zlib
 
@@ -12,7 +13,12 @@ import scipy.io
 
 import ranger_sim
 from ranger_sim.can_bus.edge import logs
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.api import diagnose
+from ranger_sim.sysid.dataset import Channel, Dataset
+from ranger_sim.sysid.machines import machine_of
+from ranger_sim.sysid.preparation import prepared
 from ranger_sim.sysid.readers import layout, text_file
 from ranger_sim.sysid.reading import open_recording, read
 from ranger_sim.sysid.recipe import Recipe
@@ -110,6 +116,53 @@ def test_all_rows_decide_and_not_the_first_ones(written):
     assert read(written(late))["a_V"].value[-1] == 1.5  # a comma behind the first chunk of lines
 
 
+LONG = 25_000  # rows: beyond the first chunk, and far beyond the lines that decide the layout
+
+
+def long_table(later, first="{t:.2f};{v:.4f}\n", count=LONG, names="t_s;a_V\n"):
+    return names + rows(first, count) + "".join(later.format(k=k, t=0.01 * k, v=1.5) for k in range(count, count + 500))
+
+
+@pytest.mark.parametrize(
+    ("later", "reason"),
+    [
+        ("{t:.2f};{v:.4f};7\n", "from line 25002 on 500 rows have another form than those above: 3 cells, not 2"),
+        ("{t:.2f},{v:.4f}\n", r"from line 25002 on .*: 1 cells, or 2 between other separators \(comma\)"),
+        ("{t:.2f};--- {v}\n", "a_V: 500 cells are not numbers, the first in line 25002"),
+    ],
+)
+def test_rows_that_change_their_form_late_are_named_with_their_line(later, reason, written):
+    measurement = read(written(long_table(later)))
+    said = [f"{each.channel}: {each.text}" for each in measurement.matters]
+    assert any(re.search(reason, each) for each in said), said
+    assert sum(measurement.ledger()["lines"].values()) == LONG + 501
+
+
+def test_marks_and_stamps_that_change_late_are_refused_with_their_line(written):
+    with pytest.raises(
+        UserError, match=r"decimal point \('0.0000', first in line 2\), others a decimal comma .*first in line 25002"
+    ):
+        read(written(long_table("{k};1,{k:03d}5\n")))
+    dates = "".join(f"2026-11-05T09:{k // 60:02d}:{k % 60:02d};{k}\n" for k in range(3000))
+    with pytest.raises(UserError, match=r"from line 20001 on the stamps have another form than '2026-11-05T09:00:00'"):
+        read(written("Zeit;a_V\n" + dates * 7 + rows("{k};1\n", 20_000)))
+    late = read(written(long_table("2026-11-05T09:30:00;1\n")))
+    assert "500 rows have no stamp and are left out (line 25002" in late.matters[0].text
+
+
+def test_a_second_table_far_below_is_a_question_with_both_lines(written):
+    text = long_table("", count=LONG) + "\ntime_s;b_A;c_A\n" + rows("{t:.2f};{v:.4f};1\n", 50)
+    with pytest.raises(UserError, match="names in line 1 and in line 25003"):
+        read(written(text))
+
+
+def test_thousands_that_come_late_are_not_taken_for_decimals(written):
+    text = "t_s;a_V\n" + "".join(f"{k};{k // 25}\n" for k in range(LONG))
+    late = "".join(f"{LONG + k};{1000 + k:,}\n".replace(",", ".") for k in range(600))
+    measurement = read(written(text + late))
+    assert measurement["a_V"].value[-1] == 1599.0 and measurement["a_V"].value[LONG - 1] == 999.0
+
+
 def test_several_tables_are_a_question_and_one_of_them_is_read(written):
     text = "t_s,a_V\n" + rows("{t:.2f},{v:.4f}\n") + "\ntime_s,b_A\n" + rows("{t:.2f},{i:.4f}\n", 50)
     path = written(text)
@@ -117,6 +170,50 @@ def test_several_tables_are_a_question_and_one_of_them_is_read(written):
         read(path)
     assert "--assume names=203" in error.value.args[2]
     assert len(read(path, assume={"names": "203"})["b_A"].value) == 50
+
+
+def test_microseconds_since_a_controllers_start_are_not_a_date(written):
+    stamps = "".join(f"{749_676_761 + 2000 * k},{k % 7}\n" for k in range(100))
+    with pytest.raises(UserError, match="in us 0.002 s:"):
+        read(written("time,a\n" + stamps))
+    dates = "".join(f"{1_749_676_761 + k // 10}.{k % 10},{k % 7}\n" for k in range(100))
+    assert read(written("time,a\n" + dates))["a"].time_s[-1] == pytest.approx(9.9, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (rows("{t:.3f},{v:.3f}\n").replace(".", ","), "may be decimals behind a comma, and then nothing says where"),
+        ('t_s,note,a_V\n0,"one\ntwo",1\n1,"one\ntwo",2\n', ":2: a quoted cell goes on in the next line"),
+        (rows("step {k} {v:.3f}\n"), "has no names, and its column_1 holds words such as 'step'"),
+        ('{"t": 0, "u": 1}\n', "this is a JSON file"),
+    ],
+)
+def test_what_is_not_a_table_is_refused_with_its_reason(text, reason, written):
+    with pytest.raises(UserError, match=reason):
+        read(written(text))
+
+
+def test_the_finer_of_two_times_is_taken(written):
+    text = "Date,Time,t_s,a_V\n" + "".join(f"2026-11-05,09:30:{k // 100:02d},{0.01 * k:.2f},{k}\n" for k in range(200))
+    measurement = read(written(text))
+    assert measurement["a_V"].time_s == pytest.approx(T) and list(measurement.channels) == ["a_V"]
+
+
+def test_stamps_without_anything_between_are_dates_and_parts_of_a_day_are_not_seconds(written):
+    packed = "".join(f"20261105T0930{k // 100:02d}.{k % 100:02d},{k}\n" for k in range(200))
+    assert read(written("time,a_V\n" + packed))["a_V"].time_s == pytest.approx(T)
+    days = "".join(f"{0.395833333 + 0.01 * k / 86400.0:.12f},{k}\n" for k in range(200))
+    measurement = read(written("Time,a_V\n" + days))
+    assert np.diff(measurement["a_V"].time_s) == pytest.approx(np.full(199, 0.01), rel=1e-4)
+    assert "taken for days" in measurement.matters[0].text
+
+
+def test_marks_of_no_value_and_hexadecimal_columns_are_not_numbers(written):
+    cells = "".join(f"{0.01 * k:.2f},{'9.91E+37' if k % 30 == 5 else k},{10 + k % 3}E{k % 3}\n" for k in range(200))
+    measurement = read(written("t_s,a_V,id_hex\n" + cells))
+    assert list(measurement.channels) == ["a_V"] and np.isnan(measurement["a_V"].value[5::30]).all()
+    assert any("hexadecimal numbers such as '10E0'" in each.text for each in measurement.matters)
 
 
 def test_an_assumption_is_checked():
@@ -240,7 +337,7 @@ def test_messages_of_mcap_are_channels_by_topic(tmp_path):
 
 def test_what_is_of_another_kind_is_named(written):
     for content, line in (
-        (b"TDSm\x0e\0\0\0", "TDMS"), (b"\xd4\xc3\xb2\xa1\x02\0", "packet capture"), (b"%PDF-1.7\n", "a PDF"),
+        (b"\xd0\xcf\x11\xe0\0\0", "workbook of an old Excel"), (b"%PDF-1.7\n", "a PDF"),
     ):  # fmt: skip
         with pytest.raises(UserError, match=line):
             read(written(content))
@@ -310,6 +407,44 @@ def test_nothing_is_concluded_from_spoilt_runs_of_the_positioning_bench(kind, re
     assert main(arguments) == 2
     error = " ".join(capsys.readouterr().err.split())
     assert reason.split(" .* ")[0] in error and "nothing is concluded" in error
+
+
+def prepared_run(written, names, data, **how):
+    text = "".join(f"{t:.3f},{a:.7f},{b:.7f},{c:.5f}\n" for t, a, b, c in data.tolist())
+    return prepared(open_recording(written(f"{names}\n{text}"), **how), machine_of("positioning"))
+
+
+@needs_data
+def test_a_cut_off_command_of_the_positioning_bench_is_refused_unless_its_limit_is_a_true_one(positioning, written):
+    names, data = positioning
+    spoilt = data[:8000].copy()
+    spoilt[:, 3] = np.minimum(spoilt[:, 3], 0.9 * spoilt[:, 3].max())
+    with pytest.raises(UserError, match=r"voltage_V: \d+ values are cut off .*--assume limits=voltage_V"):
+        prepared_run(written, names, spoilt)
+    sound = prepared_run(written, names, spoilt, assume={"limits": "motor_voltage_command_V"})
+    assert len(sound.table) == 8000
+
+
+@needs_data
+def test_shuffled_rows_of_the_positioning_bench_are_sorted_into_the_same_table(positioning, written):
+    names, data = positioning
+    base = prepared_run(written, names, data[:5000]).table
+    order = generator(3, "shuffled rows").permutation(5000)
+    shuffled = prepared_run(written, names, data[order])
+    assert {each.kind for each in shuffled.findings} >= {"reversed_stamps"}
+    for name, column in base.columns.items():
+        assert np.array_equal(shuffled.table[name], column)
+
+
+@needs_data
+def test_a_late_position_of_the_positioning_bench_is_named_as_a_lag(positioning):
+    late = positioning[1][:10_000].copy()
+    late[:, 1] = np.concatenate((np.full(30, late[0, 1]), late[:-30, 1]))
+    channels = {
+        name: Channel(name, unit, late[:, 0], late[:, column], resolution)
+        for name, unit, column, resolution in (("position_m", "m", 1, 1e-7), ("voltage_V", "V", 3, 1e-5))
+    }
+    assert "sensor_lag" in {each.name for each in diagnose([Dataset("late", channels)], "positioning").causes}
 
 
 def test_a_command_that_reads_takes_the_same_options(written, capsys):

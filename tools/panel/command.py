@@ -20,6 +20,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
 from ranger_sim.tools.command_line import terminal
 from ranger_sim.tools.command_line.units import number, whole_number, word
+from ranger_sim.tools.recordings import datasets
 
 PORT = 8311  # chosen by us: among the ports that IANA has not assigned
 HERE = "127.0.0.1"
@@ -39,7 +40,7 @@ def register(commands: Any) -> None:
     command.add_argument(
         "recordings", nargs="*", metavar="RECORDING", help="a walk's folder, MF4, CSV, RoboDAQ's text, candump"
     )
-    command.add_argument("--dbc", action="append", default=[], metavar="FILE", help="messages of frames (repeatable)")
+    datasets.add_options(command)
     command.add_argument(
         "--shift", type=number(), default=0.0, metavar="S", help="seconds by which the second one is later"
     )
@@ -94,7 +95,8 @@ def source_of(options: argparse.Namespace, report: Any) -> Iterator[Any]:
         from ranger_sim.tools.panel.recording import Event, RecordingSource
 
         align = Event.typed(options.align) if options.align else None
-        with contextlib.closing(RecordingSource(options.recordings, options.dbc, options.shift, align)) as recording:
+        how = datasets.how_of(options)
+        with contextlib.closing(RecordingSource(options.recordings, how, options.shift, align)) as recording:
             yield recording
     elif options.port:
         from ranger_sim.tools.panel.link import LinkSource

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import pathlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ranger_sim import datatable
 from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
+from ranger_sim.sysid.recipe import Recipe
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.inside.buses import Bus
 from ranger_sim.tools.panel.inside.recorded import NO_SLOTS, REPORTED_SLOTS, Decoded, RunLogs
@@ -59,15 +60,24 @@ class Event:
 class RecordingSource(Source):
     """One or two recordings, the second overlaid on the first: `shift_s` later, after aligning the events of `align`.
 
-    UserError for an unreadable recording, or one in which the event never occurs.
+    how: of `reading.open_recording`. UserError for an unreadable recording, or one in which the event never occurs.
     """
 
     def __init__(
-        self, paths: Sequence[str], databases: Sequence[str] = (), shift_s: float = 0.0, align: Event | None = None
+        self,
+        paths: Sequence[str],
+        how: Mapping[str, Any] | None = None,
+        shift_s: float = 0.0,
+        align: Event | None = None,
     ) -> None:
         super().__init__()
+        how = dict(how or {})
+        databases = how.get("databases", ())
+        if how.get("recipe"):
+            how["recipe"] = recipe = Recipe.load(how["recipe"])
+            databases = databases or recipe.databases
         decoded = [Decoded(pathlib.Path(path), databases) if databases else None for path in paths]
-        read_in = [read(path, databases, frames) for path, frames in zip(paths, decoded, strict=True)]
+        read_in = [read(path, how, frames) for path, frames in zip(paths, decoded, strict=True)]
         if align is not None:
             first, second = (align.first(dataset) for dataset in read_in)
             shift_s += first - second
@@ -174,12 +184,15 @@ class RecordingSource(Source):
         }
 
 
-def read(path: str, databases: Sequence[str], frames: Decoded | None) -> Dataset:
-    """The channels of one recording, including a simulated body's. frames: receives its frames, if it has any."""
-    if (pathlib.Path(path) / run_folder.VARIABLES).is_file():
+def read(path: str, how: Mapping[str, Any], frames: Decoded | None) -> Dataset:
+    """The channels of one recording, including a simulated body's. how: of `reading.open_recording`.
+
+    frames: receives its frames, if it has any.
+    """
+    if (pathlib.Path(path) / run_folder.VARIABLES).is_file() and not any(how.values()):
         return run_folder.read(path, truth=True)
     each_frame = None if frames is None else frames.take
-    return datasets.open_recording(path, databases=databases, each_frame=each_frame)
+    return datasets.open_recording(path, each_frame=each_frame, **how)
 
 
 def inside_of(

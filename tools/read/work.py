@@ -92,15 +92,24 @@ def show(measurement: Measurement, console: Console) -> None:
     if len(answer["channels"]) > MOST_CHANNELS:
         console.print(f"and {len(answer['channels']) - MOST_CHANNELS} more channels (--json has all)")
     _show_ledger(measurement, console)
+    of_channels: dict[tuple[str, str], list[str]] = {}  # what all channels of a time base have is one line
     for each in sorted(measurement.findings, key=lambda finding: finding.severity == sanity.NOTE):
         place = f"{each.start_s:.6g} to {each.end_s:.6g} s: " if each.end_s > each.start_s else ""
         mark = "note" if each.severity == sanity.NOTE else "finding"
-        name = f"{each.channel}: " if each.channel else ""
-        console.print(printable(f"{mark}: {name}{place}{each.text}"), soft_wrap=True)
+        of_channels.setdefault((mark, place + each.text), []).append(each.channel)
     for repair in measurement.proposals:
-        name = f"{repair.channel}: " if repair.channel else ""
-        share = f" ({measurement.share_of(repair):.2%} of its samples)" if repair.count else ""
-        console.print(printable(f"proposal: {name}{repair.text}{share}"), soft_wrap=True)
+        residual = "" if repair.residual is None else f", residual {repair.residual:.3g} {repair.unit}".rstrip()
+        share = f", {measurement.share_of(repair):.2%} of its samples" if repair.count else ""
+        option = f" ({repair.option})" if repair.option else ""
+        of_channels.setdefault(("proposal", repair.text + residual + share + option), []).append(repair.channel)
+    for (mark, text), names in of_channels.items():
+        console.print(printable(f"{mark}: {_named(names, ': ')}{text}"), soft_wrap=True)
+
+
+def _named(names: list[str], behind: str) -> str:
+    """Channels by name, the first of them where there are many; empty for the recording as a whole."""
+    called = ", ".join(name for name in names[:3] if name)
+    return called + (f" and {len(names) - 3} more" if len(names) > 3 else "") + (behind if called else "")
 
 
 def _show_ledger(measurement: Measurement, console: Console) -> None:
@@ -117,9 +126,7 @@ def _show_ledger(measurement: Measurement, console: Console) -> None:
             )
             alike.setdefault(f"{account['read']} read, {account['kept']} kept, left out: {reasons}", []).append(name)
     for text, names in alike.items():
-        called = ", ".join(name or "of no channel" for name in names[:3])
-        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        console.print(printable(f"samples of {called}{more}: {text}"), soft_wrap=True)
+        console.print(printable(f"samples of {_named(names, '') or 'no channel'}: {text}"), soft_wrap=True)
 
 
 def plot(found: list[Measurement], path: pathlib.Path) -> None:

@@ -35,7 +35,8 @@ def add_options(command: Any) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help=f"how a text table is written, where it can be read in two ways: {', '.join(layout.KEYS)} (repeatable)",
+        help="how a text table is written, where it can be read in two ways, and what is known of its channels: "
+        f"{', '.join(layout.KEYS)} (repeatable)",
     )
     command.add_argument(
         "--recipe", metavar="FILE", help="read as an import recipe says (ranger-sim read --write-recipe)"

@@ -96,6 +96,20 @@ def test_recordings_that_cannot_be_replayed_are_reported(recorded, tmp_path):
             read_log(path)
 
 
+def test_an_identifier_on_two_buses_is_a_question_and_not_merged(tmp_path):
+    path = tmp_path / "two.log"
+    path.write_text("(1.0) vcan0 00E#01\n(1.1) vcan1 00E#02\n(1.2) vcan1 02A#03\n", encoding="utf-8")
+    assert [(frame.bus, frame.lo) for frame in read_log(path)] == [("vcan0", 1), ("vcan1", 2), ("vcan1", 3)]
+    with pytest.raises(UserError, match=r"buses vcan0, vcan1, and 0xe on more than one.*bus={'vcan0': 'can1'}"):
+        read_log(path, bus="can1")
+    chosen = read_log(path, bus={"vcan1": "can1"})
+    assert [(frame.bus, frame.lo) for frame in chosen] == [("can1", 2), ("can1", 3)]
+    assert chosen.ledger == {"two.log": {"frames": 2, "other buses": 1}}
+    assert [frame.lo for frame in read_log(path, bus="vcan0")] == [1]
+    with pytest.raises(UserError, match=r"bus 'vcan2': unknown bus \(available: vcan0, vcan1\)"):
+        read_log(path, bus={"vcan2": "can1"})
+
+
 def test_a_recording_that_is_cut_off_is_not_replayed(recorded, tmp_path):
     path = tmp_path / "a.blf"
     with can.Logger(path) as writer:
@@ -105,3 +119,6 @@ def test_a_recording_that_is_cut_off_is_not_replayed(recorded, tmp_path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(UserError, match=r"a.blf: \d+ of 4000 frames are lost \(\d+ cut off, behind byte"):
         read_log(path, bus="can1")
+    part = read_log(path, bus="can1", accept_loss=1.0)
+    assert 0 < len(part) < 4000 and sum(part.ledger["a.blf"].values()) == 4000
+    assert part.ledger["a.blf"]["frames"] == len(part)

@@ -15,6 +15,7 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import error_word
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.ranger.feed import FeedServer
+from ranger_sim.tools.cli import main
 from ranger_sim.tools.panel.inside.errors import ErrorList
 from ranger_sim.tools.panel.link import LinkSource
 from ranger_sim.tools.panel.recording import Event, RecordingSource
@@ -301,7 +302,7 @@ def test_the_errors_of_a_walks_folder_are_those_of_its_summary_as_far_as_they_we
 
 def test_frames_with_their_dbc_file_are_shown_by_it_and_their_load_is_not_known(folder):
     path, database = str(folder / "can1.log"), GENERATED / "can1.dbc"
-    with contextlib.closing(RecordingSource([path], [str(database)])) as source:
+    with contextlib.closing(RecordingSource([path], {"databases": [str(database)]})) as source:
         shown = source.state(1.2345)
     with contextlib.closing(RecordingSource([str(folder)])) as known:
         asyncio.run(known.run())
@@ -340,6 +341,19 @@ def test_a_file_that_is_not_a_recording_is_reported(tmp_path, monkeypatch, path,
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=words):
         RecordingSource([path])
+
+
+def test_assumptions_and_recipes_say_how_a_recording_is_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pathlib.Path("a.csv").write_text("t_s;level_V\n" + "".join(f"{k};{1 + k % 5},{100 + k}\n" for k in range(20)))
+    served = []
+    monkeypatch.setattr("ranger_sim.tools.panel.command.serve", lambda source, *_: served.append(source.data) or 0)
+    assert main(["panel", "a.csv", "--http-port", "0", "--assume", "decimal=comma", "--map", "level_V=a_V"]) == 0
+    assert main(["read", "a.csv", "--assume", "decimal=point", "--write-recipe", "lab.toml"]) == 0
+    assert main(["panel", "a.csv", "--http-port", "0", "--recipe", "lab.toml"]) == 0
+    assert [float(data[0][1][0]) for data in served] == [pytest.approx(1.1), 1100.0]
+    pathlib.Path("other.csv").write_text("t_s;volume\n0;1\n1;2\n")
+    assert main(["panel", "other.csv", "--http-port", "0", "--recipe", "lab.toml"]) == 2
 
 
 def test_a_port_that_is_not_there_is_reported():

@@ -1,0 +1,86 @@
+"""Stamps that are numbers, in whatever unit a file has them, as seconds."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ranger_sim.foundation.user_error import DataError
+from ranger_sim.sysid import units
+from ranger_sim.sysid.dataset import Array, Dataset, Finding, Repair
+from ranger_sim.sysid.readers import columns
+
+DAYS = (  # of the years 1954 to 2119: of spreadsheets since 1900, of MATLAB since the year 0, of astronomers
+    (20_000.0, 80_000.0),
+    (713_960.0, 773_960.0),
+    (2_435_018.0, 2_495_018.0),
+)
+DAY_S = 86_400.0
+EARLIEST_DAY, LATER_THAN_LONG = 0.01, 10.0  # parts of a day begin long after midnight; an oscilloscope's stamps about 0
+FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
+SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
+LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
+EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
+EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
+
+
+def seconds(
+    dataset: Dataset,
+    path: str,
+    name: str,
+    stamps: Array,
+    whole: NDArray[np.int64] | None = None,
+    unit: units.Unit | None = None,
+) -> tuple[Array, int]:
+    """Stamps (n,) in s, and the time in ns from which those of a calendar count, the first one; else 0.
+
+    path: of the file, for commands. whole: the stamps where all are whole numbers: floats would round those of a
+    calendar. unit: None where nothing gives it. UserError for a unit of something else, and for stamps whose unit
+    does not follow from their size.
+    """
+    unit = unit or _assumed(dataset, path, name, stamps)
+    if unit.numerator != ("s",) or unit.denominator:
+        raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
+    if unit.factor != 1.0:
+        dataset.repairs.append(Repair("", "si_unit", len(stamps), f"{name}: times {unit.factor:g}, now in s"))
+    time_s = stamps * unit.factor
+    from_zero = columns.from_zero(dataset, time_s)
+    if from_zero is time_s:
+        return time_s, 0
+    if whole is not None and len(whole):
+        return (whole - whole[0]) * unit.factor, int(whole[0]) * round(unit.factor * 1e9)
+    return from_zero, round(columns.ends(time_s)[0] * 1e9)
+
+
+def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Unit:
+    """Unit of stamps without a given one: what their size can only be, else seconds."""
+    steps = np.diff(stamps[np.isfinite(stamps)])
+    usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
+    ends = columns.ends(stamps)
+    of_a_day = EARLIEST_DAY < ends[0] < 1.0 and 0.0 <= ends[1] - ends[0] < ends[0] / LATER_THAN_LONG
+    days = of_a_day or any(all(low < end < high for end in ends) for low, high in DAYS)
+    if 0.0 < usual < FASTEST_S and days:
+        text = f"{name}: {ends[0]:.10g} is taken for days: samples would be {usual:.3g} s apart otherwise"
+        dataset.findings.append(Finding("", "unit_assumed", *ends, 86400.0, "s", text))
+        return units.Unit(("s",), (), DAY_S)
+    for spelling, factor in EPOCHS.items():
+        is_of_calendar = all(EPOCH_YEARS_S[0] < end * factor < EPOCH_YEARS_S[1] for end in ends)
+        if is_of_calendar and usual * factor <= EPOCH_STEP_S:
+            text = (
+                f"{name}: {ends[0]:.15g} is taken for {spelling} since 1970: of the years 1990 to 2100 in no other unit"
+            )
+            dataset.findings.append(Finding("", "unit_assumed", *ends, factor, "s", text, "note"))
+            return units.Unit(("s",), (), factor)
+    text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
+    if usual > SLOWEST_S:
+        smaller = next((unit for unit in ("ms", "us", "ns") if usual * units.ATOMS[unit][1] <= SLOWEST_S), "ns")
+        better = usual * units.ATOMS[smaller][1]
+        if usual > LONGEST_S or len(stamps) >= FEWEST:
+            raise DataError(
+                f"{path}: {name}: nothing says the unit of the stamps; in seconds samples would be "
+                f"{usual:.6g} s apart, in {smaller} {better:g} s:",
+                f"  ranger-sim read {path} --time-unit {smaller}",
+                f"  ranger-sim read {path} --time-unit s",
+            )
+        text += f", which are {usual:.6g} s apart; --time-unit {smaller} would make them {better:g} s"
+    dataset.findings.append(Finding("", "unit_assumed", *ends, 1.0, "s", text))
+    return units.Unit(("s",))
