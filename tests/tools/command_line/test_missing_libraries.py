@@ -36,8 +36,10 @@ NEEDED = {
     "distributed": ["campaign few.toml --out c --pool dask", "campaign few.toml --out c --scheduler tls://x:1"],
     "elftools": ["walk --image MCH=hip.axf"],
     "h11": ["panel"],
+    "h5py": ["read t.h5"],
     "jinja2": ["campaign few.toml --out c"],
     "mcap": ["walk --time 50ms --trace t.mcap"],
+    "nptdms": ["read t.tdms"],
     "numpy": ["walk --time 50ms", "diagnose run.csv --experiment motor-bench"],
     "perfetto": ["walk --time 50ms --trace t.pftrace"],
     "plotly": ["campaign few.toml --out c"],
@@ -67,6 +69,8 @@ def folder(tmp_path):
     (tmp_path / "few.toml").write_text(CAMPAIGN)
     (tmp_path / "hip.axf").write_bytes(b"\x7fELF")
     (tmp_path / "t.parquet").write_bytes(b"PAR1")
+    (tmp_path / "t.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    (tmp_path / "t.tdms").write_bytes(b"TDSm" + bytes(100))
     (tmp_path / "t.ulg").write_bytes(b"ULog\x01\x12\x35")
     for name in ("run.csv", "run.mf4", "x.dbc"):
         (tmp_path / name).write_text("t,angle\n0,1\n")
