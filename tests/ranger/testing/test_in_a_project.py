@@ -108,7 +108,7 @@ def test_what_the_documents_show_runs(tmp_path):
     tests = [block for block in blocks if "def test_" in block]
     [law] = [block for block in blocks if block.startswith("def compliant_control")]
     [calls] = [block for block in blocks if "with contextlib.closing(new_robot(" in block]
-    assert len(tests) == 4 and TEST in tests and law == LAW.replace("law()\n", "law()  # or your own\n", 1)
+    assert len(tests) == 3 and TEST in tests and law == LAW.replace("law()\n", "law()  # or your own\n", 1)
     for number, text in enumerate(tests):
         write(tmp_path, **{f"tests__test_shown_{number}": "import pytest\n\n" + text})
     write(tmp_path, boards__hip_law=law, tests__test_calls="def test_calls():\n    exec(" + repr(calls) + ", {})\n")
