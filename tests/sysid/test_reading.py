@@ -194,6 +194,15 @@ def test_what_is_not_a_table_is_refused_with_its_reason(text, reason, written):
         read(written(text))
 
 
+def test_a_last_number_without_its_last_digits_is_not_read_as_another_number(written):
+    text = "t_s,a_V\n" + rows("{t:.2f},{v:.4f}\n")
+    for cut in (1, 2, 3):
+        measurement = read(written(text[: -1 - cut]))
+        assert len(measurement["a_V"].value) == 199 and measurement.ledger()["lines"]["left out: cut off"] == 1
+    assert len(read(written(text[:-1]))["a_V"].value) == 200  # many writers end without a line end
+    assert len(read(written("t_s,a_V\n" + rows("{t:g},{v:g}\n")[:-1]))["a_V"].value) == 200  # numbers of any length
+
+
 def test_the_finer_of_two_times_is_taken(written):
     text = "Date,Time,t_s,a_V\n" + "".join(f"2026-11-05,09:30:{k // 100:02d},{0.01 * k:.2f},{k}\n" for k in range(200))
     measurement = read(written(text))
@@ -503,3 +512,6 @@ def test_topics_of_a_flight_log_are_channels_by_their_own_stamps(tmp_path):
     assert set(measurement.channels) == {"motor.current", "motor.angle[0]", "motor.angle[1]"}
     assert measurement["motor.current"].value == pytest.approx(0.5 * np.arange(50))
     assert measurement["motor.angle[1]"].time_s == pytest.approx(0.01 * np.arange(50))
+    path.write_bytes(b"".join(parts)[:-5])
+    (finding,) = read(path).matters
+    assert finding.kind == "cut_off" and f"begins at byte {len(b''.join(parts[:-1]))}" in finding.text
