@@ -472,6 +472,10 @@ def _channels(
             continue
         unit_text = rows.layout.units[index]
         named = columns.label(dataset.name, name, unit_text or column.unit_text or unit_text, mapping)
+        if other := _other_unit(name, unit_text, column):
+            ends = columns.ends(time_s)
+            dataset.findings.append(Finding(named.name, "unreadable", *ends, float(column.rows), "samples", other))
+            continue
         value, present = column.value(), column.has_cell()
         if column.odd and column.first_odd is not None:
             _, line, cell = column.first_odd
@@ -501,8 +505,18 @@ def _channels(
         column.values = []
     if not dataset.channels:
         called = " and ".join(names[index] for index in sorted(time_columns))
-        raise DataError(f"{rows.path}: there is no channel except the time column {called}")
+        unread = next((f" ({each.channel}: {each.text})" for each in dataset.findings if each.kind == "unreadable"), "")
+        raise DataError(f"{rows.path}: there is no channel except the time column {called}{unread}")
     return dataset
+
+
+def _other_unit(name: str, unit_text: str | None, column: _Column) -> str:
+    """What is wrong with a column whose cells have a unit of another kind than its name or its row of units; or ""."""
+    said = units.unit_of(unit_text) if unit_text else units.split(name)[1]
+    in_cells = units.unit_of(column.unit_text) if column.unit_text else None
+    if said is None or in_cells is None or said.same_kind(in_cells):
+        return ""
+    return f"cells such as {column.first[:30]!r} are in {in_cells.text}, and the column is in {said.text}: left out"
 
 
 def _refuse_words(rows: _Rows, table: list[_Column]) -> None:

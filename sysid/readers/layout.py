@@ -173,6 +173,8 @@ def of(path: pathlib.Path, survey: text_file.Survey, assumed: Mapping[str, str])
     first, names_line, names = _names(path, attempt, head, assumed)
     below = [(place, cells) for place, cells in attempt.rows if place > names_line]
     names, unit_texts, units_line, first = _units(attempt, names, names_line, below, first)
+    if names_line and not any(unit_texts):
+        unit_texts = _units_above(attempt, names_line) or unit_texts
     decimal = {"point": ".", "comma": ","}.get(assumed.get("decimal", ""), "")
     ignored: tuple[int, ...] = ()
     if "Increment" in names and below:  # Rigol: units, start and increment in the row below
@@ -192,6 +194,15 @@ def of(path: pathlib.Path, survey: text_file.Survey, assumed: Mapping[str, str])
     return Layout(
         survey.encoding, attempt.separator, decimal, names_line, units_line, first, names, unit_texts, above, ignored
     )
+
+
+def _units_above(attempt: _Attempt, names_line: int) -> tuple[str | None, ...] | None:
+    """The row above the names, where each of its cells is a unit."""
+    above = [cells for place, cells in attempt.rows if place < names_line][-1:]
+    bare = [cell.strip("[]() ") for cell in above[0]] if above else []
+    if len(bare) != attempt.count or not any(bare) or any(cell and units.unit_of(cell) is None for cell in bare):
+        return None
+    return tuple(bare)
 
 
 def _with_preamble(

@@ -163,6 +163,17 @@ def test_limits_that_are_assumed_to_be_true_are_a_note_and_nothing_is_masked(tab
         read(path, assume={"limits": "v_V"})
 
 
+def test_a_recipe_keeps_what_is_assumed_of_the_channels(table, tmp_path):
+    data = clipped()
+    stamps = np.round(0.0024 * np.arange(2000), 3)
+    path = table(stamps, np.round(data["u_V"].value, 4), np.round(np.sin(data["u_V"].time_s), 4))
+    recipe = tmp_path / "lab.toml"
+    assumed = ["--assume", "clock=even", "--assume", "limits=u_V"]
+    assert main(["read", str(path), *assumed, "--write-recipe", str(recipe)]) == 0
+    again = read(path, recipe=recipe)
+    assert again["u_V"].limits_are_true and np.diff(again["u_V"].time_s) == pytest.approx(np.full(1999, 0.0024))
+
+
 def test_rows_of_a_table_with_a_value_that_is_cut_off_are_left_out_of_all_channels():
     data = clipped()
     found = repairs.without_clipped_rows(data, sanity.inspect(data))

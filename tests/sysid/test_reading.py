@@ -194,6 +194,32 @@ def test_what_is_not_a_table_is_refused_with_its_reason(text, reason, written):
         read(written(text))
 
 
+def test_signs_behind_a_number_and_letters_that_are_not_its_unit_are_not_read_past(written):
+    measurement = read(written("t_s,a_V\n0,1.5\n1,1.5-\n2,2.5\n3,0.5-\n"))
+    assert measurement["a_V"].unit == "V" and np.isnan(measurement["a_V"].value[[1, 3]]).all()
+    milli = read(written("t_s,a_V,b_V\n" + rows("{t:.2f},{v:.3f}m,{v:.3f}\n")))
+    assert list(milli.channels) == ["b_V"]
+    assert any("cells such as '0.000m' are in m, and the column is in V" in each.text for each in milli.matters)
+    with pytest.raises(
+        UserError, match=r"except the time column t_s \(a_V: 2 cells are not numbers, .* line 2: '1_000'"
+    ):
+        read(written("t_s,a_V\n0,1_000\n1,1_001\n"))
+
+
+def test_a_row_of_units_may_be_above_the_names(written):
+    measurement = read(written("ms,mV,A\nt,u,i\n" + rows("{k}0,{v:.3f},{i:.3f}\n")))
+    assert measurement["u"].unit == "V" and measurement["u"].time_s == pytest.approx(T)
+
+
+def test_a_last_number_without_its_last_digits_is_not_read_as_another_number(written):
+    text = "t_s,a_V\n" + rows("{t:.2f},{v:.4f}\n")
+    for cut in (1, 2, 3):
+        measurement = read(written(text[: -1 - cut]))
+        assert len(measurement["a_V"].value) == 199 and measurement.ledger()["lines"]["left out: cut off"] == 1
+    assert len(read(written(text[:-1]))["a_V"].value) == 200  # many writers end without a line end
+    assert len(read(written("t_s,a_V\n" + rows("{t:g},{v:g}\n")[:-1]))["a_V"].value) == 200  # numbers of any length
+
+
 def test_the_finer_of_two_times_is_taken(written):
     text = "Date,Time,t_s,a_V\n" + "".join(f"2026-11-05,09:30:{k // 100:02d},{0.01 * k:.2f},{k}\n" for k in range(200))
     measurement = read(written(text))
@@ -503,3 +529,6 @@ def test_topics_of_a_flight_log_are_channels_by_their_own_stamps(tmp_path):
     assert set(measurement.channels) == {"motor.current", "motor.angle[0]", "motor.angle[1]"}
     assert measurement["motor.current"].value == pytest.approx(0.5 * np.arange(50))
     assert measurement["motor.angle[1]"].time_s == pytest.approx(0.01 * np.arange(50))
+    path.write_bytes(b"".join(parts)[:-5])
+    (finding,) = read(path).matters
+    assert finding.kind == "cut_off" and f"begins at byte {len(b''.join(parts[:-1]))}" in finding.text
