@@ -117,7 +117,7 @@ def environment(folder: pathlib.Path) -> pathlib.Path:
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     [packages] = (folder / "lib").glob("python*/site-packages")
     (packages / "ours.pth").write_text(f"{ROOT}\n{sysconfig.get_path('purelib')}\n", encoding="utf-8")
-    options = ["--disable-pip-version-check", "--no-deps", "-r", HERE / "requirements.txt"]
+    options = ["--disable-pip-version-check", "--no-deps", "-r", str(HERE / "requirements.txt")]
     subprocess.run([python, "-m", "pip", "install", "-q", *options], check=True)
     return python
 
@@ -169,7 +169,8 @@ def run(python: pathlib.Path, suite: Suite, top: pathlib.Path, on_ours: bool) ->
             check=False,
             timeout=LONGEST_S,
         )
-    passed, failed = set(), set()
+    passed: set[str] = set()
+    failed: set[str] = set()
     for case in ElementTree.parse(report).getroot().iter("testcase"):
         name = f"{case.get('classname')}::{case.get('name')}"
         if case.find("skipped") is None:
