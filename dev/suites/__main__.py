@@ -3,7 +3,8 @@
 The suites come as source packages from the package index, at the versions of SUITES, and run as they are, in an
 separate environment with the packages of requirements.txt. Exit code 1 when a test fails on our bus that passes on
 `virtual` and is not in `EXPECTED`; also when one of EXPECTED passes. The name `libraries` runs our own tests that
-compare with other people's libraries (OUR_TESTS): there none may be skipped. --json FILE writes the numbers.
+compare with other people's libraries (OUR_TESTS): there none may be skipped; `plugins` runs a small project of tests
+under ten popular pytest plugins, alone and in pairs. --json FILE writes the numbers.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import sysconfig
 import tarfile
 import xml.etree.ElementTree as ElementTree
 
+from dev.suites import plugins
 from ranger_sim.foundation import wallclock
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -99,7 +101,7 @@ OUR_TESTS = (
     "tests/datatable/test_a2l_file.py",
     "tests/test_examples.py::test_the_example_of_co_simulation_lets_the_robot_fall_six_times",
 )
-LIBRARIES = "libraries"
+LIBRARIES, PLUGINS = "libraries", "plugins"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -183,7 +185,18 @@ def ours_beside_libraries(python: pathlib.Path, folder: pathlib.Path) -> list[st
     folder.mkdir(exist_ok=True)
     report = folder / "libraries.xml"
     done = subprocess.run(
-        [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={report}", *OUR_TESTS],
+        [
+            python,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:randomly",
+            f"--junitxml={report}",
+            *OUR_TESTS,
+        ],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -202,21 +215,27 @@ def ours_beside_libraries(python: pathlib.Path, folder: pathlib.Path) -> list[st
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = argparse.ArgumentParser(prog="python -m dev.suites", description=__doc__.partition("\n")[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join((*SUITES, LIBRARIES))}; default: all")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"of {', '.join((*SUITES, LIBRARIES, PLUGINS))}; default: all"
+    )
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="write the numbers")
     parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "build" / "suites", help="where they are run")
     options = parser.parse_args(arguments)
-    known = [*SUITES, LIBRARIES]
+    known = [*SUITES, LIBRARIES, PLUGINS]
     unknown = sorted(set(options.names) - set(known))
     if unknown:
         parser.error(f"unknown suite {unknown[0]!r} (available: {', '.join(known)})")
     names = options.names or known
     options.folder.mkdir(parents=True, exist_ok=True)
     python = environment(options.folder / "environment")
-    numbers, wrong = {}, []
+    numbers: dict[str, dict[str, object]] = {}
+    wrong: list[str] = []
     if LIBRARIES in names:
         names.remove(LIBRARIES)
         wrong += ours_beside_libraries(python, options.folder)
+    if PLUGINS in names:
+        names.remove(PLUGINS)
+        wrong += plugins.in_pairs(python, options.folder / PLUGINS)
     print(f"{'suite':12} {'virtual':>12} {'ranger_sim':>12} {'seconds':>16}")
     for name in names:
         suite = SUITES[name]
