@@ -24,6 +24,9 @@ from ranger_sim.foundation import wallclock
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HERE = pathlib.Path(__file__).resolve().parent
 LONGEST_S = 900.0
+# plugins of the same environment, for `plugins` alone
+OTHERS = ("randomly", "asyncio", "repeat", "html", "instafail", "pytest_cov")
+WITHOUT = [text for name in OTHERS for text in ("-p", f"no:{name}")]
 SHOWN = 40  # tests of a suite
 
 
