@@ -94,7 +94,7 @@ def diagnose(
     if found.named:
         extended = naming.refit(found.base, found.named, [*skews, *found.named])
     _widen(extended)
-    after = predictability.test(extended, predictor.columns(recordings), seed)
+    after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
     if held:
@@ -154,9 +154,12 @@ def unclipped(machine: Machine, recording: Recording) -> Recording:
 def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple[bands.Band, predictability.Predictor]:
     """The band, of three that suit, in which most of the residual can be predicted; and the predictor in it."""
     best: tuple[float, bands.Band, predictability.Predictor] | None = None
-    for band in bands.choose(recordings):
+    suiting = bands.choose(recordings)
+    for band in suiting:
         inside = [band.of(each) for each in recordings]
         predictor = predictability.predictor(machine, inside, seed)
+        if len(suiting) == 1:
+            return band, predictor
         tests = predictability.test(bands.plain(inside), predictor.columns(inside), seed)
         share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
         if best is None or share > max(MORE_PREDICTED * best[0], predictability.WORTH):
@@ -261,7 +264,7 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
             needed = threshold + free * math.log(regression.size) + 2.0 * math.log(shapes)
             errors = np.sqrt(np.maximum(np.diag(inverse), 0.0) * needed * trial.inflation)
             off = _off(trial.gram, trial.white)
-            if off > predictability.HIDDEN:
+            if off > likelihood.HIDDEN:
                 named = dict(zip(effect.coefficients, (float(each) for each in errors), strict=True))
                 sizes.append((off, named, trial.shape))
         if sizes:

@@ -24,6 +24,7 @@ LEVEL = 0.02  # chance that the best of all candidates exceeds its threshold on 
 MOST = 5  # causes
 LEAST = 6.0  # score that a cause must have whatever the surrogates say: that of a tie
 BLOCKS = 8  # of the cross-validation within the training data
+HIDDEN = 1e-4  # of a candidate's square: when the others explain all but this, an equation does not show it
 FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
 
 Accepts = Callable[[Sequence[Named], Named, Regression, Regression], bool]
@@ -71,8 +72,10 @@ def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: 
         most = np.count_nonzero(good) // FEWEST_FREE - x.shape[1]
         kept: list[Array] = []
         for _, columns in added:
-            if sum(each.shape[1] for each in kept) + columns.shape[1] <= most:
-                kept.append(columns)
+            new = _seen(columns, good, basis)
+            if sum(each.shape[1] for each in kept) + new.shape[1] <= most:
+                kept.append(new)
+                basis = np.linalg.qr(np.hstack([basis, new[good]]))[0]
         wide = np.hstack([x, *kept])
         residual = y - wide @ least_squares(wide[good], y[good])
         memory = noise.autoregression(residual, good & _unbroken(part))
@@ -100,6 +103,18 @@ def _correlations(white: dict[str, Array]) -> dict[tuple[str, str], float]:
 
 def _unbroken(part: Part) -> np.ndarray:
     return np.diff(part.run, prepend=part.run[:1]) == 0
+
+
+def _seen(columns: Array, good: np.ndarray, basis: Array) -> Array:
+    """(n, m) directions of columns (n, k) that an orthonormal basis (rows that count, p) does not have already.
+
+    What is left of a column that the basis has nearly is the noise of the trajectory along which it was made, which
+    would explain the noise itself.
+    """
+    scaled = columns / np.maximum(np.linalg.norm(columns[good], axis=0), 1e-300)
+    inside = scaled[good]
+    _, sizes, turns = np.linalg.svd(inside - basis @ (basis.T @ inside), full_matrices=False)
+    return np.asarray(scaled @ turns[sizes**2 > HIDDEN].T)
 
 
 def _scaled(columns: Array) -> Array:
