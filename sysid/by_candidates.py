@@ -7,6 +7,7 @@ held-out data do not refuse (`likelihood.py`), three errors (`three_numbers.py`)
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import cast
 
 import numpy as np
 from scipy import ndimage
@@ -60,6 +61,8 @@ def diagnose(
     had = [find(each, effects) for each in known]
     effects = [each for each in effects if all(each is not other.effect for other in had)]
     progress("misfit", 0.2)
+    if hasattr(machine, "about_all"):
+        recordings, held = ([_about_all(machine, each, effects) for each in some] for some in (recordings, held))
     skews = list(had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
@@ -125,6 +128,13 @@ def diagnose(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]) -> Recording:
+    """A simulator's recording, linearised with all effects in it, each at the shape that suits best without them."""
+    known = likelihood.noise_of([recording], effects, ())
+    best = likelihood.ranking(naming.trials(effects, Regression([recording], noise=known)), len(recording.table))
+    return cast(Recording, machine.about_all(recording, [(each[3].effect, each[3].shape) for each in best]))  # type: ignore[attr-defined]
 
 
 def unclipped(machine: Machine, recording: Recording) -> Recording:

@@ -53,6 +53,7 @@ STRETCH = 400  # samples of a stretch; covariances of all stretches are computed
 LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
 OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
 AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
@@ -484,6 +485,21 @@ class SimulatedMachine(abc.ABC):
         assert fit is not None
         return fit.acted_on(acting, fixed).recording(AGAIN)
 
+    def about_all(self, recording: Recording, effects: Sequence[tuple[Effect, Shape]]) -> Recording:
+        """The recording linearised where the simulator fits with all of these effects in it, and not only without."""
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        acting = [
+            Acting(effect.term, shape, (0.0,) * len(effect.coefficients))
+            for effect, shape in effects
+            if isinstance(effect, SimulatedEffect) and effect.term is not None
+        ]
+        if not acting:
+            return recording
+        tried = fit.with_all(acting)
+        made = tried.recording()
+        return made if tried.cost * np.prod(tried.noise_y) < fit.cost * np.prod(fit.noise_y) else recording
+
     def free(self, recording: Recording) -> Recording:
         """The recording with errors of free simulation as its equations: the outputs' errors over `window_s`, with the
         simulator started at the most probable state of each window. Inputs count as exact."""
@@ -538,13 +554,14 @@ class _Fit:
         self.size_x, self.size_u = (np.maximum(np.sqrt(np.mean(each**2, axis=0)), 1e-9) for each in (self.x, self.u))
         self.size_p = np.where(self.p != 0.0, np.abs(self.p), 0.01 * np.minimum(self.high - self.low, 1e6))
         self.predictor: Predictor | None = None
-        self.came_from = (self.x, self.u, self.p)
+        self.came_from = self.began = (self.x, self.u, self.p)
         reach = len(table) if not np.isfinite(machine.horizon_s) else max(2, round(machine.horizon_s / self.step_s))
         self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
         self.acting: list[Acting] = []
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
+        self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.at_ports = np.zeros((len(table), len(machine.ports), 0))  # input for a unit of each coefficient
 
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "_Fit":
@@ -559,8 +576,24 @@ class _Fit:
         )
         new.size_p = np.concatenate((self.size_p[:count], np.where(added != 0.0, np.abs(added), 1.0)))
         new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
+        new.damped = np.zeros(len(new.p))
         new.came_from = (new.x, new.u, new.p)
         new.at_ports = np.zeros((*self.at_ports.shape[:2], len(added)))  # filled by the first round, if any effect acts
+        return new
+
+    def with_all(self, acting: Sequence[Acting]) -> "_Fit":
+        """A fit from the start, with candidates in the simulator that are pulled towards 0; their coefficients are 0.
+
+        What a model without its fault ends at may be far from the machine, and not only in the faulty place; first
+        order about it says little. Candidates that these data cannot tell from each other stay small.
+        """
+        count = len(self.names)
+        new = self.acted_on(acting, fixed=False)
+        new.x, new.u, start = self.began
+        new.p = np.concatenate((start[:count], np.zeros(len(new.p) - count)))
+        new.damped = np.concatenate((np.zeros(count), np.full(len(new.p) - count, DAMPED)))
+        new.came_from, new.predictor = (new.x, new.u, new.p), None
+        new.noise_y = self.shown_y
         return new
 
     def _acting_now(self) -> Array:
@@ -670,12 +703,7 @@ class _Fit:
         self.cost = float(np.mean((self.response / wide.unit) ** 2))
         a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * (self.size_p * self.moves)
         b = (self.response / wide.unit).reshape(n)
-        length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
-        u, sv, vt = np.linalg.svd(a / length, full_matrices=False)
-        strong = sv > 1e-6 * sv[0]
-        change = (vt[strong].T @ ((u.T @ b)[strong] / sv[strong])) / length * self.size_p
-        error = np.sqrt(((vt[strong] / sv[strong, None]) ** 2).sum(axis=0)) / length * self.size_p
-        change = np.clip(self.p + change, self.low, self.high) - self.p
+        change, error = self._step(a, b)
         # positive parameters are divisors, far from linear: no step more than halves or doubles one
         ratio = np.divide(self.p + change, self.p, out=np.ones_like(self.p), where=self.low > 0.0)
         change *= min(1.0, *(0.5 / (1.0 - r) if r < 0.5 else 1.0 / (r - 1.0) if r > 2.0 else 1.0 for r in ratio))
@@ -686,6 +714,33 @@ class _Fit:
         self.x, self.u, self.p = self.x + dx, self.u + offset + du, self.p + change
         self.rest = wide.errors(state[:, :, None], output[:, :, None])[:, :, 0]
         return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
+
+    def _step(self, a: Array, b: Array) -> tuple[Array, Array]:
+        """(change of the parameters, their standard errors) by least squares within the limits.
+
+        a: (n, p) columns for a change of `size_p`; b: (n,). A parameter that would leave its limits goes to the limit,
+        and the others are fitted again: cut off alone, it would leave them where only its full step belongs to them.
+        """
+        length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
+        scaled = np.vstack((a / length, np.diag(self.damped)))
+        wanted = np.concatenate((b, -self.damped * self.p * length / self.size_p))
+        change, error = np.zeros(len(self.p)), np.zeros(len(self.p))
+        free = np.ones(len(self.p), dtype=bool)
+        while np.any(free):
+            columns = scaled[:, free]
+            u, sv, vt = np.linalg.svd(columns, full_matrices=False)
+            strong = sv > 1e-6 * sv[0]
+            found = vt[strong].T @ ((u.T @ wanted)[strong] / sv[strong])
+            scale = self.size_p[free] / length[free]
+            change[free] = found * scale
+            error[free] = np.sqrt(((vt[strong] / sv[strong, None]) ** 2).sum(axis=0)) * scale
+            beyond = free & ((self.p + change < self.low) | (self.p + change > self.high))
+            if not np.any(beyond):
+                break
+            change[beyond] = np.clip(self.p + change, self.low, self.high)[beyond] - self.p[beyond]
+            wanted = wanted - scaled[:, beyond] @ (change * length / self.size_p)[beyond]
+            free &= ~beyond
+        return change, error
 
     def _renew_noise(self) -> None:
         """Estimate the sensors' noise from the residual; the median ignores a short error.

@@ -224,14 +224,14 @@ def select(
         chance = by_chance(tried, regression, surrogates(regression, seed))
         threshold = max(float(np.quantile(chance, 1.0 - LEVEL)), LEAST)
         thresholds.append(threshold)
-        ranking = _ranking(tried, regression)
-        chosen = next((each for each in ranking if naming.possible(each[3])), None)
+        ranked = ranking(tried, regression.size)
+        chosen = next((each for each in ranked if naming.possible(each[3])), None)
         if chosen is None or chosen[0] <= threshold or len(named) == most:
             return Selection(
-                named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranking]
+                named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranked]
             )
         bic, chi2, freedom, trial = chosen
-        others = [each for each in ranking if each[3].effect is not trial.effect]
+        others = [each for each in ranked if each[3].effect is not trial.effect]
         found = Named(
             trial.effect,
             trial.shape,
@@ -259,7 +259,7 @@ def select(
         ]
 
 
-def _ranking(tried: Sequence[Trial], regression: Regression) -> list[tuple[float, float, int, Trial]]:
+def ranking(tried: Sequence[Trial], size: int) -> list[tuple[float, float, int, Trial]]:
     """(score, chi-square, freedom, trial) of each effect at its best shape, best first."""
     best: dict[int, tuple[float, float, int, Trial]] = {}
     for trial in tried:
@@ -267,7 +267,7 @@ def _ranking(tried: Sequence[Trial], regression: Regression) -> list[tuple[float
         if not freedom:
             continue
         chi2 /= trial.inflation
-        found = (float(score(chi2, freedom, len(trial.effect.shapes), regression.size)), chi2, freedom, trial)
+        found = (float(score(chi2, freedom, len(trial.effect.shapes), size)), chi2, freedom, trial)
         if id(trial.effect) not in best or found[0] > best[id(trial.effect)][0]:
             best[id(trial.effect)] = found
     return sorted(best.values(), key=lambda each: -each[0])
