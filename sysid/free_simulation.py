@@ -53,6 +53,8 @@ STRETCH = 400  # samples of a stretch; covariances of all stretches are computed
 LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
 OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
 AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+JUMPS = 0.2  # of the samples at most: an input that changes at no more of them is held in between
+SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
@@ -343,6 +345,15 @@ def roughness(table: Table, column: Array) -> float:
     return float(np.median(np.abs(rest))) / 0.6745 * float(np.sqrt(size / (size - 3.0)))
 
 
+def _stays(table: Table, column: Array) -> bool:
+    """True for an input that stays at a value for several samples and then jumps: its source holds it."""
+    return all(
+        np.count_nonzero(np.diff(column[run])) < JUMPS * (run.stop - run.start)
+        for run in table.runs
+        if run.stop - run.start > 1
+    )
+
+
 def averaged(table: Table, count: int) -> Table:
     """The table with every `count` samples of a run averaged into one."""
     if count == 1:
@@ -385,12 +396,13 @@ class SimulatedMachine(abc.ABC):
     ports: tuple[Port, ...]
     # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
-    # From one sample to the next inputs and ports are straight lines, but for those that a converter holds
+    # From one sample to the next inputs and ports are straight lines, but for those that a converter holds, and for
+    # inputs that stay at a value and jump, in these data
     held_inputs: Collection[str] = ()
     parts: int = 2  # steps from one sample to the next, each with the inputs of its own middle
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording
-    window_s: float = 2.0  # over which the gain is measured in free simulation
+    window_s: float = 2.0  # over which the gain is measured in free simulation, or 50 samples
     noise_by_candidates: bool = True  # `Recording.noise_by_candidates`
 
     @abc.abstractmethod
@@ -525,6 +537,7 @@ class _Fit:
             guess = {name: table[f"first {name}"] for name in guess}
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = given
+        self.held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
         self.names = [known.name for known in machine.parameters]
         self.x = np.column_stack([guess[name] for name in machine.states])
         self.p = np.array([known.value for known in machine.parameters])
@@ -623,7 +636,7 @@ class _Fit:
         given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
         given |= {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
         change = {
-            name: 0.0 * c if name in machine.held_inputs else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
+            name: 0.0 * c if name in self.held else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
             for name, c in given.items()
         }
         after: Quantities = states
@@ -779,7 +792,7 @@ class _Fit:
 
         Where the law is open (`loose`) it stays so. Not whitened: a sum of squares is that of the outputs' errors.
         """
-        window = max(2, round(self.machine.window_s / self.step_s))
+        window = max(SHORTEST_WINDOW, round(self.machine.window_s / self.step_s))
         starts = np.array([k for run in self.table.runs for k in range(run.start, run.stop, window)])
         predictor = Predictor(self.lin, np.zeros_like(self.noise_u), self.noise_y, self._loose(), starts,
                               AWAY * self.size_x, stretch=window)  # fmt: skip

@@ -24,7 +24,8 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)  # of the mean square of a feature; and a
 BLOCKS = 10
 BEYOND = 0.02  # of a signal's training range, beyond which a row is outside of it
 WORTH = 0.05  # of the residual's square: less is not a reason for another band
-FIRST, PLAIN = 99, 8  # surrogates that are tried first; when so many of them do as well, no more are
+FIRST = 99  # surrogates that are tried first; no more are where so many of them do as well, or where all are far below:
+PLAIN, FAR = 8, 10.0  # deviations above their mean
 SURROGATES = 199  # and as many for every further equation, so that their least chance together stays the same
 RANK = 1e-6  # of the longest direction of a base: a shorter one is rounding
 MOST_ROWS = 3000  # that count in the test: slower than every n-th row nothing is lost below the band's edge
@@ -139,13 +140,13 @@ def test(regression: Regression, features: Mapping[str, Array], seed: int) -> li
         residual = (part.response - part.measured @ values)[rows]
         ridge = _Ridge(features[name][rows], part.measured[rows])
         share = float(ridge.shares(residual[:, None])[0])
-        chance = np.zeros(0)
-        for more in (drawn[rows, :FIRST], drawn[rows, FIRST:]):
-            chance = np.concatenate((chance, ridge.shares(more)))
-            if np.count_nonzero(chance >= share) >= PLAIN:  # the rest would not change the answer
-                break
+        chance = ridge.shares(drawn[rows, :FIRST])
+        p = 1.0 / (1.0 + count)
+        if share < np.mean(chance) + FAR * np.std(chance):
+            if np.count_nonzero(chance >= share) < PLAIN:
+                chance = np.concatenate((chance, ridge.shares(drawn[rows, FIRST:])))
+            p = (1.0 + float(np.count_nonzero(chance >= share))) / (1.0 + len(chance))
         memory = noise.correlation_time(own.coefficients)
-        p = (1.0 + float(np.count_nonzero(chance >= share))) / (1.0 + len(chance))
         found.append(Predicted(name, max(0.0, share), p, np.count_nonzero(good) / memory))
     return found
 
@@ -159,7 +160,8 @@ class _Ridge:
     def __init__(self, features: Array, base: Array) -> None:
         """features: (n, k); base: (n, p)."""
         self.basis = _orthonormal(base)
-        self.block = [np.arange(each * len(features) // BLOCKS, (each + 1) * len(features) // BLOCKS) for each in range(BLOCKS)]
+        ends = np.arange(BLOCKS + 1) * len(features) // BLOCKS
+        self.block = [np.arange(low, high) for low, high in itertools.pairwise(ends)]
         self.features = self.off(features)
         size = np.sqrt(np.mean(self.features**2, axis=0))
         self.size = np.where(size > likelihood.HIDDEN * np.sqrt(np.mean(features**2, axis=0)), size, np.inf)
@@ -167,6 +169,9 @@ class _Ridge:
         self.squares = [self.features[rows].T @ self.features[rows] for rows in self.block]
         self.whole = np.sum(self.squares, axis=0)
         self.turns = [np.linalg.eigh(self.whole - each) for each in self.squares]
+        self.turned = [
+            vectors.T @ square @ vectors for square, (_, vectors) in zip(self.squares, self.turns, strict=True)
+        ]
 
     def off(self, columns: Array) -> Array:
         """Columns (n, m) less the base's part."""
@@ -179,11 +184,8 @@ class _Ridge:
         whole = np.sum(products, axis=0)
         total = np.sum(residuals**2, axis=0)
         left = np.tile(total, (len(RIDGES), 1))
-        for rows, square, product, (power, vectors) in zip(
-            self.block, self.squares, products, self.turns, strict=True
-        ):
+        for rows, turned, product, (power, vectors) in zip(self.block, self.turned, products, self.turns, strict=True):
             along, held = vectors.T @ (whole - product), vectors.T @ product
-            turned = vectors.T @ square @ vectors
             count = len(residuals) - len(rows)
             for number, ridge in enumerate(RIDGES):
                 found = along / (np.maximum(power, 0.0) + ridge * count)[:, None]
