@@ -34,6 +34,7 @@ from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held
 
+MOST_ACTING = 12  # candidates in the simulator while it is linearised: the likeliest
 AGAIN = 2  # simulations with the named effects, at most
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
@@ -133,7 +134,10 @@ def diagnose(
 def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]) -> Recording:
     """A simulator's recording, linearised with all effects in it, each at the shape that suits best without them."""
     known = likelihood.noise_of([recording], effects, ())
-    best = likelihood.ranking(naming.trials(effects, Regression([recording], noise=known)), len(recording.table))
+    tried = naming.trials(effects, Regression([recording], noise=known))
+    best = likelihood.ranking([each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN],
+                              len(recording.table))[:MOST_ACTING]  # fmt: skip
+    best = [each for each in best if each[0] > 0.0]
     return cast(Recording, machine.about_all(recording, [(each[3].effect, each[3].shape) for each in best]))  # type: ignore[attr-defined]
 
 
@@ -273,7 +277,7 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
             free = len(inverse) + (shapes > 1)
             needed = threshold + free * math.log(regression.size) + 2.0 * math.log(shapes)
             errors = np.sqrt(np.maximum(np.diag(inverse), 0.0) * needed * trial.inflation)
-            off = _off(trial.gram, trial.white)
+            off = likelihood.own_part(trial)
             if off > likelihood.HIDDEN:
                 named = dict(zip(effect.coefficients, (float(each) for each in errors), strict=True))
                 sizes.append((off, named, trial.shape))
@@ -283,12 +287,6 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
         else:
             out.append(Visible(effect, None, {}))
     return out
-
-
-def _off(gram: Array, white: Mapping[str, Array]) -> float:
-    """Part of an effect's square that the base does not explain."""
-    whole = sum(float(np.sum(columns**2)) for columns in white.values())
-    return float(np.trace(gram)) / max(whole, 1e-300)
 
 
 def unexplained(found: Diagnosis) -> list[str]:

@@ -28,6 +28,7 @@ A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is
 import abc
 import copy
 import dataclasses
+import functools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import cast
 
@@ -38,7 +39,23 @@ from scipy.signal import savgol_filter
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.free_candidates import candidates
 from ranger_sim.sysid.machine import Columns, Effect, Entry, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.simulated_terms import (
+    Acting,
+    Joint,
+    Output,
+    Port,
+    Ports,
+    Shape,
+    SimulatedEffect,
+    Term,
+    into,
+    on,
+    shown,
+)
+
+__all__ = ["Acting", "Joint", "Output", "Port", "SimulatedEffect", "Term"]  # for machines
 
 ROUNDS = 30  # of Gauss and Newton, at most
 RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
@@ -52,75 +69,16 @@ AWAY = 30.0  # a free initial state's deviation, in rms of the state: practicall
 STRETCH = 400  # samples of a stretch; covariances of all stretches are computed side by side
 LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
 OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
-AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+AGAIN = 12  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
 JUMPS = 0.2  # of the samples at most: an input that changes at no more of them is held in between
 SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
+TOGETHER = 24  # responses that are computed side by side
+SAME = 1.0 - 1e-6  # cosine of two responses: candidates of two names for one effect
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
 Quantities = Mapping[str, Array]  # by name, all of one shape
-Shape = Mapping[str, float]
-Ports = Mapping[str, Array]  # an effect's input by port, (n,) or (n, k)
-
-
-@dataclasses.dataclass(frozen=True)
-class Output:
-    """A measured channel that the simulator predicts. letter, subsystem: of the balance that its misfit accuses."""
-
-    channel: str
-    letter: str
-    subsystem: str
-    unit: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Port:
-    """A place where something that the simulator lacks can enter: an input that is 0 as long as nothing is wrong.
-
-    where: name of a signal, 0 ... 1, that weights everything that enters; "": it enters at all times. A torque has no
-    effect where dry friction holds.
-    """
-
-    name: str
-    unit: str
-    subsystem: str
-    where: str = ""
-
-
-@dataclasses.dataclass(frozen=True)
-class Term:
-    """A candidate cause, as `Effect`, given by its input at the ports.
-
-    make(signals, shape, values) -> by port (n,) for one coefficient or (n, k) for k. signals: states, inputs, outputs
-    and `t` along the fitted trajectory, (n,) by name, and the signals that `SimulatedMachine.signals` adds.
-    """
-
-    cause: str
-    at: str
-    subsystem: str
-    coefficients: tuple[str, ...]
-    make: Callable[["SimulatedRecording", Shape, Values], Ports]
-    shapes: Sequence[Shape] = ({},)
-    admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
-    meaning: str = ""
-    phase_is_free: bool = False
-
-
-@dataclasses.dataclass(frozen=True)
-class SimulatedEffect(Effect):
-    """A term as an effect on the outputs."""
-
-    term: Term | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class Acting:
-    """An effect that acts in the simulator: its term at a shape, and coefficients."""
-
-    term: Term
-    shape: Shape
-    coefficients: tuple[float, ...]
 
 
 def held(rate: Array, braking: Array) -> Array:
@@ -288,6 +246,8 @@ class SimulatedRecording(Recording):
     ports: tuple[Port, ...] = ()
     outputs: tuple[str, ...] = ()
     fit: "_Fit | None" = None  # the fit that made it, which continues with an effect in the simulator
+    held_ports: frozenset[str] = frozenset()
+    free: dict[tuple[int, int], Columns] = dataclasses.field(default_factory=dict)  # by term and number of its shape
 
     def entering(self, entries: Ports) -> Array:
         """(n, ports, k): the input at the ports, (n,) or (n, k) by name, weighted by each port's `where`."""
@@ -308,17 +268,50 @@ class SimulatedRecording(Recording):
         if unknown:
             raise UserError(f"a term puts something into {', '.join(unknown)}; ports are {_names(self.ports)}")
         entering = self.entering(entries)
-        state, output = forced(lin.f_q, _between(entering)), forced(lin.h_q, entering)
+        held = np.array([port.name in self.held_ports for port in self.ports])
+        state, output = forced(lin.f_q, _between(entering, held)), forced(lin.h_q, entering)
         white = predictor.white(predictor.errors(state, output))
-        power = (white**2).sum(axis=(0, 2)) / predictor.unit**2
+        return self._heard(white)
+
+    def _heard(self, white: Array) -> Columns:
+        """(n, k) of each equation that has the effect."""
+        assert self.predictor is not None
+        power = (white**2).sum(axis=(0, 2)) / self.predictor.unit**2
         return {
             name: white[:, number] for number, name in enumerate(self.outputs) if power[number] > SILENT * power.sum()
         }
 
+    def of_free(self, terms: Sequence[Term], term: Term, shape: Shape) -> Columns:
+        """The response to a free term at a shape; on its grid, that of all free `terms` is computed together."""
+        place = next((number for number, each in enumerate(term.shapes) if each is shape), None)
+        if place is None:
+            return self.respond(term.make(self, shape, {}))
+        if (id(term), place) not in self.free:
+            made = [(each, number, each.make(self, one, {}))
+                    for each in terms for number, one in enumerate(each.shapes)]  # fmt: skip
+            for some in (made[begin : begin + TOGETHER] for begin in range(0, len(made), TOGETHER)):
+                self._fill(some)
+        return self.free[id(term), place]
 
-def _between(column: Array) -> Array:
-    """Means of each sample and the next, for the step between them."""
-    return np.asarray(0.5 * (column + np.concatenate((column[1:], column[-1:]))), dtype=float)
+    def _fill(self, made: Sequence[tuple[Term, int, Ports]]) -> None:
+        lin, predictor = self.linear, self.predictor
+        assert lin is not None and predictor is not None
+        entering = [self.entering(ports) for _, _, ports in made]
+        held = np.array([port.name in self.held_ports for port in self.ports])
+        together = np.concatenate(entering, axis=2)
+        white = predictor.white(
+            predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together))
+        )
+        first = 0
+        for (term, place, _), each in zip(made, entering, strict=True):
+            self.free[id(term), place] = self._heard(white[:, :, first : first + each.shape[2]])
+            first += each.shape[2]
+
+
+def _between(column: Array, held: np.ndarray) -> Array:
+    """(n, ports, k): means of each sample and the next, for the step between them; a held port's are the samples."""
+    after = np.concatenate((column[1:], column[-1:]))
+    return np.where(held[None, :, None], column, 0.5 * (column + after))
 
 
 def forced(sensitivity: Array, entering: Array) -> Array:
@@ -328,6 +321,17 @@ def forced(sensitivity: Array, entering: Array) -> Array:
         if np.any(entering[:, number]):
             out += sensitivity[:, :, number, None] * entering[:, None, number]
     return out
+
+
+def _direction(columns: Columns, recording: SimulatedRecording) -> Array:
+    """An effect's response with one coefficient as a vector of length 1, each output in its noise."""
+    assert recording.predictor is not None
+    nothing = np.zeros((len(recording.table), 1))
+    stacked = np.concatenate(
+        [columns.get(name, nothing)[:, 0] / unit
+         for name, unit in zip(recording.outputs, recording.predictor.unit, strict=True)]
+    )  # fmt: skip
+    return np.asarray(stacked / max(float(np.linalg.norm(stacked)), 1e-300))
 
 
 def _names(ports: Sequence[Port]) -> str:
@@ -393,7 +397,9 @@ class SimulatedMachine(abc.ABC):
     parameters: tuple[Known, ...]
     states: tuple[str, ...]
     outputs: tuple[Output, ...]
-    ports: tuple[Port, ...]
+    ports: tuple[Port, ...] = ()
+    joints: tuple[Joint, ...] = ()  # where friction is sought, without a port or a term
+    free_candidates: bool = True  # what every machine can have (sysid/free_candidates.py), next to its own terms
     # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
     # From one sample to the next inputs and ports are straight lines, but for those that a converter holds, and for
@@ -421,9 +427,9 @@ class SimulatedMachine(abc.ABC):
     def observe(self, x: Quantities, u: Quantities, p: Quantities) -> Quantities:
         """The outputs, by channel."""
 
-    @abc.abstractmethod
     def terms(self, recordings: Sequence[SimulatedRecording]) -> list[Term]:
-        """All candidate causes, with grids that suit these recordings."""
+        """Candidate causes of this machine alone, with grids that suit these recordings."""
+        return []
 
     def loose(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
         """Deviations of states per step that the law leaves open, by name: where dry friction holds, for example."""
@@ -440,7 +446,8 @@ class SimulatedMachine(abc.ABC):
     def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
         """For ports and equations, the signals over which a misfit is sought without a cause in mind."""
         everything = {name: recording.signals[name] for name in (*self.states, "t")}
-        return {each.name: everything for each in self.ports}
+        places = [each.name for each in self.ports] or [on(each.rate) for each in self.joints]
+        return {each: everything for each in places or [each.channel for each in self.outputs]}
 
     # --- called by the diagnosis ---------------------------------------------------------------------------------
 
@@ -461,28 +468,55 @@ class SimulatedMachine(abc.ABC):
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The terms as effects on the outputs."""
-        made: list[Effect] = []
-        for term in self.terms(cast(Sequence[SimulatedRecording], recordings)):
+        simulated = cast(Sequence[SimulatedRecording], recordings)
+        own = self.terms(simulated)
+        free = self._free(own, simulated)
 
-            def columns(recording: Recording, shape: Shape, values: Values, term: Term = term) -> Columns:
-                simulated = cast(SimulatedRecording, recording)
-                return simulated.respond(term.make(simulated, shape, values))
+        def columns(recording: Recording, shape: Shape, values: Values, term: Term) -> Columns:
+            here = cast(SimulatedRecording, recording)
+            return here.of_free(free, term, shape) if term.free else here.respond(term.make(here, shape, values))
 
-            made.append(
-                SimulatedEffect(
-                    term.cause,
-                    term.at,
-                    term.subsystem,
-                    term.coefficients,
-                    term.shapes,
-                    columns,
-                    term.admissible,
-                    term.meaning,
-                    phase_is_free=term.phase_is_free,
-                    term=term,
-                )
+        return [
+            SimulatedEffect(
+                term.cause,
+                term.at,
+                term.subsystem,
+                term.coefficients,
+                term.shapes,
+                functools.partial(columns, term=term),
+                term.admissible,
+                term.meaning,
+                phase_is_free=term.phase_is_free,
+                form=term.form,
+                scale=term.scale,
+                term=term,
             )
-        return made
+            for term in (*own, *free)
+        ]
+
+    def _free(self, own: Sequence[Term], recordings: Sequence[SimulatedRecording]) -> list[Term]:
+        """The free candidates that are not the same as a term of the machine's own."""
+        if not self.free_candidates or not self.noise_by_candidates:
+            return []
+        fit = recordings[0].fit
+        assert fit is not None
+        named = {(each.cause, each.at) for each in own}
+        made = [
+            each for each in candidates(self, list(fit.inputs), recordings) if (each.cause, each.at) not in named
+        ]
+        first, values = recordings[0], recordings[0].fitted
+        known = [_direction(first.respond(each.make(first, shape, values)), first)
+                 for each in own for shape in each.shapes if len(each.coefficients) == 1]  # fmt: skip
+        return [
+            each
+            for each in made
+            if len(each.coefficients) > 1
+            or all(
+                abs(float(_direction(first.of_free(made, each, shape), first) @ other)) < SAME
+                for shape in each.shapes
+                for other in known
+            )
+        ]
 
     def again(
         self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
@@ -522,6 +556,13 @@ class SimulatedMachine(abc.ABC):
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """The signals of `looked_over`."""
         return self.looked_over(cast(SimulatedRecording, recording))
+
+
+def _own_ports(machine: SimulatedMachine, inputs: Sequence[str]) -> list[Port]:
+    """The ports that the engine adds to a machine."""
+    made = [Port(shown(each.channel), each.unit, "sensor") for each in machine.outputs]
+    made += [Port(into(name), "", "input") for name in inputs]
+    return made + [Port(on(each.rate), "", "mechanical") for each in machine.joints]
 
 
 class _Fit:
@@ -575,7 +616,10 @@ class _Fit:
         self.acting: list[Acting] = []
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
-        self.at_ports = np.zeros((len(table), len(machine.ports), 0))  # input for a unit of each coefficient
+        self.ports = (*machine.ports, *_own_ports(machine, list(given)))
+        self.held_ports = frozenset(into(name) for name in self.held)
+        self.is_held = np.array([port.name in self.held_ports for port in self.ports], dtype=bool)
+        self.at_ports = np.zeros((len(table), len(self.ports), 0))  # input for a unit of each coefficient
 
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "_Fit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
@@ -624,7 +668,7 @@ class _Fit:
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
         along["t"] = table.time_s - table.time_s[0]
         along |= machine.extra_signals(along, table)
-        return SimulatedRecording(table, along, {}, ports=machine.ports)
+        return SimulatedRecording(table, along, {}, ports=self.ports)
 
     def _at(self, x: Array, u: Array, p: Array, ports: Array) -> tuple[Array, Array]:
         """(f, h) as (m, n, s) and (m, n, o). x: (m, n, s), u: (m, n, i), p: (m, n or 1, p), ports: (m, n or 1, q)."""
@@ -634,17 +678,24 @@ class _Fit:
         values = {name: p[..., i] for i, name in enumerate(self.names)}
         given = {name: column[None] for name, column in self.inputs.items()}
         given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
-        given |= {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
+        at_ports = {each.name: ports[..., i] for i, each in enumerate(self.ports)}
+        given = {name: column + at_ports[into(name)] for name, column in given.items()}
+        given |= at_ports
         change = {
-            name: 0.0 * c if name in self.held else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
+            name: 0.0 * c if name in self.held or name in self.held_ports else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
             for name, c in given.items()
         }
         after: Quantities = states
         for part in range(machine.parts):
             share = (part + 0.5) / machine.parts
             middle = {name: np.asarray(c + share * change[name]) for name, c in given.items()}
-            after = machine.step(after, middle, values, self.step_s / machine.parts)
-        seen = machine.observe(states, given, values)
+            after = dict(machine.step(after, middle, values, self.step_s / machine.parts))
+            for joint in machine.joints:
+                inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
+                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / machine.parts / inertia
+        seen = dict(machine.observe(states, given, values))
+        for each in machine.outputs:
+            seen[each.channel] = seen[each.channel] + at_ports[shown(each.channel)]
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
         return f, h
@@ -654,12 +705,14 @@ class _Fit:
         x, u, p = self.x[None], self.u[None], self.p[None, None]
         count = len(self.names)
         self.at_ports = self._acting_now()
-        ports = (self.at_ports @ self.p[count:])[None] if self.acting else np.zeros((1, 1, len(self.machine.ports)))
+        ports = (self.at_ports @ self.p[count:])[None] if self.acting else np.zeros((1, 1, len(self.ports)))
         f, h = self._at(x, u, p, ports)
 
-        def derivative(which: int, sizes: Array) -> tuple[Array, Array]:
+        def derivative(which: int, sizes: Array, some: Sequence[int] | None = None) -> tuple[Array, Array]:
             columns = []
             for number, size in enumerate(sizes):
+                if some is not None and number not in some:
+                    continue
                 arguments = [x, u, p, ports]
                 up, down = arguments[which].copy(), arguments[which].copy()
                 up[..., number] += NUDGE * size
@@ -674,9 +727,9 @@ class _Fit:
         f_x, h_x = derivative(0, self.size_x)
         f_u, h_u = derivative(1, self.size_u)
         f_p, h_p = derivative(2, self.size_p[:count])
-        f_q, h_q = derivative(3, np.ones(len(self.machine.ports)))
+        f_q, h_q = self._at_ports(derivative, f_u, h_u)
         if self.acting:
-            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports))), axis=2)
+            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports, self.is_held))), axis=2)
             h_p = np.concatenate((h_p, forced(h_q, self.at_ports)), axis=2)
         if not all(np.all(np.isfinite(each)) for each in (f, h, f_x, h_x, f_p, h_p)):
             raise UserError(
@@ -684,13 +737,30 @@ class _Fit:
             )
         return Jacobians(f[0], h[0], f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
 
+    def _at_ports(
+        self, derivative: Callable[..., tuple[Array, Array]], f_u: Array, h_u: Array
+    ) -> tuple[Array, Array]:
+        """(f_q, h_q). What the engine adds itself is known: an output's port moves it alone, a noisy input's as its
+        noise does."""
+        n, s = self.x.shape
+        f_q, h_q = np.zeros((n, s, len(self.ports))), np.zeros((n, len(self.machine.outputs), len(self.ports)))
+        names = [each.name for each in self.ports]
+        for number, each in enumerate(self.machine.outputs):
+            h_q[:, number, names.index(shown(each.channel))] = 1.0
+        known = {shown(each.channel) for each in self.machine.outputs} | {into(name) for name in self.noisy}
+        for number, name in enumerate(self.noisy):
+            f_q[:, :, names.index(into(name))], h_q[:, :, names.index(into(name))] = f_u[:, :, number], h_u[:, :, number]
+        rest = [number for number, name in enumerate(names) if name not in known]
+        f_q[:, :, rest], h_q[:, :, rest] = derivative(3, np.ones(len(names)), rest)
+        return f_q, h_q
+
     def _loose(self) -> Array:
         machine = self.machine
         states = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         values = {name: np.full(len(self.x), self.p[i]) for i, name in enumerate(self.names)}
         given = self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
         entering = self.at_ports @ self.p[len(self.names) :]
-        given |= {each.name: entering[:, i] for i, each in enumerate(machine.ports)}
+        given |= {each.name: entering[:, i] for i, each in enumerate(self.ports)}
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
@@ -825,7 +895,8 @@ class _Fit:
             fitted=dict(zip(self.names, (float(each) for each in self.p_at), strict=False)),
             linear=self.lin,
             predictor=predictor,
-            ports=machine.ports,
+            ports=self.ports,
+            held_ports=self.held_ports,
             outputs=tuple(each.channel for each in machine.outputs),
             fit=self,
             noise_by_candidates=machine.noise_by_candidates,
@@ -834,7 +905,7 @@ class _Fit:
         def entry(port: Port) -> Entry:
             return Entry(port.subsystem, lambda columns: made.respond({port.name: columns}))
 
-        made.entries = {each.name: entry(each) for each in machine.ports}
+        made.entries = {each.name: entry(each) for each in self.ports}
         return made
 
     def _standstill(self, predictor: Predictor) -> dict[str, Array]:

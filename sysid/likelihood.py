@@ -218,7 +218,7 @@ def select(
     thresholds: list[float] = []
     while True:
         progress(len(named) / most)
-        tried = naming.trials(rest, regression)
+        tried = [each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN]
         if not tried:
             return Selection(named, refused, base, regression, thresholds, [])
         chance = by_chance(tried, regression, surrogates(regression, seed))
@@ -257,6 +257,12 @@ def select(
             and all(each is not other.effect for other in refused)
             and not any(other.effect.excludes(each) for other in named)
         ]
+
+
+def own_part(trial: Trial) -> float:
+    """Part of an effect's square that the base does not explain."""
+    whole = sum(float(np.sum(columns**2)) for columns in trial.white.values())
+    return float(np.trace(trial.gram)) / max(whole, 1e-300)
 
 
 def ranking(tried: Sequence[Trial], size: int) -> list[tuple[float, float, int, Trial]]:
