@@ -29,12 +29,12 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
-from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held
 
-MOST_ACTING = 12  # candidates in the simulator while it is linearised: the likeliest
+MOST_ACTING = 4  # candidates in the simulator while it is linearised: the likeliest
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
 AGAIN = 2  # simulations with the named effects, at most
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
@@ -86,7 +86,7 @@ def diagnose(
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
         previous = found
         recordings = held_out.simulated_again(machine, recordings, found.named, found.with_named)
-        held = held_out.simulated_again(machine, held, found.named, found.with_named, fixed=True)
+        held = held_out.simulated_again(machine, held, found.named, found.with_named)
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
         if [each.effect for each in found.named] == [each.effect for each in previous.named]:
             break
@@ -137,10 +137,13 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
     """A simulator's recording, linearised with all effects in it, each at the shape that suits best without them."""
     known = likelihood.noise_of([recording], effects, ())
     tried = naming.trials(effects, Regression([recording], noise=known))
-    best = likelihood.ranking([each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN],
-                              len(recording.table))[:MOST_ACTING]  # fmt: skip
-    best = [each for each in best if each[0] > 0.0]
-    return cast(Recording, machine.about_all(recording, [(each[3].effect, each[3].shape) for each in best]))  # type: ignore[attr-defined]
+    seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
+    likeliest: list[Trial] = []
+    for score, _, _, trial in likelihood.ranking(seen, len(recording.table)):
+        if score > 0.0 and not any(each.effect.excludes(trial.effect) for each in likeliest):
+            likeliest.append(trial)
+    acting = [(each.effect, each.shape) for each in likeliest[:MOST_ACTING]]
+    return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
 
 
 def _decided(

@@ -72,6 +72,9 @@ OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
 AGAIN = 12  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
 JUMPS = 0.2  # of the samples at most: an input that changes at no more of them is held in between
 SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
+FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
+FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
+FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 TOGETHER = 24  # responses that are computed side by side
@@ -620,6 +623,7 @@ class _Fit:
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
         self.acting: list[Acting] = []
+        self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.ports = (*machine.ports, *_own_ports(machine, list(given)))
@@ -778,7 +782,7 @@ class _Fit:
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
-        return np.column_stack([found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x
+        return np.column_stack([found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x + self.slack
 
     def round(self) -> float:
         """One round; returns the largest step of a parameter in its standard errors."""
@@ -850,26 +854,58 @@ class _Fit:
 
     def recording(self, rounds: int = ROUNDS) -> SimulatedRecording:
         """Fitted and linearised."""
-        renewed, best = 0, np.inf
+        if not self._settle(rounds) or self.cost > FAR_OFF:
+            self._follow()
+        self.round_again()
+        assert self.predictor is not None
+        return self._told(self.predictor, self.response, self.columns)
+
+    def _settle(self, rounds: int) -> bool:
+        """Rounds until nothing moves any more; False when it still does after them."""
+        renewed, best, share = 0, np.inf, 1.0
         for _ in range(rounds):
             accepted = (self.x, self.u, self.p)
             step = self.round()
             if not self.cost < WORSE * best:
-                # too far: a quarter of the step
-                old = self.came_from
-                self.x, self.u, self.p = (b + 0.25 * (a - b) for a, b in zip(accepted, old, strict=True))
+                # too far: a part of the step from where it began, whose cost is another with the covariances of now
+                (self.x, self.u, self.p), best, share = self.came_from, np.inf, 0.25 * share
                 continue
+            if share < 1.0:
+                self.x, self.u, self.p = (
+                    old + share * (new - old) for old, new in zip(accepted, (self.x, self.u, self.p), strict=True)
+                )
+                share = min(1.0, 2.0 * share)
             self.came_from = accepted
             best = min(best, self.cost)
             if step > STEADY:
                 continue
             if renewed == RENEWED:
-                break
+                return True
             self._renew_noise()
             renewed, best = renewed + 1, np.inf
-        self.round_again()
-        assert self.predictor is not None
-        return self._told(self.predictor, self.response, self.columns)
+        return False
+
+    def _follow(self) -> None:
+        """Fit again from the start, along the measurement: states may leave the law by a share of their steps.
+
+        A simulator without a large fault's cause has no good trajectory, and where its fit ends means nothing. The
+        share becomes smaller as long as it explains what is left.
+        """
+        self.x, self.u, start = self.began
+        self.p = np.concatenate((start[: len(self.names)], np.zeros(len(self.p) - len(self.names))))
+        self.noise_y, self.predictor = self.shown_y, None
+        moved = np.diff(self.x, axis=0)
+        moved[self.ends[:-1]] = 0.0
+        usual = np.sqrt(np.mean(moved**2, axis=0))
+        kept = (self.x, self.u, self.p)
+        for share in FOLLOWED:
+            self.slack = share * usual
+            self.came_from = (self.x, self.u, self.p)
+            self._settle(FOLLOWING)
+            if not self.cost < MISSED and share < FOLLOWED[0]:
+                break
+            kept = (self.x, self.u, self.p)
+        (self.x, self.u, self.p), self.slack, self.predictor = kept, np.zeros_like(usual), None
 
     def free(self) -> SimulatedRecording:
         """Errors of free simulation over windows, about the same trajectory: without noise, each window starts free.
