@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Recording
-from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, shown
+from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, sensed, shown
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording
@@ -58,12 +58,12 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
     def sensor(cause: str, coefficient: str, make: Callable[[Table, Array], Array]) -> Term:
         return Term(
             cause, name, "sensor", (coefficient,),
-            lambda r, shape, values: {place: make(r.table, r.signals[name])}, free=True,
+            lambda r, shape, values: {place: make(r.table, r.signals[sensed(name)])}, free=True,
         )  # fmt: skip
 
     def lag(form: str, late: Callable[[Table, Array, float], Array]) -> Term:
         def make(r: Recording, shape: Shape, values: Mapping[str, float]) -> dict[str, Array]:
-            seen, lag_s = r.signals[name], shape["near_s"]
+            seen, lag_s = r.signals[sensed(name)], shape["near_s"]
             return {place: (late(r.table, seen, lag_s) - seen) / lag_s}
 
         return Term(

@@ -52,6 +52,7 @@ from ranger_sim.sysid.simulated_terms import (
     Term,
     into,
     on,
+    sensed,
     shown,
 )
 
@@ -75,6 +76,7 @@ SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial 
 FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
+SMOOTHER = 0.25  # of the straight lines' square that a cubic leaves: there it is the better way between samples
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 TOGETHER = 24  # responses that are computed side by side
@@ -361,6 +363,19 @@ def _stays(table: Table, column: Array) -> bool:
     )
 
 
+def _is_smooth(table: Table, column: Array) -> bool:
+    """True where a cubic through every second sample meets the samples between better than straight lines do."""
+    straight = cubic = 0.0
+    for run in table.runs:
+        c = column[run]
+        if len(c) < 8:
+            continue
+        middle, near, far = c[3:-3], 0.5 * (c[2:-4] + c[4:-2]), 0.5 * (c[:-6] + c[6:])
+        straight += float(np.sum((middle - near) ** 2))
+        cubic += float(np.sum((middle - (9.0 * near - far) / 8.0) ** 2))
+    return cubic < SMOOTHER * straight
+
+
 def averaged(table: Table, count: int) -> Table:
     """The table with every `count` samples of a run averaged into one."""
     if count == 1:
@@ -588,6 +603,10 @@ class _Fit:
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = given
         self.held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
+        self.curved = {name for name in given if name not in self.held and _is_smooth(table, given[name])}
+        self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
+        for run in table.runs:
+            self.inside[run.start + 1 : run.stop - 2] = 1.0
         self.names = [known.name for known in machine.parameters]
         self.x = np.column_stack([guess[name] for name in machine.states])
         self.p = np.array([known.value for known in machine.parameters])
@@ -684,6 +703,9 @@ class _Fit:
         along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         along |= self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
+        acting = self.at_ports @ self.p[len(self.names) :] if self.acting else np.zeros(self.at_ports.shape[:2])
+        for number, each in enumerate(machine.outputs, len(machine.ports)):
+            along[sensed(each.channel)] = along[each.channel] - acting[:, number]
         along["t"] = table.time_s - table.time_s[0]
         along |= machine.extra_signals(along, table)
         return SimulatedRecording(table, along, {}, ports=self.ports)
@@ -699,14 +721,11 @@ class _Fit:
         at_ports = {each.name: ports[..., i] for i, each in enumerate(self.ports)}
         given = {name: column + at_ports[into(name)] for name, column in given.items()}
         given |= at_ports
-        change = {
-            name: 0.0 * c if name in self.held or name in self.held_ports else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
-            for name, c in given.items()
-        }
+        between = {name: self._between_samples(name, c) for name, c in given.items()}
         after: Quantities = states
         for part in range(machine.parts):
             share = (part + 0.5) / machine.parts
-            middle = {name: np.asarray(c + share * change[name]) for name, c in given.items()}
+            middle = {name: at(share) for name, at in between.items()}
             after = dict(machine.step(after, middle, values, self.step_s / machine.parts))
             for joint in machine.joints:
                 inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
@@ -717,6 +736,25 @@ class _Fit:
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
         return f, h
+
+    def _between_samples(self, name: str, c: Array) -> Callable[[float], Array]:
+        """An input or port between its samples (m, n), at a share of the way to the next: held, on a cubic through its
+        neighbours where the samples lie on one, or on a straight line."""
+        if name in self.held or name in self.held_ports:
+            return lambda share: c
+        after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
+        if name not in self.curved:
+            return lambda share: c + share * (after - c)
+        before, second = (np.concatenate(each, axis=1) for each in ((c[:, :1], c[:, :-1]), (after[:, 1:], after[:, -1:])))
+        inside = self.inside if c.shape[1] > 1 else np.zeros(1)
+        bend = after - 2.0 * c + before, second - 2.0 * after + c
+
+        def at(share: float) -> Array:
+            rest = 1.0 - share
+            curve = (rest * (rest * rest - 1.0) * bend[0] + share * (share * share - 1.0) * bend[1]) / 6.0
+            return np.asarray(c + share * (after - c) + inside * curve)
+
+        return at
 
     def linearise(self) -> Jacobians:
         """By central differences, all samples at once; with the effects that act."""
