@@ -36,7 +36,9 @@ from ranger_sim.sysid.three_numbers import Held
 
 MOST_ACTING = 4  # candidates in the simulator while it is linearised: the likeliest
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
-AGAIN = 2  # simulations with the named effects, at most
+AGAIN = 3  # simulations with the named effects, at most
+MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
+ABOVE_NUMERICS = 3.0  # times what numerics move it by: a named effect is at least so large
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
@@ -82,14 +84,20 @@ def diagnose(
         skews += stamps
         found = selected(recordings, held, 0.25)
     before = predictability.test(found.base, predictor.columns(recordings), seed)
+    floor: dict[str, tuple[float, ...]] = {}
     for number in range(AGAIN if found.named and hasattr(machine, "again") else 0):
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
         previous = found
+        effects = _finer(effects, found, skews)
         recordings = held_out.simulated_again(machine, recordings, found.named, found.with_named)
         held = held_out.simulated_again(machine, held, found.named, found.with_named)
+        if hasattr(machine, "numerical"):
+            floor = _numerical_floor(machine, recordings, found.named)
+            effects = [each for each in effects if not _below(floor, found, each)]
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
-        if [each.effect for each in found.named] == [each.effect for each in previous.named]:
-            break
+        if [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]:
+            if all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):
+                break
     progress("what is left", 0.75)
     known_to: dict[str, intervals.Intervals] = {}
     extended = found.with_named
@@ -144,6 +152,53 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
             likeliest.append(trial)
     acting = [(each.effect, each.shape) for each in likeliest[:MOST_ACTING]]
     return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
+
+
+def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequence[Named]) -> list[Effect]:
+    """The effects, those found at a shape on a scale with a finer grid about it; found gets them as well."""
+    out = list(effects)
+    for each in found.named:
+        if each.effect.scale is None:
+            continue
+        others = [other for other in found.named if other is not each]
+        base = naming.refit(found.base, others, [*fixed, *others]) if others else found.base
+        old = each.effect
+        shapes = [each.shape, *intervals.between(each)]
+        each.shape, _ = intervals.profile(each, base)
+        each.effect = dataclasses.replace(old, shapes=shapes)
+        out = [each.effect if one is old else one for one in out]
+    if found.named:
+        found.with_named = naming.refit(found.base, found.named, [*fixed, *found.named])
+    return out
+
+
+def _numerical_floor(
+    machine: Machine, recordings: Sequence[Recording], named: Sequence[Named]
+) -> dict[str, tuple[float, ...]]:
+    """By effect, the most that each coefficient moves with half the step and with inputs drawn otherwise."""
+    moved = np.mean([np.max(np.abs(machine.numerical(each)), axis=0, initial=0.0) for each in recordings], axis=0)  # type: ignore[attr-defined]
+    out, first = {}, 0
+    for each in named:
+        count = len(each.coefficients)
+        out[each.effect.name] = tuple(float(size) for size in moved[first : first + count])
+        first += count
+    return out
+
+
+def _below(floor: Mapping[str, tuple[float, ...]], found: likelihood.Selection, effect: Effect) -> bool:
+    """True for a named effect that is not clearly larger than what numerics move it by."""
+    for each in found.named:
+        if each.effect is effect and effect.name in floor:
+            size = math.hypot(*(found.with_named.values[name] for name in each.coefficients))
+            return size < ABOVE_NUMERICS * math.hypot(*floor[effect.name])
+    return False
+
+
+def _unmoved(found: likelihood.Selection, previous: likelihood.Selection, name: str) -> bool:
+    """True when a coefficient is within a tenth of its standard error of what it was before it was simulated."""
+    number = found.with_named.names.index(name)
+    error = math.sqrt(max(0.0, float(found.with_named.covariance[number, number])))
+    return abs(found.with_named.values[name] - previous.with_named.values.get(name, math.inf)) <= MOVED * error
 
 
 def _decided(

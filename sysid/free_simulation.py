@@ -77,6 +77,7 @@ FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the f
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
 SMOOTHER = 0.25  # of the straight lines' square that a cubic leaves: there it is the better way between samples
+NARROW = 0.25  # of what is open at standstill, in the numerical floor
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 TOGETHER = 24  # responses that are computed side by side
@@ -564,6 +565,17 @@ class SimulatedMachine(abc.ABC):
         made = tried.recording()
         return made if tried.surprise < fit.surprise else recording
 
+    def numerical(self, recording: Recording) -> Array:
+        """(variants, coefficients): what the coefficients of what acts move by with other numerics."""
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        count = len(fit.names)
+        moved = []
+        for other in fit.otherwise():
+            other.recording(AGAIN)
+            moved.append(other.p_at[count:] - fit.p_at[count:])
+        return np.array(moved)
+
     def surprise(self, recording: Recording) -> float:
         """-2 log likelihood of a recording with what acts in its simulator, up to a constant."""
         fit = cast(SimulatedRecording, recording).fit
@@ -602,6 +614,7 @@ class _Fit:
             guess = {name: table[f"first {name}"] for name in guess}
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = given
+        self.parts, self.rest_share = machine.parts, 1.0
         self.held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
         self.curved = {name for name in given if name not in self.held and _is_smooth(table, given[name])}
         self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
@@ -690,6 +703,20 @@ class _Fit:
         new.noise_y = self.shown_y
         return new
 
+    def otherwise(self) -> "list[_Fit]":
+        """Fits that continue from here with other numerics: half the step; inputs on straight lines instead of cubics,
+        or on straight lines instead of held; a quarter of what is open at standstill."""
+        finer, straight, narrow = (copy.copy(self) for _ in range(3))
+        finer.parts = 2 * self.parts
+        straight.curved, straight.held = set(), set(self.machine.held_inputs)
+        narrow.rest_share = NARROW
+        made = [finer]
+        if self.curved or straight.held != self.held:
+            made.append(straight)
+        if np.any(self._loose() > 1e-6 * self.size_x):
+            made.append(narrow)
+        return made
+
     def _acting_now(self) -> Array:
         """(n, ports, coefficients): the effects' input at the ports along the present trajectory."""
         if not self.acting:
@@ -723,13 +750,13 @@ class _Fit:
         given |= at_ports
         between = {name: self._between_samples(name, c) for name, c in given.items()}
         after: Quantities = states
-        for part in range(machine.parts):
-            share = (part + 0.5) / machine.parts
+        for part in range(self.parts):
+            share = (part + 0.5) / self.parts
             middle = {name: at(share) for name, at in between.items()}
-            after = dict(machine.step(after, middle, values, self.step_s / machine.parts))
+            after = dict(machine.step(after, middle, values, self.step_s / self.parts))
             for joint in machine.joints:
                 inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
-                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / machine.parts / inertia
+                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / self.parts / inertia
         seen = dict(machine.observe(states, given, values))
         for each in machine.outputs:
             seen[each.channel] = seen[each.channel] + at_ports[shown(each.channel)]
@@ -820,7 +847,7 @@ class _Fit:
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
-        return np.column_stack([found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x + self.slack
+        return np.column_stack([self.rest_share * found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x + self.slack
 
     def round(self) -> float:
         """One round; returns the largest step of a parameter in its standard errors."""
