@@ -77,6 +77,7 @@ FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the f
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
 SMOOTHER = 0.25  # of the straight lines' square that a cubic leaves: there it is the better way between samples
+NUMERICAL = 4  # rounds with other numerics, from the fit without them
 NARROW = 0.25  # of what is open at standstill, in the numerical floor
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
@@ -572,7 +573,7 @@ class SimulatedMachine(abc.ABC):
         count = len(fit.names)
         moved = []
         for other in fit.otherwise():
-            other.recording(AGAIN)
+            other.recording(NUMERICAL)
             moved.append(other.p_at[count:] - fit.p_at[count:])
         return np.array(moved)
 
