@@ -25,7 +25,7 @@ from ranger_sim.sysid import (
     predictability,
     signals,
 )
-from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
@@ -151,9 +151,7 @@ def diagnose(
     )
 
 
-def _about_all(
-    machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]
-) -> Recording:
+def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]) -> Recording:
     """A simulator's recording, linearised with known and likely effects in it, each at the shape that suits best."""
     known = likelihood.noise_of([recording], effects, had)
     tried = naming.trials(effects, naming.refit(Regression([recording], noise=known), had))
@@ -162,7 +160,8 @@ def _about_all(
     for score, _, _, trial in likelihood.ranking(seen, len(recording.table)):
         if score > 0.0 and not any(each.effect.excludes(trial.effect) for each in likeliest):
             likeliest.append(trial)
-    acting = [(each.effect, each.shape) for each in [*had, *likeliest[:MOST_ACTING]]]
+    acting = [(each.effect, each.shape) for each in had]
+    acting += [(each.effect, each.shape) for each in likeliest[:MOST_ACTING]]
     return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
 
 

@@ -102,10 +102,15 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
                  f"the machine gets {name} + offset")]  # fmt: skip
     if limits:
         beyond: Signal = lambda s, shape: np.clip(s[name], -shape["limit"], shape["limit"]) - s[name]  # noqa: E731
-        made.append(term(
-            "saturation", "share", beyond, f"the machine does not get the share of {name} that is beyond the limit",
-            [{"limit": each} for each in limits],
-        ))
+        made.append(
+            term(
+                "saturation",
+                "share",
+                beyond,
+                f"the machine does not get the share of {name} that is beyond the limit",
+                [{"limit": each} for each in limits],
+            )
+        )
     inside: Signal = lambda s, shape: -np.clip(s[name], -shape["limit"], shape["limit"])  # noqa: E731
     text = f"the machine does not get the share of {name} that is within the limit"
     made.append(term("dead_zone", "share", inside, text, [{"limit": each * largest} for each in DEAD]))
@@ -119,8 +124,15 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
     slow = joint.slow or SLOW * usual
     unit = joint.unit
 
-    def term(cause: str, coefficients: tuple[str, ...], make: Signal, meaning: str, shapes: Sequence[Shape] = ({},),
-             admissible: Callable[[Mapping[str, float]], bool] = lambda found: True, phase: bool = False) -> Term:  # fmt: skip
+    def term(
+        cause: str,
+        coefficients: tuple[str, ...],
+        make: Signal,
+        meaning: str,
+        shapes: Sequence[Shape] = ({},),
+        admissible: Callable[[Mapping[str, float]], bool] = lambda found: True,
+        phase: bool = False,
+    ) -> Term:
         return Term(
             cause, joint.rate, "mechanical", coefficients,
             lambda r, shape, values: {on(joint.rate): make(r.signals, shape)}, shapes, admissible,
@@ -143,7 +155,8 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
         term("coulomb_friction", (f"coulomb_{unit}",), lambda s, _: -sign(s),
              f"further dry friction, -coulomb_{unit} * sign(rate)"),
         term("stribeck", (f"excess_{unit}",), low,
-             f"friction is larger at low speed, -excess_{unit} * sign(rate) * exp(-(rate / speed)^2)", [{"speed": each * usual} for each in SPEEDS],
+             f"friction is larger at low speed, -excess_{unit} * sign(rate) * exp(-(rate / speed)^2)",
+             [{"speed": each * usual} for each in SPEEDS],
              lambda found: found[f"excess_{unit}"] > 0.0),
         term("direction_friction", (f"difference_{unit}",), lambda s, _: -np.abs(sign(s)),
              f"friction differs between the directions, -difference_{unit} * |sign(rate)|"),
@@ -152,11 +165,13 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
     ]  # fmt: skip
     if joint.load:
         friction: Signal = lambda s, _: -sign(s) * np.abs(s[joint.load])  # noqa: E731
-        made.append(term("load_friction", ("share",), friction, f"friction grows with the load, share * |{joint.load}|"))
+        made.append(
+            term("load_friction", ("share",), friction, f"friction grows with the load, share * |{joint.load}|")
+        )
     if joint.position:
         periods = [{"periods": float(each)} for each in joint.periods]
         made.append(term("once_per_turn", (f"cosine_{unit}", f"sine_{unit}"), around,
-                         f"periodic in {joint.position}, cosine and sine of periods * {joint.turns:g} * {joint.position}",
+                         f"periodic, cosine and sine of periods * {joint.turns:g} * {joint.position}",
                          periods, phase=True))  # fmt: skip
     return made
 

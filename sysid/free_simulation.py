@@ -56,7 +56,11 @@ from ranger_sim.sysid.simulated_terms import (
     shown,
 )
 
-__all__ = ["Acting", "Joint", "Output", "Port", "SimulatedEffect", "Term"]  # for machines
+# for machines, which need nothing else
+__all__ = [
+    "Acting", "Joint", "Output", "Port", "Ports", "Predictor", "Shape", "SimulatedEffect", "SimulatedMachine",
+    "SimulatedRecording", "Term", "averaged", "forced", "held", "roughness", "runge_kutta", "standing",
+]  # fmt: skip
 
 ROUNDS = 30  # of Gauss and Newton, at most
 RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
@@ -306,9 +310,7 @@ class SimulatedRecording(Recording):
         entering = [self.entering(ports) for _, _, ports in made]
         held = np.array([port.name in self.held_ports for port in self.ports])
         together = np.concatenate(entering, axis=2)
-        white = predictor.white(
-            predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together))
-        )
+        white = predictor.white(predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together)))
         first = 0
         for (term, place, _), each in zip(made, entering, strict=True):
             self.free[id(term), place] = self._heard(white[:, :, first : first + each.shape[2]])
@@ -521,9 +523,7 @@ class SimulatedMachine(abc.ABC):
         fit = recordings[0].fit
         assert fit is not None
         named = {(each.cause, each.at) for each in own}
-        made = [
-            each for each in candidates(self, list(fit.inputs), recordings) if (each.cause, each.at) not in named
-        ]
+        made = [each for each in candidates(self, list(fit.inputs), recordings) if (each.cause, each.at) not in named]
         first, values = recordings[0], recordings[0].fitted
         known = [_direction(first.respond(each.make(first, shape, values)), first)
                  for each in own for shape in each.shapes if len(each.coefficients) == 1]  # fmt: skip
@@ -773,7 +773,9 @@ class _Fit:
         after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
         if name not in self.curved:
             return lambda share: c + share * (after - c)
-        before, second = (np.concatenate(each, axis=1) for each in ((c[:, :1], c[:, :-1]), (after[:, 1:], after[:, -1:])))
+        before, second = (
+            np.concatenate(each, axis=1) for each in ((c[:, :1], c[:, :-1]), (after[:, 1:], after[:, -1:]))
+        )
         inside = self.inside if c.shape[1] > 1 else np.zeros(1)
         bend = after - 2.0 * c + before, second - 2.0 * after + c
 
@@ -821,9 +823,7 @@ class _Fit:
             )
         return Jacobians(f[0], h[0], f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
 
-    def _at_ports(
-        self, derivative: Callable[..., tuple[Array, Array]], f_u: Array, h_u: Array
-    ) -> tuple[Array, Array]:
+    def _at_ports(self, derivative: Callable[..., tuple[Array, Array]], f_u: Array, h_u: Array) -> tuple[Array, Array]:
         """(f_q, h_q). What the engine adds itself is known: an output's port moves it alone, a noisy input's as its
         noise does."""
         n, s = self.x.shape
@@ -833,7 +833,10 @@ class _Fit:
             h_q[:, number, names.index(shown(each.channel))] = 1.0
         known = {shown(each.channel) for each in self.machine.outputs} | {into(name) for name in self.noisy}
         for number, name in enumerate(self.noisy):
-            f_q[:, :, names.index(into(name))], h_q[:, :, names.index(into(name))] = f_u[:, :, number], h_u[:, :, number]
+            f_q[:, :, names.index(into(name))], h_q[:, :, names.index(into(name))] = (
+                f_u[:, :, number],
+                h_u[:, :, number],
+            )
         rest = [number for number, name in enumerate(names) if name not in known]
         f_q[:, :, rest], h_q[:, :, rest] = derivative(3, np.ones(len(names)), rest)
         return f_q, h_q
@@ -848,7 +851,11 @@ class _Fit:
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
-        return np.column_stack([self.rest_share * found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x + self.slack
+        return (
+            np.column_stack([self.rest_share * found.get(name, nothing) for name in machine.states])
+            + 1e-9 * self.size_x
+            + self.slack
+        )
 
     def round(self) -> float:
         """One round; returns the largest step of a parameter in its standard errors."""

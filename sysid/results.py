@@ -176,8 +176,8 @@ class DiagnosisEvidence:
     noise_floor, by equation; above_noise_floor, equations that leave far more than their channel's noise;
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
     the machine's own parameters explain in these data; too_short_s, by equation whose noise is too slow for these
-    recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than what
-    numerics move them by.
+    recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than
+    what numerics move them by.
     """
 
     p_general: float

@@ -10,10 +10,10 @@ median error of the value, and the processor time.
 import argparse
 import dataclasses
 import sys
-import time
 
 import numpy as np
 
+from ranger_sim.foundation.wallclock import process_cpu_s
 from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid import machines_of_a_user, other_machines
 
@@ -75,7 +75,7 @@ def main():
         if given.only not in case.title:
             continue
         right = inside = 0
-        errors, names, took = [], [], time.process_time()
+        errors, names, before = [], [], process_cpu_s()
         for seed in range(given.first, given.first + given.seeds):
             result = case.found(seed).result
             first = case.named(result)
@@ -85,7 +85,7 @@ def main():
                 value = first.parameters[case.coefficient]
                 inside += value.ci95[0] <= case.true <= value.ci95[1]
                 errors.append(abs(value.value / case.true - 1.0))
-        took = (time.process_time() - took) / given.seeds
+        took = (process_cpu_s() - before) / given.seeds
         middle = f"{np.median(errors):.1%}" if errors else ""
         sys.stdout.write(
             f"{case.title:26} {case.size:8g}  right {right}/{given.seeds}  interval {inside}/{len(errors)}  "

@@ -97,14 +97,12 @@ def heated_rod(cause, size, seed, seconds=6000.0, step_s=5.0):
         time_s,
         heater_W=power,
         hot_C=done[:, 0] + 0.05 * draw.normal(size=rows),
-        cold_C=done[:, 1]
-        + (size * time_s / seconds if cause == "drift" else 0.0)
-        + 0.05 * draw.normal(size=rows),
+        cold_C=done[:, 1] + (size * time_s / seconds if cause == "drift" else 0.0) + 0.05 * draw.normal(size=rows),
     )
 
 
 def elastic_joint(cause, size, seed, seconds=20.0, rate_hz=250.0):
-    """A motor that turns a link through a compliant gear; its torque and both angles, in counts of 14 bits, are logged."""
+    """A motor turns a link through a compliant gear; its torque and both angles in counts of 14 bits are logged."""
     draw = generator(seed, "elastic joint")
     rows = round(seconds * rate_hz)
     fine_s = np.arange(rows * FINE + 1) / rate_hz / FINE
@@ -129,4 +127,6 @@ def elastic_joint(cause, size, seed, seconds=20.0, rate_hz=250.0):
     angles[:, 1] *= 1.0 + (size if cause == "scale" else 0.0)
     count = 2.0 * np.pi / 16384
     motor, link = (np.round(angles / count) * count).T
-    return table(f"elastic joint {cause} {seed}", fine_s[:-1:FINE], torque_Nm=torque[:-1:FINE], motor_rad=motor, link_rad=link)
+    return table(
+        f"elastic joint {cause} {seed}", fine_s[:-1:FINE], torque_Nm=torque[:-1:FINE], motor_rad=motor, link_rad=link
+    )

@@ -14,7 +14,9 @@ def found(title, seed=1):
     return case, case.found(seed, **SHORT[case.machine.name]).result
 
 
-@pytest.mark.parametrize("title", ["heated-rod radiation", "heated-rod drift", "thrust-stand offset", "elastic-joint scale"])
+@pytest.mark.parametrize(
+    "title", ["heated-rod radiation", "heated-rod drift", "thrust-stand offset", "elastic-joint scale"]
+)
 def test_a_hidden_effect_is_the_first_cause_with_its_value(title):
     """The last of them moved the fit without it so far that first order about it named nothing."""
     case, result = found(title)

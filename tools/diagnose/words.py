@@ -34,8 +34,8 @@ def nothing(answer: dict[str, Any]) -> str:
     if short := evidence.get("too_short_s"):
         name, needed_s = max(short.items(), key=lambda one: one[1])
         return (
-            f"too short for this noise: what the {name} equation leaves is so slow that these recordings have fewer than "
-            f"20 independent stretches of it, and nothing is concluded; {needed_s:g} s like these would be enough"
+            f"too short for this noise: what the {name} equation leaves is so slow that these recordings have fewer "
+            f"than 20 independent stretches of it, and nothing is concluded; {needed_s:g} s like these would be enough"
         )
     if above := evidence.get("above_noise_floor"):
         each = evidence["noise_floor"][above[0]]
