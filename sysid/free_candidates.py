@@ -100,9 +100,10 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
     limits = sorted({float(np.quantile(size, each)) for each in CLIPPED} - {largest, 0.0})
 
     def term(cause: str, coefficient: str, make: Signal, meaning: str, shapes: Sequence[Shape] = ({},)) -> Term:
+        least = LEAST_SHARE if coefficient == "share" else -np.inf
         return Term(
             cause, name, "input", (coefficient,), lambda r, shape, values: {into(name): make(r.signals, shape)},
-            shapes, lambda found: cause == "input_offset" or found[coefficient] > LEAST_SHARE, meaning, independent=True,
+            shapes, lambda found: found[coefficient] > least, meaning, independent=True,
         )  # fmt: skip
 
     made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]),

@@ -279,7 +279,9 @@ def test_what_enters_at_a_port_is_weighed_there_and_seen_by_the_equations_that_i
     one, two = recording.signals["v"], np.column_stack((recording.signals["x"], np.ones(COUNT)))
     gate = recording.signals["gate"]
     entering = recording.entering({"push": one})
-    assert entering.shape == (COUNT, 6, 1) and np.allclose(entering[:, 0, 0], gate * one) and not np.any(entering[:, 1:])
+    assert (
+        entering.shape == (COUNT, 6, 1) and np.allclose(entering[:, 0, 0], gate * one) and not np.any(entering[:, 1:])
+    )
     both = recording.entering({"push": two, "shown": 3.0 * two})
     assert np.allclose(both[:, 0], gate[:, None] * two) and np.allclose(both[:, 1], 3.0 * two)
     lin, predictor = recording.linear, recording.predictor

@@ -56,7 +56,11 @@ def test_the_page_s_machine_of_twenty_lines_has_its_candidates_without_a_port_or
     draw = generator(5, "disc")
     fine_s = np.arange(1500 * 8 + 1) / 800.0
     volts = sum(2.0 * np.sin(f * fine_s + draw.uniform(0.0, 6.28)) for f in (0.7, 1.9, 4.3))
-    speed = integrated(lambda x, v: (6.0 * v - 1.2 * x[0] - 0.05 * x[0] * abs(x[0]),), [0.0], volts.tolist(), 0.01)[:, 0]
+
+    def rates(x, v):
+        return (6.0 * v - 1.2 * x[0] - 0.05 * x[0] * abs(x[0]),)
+
+    speed = integrated(rates, [0.0], volts.tolist(), 0.01)[:, 0]
     run = table("disc", fine_s[:-1:8], voltage_V=volts[:-1:8], speed_rad_s=speed + 0.02 * draw.normal(size=1500))
     result = diagnose(made["Disc"](), [run]).result
     assert [(each.name, each.at) for each in result.causes] == [("drag", "speed")]

@@ -52,7 +52,7 @@ def test_a_sound_joint_has_no_cause_however_slow_its_noise():
 
 
 def test_a_recording_that_is_too_short_for_its_noise_is_called_so_with_the_length_it_would_need():
-    """Noise with a memory of 0.98 is correlated over 99 samples, as its own fit finds shorter: 20 stretches are 20 s."""
+    """Noise with a memory of 0.98 is correlated over 99 samples of 10 ms: 20 stretches of it are 20 s."""
     found = diagnose(Joint(), [run(3, 0.98, "drag", 0.0, rows=800)])
     ((_, needed_s),) = found.result.evidence.too_short_s.items()
     assert not found.result.detected and 9.0 < needed_s < 40.0
