@@ -221,7 +221,7 @@ def _decided(
 ) -> likelihood.Selection:
     """The selection with each cause held against its nearest rivals in the simulator itself.
 
-    First order cannot tell causes from each other that differ by a small share of a large effect.
+    First order cannot distinguish causes that differ by a small share of a large effect.
     """
     named = list(found.named)
     for place, each in enumerate(found.named):

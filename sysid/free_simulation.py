@@ -282,9 +282,9 @@ class SimulatedRecording(Recording):
         held = np.array([port.name in self.held_ports for port in self.ports])
         state, output = forced(lin.f_q, _between(entering, held)), forced(lin.h_q, entering)
         white = predictor.white(predictor.errors(state, output))
-        return self._heard(white)
+        return self._reached(white)
 
-    def _heard(self, white: Array) -> Columns:
+    def _reached(self, white: Array) -> Columns:
         """(n, k) of each equation that has the effect."""
         assert self.predictor is not None
         power = (white**2).sum(axis=(0, 2)) / self.predictor.unit**2
@@ -313,7 +313,7 @@ class SimulatedRecording(Recording):
         white = predictor.white(predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together)))
         first = 0
         for (term, place, _), each in zip(made, entering, strict=True):
-            self.free[id(term), place] = self._heard(white[:, :, first : first + each.shape[2]])
+            self.free[id(term), place] = self._reached(white[:, :, first : first + each.shape[2]])
             first += each.shape[2]
 
 
@@ -693,7 +693,7 @@ class _Fit:
         """A fit from the start, with candidates in the simulator that are pulled towards 0; their coefficients are 0.
 
         What a model without its fault ends at may be far from the machine, and not only in the faulty place; first
-        order about it says little. Candidates that these data cannot tell from each other stay small.
+        order about it says little. Candidates that these data cannot distinguish stay small.
         """
         count = len(self.names)
         new = self.acted_on(acting, fixed=False)

@@ -76,17 +76,17 @@ def heated_rod(cause, size, seed, seconds=6000.0, step_s=5.0):
     rows = round(seconds / step_s)
     power = np.repeat(draw.choice([0.0, 20.0, 40.0, 60.0], int(seconds / 300.0) + 1), round(300.0 / step_s))[:rows]
     power[: rows // 8] = 40.0
-    room = 22.0
+    air = 22.0
 
     def rates(state, watts):
         hot, cold = state
         through = 1.6 * (hot - cold)
-        given = watts * (1.0 - (size if cause == "heater" else 0.0)) - through - 0.25 * (hot - room)
-        given -= size * ((hot + 273.15) ** 4 - (room + 273.15) ** 4) if cause == "radiation" else 0.0
-        return given / 150.0, (through - 0.35 * (cold - room)) / 220.0
+        given = watts * (1.0 - (size if cause == "heater" else 0.0)) - through - 0.25 * (hot - air)
+        given -= size * ((hot + 273.15) ** 4 - (air + 273.15) ** 4) if cause == "radiation" else 0.0
+        return given / 150.0, (through - 0.35 * (cold - air)) / 220.0
 
     held = np.repeat(power, FINE)
-    out, state = [], [room, room]
+    out, state = [], [air, air]
     for number in range(rows):  # the power of a sample until the next
         part = held[number * FINE : (number + 1) * FINE].tolist()
         out.append(state)

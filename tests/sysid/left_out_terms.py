@@ -1,6 +1,6 @@
 """True terms left out of real recordings at graded shares: is each named, with which value, and what does it gain.
 
-    python -m tests.sysid.knock_outs
+    python -m tests.sysid.left_out_terms
 
 Recordings: joints 1 and 4 of a UR10e (RANGER_SIM_DATA, or where the tests find them). A share of 1 leaves the whole of
 joint 4's gravity out of the model; at 0 it is in the model, and nothing is to be named. Joint 1 has a friction that
