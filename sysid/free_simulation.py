@@ -602,6 +602,21 @@ def _own_ports(machine: SimulatedMachine, inputs: Sequence[str]) -> list[Port]:
     return made + [Port(on(each.rate), "", "mechanical") for each in machine.joints]
 
 
+@dataclasses.dataclass(frozen=True)
+class Numerics:
+    """How a fit steps: parts of a sample; inputs that are held, and on cubics; share of what is open at standstill."""
+
+    parts: int
+    held: frozenset[str]
+    curved: frozenset[str]
+    open_share: float = 1.0
+
+    @property
+    def held_ports(self) -> frozenset[str]:
+        """Ports of the inputs that are held."""
+        return frozenset(into(name) for name in self.held)
+
+
 class _Fit:
     """Trajectory and parameters of one recording, by Gauss and Newton."""
 
@@ -615,9 +630,9 @@ class _Fit:
             guess = {name: table[f"first {name}"] for name in guess}
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = given
-        self.parts, self.rest_share = machine.parts, 1.0
-        self.held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
-        self.curved = {name for name in given if name not in self.held and _is_smooth(table, given[name])}
+        held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
+        curved = {name for name in given if name not in held and _is_smooth(table, given[name])}
+        self.numerics = Numerics(machine.parts, frozenset(held), frozenset(curved))
         self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
         for run in table.runs:
             self.inside[run.start + 1 : run.stop - 2] = 1.0
@@ -660,8 +675,6 @@ class _Fit:
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.ports = (*machine.ports, *_own_ports(machine, list(given)))
-        self.held_ports = frozenset(into(name) for name in self.held)
-        self.is_held = np.array([port.name in self.held_ports for port in self.ports], dtype=bool)
         self.at_ports = np.zeros((len(table), len(self.ports), 0))  # input for a unit of each coefficient
 
     @property
@@ -708,15 +721,20 @@ class _Fit:
         """Fits that continue from here with other numerics: half the step; inputs on straight lines instead of cubics,
         or on straight lines instead of held; a quarter of what is open at standstill."""
         finer, straight, narrow = (copy.copy(self) for _ in range(3))
-        finer.parts = 2 * self.parts
-        straight.curved, straight.held = set(), set(self.machine.held_inputs)
-        narrow.rest_share = NARROW
+        now = self.numerics
+        finer.numerics = dataclasses.replace(now, parts=2 * now.parts)
+        straight.numerics = dataclasses.replace(now, curved=frozenset(), held=frozenset(self.machine.held_inputs))
+        narrow.numerics = dataclasses.replace(now, open_share=NARROW)
         made = [finer]
-        if self.curved or straight.held != self.held:
+        if straight.numerics != now:
             made.append(straight)
         if np.any(self._loose() > 1e-6 * self.size_x):
             made.append(narrow)
         return made
+
+    def is_held(self) -> np.ndarray:
+        """(ports,) flags: the port of an input that is held."""
+        return np.array([port.name in self.numerics.held_ports for port in self.ports], dtype=bool)
 
     def _acting_now(self) -> Array:
         """(n, ports, coefficients): the effects' input at the ports along the present trajectory."""
@@ -751,13 +769,15 @@ class _Fit:
         given |= at_ports
         between = {name: self._between_samples(name, c) for name, c in given.items()}
         after: Quantities = states
-        for part in range(self.parts):
-            share = (part + 0.5) / self.parts
+        for part in range(self.numerics.parts):
+            share = (part + 0.5) / self.numerics.parts
             middle = {name: at(share) for name, at in between.items()}
-            after = dict(machine.step(after, middle, values, self.step_s / self.parts))
+            after = dict(machine.step(after, middle, values, self.step_s / self.numerics.parts))
             for joint in machine.joints:
                 inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
-                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / self.parts / inertia
+                after[joint.rate] = (
+                    after[joint.rate] + middle[on(joint.rate)] * self.step_s / self.numerics.parts / inertia
+                )
         seen = dict(machine.observe(states, given, values))
         for each in machine.outputs:
             seen[each.channel] = seen[each.channel] + at_ports[shown(each.channel)]
@@ -768,10 +788,10 @@ class _Fit:
     def _between_samples(self, name: str, c: Array) -> Callable[[float], Array]:
         """An input or port between its samples (m, n), at a share of the way to the next: held, on a cubic through its
         neighbours where the samples lie on one, or on a straight line."""
-        if name in self.held or name in self.held_ports:
+        if name in self.numerics.held or name in self.numerics.held_ports:
             return lambda share: c
         after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
-        if name not in self.curved:
+        if name not in self.numerics.curved:
             return lambda share: c + share * (after - c)
         before, second = (
             np.concatenate(each, axis=1) for each in ((c[:, :1], c[:, :-1]), (after[:, 1:], after[:, -1:]))
@@ -815,7 +835,7 @@ class _Fit:
         f_p, h_p = derivative(2, self.size_p[:count])
         f_q, h_q = self._at_ports(derivative, f_u, h_u)
         if self.acting:
-            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports, self.is_held))), axis=2)
+            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports, self.is_held()))), axis=2)
             h_p = np.concatenate((h_p, forced(h_q, self.at_ports)), axis=2)
         if not all(np.all(np.isfinite(each)) for each in (f, h, f_x, h_x, f_p, h_p)):
             raise UserError(
@@ -852,7 +872,7 @@ class _Fit:
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
         return (
-            np.column_stack([self.rest_share * found.get(name, nothing) for name in machine.states])
+            np.column_stack([self.numerics.open_share * found.get(name, nothing) for name in machine.states])
             + 1e-9 * self.size_x
             + self.slack
         )
@@ -1025,7 +1045,7 @@ class _Fit:
             linear=self.lin,
             predictor=predictor,
             ports=self.ports,
-            held_ports=self.held_ports,
+            held_ports=self.numerics.held_ports,
             outputs=tuple(each.channel for each in machine.outputs),
             fit=self,
             noise_by_candidates=machine.noise_by_candidates,

@@ -2,7 +2,7 @@
 
 Runge and Kutta's method in plain numbers, with steps far finer than the samples; nothing of the diagnosis is used, and
 the hidden effects are written otherwise than its candidates: a winding that heats by what it dissipates, friction of
-constant sign, radiation in kelvin, a low-pass as a state of its own.
+constant sign, radiation in kelvin, a low-pass as a further state.
 """
 
 import math
