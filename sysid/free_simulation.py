@@ -743,6 +743,31 @@ class _Fit:
         seen, values = self._seen(), dict(zip(self.names, self.p, strict=False))
         return np.concatenate([seen.entering(each.term.make(seen, each.shape, values)) for each in self.acting], axis=2)
 
+    def _fed_back(self) -> Array:
+        """(n, ports, states): what acts depends on the states, as gravity does on an angle; by differences.
+
+        Only where it depends on the states of its own sample: what remembers is not fed back.
+        """
+        seen, values = self._seen(), dict(zip(self.names, self.p, strict=False))
+        out = np.zeros((len(self.x), len(self.ports), len(self.machine.states)))
+        every_second = np.arange(len(self.x)) % 2 == 0
+        first = len(self.names)
+        for each in self.acting:
+            coefficients = self.p[first : first + len(each.coefficients)]
+            first += len(coefficients)
+
+            def entering(name: str, by: Array, each: Acting = each, coefficients: Array = coefficients) -> Array:
+                moved = dataclasses.replace(seen, signals=seen.signals | {name: seen.signals[name] + by})
+                return np.asarray(moved.entering(each.term.make(moved, each.shape, values)) @ coefficients)
+
+            for number, name in enumerate(self.machine.states):
+                nudge = NUDGE * self.size_x[number]
+                up, down = entering(name, nudge * every_second), entering(name, -nudge * every_second)
+                if np.array_equal(up[~every_second], down[~every_second]) and not np.array_equal(up, down):
+                    up, down = entering(name, np.full(len(self.x), nudge)), entering(name, np.full(len(self.x), -nudge))
+                    out[:, :, number] += (up - down) / (2.0 * nudge)
+        return out
+
     def _seen(self) -> SimulatedRecording:
         """Signals along the trajectory, without equations."""
         machine, table = self.machine, self.table
@@ -835,6 +860,9 @@ class _Fit:
         f_p, h_p = derivative(2, self.size_p[:count])
         f_q, h_q = self._at_ports(derivative, f_u, h_u)
         if self.acting:
+            fed_back = self._fed_back()
+            after = np.concatenate((fed_back[1:], fed_back[-1:]))  # a step has the mean of its two ends
+            f_x, h_x = f_x + 0.5 * f_q @ (fed_back + after @ f_x), h_x + h_q @ fed_back
             f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports, self.is_held()))), axis=2)
             h_p = np.concatenate((h_p, forced(h_q, self.at_ports)), axis=2)
         if not all(np.all(np.isfinite(each)) for each in (f, h, f_x, h_x, f_p, h_p)):
