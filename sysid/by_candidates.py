@@ -34,7 +34,7 @@ from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held
 
-MOST_ACTING = 4  # candidates in the simulator while it is linearised: the likeliest
+MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
