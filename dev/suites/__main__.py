@@ -157,6 +157,7 @@ def run(python: pathlib.Path, suite: Suite, top: pathlib.Path, on_ours: bool) ->
         "no:cacheprovider",
         "-p",
         "no:ranger_sim",
+        *WITHOUT,
         "--timeout=60",
         f"--junitxml={report}",
     ]
