@@ -94,7 +94,7 @@ def diagnose(
     if found.named:
         extended = naming.refit(found.base, found.named, [*skews, *found.named])
     _widen(extended)
-    after = predictability.test(extended, predictor.columns(recordings), seed)
+    after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
     if held:
@@ -157,9 +157,13 @@ def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple
     for band in bands.choose(recordings):
         inside = [band.of(each) for each in recordings]
         predictor = predictability.predictor(machine, inside, seed)
-        tests = predictability.test(bands.plain(inside), predictor.columns(inside), seed)
-        share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
-        if best is None or share > max(MORE_PREDICTED * best[0], predictability.WORTH):
+        regression, features = bands.plain(inside), predictor.columns(inside)
+        needed = max(MORE_PREDICTED * best[0], predictability.WORTH) if best is not None else predictability.WORTH
+        share = predictability.share(regression, features)
+        if share > needed:  # chance costs some hundred times as much, and matters only then
+            tests = predictability.test(regression, features, seed)
+            share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
+        if best is None or share > needed:
             best = (share, band, predictor)
     assert best is not None
     return best[1], best[2]

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ranger_sim.sysid import naming, noise
-from ranger_sim.sysid.bands import least_squares, plain
+from ranger_sim.sysid.bands import fitted, least_squares, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Effect, Recording
 from ranger_sim.sysid.naming import Named, Trial
@@ -74,7 +74,7 @@ def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: 
             if sum(each.shape[1] for each in kept) + columns.shape[1] <= most:
                 kept.append(columns)
         wide = np.hstack([x, *kept])
-        residual = y - wide @ least_squares(wide[good], y[good])
+        residual = y - wide @ fitted(np.hstack([z, *kept])[good], wide[good], y[good])
         memory = noise.autoregression(residual, good & _unbroken(part))
         counted = base._good(name, memory)
         shocks = innovations(memory, residual)
@@ -128,7 +128,7 @@ def _stacked(base: Regression, made: Sequence[dict[str, Array]], name: str, widt
     parts = []
     for recording, columns in zip(base.recordings, made, strict=True):
         given = columns.get(name, np.zeros((len(recording.table), width)))
-        parts.append(reduced(recording, given))
+        parts.append(reduced(recording, given, name))
     return np.vstack(parts)
 
 

@@ -104,7 +104,7 @@ class Predictor:
                     columns.append(seen.get(name, np.zeros((len(recording.table), wide))))
             for name, features_here in here.items():
                 if features_here:
-                    parts.setdefault(name, []).append(reduced(recording, np.hstack(features_here)))
+                    parts.setdefault(name, []).append(reduced(recording, np.hstack(features_here), name))
         return {name: np.vstack(each) for name, each in parts.items()}
 
 
@@ -121,24 +121,39 @@ def predictor(machine: Machine, recordings: Sequence[Recording], seed: int, with
     return Predictor(machine, {name: cosines([each[name] for each in general], seed) for name in places})
 
 
+def share(regression: Regression, features: Mapping[str, Array]) -> float:
+    """The largest share, of the equations, of a residual's square that is predicted on held-out blocks."""
+    found = 0.0
+    for name, part in regression.parts.items():
+        if name in features and np.count_nonzero(regression.good[name]) >= 4 * BLOCKS:
+            rows, residual, used = _rows(regression, name)
+            found = max(found, float(_held_out(features[name][rows], used, residual[rows, None])[0]))
+    return found
+
+
+def _rows(regression: Regression, name: str) -> tuple[np.ndarray, Array, Array]:
+    """(rows of an equation that a test counts, its residual (n,), the base's columns in those rows)."""
+    part = regression.parts[name]
+    good = np.flatnonzero(regression.good[name])
+    rows = good[:: max(1, len(good) // MOST_ROWS)]
+    residual = part.response - part.measured @ np.array([regression.values[each] for each in regression.names])
+    used = part.stand_in[rows]  # a feature must not find a column's own noise, which is in the residual
+    return rows, residual, used[:, np.any(used != 0.0, axis=0)]
+
+
 def test(regression: Regression, features: Mapping[str, Array], seed: int) -> list[Predicted]:
     """Each equation's residual against chance. features: by equation, over all of the regression's rows."""
     found = []
-    values = np.array([regression.values[each] for each in regression.names])
     count = (SURROGATES + 1) * len(regression.parts) - 1
     noises = likelihood.own_noise(regression).whitening
-    for name, part in regression.parts.items():
+    for name in regression.parts:
         good = regression.good[name]
         if name not in features or np.count_nonzero(good) < 4 * BLOCKS:
             continue
         own = noises[name]
         drawn = noise.surrogates(own.coefficients, own.deviation, len(good), count, seed, f"chance of {name}")
-        every = max(1, np.count_nonzero(good) // MOST_ROWS)
-        rows = np.flatnonzero(good)[::every]
-        residual = (part.response - part.measured @ values)[rows]
-        used = part.measured[rows]
-        used = used[:, np.any(used != 0.0, axis=0)]
-        shares = _held_out(features[name][rows], used, np.column_stack([residual, drawn[rows]]))
+        rows, residual, used = _rows(regression, name)
+        shares = _held_out(features[name][rows], used, np.column_stack([residual[rows], drawn[rows]]))
         memory = noise.correlation_time(own.coefficients)
         p = (1.0 + float(np.count_nonzero(shares[1:] >= shares[0]))) / (1.0 + count)
         found.append(Predicted(name, max(0.0, float(shares[0])), p, np.count_nonzero(good) / memory))
@@ -172,8 +187,12 @@ class _Fold:
         """((m,) square of what the base misses on the held rows, (ridges, m) and with the features)."""
         missed, missed_held = self.missed(residuals)
         along = self.vectors.T @ (self.rest.T @ missed)
-        left = [np.sum((missed_held - self.turned @ self._shrunk(along, ridge)) ** 2, axis=0) for ridge in RIDGES]
-        return np.sum(missed_held**2, axis=0), np.stack(left)
+        whole, met, gram = np.sum(missed_held**2, axis=0), self.turned.T @ missed_held, self.turned.T @ self.turned
+        left = []
+        for ridge in RIDGES:  # |m - T s|^2 by its products, a third of the rows' own
+            shrunk = self._shrunk(along, ridge)
+            left.append(whole + np.sum((gram @ shrunk - 2.0 * met) * shrunk, axis=0))
+        return whole, np.stack(left)
 
     def coefficients(self, residual: Array, ridge: float) -> Array:
         """(k,) of the features for a residual (n,)."""

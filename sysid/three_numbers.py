@@ -82,7 +82,7 @@ class Held:
         out = []
         for name in self.base.equations:
             parts = [
-                reduced(recording, columns.get(name, np.zeros((len(recording.table), wide))))
+                reduced(recording, columns.get(name, np.zeros((len(recording.table), wide))), name)
                 for recording, columns in zip(self.recordings, made, strict=True)
             ]
             out.append(np.vstack(parts)[self.rows[name]] / self.sizes[name])

@@ -176,7 +176,7 @@ class MotorBench:
             )
         regimes = _regimes(s, firm_w)
         lags = (0, 10, 30, 100) if measured else (0, 100, 250)
-        return Recording(table, s, equations, regimes, lags=lags, noise_by_candidates=False)
+        return Recording(table, s, equations, regimes, lags=lags)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is examined without a cause in mind."""
