@@ -7,6 +7,7 @@ held-out data do not refuse (`likelihood.py`), three errors (`three_numbers.py`)
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import cast
 
 import numpy as np
 from scipy import ndimage
@@ -33,6 +34,7 @@ from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held
 
+MOST_ACTING = 12  # candidates in the simulator while it is linearised: the likeliest
 AGAIN = 2  # simulations with the named effects, at most
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
@@ -60,6 +62,8 @@ def diagnose(
     had = [find(each, effects) for each in known]
     effects = [each for each in effects if all(each is not other.effect for other in had)]
     progress("misfit", 0.2)
+    if hasattr(machine, "about_all"):
+        recordings, held = ([_about_all(machine, each, effects) for each in some] for some in (recordings, held))
     skews = list(had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
@@ -127,6 +131,16 @@ def diagnose(
     )
 
 
+def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]) -> Recording:
+    """A simulator's recording, linearised with all effects in it, each at the shape that suits best without them."""
+    known = likelihood.noise_of([recording], effects, ())
+    tried = naming.trials(effects, Regression([recording], noise=known))
+    best = likelihood.ranking([each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN],
+                              len(recording.table))[:MOST_ACTING]  # fmt: skip
+    best = [each for each in best if each[0] > 0.0]
+    return cast(Recording, machine.about_all(recording, [(each[3].effect, each[3].shape) for each in best]))  # type: ignore[attr-defined]
+
+
 def unclipped(machine: Machine, recording: Recording) -> Recording:
     """The recording without the rows in which a measured channel is cut off, and those that the band's filter reaches
     from there. UserError where it is a large part of them, or where a simulator would have to follow the channel."""
@@ -154,12 +168,15 @@ def unclipped(machine: Machine, recording: Recording) -> Recording:
 def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple[bands.Band, predictability.Predictor]:
     """The band, of three that suit, in which most of the residual can be predicted; and the predictor in it."""
     best: tuple[float, bands.Band, predictability.Predictor] | None = None
-    for band in bands.choose(recordings):
+    suiting = bands.choose(recordings)
+    for band in suiting:
         inside = [band.of(each) for each in recordings]
         predictor = predictability.predictor(machine, inside, seed)
+        if len(suiting) == 1:
+            return band, predictor
         regression, features = bands.plain(inside), predictor.columns(inside)
         needed = max(MORE_PREDICTED * best[0], predictability.WORTH) if best is not None else predictability.WORTH
-        share = predictability.share(regression, features)
+        share = predictability.largest_share(regression, features)
         if share > needed:  # chance costs some hundred times as much, and matters only then
             tests = predictability.test(regression, features, seed)
             share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
@@ -264,8 +281,8 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
             free = len(inverse) + (shapes > 1)
             needed = threshold + free * math.log(regression.size) + 2.0 * math.log(shapes)
             errors = np.sqrt(np.maximum(np.diag(inverse), 0.0) * needed * trial.inflation)
-            off = _off(trial.gram, trial.white)
-            if off > predictability.HIDDEN:
+            off = likelihood.own_part(trial)
+            if off > likelihood.HIDDEN:
                 named = dict(zip(effect.coefficients, (float(each) for each in errors), strict=True))
                 sizes.append((off, named, trial.shape))
         if sizes:
@@ -274,12 +291,6 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
         else:
             out.append(Visible(effect, None, {}))
     return out
-
-
-def _off(gram: Array, white: Mapping[str, Array]) -> float:
-    """Part of an effect's square that the base does not explain."""
-    whole = sum(float(np.sum(columns**2)) for columns in white.values())
-    return float(np.trace(gram)) / max(whole, 1e-300)
 
 
 def unexplained(found: Diagnosis) -> list[str]:

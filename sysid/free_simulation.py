@@ -28,6 +28,7 @@ A user's machine is a subclass of `SimulatedMachine`; `examples/servo_arm.py` is
 import abc
 import copy
 import dataclasses
+import functools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import cast
 
@@ -38,7 +39,23 @@ from scipy.signal import savgol_filter
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.free_candidates import candidates
 from ranger_sim.sysid.machine import Columns, Effect, Entry, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.simulated_terms import (
+    Acting,
+    Joint,
+    Output,
+    Port,
+    Ports,
+    Shape,
+    SimulatedEffect,
+    Term,
+    into,
+    on,
+    shown,
+)
+
+__all__ = ["Acting", "Joint", "Output", "Port", "SimulatedEffect", "Term"]  # for machines
 
 ROUNDS = 30  # of Gauss and Newton, at most
 RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
@@ -52,72 +69,16 @@ AWAY = 30.0  # a free initial state's deviation, in rms of the state: practicall
 STRETCH = 400  # samples of a stretch; covariances of all stretches are computed side by side
 LOUDER = 2.0  # times the channel's own noise estimate (`roughness`), which misses slower noise. Chosen by us
 OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
-AGAIN = 6  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+AGAIN = 12  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+JUMPS = 0.2  # of the samples at most: an input that changes at no more of them is held in between
+SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
+DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
+TOGETHER = 24  # responses that are computed side by side
+SAME = 1.0 - 1e-6  # cosine of two responses: candidates of two names for one effect
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 
 Quantities = Mapping[str, Array]  # by name, all of one shape
-Shape = Mapping[str, float]
-Ports = Mapping[str, Array]  # an effect's input by port, (n,) or (n, k)
-
-
-@dataclasses.dataclass(frozen=True)
-class Output:
-    """A measured channel that the simulator predicts. letter, subsystem: of the balance that its misfit accuses."""
-
-    channel: str
-    letter: str
-    subsystem: str
-    unit: str
-
-
-@dataclasses.dataclass(frozen=True)
-class Port:
-    """A place where something that the simulator lacks can enter: an input that is 0 as long as nothing is wrong.
-
-    where: name of a signal, 0 ... 1, that weights everything that enters; "": it enters at all times. A torque has no
-    effect where dry friction holds.
-    """
-
-    name: str
-    unit: str
-    subsystem: str
-    where: str = ""
-
-
-@dataclasses.dataclass(frozen=True)
-class Term:
-    """A candidate cause, as `Effect`, given by its input at the ports.
-
-    make(signals, shape, values) -> by port (n,) for one coefficient or (n, k) for k. signals: states, inputs, outputs
-    and `t` along the fitted trajectory, (n,) by name, and the signals that `SimulatedMachine.signals` adds.
-    """
-
-    cause: str
-    at: str
-    subsystem: str
-    coefficients: tuple[str, ...]
-    make: Callable[["SimulatedRecording", Shape, Values], Ports]
-    shapes: Sequence[Shape] = ({},)
-    admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
-    meaning: str = ""
-    phase_is_free: bool = False
-
-
-@dataclasses.dataclass(frozen=True)
-class SimulatedEffect(Effect):
-    """A term as an effect on the outputs."""
-
-    term: Term | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class Acting:
-    """An effect that acts in the simulator: its term at a shape, and coefficients."""
-
-    term: Term
-    shape: Shape
-    coefficients: tuple[float, ...]
 
 
 def held(rate: Array, braking: Array) -> Array:
@@ -285,6 +246,8 @@ class SimulatedRecording(Recording):
     ports: tuple[Port, ...] = ()
     outputs: tuple[str, ...] = ()
     fit: "_Fit | None" = None  # the fit that made it, which continues with an effect in the simulator
+    held_ports: frozenset[str] = frozenset()
+    free: dict[tuple[int, int], Columns] = dataclasses.field(default_factory=dict)  # by term and number of its shape
 
     def entering(self, entries: Ports) -> Array:
         """(n, ports, k): the input at the ports, (n,) or (n, k) by name, weighted by each port's `where`."""
@@ -305,17 +268,50 @@ class SimulatedRecording(Recording):
         if unknown:
             raise UserError(f"a term puts something into {', '.join(unknown)}; ports are {_names(self.ports)}")
         entering = self.entering(entries)
-        state, output = forced(lin.f_q, _between(entering)), forced(lin.h_q, entering)
+        held = np.array([port.name in self.held_ports for port in self.ports])
+        state, output = forced(lin.f_q, _between(entering, held)), forced(lin.h_q, entering)
         white = predictor.white(predictor.errors(state, output))
-        power = (white**2).sum(axis=(0, 2)) / predictor.unit**2
+        return self._heard(white)
+
+    def _heard(self, white: Array) -> Columns:
+        """(n, k) of each equation that has the effect."""
+        assert self.predictor is not None
+        power = (white**2).sum(axis=(0, 2)) / self.predictor.unit**2
         return {
             name: white[:, number] for number, name in enumerate(self.outputs) if power[number] > SILENT * power.sum()
         }
 
+    def of_free(self, terms: Sequence[Term], term: Term, shape: Shape) -> Columns:
+        """The response to a free term at a shape; on its grid, that of all free `terms` is computed together."""
+        place = next((number for number, each in enumerate(term.shapes) if each is shape), None)
+        if place is None:
+            return self.respond(term.make(self, shape, {}))
+        if (id(term), place) not in self.free:
+            made = [(each, number, each.make(self, one, {}))
+                    for each in terms for number, one in enumerate(each.shapes)]  # fmt: skip
+            for some in (made[begin : begin + TOGETHER] for begin in range(0, len(made), TOGETHER)):
+                self._fill(some)
+        return self.free[id(term), place]
 
-def _between(column: Array) -> Array:
-    """Means of each sample and the next, for the step between them."""
-    return np.asarray(0.5 * (column + np.concatenate((column[1:], column[-1:]))), dtype=float)
+    def _fill(self, made: Sequence[tuple[Term, int, Ports]]) -> None:
+        lin, predictor = self.linear, self.predictor
+        assert lin is not None and predictor is not None
+        entering = [self.entering(ports) for _, _, ports in made]
+        held = np.array([port.name in self.held_ports for port in self.ports])
+        together = np.concatenate(entering, axis=2)
+        white = predictor.white(
+            predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together))
+        )
+        first = 0
+        for (term, place, _), each in zip(made, entering, strict=True):
+            self.free[id(term), place] = self._heard(white[:, :, first : first + each.shape[2]])
+            first += each.shape[2]
+
+
+def _between(column: Array, held: np.ndarray) -> Array:
+    """(n, ports, k): means of each sample and the next, for the step between them; a held port's are the samples."""
+    after = np.concatenate((column[1:], column[-1:]))
+    return np.where(held[None, :, None], column, 0.5 * (column + after))
 
 
 def forced(sensitivity: Array, entering: Array) -> Array:
@@ -325,6 +321,17 @@ def forced(sensitivity: Array, entering: Array) -> Array:
         if np.any(entering[:, number]):
             out += sensitivity[:, :, number, None] * entering[:, None, number]
     return out
+
+
+def _direction(columns: Columns, recording: SimulatedRecording) -> Array:
+    """An effect's response with one coefficient as a vector of length 1, each output in its noise."""
+    assert recording.predictor is not None
+    nothing = np.zeros((len(recording.table), 1))
+    stacked = np.concatenate(
+        [columns.get(name, nothing)[:, 0] / unit
+         for name, unit in zip(recording.outputs, recording.predictor.unit, strict=True)]
+    )  # fmt: skip
+    return np.asarray(stacked / max(float(np.linalg.norm(stacked)), 1e-300))
 
 
 def _names(ports: Sequence[Port]) -> str:
@@ -340,6 +347,15 @@ def roughness(table: Table, column: Array) -> float:
     rest = np.concatenate(parts)
     # the parabola uses three of these degrees of freedom
     return float(np.median(np.abs(rest))) / 0.6745 * float(np.sqrt(size / (size - 3.0)))
+
+
+def _stays(table: Table, column: Array) -> bool:
+    """True for an input that stays at a value for several samples and then jumps: its source holds it."""
+    return all(
+        np.count_nonzero(np.diff(column[run])) < JUMPS * (run.stop - run.start)
+        for run in table.runs
+        if run.stop - run.start > 1
+    )
 
 
 def averaged(table: Table, count: int) -> Table:
@@ -381,15 +397,18 @@ class SimulatedMachine(abc.ABC):
     parameters: tuple[Known, ...]
     states: tuple[str, ...]
     outputs: tuple[Output, ...]
-    ports: tuple[Port, ...]
+    ports: tuple[Port, ...] = ()
+    joints: tuple[Joint, ...] = ()  # where friction is sought, without a port or a term
+    free_candidates: bool = True  # what every machine can have (sysid/free_candidates.py), next to its own terms
     # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
-    # From one sample to the next inputs and ports are straight lines, but for those that a converter holds
+    # From one sample to the next inputs and ports are straight lines, but for those that a converter holds, and for
+    # inputs that stay at a value and jump, in these data
     held_inputs: Collection[str] = ()
     parts: int = 2  # steps from one sample to the next, each with the inputs of its own middle
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording
-    window_s: float = 2.0  # over which the gain is measured in free simulation
+    window_s: float = 2.0  # over which the gain is measured in free simulation, or 50 samples
     noise_by_candidates: bool = True  # `Recording.noise_by_candidates`
 
     @abc.abstractmethod
@@ -408,9 +427,9 @@ class SimulatedMachine(abc.ABC):
     def observe(self, x: Quantities, u: Quantities, p: Quantities) -> Quantities:
         """The outputs, by channel."""
 
-    @abc.abstractmethod
     def terms(self, recordings: Sequence[SimulatedRecording]) -> list[Term]:
-        """All candidate causes, with grids that suit these recordings."""
+        """Candidate causes of this machine alone, with grids that suit these recordings."""
+        return []
 
     def loose(self, x: Quantities, u: Quantities, p: Quantities, step_s: float) -> Quantities:
         """Deviations of states per step that the law leaves open, by name: where dry friction holds, for example."""
@@ -427,7 +446,8 @@ class SimulatedMachine(abc.ABC):
     def looked_over(self, recording: SimulatedRecording) -> dict[str, dict[str, Array]]:
         """For ports and equations, the signals over which a misfit is sought without a cause in mind."""
         everything = {name: recording.signals[name] for name in (*self.states, "t")}
-        return {each.name: everything for each in self.ports}
+        places = [each.name for each in self.ports] or [on(each.rate) for each in self.joints]
+        return {each: everything for each in places or [each.channel for each in self.outputs]}
 
     # --- called by the diagnosis ---------------------------------------------------------------------------------
 
@@ -448,28 +468,55 @@ class SimulatedMachine(abc.ABC):
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The terms as effects on the outputs."""
-        made: list[Effect] = []
-        for term in self.terms(cast(Sequence[SimulatedRecording], recordings)):
+        simulated = cast(Sequence[SimulatedRecording], recordings)
+        own = self.terms(simulated)
+        free = self._free(own, simulated)
 
-            def columns(recording: Recording, shape: Shape, values: Values, term: Term = term) -> Columns:
-                simulated = cast(SimulatedRecording, recording)
-                return simulated.respond(term.make(simulated, shape, values))
+        def columns(recording: Recording, shape: Shape, values: Values, term: Term) -> Columns:
+            here = cast(SimulatedRecording, recording)
+            return here.of_free(free, term, shape) if term.free else here.respond(term.make(here, shape, values))
 
-            made.append(
-                SimulatedEffect(
-                    term.cause,
-                    term.at,
-                    term.subsystem,
-                    term.coefficients,
-                    term.shapes,
-                    columns,
-                    term.admissible,
-                    term.meaning,
-                    phase_is_free=term.phase_is_free,
-                    term=term,
-                )
+        return [
+            SimulatedEffect(
+                term.cause,
+                term.at,
+                term.subsystem,
+                term.coefficients,
+                term.shapes,
+                functools.partial(columns, term=term),
+                term.admissible,
+                term.meaning,
+                phase_is_free=term.phase_is_free,
+                form=term.form,
+                scale=term.scale,
+                term=term,
             )
-        return made
+            for term in (*own, *free)
+        ]
+
+    def _free(self, own: Sequence[Term], recordings: Sequence[SimulatedRecording]) -> list[Term]:
+        """The free candidates that are not the same as a term of the machine's own."""
+        if not self.free_candidates or not self.noise_by_candidates:
+            return []
+        fit = recordings[0].fit
+        assert fit is not None
+        named = {(each.cause, each.at) for each in own}
+        made = [
+            each for each in candidates(self, list(fit.inputs), recordings) if (each.cause, each.at) not in named
+        ]
+        first, values = recordings[0], recordings[0].fitted
+        known = [_direction(first.respond(each.make(first, shape, values)), first)
+                 for each in own for shape in each.shapes if len(each.coefficients) == 1]  # fmt: skip
+        return [
+            each
+            for each in made
+            if len(each.coefficients) > 1
+            or all(
+                abs(float(_direction(first.of_free(made, each, shape), first) @ other)) < SAME
+                for shape in each.shapes
+                for other in known
+            )
+        ]
 
     def again(
         self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
@@ -484,6 +531,21 @@ class SimulatedMachine(abc.ABC):
         assert fit is not None
         return fit.acted_on(acting, fixed).recording(AGAIN)
 
+    def about_all(self, recording: Recording, effects: Sequence[tuple[Effect, Shape]]) -> Recording:
+        """The recording linearised where the simulator fits with all of these effects in it, and not only without."""
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        acting = [
+            Acting(effect.term, shape, (0.0,) * len(effect.coefficients))
+            for effect, shape in effects
+            if isinstance(effect, SimulatedEffect) and effect.term is not None
+        ]
+        if not acting:
+            return recording
+        tried = fit.with_all(acting)
+        made = tried.recording()
+        return made if tried.cost * np.prod(tried.noise_y) < fit.cost * np.prod(fit.noise_y) else recording
+
     def free(self, recording: Recording) -> Recording:
         """The recording with errors of free simulation as its equations: the outputs' errors over `window_s`, with the
         simulator started at the most probable state of each window. Inputs count as exact."""
@@ -494,6 +556,13 @@ class SimulatedMachine(abc.ABC):
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """The signals of `looked_over`."""
         return self.looked_over(cast(SimulatedRecording, recording))
+
+
+def _own_ports(machine: SimulatedMachine, inputs: Sequence[str]) -> list[Port]:
+    """The ports that the engine adds to a machine."""
+    made = [Port(shown(each.channel), each.unit, "sensor") for each in machine.outputs]
+    made += [Port(into(name), "", "input") for name in inputs]
+    return made + [Port(on(each.rate), "", "mechanical") for each in machine.joints]
 
 
 class _Fit:
@@ -509,6 +578,7 @@ class _Fit:
             guess = {name: table[f"first {name}"] for name in guess}
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = given
+        self.held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
         self.names = [known.name for known in machine.parameters]
         self.x = np.column_stack([guess[name] for name in machine.states])
         self.p = np.array([known.value for known in machine.parameters])
@@ -538,14 +608,18 @@ class _Fit:
         self.size_x, self.size_u = (np.maximum(np.sqrt(np.mean(each**2, axis=0)), 1e-9) for each in (self.x, self.u))
         self.size_p = np.where(self.p != 0.0, np.abs(self.p), 0.01 * np.minimum(self.high - self.low, 1e6))
         self.predictor: Predictor | None = None
-        self.came_from = (self.x, self.u, self.p)
+        self.came_from = self.began = (self.x, self.u, self.p)
         reach = len(table) if not np.isfinite(machine.horizon_s) else max(2, round(machine.horizon_s / self.step_s))
         self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
         self.acting: list[Acting] = []
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
-        self.at_ports = np.zeros((len(table), len(machine.ports), 0))  # input for a unit of each coefficient
+        self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
+        self.ports = (*machine.ports, *_own_ports(machine, list(given)))
+        self.held_ports = frozenset(into(name) for name in self.held)
+        self.is_held = np.array([port.name in self.held_ports for port in self.ports], dtype=bool)
+        self.at_ports = np.zeros((len(table), len(self.ports), 0))  # input for a unit of each coefficient
 
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "_Fit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
@@ -559,8 +633,24 @@ class _Fit:
         )
         new.size_p = np.concatenate((self.size_p[:count], np.where(added != 0.0, np.abs(added), 1.0)))
         new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
+        new.damped = np.zeros(len(new.p))
         new.came_from = (new.x, new.u, new.p)
         new.at_ports = np.zeros((*self.at_ports.shape[:2], len(added)))  # filled by the first round, if any effect acts
+        return new
+
+    def with_all(self, acting: Sequence[Acting]) -> "_Fit":
+        """A fit from the start, with candidates in the simulator that are pulled towards 0; their coefficients are 0.
+
+        What a model without its fault ends at may be far from the machine, and not only in the faulty place; first
+        order about it says little. Candidates that these data cannot tell from each other stay small.
+        """
+        count = len(self.names)
+        new = self.acted_on(acting, fixed=False)
+        new.x, new.u, start = self.began
+        new.p = np.concatenate((start[:count], np.zeros(len(new.p) - count)))
+        new.damped = np.concatenate((np.zeros(count), np.full(len(new.p) - count, DAMPED)))
+        new.came_from, new.predictor = (new.x, new.u, new.p), None
+        new.noise_y = self.shown_y
         return new
 
     def _acting_now(self) -> Array:
@@ -578,7 +668,7 @@ class _Fit:
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
         along["t"] = table.time_s - table.time_s[0]
         along |= machine.extra_signals(along, table)
-        return SimulatedRecording(table, along, {}, ports=machine.ports)
+        return SimulatedRecording(table, along, {}, ports=self.ports)
 
     def _at(self, x: Array, u: Array, p: Array, ports: Array) -> tuple[Array, Array]:
         """(f, h) as (m, n, s) and (m, n, o). x: (m, n, s), u: (m, n, i), p: (m, n or 1, p), ports: (m, n or 1, q)."""
@@ -588,17 +678,24 @@ class _Fit:
         values = {name: p[..., i] for i, name in enumerate(self.names)}
         given = {name: column[None] for name, column in self.inputs.items()}
         given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
-        given |= {each.name: ports[..., i] for i, each in enumerate(machine.ports)}
+        at_ports = {each.name: ports[..., i] for i, each in enumerate(self.ports)}
+        given = {name: column + at_ports[into(name)] for name, column in given.items()}
+        given |= at_ports
         change = {
-            name: 0.0 * c if name in machine.held_inputs else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
+            name: 0.0 * c if name in self.held or name in self.held_ports else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
             for name, c in given.items()
         }
         after: Quantities = states
         for part in range(machine.parts):
             share = (part + 0.5) / machine.parts
             middle = {name: np.asarray(c + share * change[name]) for name, c in given.items()}
-            after = machine.step(after, middle, values, self.step_s / machine.parts)
-        seen = machine.observe(states, given, values)
+            after = dict(machine.step(after, middle, values, self.step_s / machine.parts))
+            for joint in machine.joints:
+                inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
+                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / machine.parts / inertia
+        seen = dict(machine.observe(states, given, values))
+        for each in machine.outputs:
+            seen[each.channel] = seen[each.channel] + at_ports[shown(each.channel)]
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
         return f, h
@@ -608,12 +705,14 @@ class _Fit:
         x, u, p = self.x[None], self.u[None], self.p[None, None]
         count = len(self.names)
         self.at_ports = self._acting_now()
-        ports = (self.at_ports @ self.p[count:])[None] if self.acting else np.zeros((1, 1, len(self.machine.ports)))
+        ports = (self.at_ports @ self.p[count:])[None] if self.acting else np.zeros((1, 1, len(self.ports)))
         f, h = self._at(x, u, p, ports)
 
-        def derivative(which: int, sizes: Array) -> tuple[Array, Array]:
+        def derivative(which: int, sizes: Array, some: Sequence[int] | None = None) -> tuple[Array, Array]:
             columns = []
             for number, size in enumerate(sizes):
+                if some is not None and number not in some:
+                    continue
                 arguments = [x, u, p, ports]
                 up, down = arguments[which].copy(), arguments[which].copy()
                 up[..., number] += NUDGE * size
@@ -628,9 +727,9 @@ class _Fit:
         f_x, h_x = derivative(0, self.size_x)
         f_u, h_u = derivative(1, self.size_u)
         f_p, h_p = derivative(2, self.size_p[:count])
-        f_q, h_q = derivative(3, np.ones(len(self.machine.ports)))
+        f_q, h_q = self._at_ports(derivative, f_u, h_u)
         if self.acting:
-            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports))), axis=2)
+            f_p = np.concatenate((f_p, forced(f_q, _between(self.at_ports, self.is_held))), axis=2)
             h_p = np.concatenate((h_p, forced(h_q, self.at_ports)), axis=2)
         if not all(np.all(np.isfinite(each)) for each in (f, h, f_x, h_x, f_p, h_p)):
             raise UserError(
@@ -638,13 +737,30 @@ class _Fit:
             )
         return Jacobians(f[0], h[0], f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
 
+    def _at_ports(
+        self, derivative: Callable[..., tuple[Array, Array]], f_u: Array, h_u: Array
+    ) -> tuple[Array, Array]:
+        """(f_q, h_q). What the engine adds itself is known: an output's port moves it alone, a noisy input's as its
+        noise does."""
+        n, s = self.x.shape
+        f_q, h_q = np.zeros((n, s, len(self.ports))), np.zeros((n, len(self.machine.outputs), len(self.ports)))
+        names = [each.name for each in self.ports]
+        for number, each in enumerate(self.machine.outputs):
+            h_q[:, number, names.index(shown(each.channel))] = 1.0
+        known = {shown(each.channel) for each in self.machine.outputs} | {into(name) for name in self.noisy}
+        for number, name in enumerate(self.noisy):
+            f_q[:, :, names.index(into(name))], h_q[:, :, names.index(into(name))] = f_u[:, :, number], h_u[:, :, number]
+        rest = [number for number, name in enumerate(names) if name not in known]
+        f_q[:, :, rest], h_q[:, :, rest] = derivative(3, np.ones(len(names)), rest)
+        return f_q, h_q
+
     def _loose(self) -> Array:
         machine = self.machine
         states = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         values = {name: np.full(len(self.x), self.p[i]) for i, name in enumerate(self.names)}
         given = self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
         entering = self.at_ports @ self.p[len(self.names) :]
-        given |= {each.name: entering[:, i] for i, each in enumerate(machine.ports)}
+        given |= {each.name: entering[:, i] for i, each in enumerate(self.ports)}
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
@@ -670,12 +786,7 @@ class _Fit:
         self.cost = float(np.mean((self.response / wide.unit) ** 2))
         a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * (self.size_p * self.moves)
         b = (self.response / wide.unit).reshape(n)
-        length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
-        u, sv, vt = np.linalg.svd(a / length, full_matrices=False)
-        strong = sv > 1e-6 * sv[0]
-        change = (vt[strong].T @ ((u.T @ b)[strong] / sv[strong])) / length * self.size_p
-        error = np.sqrt(((vt[strong] / sv[strong, None]) ** 2).sum(axis=0)) / length * self.size_p
-        change = np.clip(self.p + change, self.low, self.high) - self.p
+        change, error = self._step(a, b)
         # positive parameters are divisors, far from linear: no step more than halves or doubles one
         ratio = np.divide(self.p + change, self.p, out=np.ones_like(self.p), where=self.low > 0.0)
         change *= min(1.0, *(0.5 / (1.0 - r) if r < 0.5 else 1.0 / (r - 1.0) if r > 2.0 else 1.0 for r in ratio))
@@ -686,6 +797,33 @@ class _Fit:
         self.x, self.u, self.p = self.x + dx, self.u + offset + du, self.p + change
         self.rest = wide.errors(state[:, :, None], output[:, :, None])[:, :, 0]
         return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
+
+    def _step(self, a: Array, b: Array) -> tuple[Array, Array]:
+        """(change of the parameters, their standard errors) by least squares within the limits.
+
+        a: (n, p) columns for a change of `size_p`; b: (n,). A parameter that would leave its limits goes to the limit,
+        and the others are fitted again: cut off alone, it would leave them where only its full step belongs to them.
+        """
+        length = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
+        scaled = np.vstack((a / length, np.diag(self.damped)))
+        wanted = np.concatenate((b, -self.damped * self.p * length / self.size_p))
+        change, error = np.zeros(len(self.p)), np.zeros(len(self.p))
+        free = np.ones(len(self.p), dtype=bool)
+        while np.any(free):
+            columns = scaled[:, free]
+            u, sv, vt = np.linalg.svd(columns, full_matrices=False)
+            strong = sv > 1e-6 * sv[0]
+            found = vt[strong].T @ ((u.T @ wanted)[strong] / sv[strong])
+            scale = self.size_p[free] / length[free]
+            change[free] = found * scale
+            error[free] = np.sqrt(((vt[strong] / sv[strong, None]) ** 2).sum(axis=0)) * scale
+            beyond = free & ((self.p + change < self.low) | (self.p + change > self.high))
+            if not np.any(beyond):
+                break
+            change[beyond] = np.clip(self.p + change, self.low, self.high)[beyond] - self.p[beyond]
+            wanted = wanted - scaled[:, beyond] @ (change * length / self.size_p)[beyond]
+            free &= ~beyond
+        return change, error
 
     def _renew_noise(self) -> None:
         """Estimate the sensors' noise from the residual; the median ignores a short error.
@@ -724,7 +862,7 @@ class _Fit:
 
         Where the law is open (`loose`) it stays so. Not whitened: a sum of squares is that of the outputs' errors.
         """
-        window = max(2, round(self.machine.window_s / self.step_s))
+        window = max(SHORTEST_WINDOW, round(self.machine.window_s / self.step_s))
         starts = np.array([k for run in self.table.runs for k in range(run.start, run.stop, window)])
         predictor = Predictor(self.lin, np.zeros_like(self.noise_u), self.noise_y, self._loose(), starts,
                               AWAY * self.size_x, stretch=window)  # fmt: skip
@@ -757,7 +895,8 @@ class _Fit:
             fitted=dict(zip(self.names, (float(each) for each in self.p_at), strict=False)),
             linear=self.lin,
             predictor=predictor,
-            ports=machine.ports,
+            ports=self.ports,
+            held_ports=self.held_ports,
             outputs=tuple(each.channel for each in machine.outputs),
             fit=self,
             noise_by_candidates=machine.noise_by_candidates,
@@ -766,7 +905,7 @@ class _Fit:
         def entry(port: Port) -> Entry:
             return Entry(port.subsystem, lambda columns: made.respond({port.name: columns}))
 
-        made.entries = {each.name: entry(each) for each in machine.ports}
+        made.entries = {each.name: entry(each) for each in self.ports}
         return made
 
     def _standstill(self, predictor: Predictor) -> dict[str, Array]:

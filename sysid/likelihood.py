@@ -24,6 +24,7 @@ LEVEL = 0.02  # chance that the best of all candidates exceeds its threshold on 
 MOST = 5  # causes
 LEAST = 6.0  # score that a cause must have whatever the surrogates say: that of a tie
 BLOCKS = 8  # of the cross-validation within the training data
+HIDDEN = 1e-4  # of a candidate's square: when the others explain all but this, an equation does not show it
 FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
 
 Accepts = Callable[[Sequence[Named], Named, Regression, Regression], bool]
@@ -71,8 +72,10 @@ def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: 
         most = np.count_nonzero(good) // FEWEST_FREE - x.shape[1]
         kept: list[Array] = []
         for _, columns in added:
-            if sum(each.shape[1] for each in kept) + columns.shape[1] <= most:
-                kept.append(columns)
+            new = _seen(columns, good, basis)
+            if sum(each.shape[1] for each in kept) + new.shape[1] <= most:
+                kept.append(new)
+                basis = np.linalg.qr(np.hstack([basis, new[good]]))[0]
         wide = np.hstack([x, *kept])
         residual = y - wide @ fitted(np.hstack([z, *kept])[good], wide[good], y[good])
         memory = noise.autoregression(residual, good & _unbroken(part))
@@ -100,6 +103,18 @@ def _correlations(white: dict[str, Array]) -> dict[tuple[str, str], float]:
 
 def _unbroken(part: Part) -> np.ndarray:
     return np.diff(part.run, prepend=part.run[:1]) == 0
+
+
+def _seen(columns: Array, good: np.ndarray, basis: Array) -> Array:
+    """(n, m) directions of columns (n, k) that an orthonormal basis (rows that count, p) does not have already.
+
+    What is left of a column that the basis has nearly is the noise of the trajectory along which it was made, which
+    would explain the noise itself.
+    """
+    scaled = columns / np.maximum(np.linalg.norm(columns[good], axis=0), 1e-300)
+    inside = scaled[good]
+    _, sizes, turns = np.linalg.svd(inside - basis @ (basis.T @ inside), full_matrices=False)
+    return np.asarray(scaled @ turns[sizes**2 > HIDDEN].T)
 
 
 def _scaled(columns: Array) -> Array:
@@ -203,20 +218,20 @@ def select(
     thresholds: list[float] = []
     while True:
         progress(len(named) / most)
-        tried = naming.trials(rest, regression)
+        tried = [each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN]
         if not tried:
             return Selection(named, refused, base, regression, thresholds, [])
         chance = by_chance(tried, regression, surrogates(regression, seed))
         threshold = max(float(np.quantile(chance, 1.0 - LEVEL)), LEAST)
         thresholds.append(threshold)
-        ranking = _ranking(tried, regression)
-        chosen = next((each for each in ranking if naming.possible(each[3])), None)
+        ranked = ranking(tried, regression.size)
+        chosen = next((each for each in ranked if naming.possible(each[3])), None)
         if chosen is None or chosen[0] <= threshold or len(named) == most:
             return Selection(
-                named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranking]
+                named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranked]
             )
         bic, chi2, freedom, trial = chosen
-        others = [each for each in ranking if each[3].effect is not trial.effect]
+        others = [each for each in ranked if each[3].effect is not trial.effect]
         found = Named(
             trial.effect,
             trial.shape,
@@ -244,7 +259,13 @@ def select(
         ]
 
 
-def _ranking(tried: Sequence[Trial], regression: Regression) -> list[tuple[float, float, int, Trial]]:
+def own_part(trial: Trial) -> float:
+    """Part of an effect's square that the base does not explain."""
+    whole = sum(float(np.sum(columns**2)) for columns in trial.white.values())
+    return float(np.trace(trial.gram)) / max(whole, 1e-300)
+
+
+def ranking(tried: Sequence[Trial], size: int) -> list[tuple[float, float, int, Trial]]:
     """(score, chi-square, freedom, trial) of each effect at its best shape, best first."""
     best: dict[int, tuple[float, float, int, Trial]] = {}
     for trial in tried:
@@ -252,7 +273,7 @@ def _ranking(tried: Sequence[Trial], regression: Regression) -> list[tuple[float
         if not freedom:
             continue
         chi2 /= trial.inflation
-        found = (float(score(chi2, freedom, len(trial.effect.shapes), regression.size)), chi2, freedom, trial)
+        found = (float(score(chi2, freedom, len(trial.effect.shapes), size)), chi2, freedom, trial)
         if id(trial.effect) not in best or found[0] > best[id(trial.effect)][0]:
             best[id(trial.effect)] = found
     return sorted(best.values(), key=lambda each: -each[0])

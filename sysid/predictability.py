@@ -24,8 +24,10 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)  # of the mean square of a feature; and a
 BLOCKS = 10
 BEYOND = 0.02  # of a signal's training range, beyond which a row is outside of it
 WORTH = 0.05  # of the residual's square: less is not a reason for another band
-HIDDEN = 1e-4  # of an effect's square: when the base explains all but this, the data do not show it
+FIRST = 99  # surrogates that are tried first; no more are where so many of them do as well, or where all are far below:
+PLAIN, FAR = 8, 10.0  # deviations above their mean
 SURROGATES = 199  # and as many for every further equation, so that their least chance together stays the same
+RANK = 1e-6  # of the longest direction of a base: a shorter one is rounding
 MOST_ROWS = 3000  # that count in the test: slower than every n-th row nothing is lost below the band's edge
 
 
@@ -121,102 +123,108 @@ def predictor(machine: Machine, recordings: Sequence[Recording], seed: int, with
     return Predictor(machine, {name: cosines([each[name] for each in general], seed) for name in places})
 
 
-def share(regression: Regression, features: Mapping[str, Array]) -> float:
-    """The largest share, of the equations, of a residual's square that is predicted on held-out blocks."""
-    found = 0.0
-    for name, part in regression.parts.items():
-        if name in features and np.count_nonzero(regression.good[name]) >= 4 * BLOCKS:
-            rows, residual, used = _rows(regression, name)
-            found = max(found, float(_held_out(features[name][rows], used, residual[rows, None])[0]))
-    return found
-
-
-def _rows(regression: Regression, name: str) -> tuple[np.ndarray, Array, Array]:
-    """(rows of an equation that a test counts, its residual (n,), the base's columns in those rows)."""
-    part = regression.parts[name]
-    good = np.flatnonzero(regression.good[name])
-    rows = good[:: max(1, len(good) // MOST_ROWS)]
-    residual = part.response - part.measured @ np.array([regression.values[each] for each in regression.names])
-    used = part.stand_in[rows]  # a feature must not find a column's own noise, which is in the residual
-    return rows, residual, used[:, np.any(used != 0.0, axis=0)]
-
-
 def test(regression: Regression, features: Mapping[str, Array], seed: int) -> list[Predicted]:
     """Each equation's residual against chance. features: by equation, over all of the regression's rows."""
     found = []
     count = (SURROGATES + 1) * len(regression.parts) - 1
     noises = likelihood.own_noise(regression).whitening
-    for name in regression.parts:
-        good = regression.good[name]
-        if name not in features or np.count_nonzero(good) < 4 * BLOCKS:
-            continue
-        own = noises[name]
+    for name, ridge, rows, share in _predicted(regression, features):
+        own, good = noises[name], regression.good[name]
         drawn = noise.surrogates(own.coefficients, own.deviation, len(good), count, seed, f"chance of {name}")
-        rows, residual, used = _rows(regression, name)
-        shares = _held_out(features[name][rows], used, np.column_stack([residual[rows], drawn[rows]]))
+        chance = ridge.shares(drawn[rows, :FIRST])
+        p = 1.0 / (1.0 + count)
+        if share < np.mean(chance) + FAR * np.std(chance):
+            if np.count_nonzero(chance >= share) < PLAIN:
+                chance = np.concatenate((chance, ridge.shares(drawn[rows, FIRST:])))
+            p = (1.0 + float(np.count_nonzero(chance >= share))) / (1.0 + len(chance))
         memory = noise.correlation_time(own.coefficients)
-        p = (1.0 + float(np.count_nonzero(shares[1:] >= shares[0]))) / (1.0 + count)
-        found.append(Predicted(name, max(0.0, float(shares[0])), p, np.count_nonzero(good) / memory))
+        found.append(Predicted(name, max(0.0, share), p, np.count_nonzero(good) / memory))
     return found
 
 
-class _Fold:
-    """Features less a base's part, fitted on some rows, held against others: each ridge by one decomposition."""
-
-    def __init__(self, features: Array, base: Array, fitted: np.ndarray, held: np.ndarray) -> None:
-        scale = np.linalg.norm(base[fitted], axis=0)
-        scale = np.where(scale > 0.0, scale, 1.0)
-        self.fitted, self.held = fitted, held
-        self.basis, self.base_held = np.linalg.pinv(base[fitted] / scale), base[held] / scale
-        self.base_fitted = base[fitted] / scale
-        own = self.basis @ features[fitted]
-        rest = features[fitted] - self.base_fitted @ own
-        size = np.std(rest, axis=0)
-        self.size = np.where(size > 1e-9 * np.max(size, initial=1e-300), size, np.inf)
-        self.rest = rest / self.size
-        power, self.vectors = np.linalg.eigh(self.rest.T @ self.rest)
-        self.power = np.maximum(power, 0.0)
-        self.turned = ((features[held] - self.base_held @ own) / self.size) @ self.vectors
-
-    def missed(self, residuals: Array) -> tuple[Array, Array]:
-        """Residuals (n, m) less the base's part, on the fitted rows and on the held ones."""
-        own = self.basis @ residuals[self.fitted]
-        return residuals[self.fitted] - self.base_fitted @ own, residuals[self.held] - self.base_held @ own
-
-    def squares(self, residuals: Array) -> tuple[Array, Array]:
-        """((m,) square of what the base misses on the held rows, (ridges, m) and with the features)."""
-        missed, missed_held = self.missed(residuals)
-        along = self.vectors.T @ (self.rest.T @ missed)
-        whole, met, gram = np.sum(missed_held**2, axis=0), self.turned.T @ missed_held, self.turned.T @ self.turned
-        left = []
-        for ridge in RIDGES:  # |m - T s|^2 by its products, a third of the rows' own
-            shrunk = self._shrunk(along, ridge)
-            left.append(whole + np.sum((gram @ shrunk - 2.0 * met) * shrunk, axis=0))
-        return whole, np.stack(left)
-
-    def coefficients(self, residual: Array, ridge: float) -> Array:
-        """(k,) of the features for a residual (n,)."""
-        missed, _ = self.missed(residual[:, None])
-        along = self.vectors.T @ (self.rest.T @ missed)
-        return np.asarray((self.vectors @ self._shrunk(along, ridge))[:, 0] / self.size)
-
-    def _shrunk(self, along: Array, ridge: float) -> Array:
-        return np.asarray(along / (self.power + ridge * len(self.rest))[:, None])
+def largest_share(regression: Regression, features: Mapping[str, Array]) -> float:
+    """Of all equations, of a residual's square that is predicted on blocks left out, whatever chance predicts."""
+    return max((share for *_, share in _predicted(regression, features)), default=0.0)
 
 
-def _folds(features: Array, base: Array) -> Iterator[_Fold]:
-    block = np.arange(len(features)) * BLOCKS // len(features)
-    for each in range(BLOCKS):
-        yield _Fold(features, base, block != each, block == each)
+def _predicted(
+    regression: Regression, features: Mapping[str, Array]
+) -> Iterator[tuple[str, "_Ridge", np.ndarray, float]]:
+    """(equation, its ridges, rows that count in the test, share of its residual's square that they predict)."""
+    values = np.array([regression.values[each] for each in regression.names])
+    for name, part in regression.parts.items():
+        good = np.flatnonzero(regression.good[name])
+        if name not in features or len(good) < 4 * BLOCKS:
+            continue
+        rows = good[:: max(1, len(good) // MOST_ROWS)]
+        # stand-ins: less of a measured column, a feature would show that column's noise, which is in the residual
+        ridge = _Ridge(features[name][rows], part.stand_in[rows])
+        residual = part.response[rows] - part.measured[rows] @ values
+        yield name, ridge, rows, float(ridge.shares(residual[:, None])[0])
 
 
-def _held_out(features: Array, base: Array, residuals: Array) -> Array:
-    """(m,) share of each residual (n, m) that is predicted on blocks left out, at the best ridge for each."""
-    whole, left = np.zeros(residuals.shape[1]), np.zeros((len(RIDGES), residuals.shape[1]))
-    for fold in _folds(features, base):
-        missed, squares = fold.squares(residuals)
-        whole, left = whole + missed, left + squares
-    return np.asarray(np.max(1.0 - left / np.maximum(whole, 1e-300), axis=0))
+class _Ridge:
+    """Ridges over features of which the base's part is taken off, fitted on all blocks but one and held against it.
+
+    The base is taken off all rows at once: a block of its own would not determine every parameter.
+    """
+
+    def __init__(self, features: Array, base: Array) -> None:
+        """features: (n, k); base: (n, p)."""
+        self.basis = _orthonormal(base)
+        ends = np.arange(BLOCKS + 1) * len(features) // BLOCKS
+        self.block = [np.arange(low, high) for low, high in itertools.pairwise(ends)]
+        self.features = self.off(features)
+        size = np.sqrt(np.mean(self.features**2, axis=0))
+        self.size = np.where(size > likelihood.HIDDEN * np.sqrt(np.mean(features**2, axis=0)), size, np.inf)
+        self.features = self.features / self.size
+        self.squares = [self.features[rows].T @ self.features[rows] for rows in self.block]
+        self.whole = np.sum(self.squares, axis=0)
+        self.turns = [np.linalg.eigh(self.whole - each) for each in self.squares]
+        self.turned = [
+            vectors.T @ square @ vectors for square, (_, vectors) in zip(self.squares, self.turns, strict=True)
+        ]
+
+    def off(self, columns: Array) -> Array:
+        """Columns (n, m) less the base's part."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+    def errors(self, residuals: Array) -> tuple[Array, Array]:
+        """((m,) square of residuals (n, m), (ridges, m) of what is left of it on blocks that had no part in the fit)."""
+        residuals = self.off(residuals)
+        products = [self.features[rows].T @ residuals[rows] for rows in self.block]
+        whole = np.sum(products, axis=0)
+        total = np.sum(residuals**2, axis=0)
+        left = np.tile(total, (len(RIDGES), 1))
+        for rows, turned, product, (power, vectors) in zip(self.block, self.turned, products, self.turns, strict=True):
+            along, held = vectors.T @ (whole - product), vectors.T @ product
+            count = len(residuals) - len(rows)
+            for number, ridge in enumerate(RIDGES):
+                found = along / (np.maximum(power, 0.0) + ridge * count)[:, None]
+                left[number] += np.sum(found * (turned @ found - 2.0 * held), axis=0)
+        return total, left
+
+    def shares(self, residuals: Array) -> Array:
+        """(m,) share of each residual (n, m) that is predicted on blocks left out, at the best ridge for each."""
+        total, left = self.errors(residuals)
+        return np.asarray(np.max(1.0 - left / np.maximum(total, 1e-300), axis=0))
+
+    def coefficients(self, residual: Array) -> Array:
+        """(k,) of the features for a residual (n,), at the ridge that predicts best; 0 where none predicts anything."""
+        total, left = self.errors(residual[:, None])
+        best = int(np.argmin(left[:, 0]))
+        if left[best, 0] >= total[0]:
+            return np.zeros(len(self.size))
+        power, vectors = np.linalg.eigh(self.whole)
+        along = vectors.T @ (self.features.T @ self.off(residual[:, None])[:, 0])
+        return np.asarray(vectors @ (along / (np.maximum(power, 0.0) + RIDGES[best] * len(residual))) / self.size)
+
+
+def _orthonormal(base: Array) -> Array:
+    """(n, r) orthonormal basis of a base's columns (n, p), without directions that only rounding determines."""
+    lengths = np.linalg.norm(base, axis=0)
+    basis, sizes, _ = np.linalg.svd(base[:, lengths > 0.0] / lengths[lengths > 0.0], full_matrices=False)
+    return np.asarray(basis[:, sizes > RANK * np.max(sizes, initial=0.0)])
 
 
 def learned(features: Array, base: Array, residual: Array) -> Array:
@@ -224,12 +232,4 @@ def learned(features: Array, base: Array, residual: Array) -> Array:
 
     All zero where no ridge predicts anything.
     """
-    whole, left = 0.0, np.zeros(len(RIDGES))
-    for fold in _folds(features, base):
-        missed, squares = fold.squares(residual[:, None])
-        whole, left = whole + float(missed[0]), left + squares[:, 0]
-    best = int(np.argmin(left))
-    if left[best] >= whole:
-        return np.zeros(features.shape[1])
-    everything = np.ones(len(features), dtype=bool)
-    return _Fold(features, base, everything, ~everything).coefficients(residual, RIDGES[best])
+    return _Ridge(features, base).coefficients(residual)

@@ -1,0 +1,178 @@
+"""Candidate causes that every machine given by its simulator has, without a line of the user's.
+
+At every output an offset, a scale, a drift and a lag, as a pure delay or as a filter; at every input an offset, a
+saturation and a dead zone; at every joint that the machine declares viscous, Coulomb and Stribeck friction, friction
+that differs between the directions or grows with the load, drag, and what is periodic in the position. Lags, speeds,
+limits and periods are on grids that suit the recordings. They enter at places that the engine adds to the simulator
+(`free_simulation.py`), so that `step` and `observe` need not know of them.
+
+A candidate that the machine's own parameters explain cannot be seen and is not named; one that a term of the user's
+equals is left out.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.machine import Recording
+from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, shown
+
+FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
+MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording
+SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess falls off
+SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
+CLIPPED = (0.5, 0.7, 0.85, 0.95)  # quantiles of an input's size at which it may saturate
+DEAD = (0.02, 0.05, 0.1, 0.2)  # of an input's largest size
+
+
+class Declares(Protocol):
+    """What the candidates need of a machine."""
+
+    outputs: tuple[Output, ...]
+    joints: tuple[Joint, ...]
+
+
+Signal = Callable[[Mapping[str, Array], Shape], Array]
+
+
+def candidates(machine: Declares, inputs: Sequence[str], recordings: Sequence[Recording]) -> list[Term]:
+    """All of them. inputs: names of the simulator's inputs."""
+    made: list[Term] = []
+    for output in machine.outputs:
+        made += at_output(output, recordings)
+    for name in inputs:
+        made += at_input(name, recordings)
+    for joint in machine.joints:
+        made += at_joint(joint, recordings)
+    return made
+
+
+def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
+    """An output's offset, scale, drift and lag."""
+    name, place, unit = output.channel, shown(output.channel), _word(output.unit)
+
+    def sensor(cause: str, coefficient: str, make: Callable[[Table, Array], Array]) -> Term:
+        return Term(
+            cause, name, "sensor", (coefficient,),
+            lambda r, shape, values: {place: make(r.table, r.signals[name])}, free=True,
+        )  # fmt: skip
+
+    def lag(form: str, late: Callable[[Table, Array, float], Array]) -> Term:
+        def make(r: Recording, shape: Shape, values: Mapping[str, float]) -> dict[str, Array]:
+            seen, lag_s = r.signals[name], shape["near_s"]
+            return {place: (late(r.table, seen, lag_s) - seen) / lag_s}
+
+        return Term(
+            "sensor_lag", name, "sensor", ("lag_s",), make, [{"near_s": each} for each in _lags(recordings)],
+            free=True, form=form, scale="near_s",
+        )  # fmt: skip
+
+    return [
+        sensor("sensor_offset", f"offset_{unit}", lambda table, seen: np.ones(len(table))),
+        sensor("sensor_scale", "share", lambda table, seen: seen),
+        sensor("sensor_drift", f"drift_{unit}_per_s", lambda table, seen: table.time_s - table.time_s[0]),
+        lag("delay", delayed),
+        lag("filter", filtered),
+    ]
+
+
+def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
+    """An input's offset, saturation and dead zone: a share of 1 is a hard one."""
+    size = np.concatenate([np.abs(each.signals[name]) for each in recordings])
+    largest = float(np.max(size, initial=0.0))
+    if not largest > 0.0 or np.ptp(size) == 0.0 and len(set(np.sign(recordings[0].signals[name]))) == 1:
+        return []
+    limits = sorted({float(np.quantile(size, each)) for each in CLIPPED} - {largest, 0.0})
+
+    def term(cause: str, coefficient: str, make: Signal, shapes: Sequence[Shape] = ({},)) -> Term:
+        return Term(
+            cause, name, "input", (coefficient,), lambda r, shape, values: {into(name): make(r.signals, shape)},
+            shapes, lambda found: cause == "input_offset" or found[coefficient] > 0.0, free=True,
+        )  # fmt: skip
+
+    made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]))]
+    if limits:
+        beyond: Signal = lambda s, shape: np.clip(s[name], -shape["limit"], shape["limit"]) - s[name]  # noqa: E731
+        made.append(term("saturation", "share", beyond, [{"limit": each} for each in limits]))
+    inside: Signal = lambda s, shape: -np.clip(s[name], -shape["limit"], shape["limit"])  # noqa: E731
+    made.append(term("dead_zone", "share", inside, [{"limit": each * largest} for each in DEAD]))
+    return made
+
+
+def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
+    """Friction of a joint, drag, and what is periodic in its position."""
+    rates = np.concatenate([each.signals[joint.rate] for each in recordings])
+    usual = float(np.sqrt(np.mean(rates**2)))
+    slow = joint.slow or SLOW * usual
+    unit = joint.unit
+
+    def term(cause: str, coefficients: tuple[str, ...], make: Signal, shapes: Sequence[Shape] = ({},),
+             admissible: Callable[[Mapping[str, float]], bool] = lambda found: True, phase: bool = False) -> Term:  # fmt: skip
+        return Term(
+            cause, joint.rate, "mechanical", coefficients,
+            lambda r, shape, values: {on(joint.rate): make(r.signals, shape)}, shapes, admissible,
+            phase_is_free=phase, free=True,
+        )  # fmt: skip
+
+    def sign(s: Mapping[str, Array]) -> Array:
+        return np.asarray(np.tanh(s[joint.rate] / slow))
+
+    def low(s: Mapping[str, Array], shape: Shape) -> Array:
+        return np.asarray(-sign(s) * np.exp(-((s[joint.rate] / shape["speed"]) ** 2)))
+
+    def around(s: Mapping[str, Array], shape: Shape) -> Array:
+        angle = shape["periods"] * joint.turns * s[joint.position]
+        return np.column_stack((np.cos(angle), np.sin(angle)))
+
+    made = [
+        term("viscous_friction", (f"viscous_{unit}_s",), lambda s, _: -s[joint.rate]),
+        term("coulomb_friction", (f"coulomb_{unit}",), lambda s, _: -sign(s)),
+        term("stribeck", (f"excess_{unit}",), low, [{"speed": each * usual} for each in SPEEDS],
+             lambda found: found[f"excess_{unit}"] > 0.0),
+        term("direction_friction", (f"difference_{unit}",), lambda s, _: -np.abs(sign(s))),
+        term("drag", (f"quadratic_{unit}_s2",), lambda s, _: -s[joint.rate] * np.abs(s[joint.rate])),
+    ]  # fmt: skip
+    if joint.load:
+        made.append(term("load_friction", ("share",), lambda s, _: -sign(s) * np.abs(s[joint.load])))
+    if joint.position:
+        periods = [{"periods": float(each)} for each in joint.periods]
+        made.append(term("once_per_turn", (f"cosine_{unit}", f"sine_{unit}"), around, periods, phase=True))
+    return made
+
+
+def delayed(table: Table, column: Array, lag_s: float) -> Array:
+    """A column (n,) as it was `lag_s` before, by straight lines; a run's first value before its start."""
+    out = np.empty_like(column)
+    for run in table.runs:
+        stamps = table.time_s[run]
+        out[run] = np.interp(stamps - lag_s, stamps, column[run])
+    return out
+
+
+def filtered(table: Table, column: Array, lag_s: float) -> Array:
+    """A column (n,) behind a low-pass of first order with this time constant, exact for straight lines in between."""
+    ratio = table.step_s / lag_s
+    kept = float(np.exp(-ratio))
+    through = (1.0 - kept) / ratio
+    out = np.empty_like(column)
+    for run in table.runs:
+        first = through * column[run][:1]  # so that the first value is the column's own
+        out[run], _ = lfilter([1.0 - through, through - kept], [1.0, -kept], column[run], zi=first)
+    return out
+
+
+def _lags(recordings: Sequence[Recording]) -> list[float]:
+    """Grid of lags in seconds: from half a sample to a part of the shortest recording, each longer by a factor."""
+    table = min((each.table for each in recordings), key=len)
+    most = min(float(MOST_LAG_SAMPLES), len(table) / LAGS_IN_A_RECORDING)
+    grid = itertools.takewhile(lambda lag: lag <= most, (FINEST_LAG * COARSER**n for n in itertools.count()))
+    return [each * table.step_s for each in grid]
+
+
+def _word(unit: str) -> str:
+    """A unit as part of a name."""
+    return unit.replace("/", "_per_").replace(" ", "").replace("^", "") or "unit"
