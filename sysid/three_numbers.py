@@ -13,7 +13,7 @@ import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import naming
-from ranger_sim.sysid.bands import least_squares, plain
+from ranger_sim.sysid.bands import fitted, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.naming import Named
@@ -42,14 +42,14 @@ class Held:
     def residual(self, named: Sequence[Named], values: Mapping[str, float], extra: Mapping[str, Array] | None = None
                  ) -> dict[str, Array]:  # fmt: skip
         """By equation (rows that count,), as shares of what was measured. extra: more to take off, by equation."""
-        y, x, ends = self._stacked(extra)
+        y, x, z, ends = self._stacked(extra)
         for each in named:
             columns = self._columns(each)
             if not np.any(columns):
                 continue
             sizes = np.array([values[name] for name in each.coefficients])
-            y = y - columns @ _adapted(each, sizes, columns, y, x)
-        left = y - x @ least_squares(x, y)
+            y = y - columns @ _adapted(each, sizes, columns, y, x, z)
+        left = y - x @ fitted(z, x, y)
         return {name: left[ends[number] : ends[number + 1]] for number, name in enumerate(self.base.equations)}
 
     def square(self, named: Sequence[Named], values: Mapping[str, float]) -> float:
@@ -58,23 +58,25 @@ class Held:
 
     def shows(self, each: Named, values: Mapping[str, float]) -> bool:
         """True when the effect, as large as in training, moves the held-out rows enough to be judged by them."""
-        _, x, _ = self._stacked(None)
+        _, _, z, _ = self._stacked(None)
         columns = self._columns(each)
         moved = columns @ np.array([values[name] for name in each.coefficients])
-        moved = moved - x @ least_squares(x, moved)
+        moved = moved - z @ fitted(z, z, moved)
         return float(np.mean(moved**2)) * len(self.base.equations) > SHOWS * self.square([], values)
 
-    def _stacked(self, extra: Mapping[str, Array] | None) -> tuple[Array, Array, list[int]]:
-        """(response, columns, first row of each equation and the end), rows that count, by size."""
-        ys, xs = [], []
+    def _stacked(self, extra: Mapping[str, Array] | None) -> tuple[Array, Array, Array, list[int]]:
+        """(response, columns, their stand-ins, first row of each equation and the end), rows that count, by size."""
+        ys, xs, zs = [], [], []
         for name, part in self.base.parts.items():
             good, size = self.rows[name], self.sizes[name]
             response = part.response - (extra[name] if extra and name in extra else 0.0)
             ys.append(response[good] / size)
             xs.append(part.measured[good] / size)
+            zs.append(part.stand_in[good] / size)
         ends = np.cumsum([0, *map(len, ys)]).tolist()
-        x = np.vstack(xs)
-        return np.concatenate(ys), x[:, np.any(x != 0.0, axis=0)], ends
+        x, z = np.vstack(xs), np.vstack(zs)
+        used = np.any(x != 0.0, axis=0)
+        return np.concatenate(ys), x[:, used], z[:, used], ends
 
     def _columns(self, each: Named) -> Array:
         made = [each.effect.columns(recording, each.shape, self.values) for recording in self.recordings]
@@ -139,26 +141,24 @@ def _learned(regression: Regression, trained: Mapping[str, Array], seen: Mapping
     for name, part in regression.parts.items():
         if name in trained and name in seen:
             good = part.valid & ~part.starts
-            used = part.measured[good]
-            residual = part.response[good] - used @ values
-            found = learned(trained[name][good], used[:, np.any(used != 0.0, axis=0)], residual)
+            residual = part.response[good] - part.measured[good] @ values
+            found = learned(trained[name][good], part.stand_in[good], residual)
             out[name] = seen[name] @ found
     return out
 
 
-def _adapted(each: Named, sizes: Array, columns: Array, y: Array, x: Array) -> Array:
+def _adapted(each: Named, sizes: Array, columns: Array, y: Array, x: Array, z: Array) -> Array:
     """Coefficients of training, with what another run does not share fitted here."""
     if not each.effect.phase_is_free and not each.effect.free:
         return sizes
-    off = columns - x @ least_squares(x, columns)
-    left = y - x @ least_squares(x, y)
     if each.effect.phase_is_free:
-        here = least_squares(off, left).reshape(-1, 2)
+        here = fitted(np.hstack([z, columns]), np.hstack([x, columns]), y)[x.shape[1] :].reshape(-1, 2)
         lengths = np.linalg.norm(sizes.reshape(-1, 2), axis=1) / np.maximum(np.linalg.norm(here, axis=1), 1e-300)
         return np.asarray((here * lengths[:, None]).ravel())
     free = np.array([name in each.effect.free for name in each.effect.coefficients])
     found = np.where(free, 0.0, sizes)
-    found[free] = least_squares(off[:, free], left - off @ found)
+    some = columns[:, free]
+    found[free] = fitted(np.hstack([z, some]), np.hstack([x, some]), y - columns @ found)[x.shape[1] :]
     return found
 
 
