@@ -35,6 +35,7 @@ from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held
 
 MOST_ACTING = 12  # candidates in the simulator while it is linearised: the likeliest
+CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
 AGAIN = 2  # simulations with the named effects, at most
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
@@ -70,9 +71,10 @@ def diagnose(
         rest = _others(effects, skews)
         base = naming.refit(bands.plain(recordings), skews)
         accepts = Held(held, skews, base.values).accepts if held else likelihood.everything
-        return likelihood.select(
+        found = likelihood.select(
             recordings, rest, skews, seed, accepts, progress=lambda share: progress("causes", begin + 0.2 * share)
         )
+        return _decided(machine, recordings, found, skews) if hasattr(machine, "surprise") else found
 
     found = selected(recordings, held, 0.25)
     stamps = _stamps(found)
@@ -139,6 +141,58 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
                               len(recording.table))[:MOST_ACTING]  # fmt: skip
     best = [each for each in best if each[0] > 0.0]
     return cast(Recording, machine.about_all(recording, [(each[3].effect, each[3].shape) for each in best]))  # type: ignore[attr-defined]
+
+
+def _decided(
+    machine: Machine, recordings: Sequence[Recording], found: likelihood.Selection, fixed: Sequence[Named]
+) -> likelihood.Selection:
+    """The selection with each cause held against its nearest rivals in the simulator itself.
+
+    First order cannot tell causes from each other that differ by a small share of a large effect.
+    """
+    named = list(found.named)
+    for place, each in enumerate(found.named):
+        close = [rival for rival, behind in each.rivals if behind < max(CLOSE * each.chi2, naming.TIE)][:MOST_CLOSE]
+        others = [other for other in named if other.effect is not each.effect]
+        close = [rival for rival in close if all(rival is not other.effect for other in others)]
+        if not close:
+            continue
+        base = naming.refit(found.base, others, [*fixed, *others])
+        options = [each, *(_at_best(rival, each, base) for rival in close)]
+        scores = []
+        for option in options:
+            together = [*others, option]
+            extended = naming.refit(found.base, together, [*fixed, *together])
+            simulated = held_out.simulated_again(machine, recordings, together, extended)
+            free = len(option.effect.coefficients) + (len(option.effect.shapes) > 1)
+            scores.append(
+                sum(machine.surprise(one) for one in simulated)  # type: ignore[attr-defined]
+                + free * math.log(base.size) + 2.0 * math.log(len(option.effect.shapes))
+            )  # fmt: skip
+        order = sorted(range(len(options)), key=lambda number: scores[number])
+        best, least = options[order[0]], scores[order[0]]
+        behind = {id(options[number].effect): scores[number] - least for number in order}
+        rivals = [(effect, behind.get(id(effect), far)) for effect, far in [(each.effect, 0.0), *each.rivals]
+                  if effect is not best.effect]  # fmt: skip
+        rivals.sort(key=lambda one: one[1])
+        named[place] = dataclasses.replace(
+            best,
+            tied=[options[number].effect for number in order[1:] if scores[number] - least < naming.TIE],
+            rivals=rivals,
+        )
+    if all(new is old for new, old in zip(named, found.named, strict=True)):
+        return found
+    return dataclasses.replace(
+        found, named=named, with_named=naming.refit(found.base, named, [*fixed, *named]) if named else found.base
+    )
+
+
+def _at_best(effect: Effect, instead_of: Named, base: Regression) -> Named:
+    """A rival as it would be named, at its best shape."""
+    best = likelihood.ranking(naming.trials([effect], base), base.size)[0]
+    return dataclasses.replace(
+        instead_of, effect=effect, shape=best[3].shape, chi2=best[1], freedom=best[2], bic=best[0]
+    )
 
 
 def unclipped(machine: Machine, recording: Recording) -> Recording:

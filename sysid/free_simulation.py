@@ -544,7 +544,13 @@ class SimulatedMachine(abc.ABC):
             return recording
         tried = fit.with_all(acting)
         made = tried.recording()
-        return made if tried.cost * np.prod(tried.noise_y) < fit.cost * np.prod(fit.noise_y) else recording
+        return made if tried.surprise < fit.surprise else recording
+
+    def surprise(self, recording: Recording) -> float:
+        """-2 log likelihood of a recording with what acts in its simulator, up to a constant."""
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        return fit.surprise
 
     def free(self, recording: Recording) -> Recording:
         """The recording with errors of free simulation as its equations: the outputs' errors over `window_s`, with the
@@ -620,6 +626,14 @@ class _Fit:
         self.held_ports = frozenset(into(name) for name in self.held)
         self.is_held = np.array([port.name in self.held_ports for port in self.ports], dtype=bool)
         self.at_ports = np.zeros((len(table), len(self.ports), 0))  # input for a unit of each coefficient
+
+    @property
+    def surprise(self) -> float:
+        """-2 log likelihood of the recording under the last round's simulator and noise, up to a constant."""
+        assert self.predictor is not None
+        errors = self.response / self.predictor.unit
+        spread = self.predictor.spread[:, np.arange(errors.shape[1]), np.arange(errors.shape[1])]
+        return float(np.sum(errors**2) + 2.0 * np.sum(np.log(spread)))
 
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "_Fit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
