@@ -32,7 +32,7 @@ from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
-from ranger_sim.sysid.three_numbers import Held
+from ranger_sim.sysid.three_numbers import Held, gained
 
 MOST_ACTING = 12  # candidates in the simulator while it is linearised: the likeliest
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
@@ -376,14 +376,8 @@ def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
 
 def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:
     """Share of what can be explained at all that the named causes explain on held-out data, in squares of the error."""
-    possible = won = 0.0
-    ends = np.zeros(2)
-    for each in errors.values():
-        best = min(each.after, each.black_box if each.black_box is not None else each.after)
-        possible += max(0.0, each.before**2 - best**2)
-        won += each.before**2 - each.after**2
-        ends += each.before**2 * (1.0 - np.square(each.ratio95[::-1]))
-    scale = max(possible, won, 1e-12 * sum(each.before**2 for each in errors.values()), 1e-300)
+    won, possible, ends = gained(errors.values())
+    scale = max(possible, won, 1e-300)
     before = math.sqrt(sum(each.before**2 for each in errors.values()))
     after = math.sqrt(sum(each.after**2 for each in errors.values()))
     return gain.Gain(won / scale, (float(ends[0]) / scale, min(1.0, float(ends[1]) / scale)), before, after, holdout)

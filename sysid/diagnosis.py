@@ -11,6 +11,7 @@ from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
 from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
+from ranger_sim.sysid.three_numbers import gained
 
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
@@ -87,10 +88,7 @@ class Diagnosis:
         """True when a black box explains much more of the held-out data than the named effects do."""
         if not self.errors:
             return True
-        possible = sum(
-            each.before**2 - min(each.black_box or each.after, each.after) ** 2 for each in self.errors.values()
-        )
-        won = sum(each.before**2 - each.after**2 for each in self.errors.values())
+        won, possible, _ = gained(self.errors.values())
         return won < EXPLAINED * possible
 
     def _explained_of_predictable(self) -> float:
