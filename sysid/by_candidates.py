@@ -228,12 +228,9 @@ def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple
         predictor = predictability.predictor(machine, inside, seed)
         if len(suiting) == 1:
             return band, predictor
-        regression, features = bands.plain(inside), predictor.columns(inside)
         needed = max(MORE_PREDICTED * best[0], predictability.WORTH) if best is not None else predictability.WORTH
-        share = predictability.largest_share(regression, features)
-        if share > needed:  # chance costs some hundred times as much, and matters only then
-            tests = predictability.test(regression, features, seed)
-            share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
+        tests = predictability.test(bands.plain(inside), predictor.columns(inside), seed, needed)
+        share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
         if best is None or share > needed:
             best = (share, band, predictor)
     assert best is not None
@@ -276,8 +273,17 @@ def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regress
         misfit.Test(each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p)
         for each in tests
     ]
+    lines = {name: misfit.line(name, regression) for name in _with_lines(regression)}
+    made += [test for test, _ in lines.values()]
     p = min(1.0, min((each.p for each in made), default=1.0) * len(made))
-    return misfit.Misfit(made, p, max((each.share for each in tests), default=0.0))
+    shares = [*(each.share for each in tests), *(share for test, share in lines.values() if test.p == p / len(made))]
+    return misfit.Misfit(made, p, max(shares, default=0.0))
+
+
+def _with_lines(regression: Regression) -> list[str]:
+    """Equations in whose residual's spectrum a line means anything."""
+    made = [each for recording in regression.recordings if not recording.entries for each in recording.equations.items()]
+    return [name for name in regression.equations if any(name == other and each.lines for other, each in made)]
 
 
 def _widen(regression: Regression) -> None:

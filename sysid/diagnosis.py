@@ -92,12 +92,14 @@ class Diagnosis:
         return won < EXPLAINED * possible
 
     def _explained_of_predictable(self) -> float:
-        """What the named effects take of the residual's square, of that and of what is predictable after them."""
+        """What the named effects take of the residual's square, of that and of what is predictable after them.
+
+        Each equation counts by what it leaves: one may have next to no noise.
+        """
         if not self.named:
             return 0.0
-        was, left = (sum(_left(each, name) for name in each.equations) for each in (self.plain, self.extended))
-        won, more = max(0.0, was - left), left * self.after.excess
-        return won / (won + more) if won > 0.0 else 0.0
+        won = sum(_left(self.plain, name) / _left(self.extended, name) - 1.0 for name in self.plain.equations)
+        return won / (won + self.after.excess) if won > 0.0 else 0.0
 
     @property
     def doubtful(self) -> bool:
@@ -107,9 +109,8 @@ class Diagnosis:
 
 
 def _left(regression: Regression, name: str) -> float:
-    """Sum of squares that an equation leaves, not whitened, over its rows that count, relative to its response."""
+    """Mean square that an equation leaves, not whitened, over its rows that count."""
     part, good = regression.parts[name], regression.good[name]
     values = np.array([regression.values[each] for each in regression.names])
-    response = part.response[good]
-    left = response - part.measured[good] @ values
-    return float(left @ left) / max(float(response @ response), 1e-300)
+    left = part.response[good] - part.measured[good] @ values
+    return max(float(left @ left) / max(1, len(left)), 1e-300)

@@ -16,7 +16,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import likelihood, noise
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Machine, Recording
-from ranger_sim.sysid.regression import Regression, reduced
+from ranger_sim.sysid.regression import Regression, Whitening, reduced
 
 SCALES = (0.3, 0.7, 1.5, 3.0)  # lengths of the cosines, in deviations of a signal
 PER_SIGNAL, PER_PAIR, TOGETHER = 12, 8, 24  # cosines over one signal, over two, over all
@@ -123,28 +123,35 @@ def predictor(machine: Machine, recordings: Sequence[Recording], seed: int, with
     return Predictor(machine, {name: cosines([each[name] for each in general], seed) for name in places})
 
 
-def test(regression: Regression, features: Mapping[str, Array], seed: int) -> list[Predicted]:
-    """Each equation's residual against chance. features: by equation, over all of the regression's rows."""
+def test(regression: Regression, features: Mapping[str, Array], seed: int, worth: float = 0.0) -> list[Predicted]:
+    """Each equation's residual against chance. features: by equation, over all of the regression's rows.
+
+    worth: when no share exceeds it, chance, which costs some hundred times as much, is not asked (p 1).
+    """
     found = []
+    predicted = list(_predicted(regression, features))
+    asked = any(share > worth for *_, share in predicted)
     count = (SURROGATES + 1) * len(regression.parts) - 1
     noises = likelihood.own_noise(regression).whitening
-    for name, ridge, rows, share in _predicted(regression, features):
+    for name, ridge, rows, share in predicted:
         own, good = noises[name], regression.good[name]
-        drawn = noise.surrogates(own.coefficients, own.deviation, len(good), count, seed, f"chance of {name}")
-        chance = ridge.shares(drawn[rows, :FIRST])
-        p = 1.0 / (1.0 + count)
-        if share < np.mean(chance) + FAR * np.std(chance):
+        p = 1.0
+        if asked:
+            chance = ridge.shares(_drawn(own, len(good), FIRST, seed, f"chance of {name}")[rows])
+            p = 1.0 / (1.0 + count)
+        if asked and share < np.mean(chance) + FAR * np.std(chance):
             if np.count_nonzero(chance >= share) < PLAIN:
-                chance = np.concatenate((chance, ridge.shares(drawn[rows, FIRST:])))
+                more = _drawn(own, len(good), count - FIRST, seed, f"further chance of {name}")[rows]
+                chance = np.concatenate((chance, ridge.shares(more)))
             p = (1.0 + float(np.count_nonzero(chance >= share))) / (1.0 + len(chance))
         memory = noise.correlation_time(own.coefficients)
         found.append(Predicted(name, max(0.0, share), p, np.count_nonzero(good) / memory))
     return found
 
 
-def largest_share(regression: Regression, features: Mapping[str, Array]) -> float:
-    """Of all equations, of a residual's square that is predicted on blocks left out, whatever chance predicts."""
-    return max((share for *_, share in _predicted(regression, features)), default=0.0)
+def _drawn(own: Whitening, rows: int, count: int, seed: int, name: str) -> Array:
+    """(rows, count) samples of a noise."""
+    return noise.surrogates(own.coefficients, own.deviation, rows, count, seed, name)
 
 
 def _predicted(

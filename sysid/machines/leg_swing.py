@@ -114,7 +114,6 @@ class _Leg(SimulatedMachine):
     quantities = LegSwing.quantities
     states = ("q", "w")
     shortest_s = 3.0
-    noise_by_candidates = False
 
     def __init__(self, with_voltage: bool, gear: float, first_moment_kg_m: float) -> None:
         self.gear, self.with_voltage = gear, with_voltage
