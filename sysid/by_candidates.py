@@ -270,14 +270,12 @@ def _over(machine: Machine, regression: Regression, name: str) -> str:
 def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regression: Regression) -> misfit.Misfit:
     """The tests as those of any machine; excess: the share of the residual's square that can be predicted."""
     made = [
-        misfit.Test(each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p)
+        misfit.Test(each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p, each.share)
         for each in tests
     ]
-    lines = {name: misfit.line(name, regression) for name in _with_lines(regression)}
-    made += [test for test, _ in lines.values()]
+    made += [misfit.line(name, regression) for name in _with_lines(regression)]
     p = min(1.0, min((each.p for each in made), default=1.0) * len(made))
-    shares = [*(each.share for each in tests), *(share for test, share in lines.values() if test.p == p / len(made))]
-    return misfit.Misfit(made, p, max(shares, default=0.0))
+    return misfit.Misfit(made, p, max((each.share for each in made if each.p * len(made) <= LEVEL), default=0.0))
 
 
 def _with_lines(regression: Regression) -> list[str]:

@@ -25,13 +25,17 @@ FASTEST = 0.2  # of the spectrum: above it the counts of an encoder at a steady 
 
 @dataclasses.dataclass(frozen=True)
 class Test:
-    """One group of features in one equation: its chi-square, its degrees of freedom, probability by chance."""
+    """One group of features in one equation: its chi-square, its degrees of freedom, probability by chance.
+
+    share: of the residual's square that it explains, where it is known.
+    """
 
     equation: str
     features: str
     chi2: float
     freedom: int
     p: float
+    share: float = 0.0
 
 
 @dataclasses.dataclass
@@ -45,7 +49,7 @@ class Misfit:
     @property
     def telling(self) -> Test:
         """The most significant test."""
-        return min(self.tests, key=lambda test: (test.p, -test.chi2))
+        return min(self.tests, key=lambda test: (test.p, -test.share, -test.chi2))
 
 
 def edges(signal: Array, count: int) -> Array:
@@ -143,7 +147,7 @@ def look(regression: Regression, general: General) -> Misfit:
     tests: list[Test] = []
     if all(recording.whitened for recording in regression.recordings):
         sounds = {name for r in regression.recordings for name, equation in r.equations.items() if equation.lines}
-        tests += [line(equation, regression)[0] for equation in regression.equations if equation in sounds]
+        tests += [line(equation, regression) for equation in regression.equations if equation in sounds]
     excess = 0.0
     for groups in places.values():
         gram, product = _beside([white for *_, white in groups], regression)
@@ -169,22 +173,19 @@ def _beside(groups: Sequence[Mapping[str, Array]], regression: Regression) -> tu
     return regression.gram(together, shadow), regression.product(together, shadow, regression.residual)
 
 
-def line(equation: str, regression: Regression) -> tuple[Test, float]:
-    """The strongest line in the spectrum of one equation's residual, relative to its neighbours on both sides.
-
-    And its share of the residual's square.
-    """
+def line(equation: str, regression: Regression) -> Test:
+    """The strongest line in the spectrum of one equation's residual, relative to its neighbours on both sides."""
     good = regression.good[equation]
     even = np.zeros(len(good))
     even[good] = regression.residual[regression.rows[equation]]
     power = np.abs(np.fft.rfft(even))[1:-1] ** 2
     if np.count_nonzero(good) < 100 or len(power) < 10 * BESIDE:
-        return Test(equation, "a line in time", 0.0, 2, 1.0), 0.0
+        return Test(equation, "a line in time", 0.0, 2, 1.0)
     level = ndimage.median_filter(power, BESIDE, mode="nearest") / np.log(2.0)
     ratio = power / np.maximum(level, 1e-300)
     low, high = BESIDE, max(BESIDE + 1, int(FASTEST * len(power)))
     place = low + int(np.argmax(ratio[low:high]))
     chi2 = 2.0 * float(ratio[place])
     p = -math.expm1((high - low) * math.log1p(-math.exp(-min(0.5 * chi2, 700.0))))
-    test = Test(equation, f"a line at {place + 1} periods of the data", chi2, 2, max(p, 0.0))
-    return test, float(power[place] / np.sum(power))
+    share = float(power[place] / np.sum(power))
+    return Test(equation, f"a line at {place + 1} periods of the data", chi2, 2, max(p, 0.0), share)
