@@ -27,7 +27,7 @@ FASTEST = 0.2  # of the spectrum: above it the counts of an encoder at a steady 
 class Test:
     """One group of features in one equation: its chi-square, its degrees of freedom, probability by chance.
 
-    share: of the residual's square that it explains, where it is known.
+    share: of the residual's square that it explains, where it is known; of a line, among its neighbours.
     """
 
     equation: str
@@ -187,5 +187,5 @@ def line(equation: str, regression: Regression) -> Test:
     place = low + int(np.argmax(ratio[low:high]))
     chi2 = 2.0 * float(ratio[place])
     p = -math.expm1((high - low) * math.log1p(-math.exp(-min(0.5 * chi2, 700.0))))
-    share = float(power[place] / np.sum(power))
+    share = float(power[place] / np.sum(power[place - BESIDE // 2 : place + BESIDE // 2 + 1]))
     return Test(equation, f"a line at {place + 1} periods of the data", chi2, 2, max(p, 0.0), share)
