@@ -25,7 +25,7 @@ from ranger_sim.sysid import (
     predictability,
     signals,
 )
-from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording

@@ -90,21 +90,16 @@ def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Arr
     return groups
 
 
-General = list[tuple[str, str, list[Columns]]]  # (equation or entry, group, one {equation: (n, k)} per recording)
-
-
-def _none(_: Recording) -> dict[str, dict[str, Array]]:
-    return {}
+General = list[tuple[str, str, list[Columns]]]  # (equation, group, one {equation: (n, k)} per recording)
 
 
 def general_features(machine: Machine, recordings: Sequence[Recording]) -> General:
-    """All groups of features of all equations and entries."""
+    """All groups of features of all equations."""
     found: General = []
     looked_over = [machine.generic(recording) for recording in recordings]
-    more = [getattr(machine, "features", _none)(recording) for recording in recordings]
-    for equation in dict.fromkeys(name for r in recordings for name in (*r.equations, *r.entries)):
+    for equation in dict.fromkeys(name for r in recordings for name in r.equations):
         signals = [
-            each.get(equation, {}) if equation in recording.equations or equation in recording.entries else {}
+            each.get(equation, {}) if equation in recording.equations else {}
             for recording, each in zip(recordings, looked_over, strict=True)
         ]
         together = {
@@ -117,24 +112,13 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
             [0, *(len(recording.table) if each else 0 for recording, each in zip(recordings, signals, strict=True))]
         )
         groups = features(together, recordings[0].lags)
-        here = [each.get(equation, {}) for each in more]
-        for name in dict.fromkeys(name for each in here for name in each):
-            if all(name in each or not signal for each, signal in zip(here, signals, strict=True)):
-                groups[name] = np.concatenate([each[name] for each in here if name in each])
         for group, matrix in groups.items():
             columns = [
-                _seen(recording, equation, matrix[start:stop]) if stop > start else {}
-                for recording, start, stop in zip(recordings, ends[:-1], ends[1:], strict=True)
+                {equation: matrix[start:stop]} if stop > start else {}
+                for start, stop in zip(ends[:-1], ends[1:], strict=True)
             ]
             found.append((equation, group, columns))
     return found
-
-
-def _seen(recording: Recording, place: str, columns: Array) -> Columns:
-    """Columns of the equations for columns in one of them, or at an entry."""
-    if place in recording.entries:
-        return recording.entries[place].respond(columns)
-    return {place: columns}
 
 
 def look(regression: Regression, general: General) -> Misfit:

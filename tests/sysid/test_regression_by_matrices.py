@@ -12,7 +12,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import gain, intervals, misfit, naming, regression
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.machine import Effect, Entry, Equation, Recording
+from ranger_sim.sysid.machine import Effect, Equation, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression, Whitening
 
@@ -526,23 +526,16 @@ def test_a_line_in_the_spectrum_stands_over_the_median_next_to_it(periods):
     assert misfit.line("one", Regression([Recording(table(count), {}, {"one": none})], noise=QUIET)).p > 0.001
 
 
-def test_features_are_made_of_each_equation_s_and_entry_s_signals_of_all_recordings():
+def test_features_are_made_of_each_equation_s_signals_of_all_recordings():
     one, other = asked(NOISE).recordings[0], asked(NOISE).recordings[0]
-    other.entries = {"port": Entry("m", lambda columns: {"one": 2.0 * columns})}
-    looked = {id(one): {"one": {"a": A}}, id(other): {"one": {"a": B}, "port": {"t": C}}}
-    more = np.arange(float(N))[:, None]
-    machine = SimpleNamespace(
-        generic=lambda r: looked[id(r)], features=lambda r: {"one": {"waves": more if r is one else 2.0 * more}}
-    )
+    looked = {id(one): {"one": {"a": A}}, id(other): {"one": {"a": B}, "two": {"t": C}}}
+    machine = SimpleNamespace(generic=lambda r: looked[id(r)])
     found = {(place, group): columns for place, group, columns in misfit.general_features(machine, [one, other])}
-    assert list(found) == [("one", "over a"), ("one", "history of a"), ("one", "waves"), ("port", "over t")]
+    assert list(found) == [("one", "over a"), ("one", "history of a")]
     both = misfit.features({"a": np.concatenate((A, B))}, (0, 10, 30, 100))
     for group in ("over a", "history of a"):
         first, second = found["one", group]
         assert np.array_equal(first["one"], both[group][:N]) and np.array_equal(second["one"], both[group][N:])
-    assert np.array_equal(found["one", "waves"][1]["one"], 2.0 * more)
-    first, second = found["port", "over t"]
-    assert first == {} and np.array_equal(second["one"], 2.0 * misfit.features({"t": C}, (0,))["over t"])
 
 
 # --- intervals and gains ----------------------------------------------------------------------------------------------
