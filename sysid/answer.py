@@ -142,6 +142,9 @@ def _cause(found: Diagnosis, each: Named) -> Cause:
             ties=tuple(tie.name for tie in each.tied),
             behind={effect.name: behind for effect, behind in each.rivals[:RIVALS]},
             predicted=predicted_ties.of(found.machine, extended.recordings, each),
+            moved_by_numerics=dict(zip(each.effect.coefficients, moved, strict=True))
+            if (moved := found.numerics.get(each.effect.name)) is not None
+            else None,
         ),
     )
 

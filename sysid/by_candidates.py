@@ -29,17 +29,20 @@ from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
-from ranger_sim.sysid.naming import Named
+from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import Held, gained
 
-MOST_ACTING = 12  # candidates in the simulator while it is linearised: the likeliest
+MOST_ACTING = 4  # candidates in the simulator while it is linearised: the likeliest
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
-AGAIN = 2  # simulations with the named effects, at most
+AGAIN = 3  # simulations with the named effects, at most
+MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
+ABOVE_NUMERICS = 3.0  # times what numerics move it by: a named effect is at least so large
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
+FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say nothing
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
@@ -64,7 +67,7 @@ def diagnose(
     effects = [each for each in effects if all(each is not other.effect for other in had)]
     progress("misfit", 0.2)
     if hasattr(machine, "about_all"):
-        recordings, held = ([_about_all(machine, each, effects) for each in some] for some in (recordings, held))
+        recordings, held = ([_about_all(machine, each, effects, had) for each in some] for some in (recordings, held))
     skews = list(had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
@@ -74,7 +77,7 @@ def diagnose(
         found = likelihood.select(
             recordings, rest, skews, seed, accepts, progress=lambda share: progress("causes", begin + 0.2 * share)
         )
-        return _decided(machine, recordings, found, skews) if hasattr(machine, "surprise") else found
+        return _decided(machine, recordings, found, skews, had) if hasattr(machine, "surprise") else found
 
     found = selected(recordings, held, 0.25)
     stamps = _stamps(found)
@@ -82,14 +85,26 @@ def diagnose(
         skews += stamps
         found = selected(recordings, held, 0.25)
     before = predictability.test(found.base, predictor.columns(recordings), seed)
+    floor: dict[str, tuple[float, ...]] = {}
+    small: list[str] = []
     for number in range(AGAIN if found.named and hasattr(machine, "again") else 0):
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
         previous = found
-        recordings = held_out.simulated_again(machine, recordings, found.named, found.with_named)
-        held = held_out.simulated_again(machine, held, found.named, found.with_named, fixed=True)
+        effects = _finer(effects, found, skews)
+        recordings = held_out.simulated_again(machine, recordings, [*had, *found.named], found.with_named)
+        held = held_out.simulated_again(machine, held, [*had, *found.named], found.with_named)
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
-        if [each.effect for each in found.named] == [each.effect for each in previous.named]:
-            break
+        if [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]:
+            if all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):
+                break
+    if found.named and hasattr(machine, "numerical"):
+        progress("numerics", 0.7)
+        recordings = held_out.simulated_again(machine, recordings, [*had, *found.named], found.with_named)
+        floor = _numerical_floor(machine, recordings, [*had, *found.named])
+        small = [each.effect.name for each in found.named if _below(floor, found, each.effect)]
+        if small:
+            effects = [each for each in effects if each.name not in small]
+            found = selected(recordings, held, 0.7)
     progress("what is left", 0.75)
     known_to: dict[str, intervals.Intervals] = {}
     extended = found.with_named
@@ -127,24 +142,82 @@ def diagnose(
         errors=errors,
         floors=floors(extended),
         by_candidates=True,
+        stretches={each.equation: float(each.stretches) for each in after},
+        numerics=floor,
+        below_numerics=small,
         visible=smallest(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
 
 
-def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]) -> Recording:
-    """A simulator's recording, linearised with all effects in it, each at the shape that suits best without them."""
-    known = likelihood.noise_of([recording], effects, ())
-    tried = naming.trials(effects, Regression([recording], noise=known))
-    best = likelihood.ranking([each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN],
-                              len(recording.table))[:MOST_ACTING]  # fmt: skip
-    best = [each for each in best if each[0] > 0.0]
-    return cast(Recording, machine.about_all(recording, [(each[3].effect, each[3].shape) for each in best]))  # type: ignore[attr-defined]
+def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]) -> Recording:
+    """A simulator's recording, linearised with known and likely effects in it, each at the shape that suits best."""
+    known = likelihood.noise_of([recording], effects, had)
+    tried = naming.trials(effects, naming.refit(Regression([recording], noise=known), had))
+    seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
+    likeliest: list[Trial] = []
+    for score, _, _, trial in likelihood.ranking(seen, len(recording.table)):
+        if score > 0.0 and not any(each.effect.excludes(trial.effect) for each in likeliest):
+            likeliest.append(trial)
+    acting = [(each.effect, each.shape) for each in had]
+    acting += [(each.effect, each.shape) for each in likeliest[:MOST_ACTING]]
+    return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
+
+
+def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequence[Named]) -> list[Effect]:
+    """The effects, those found at a shape on a scale with a finer grid about it; found gets them as well."""
+    out = list(effects)
+    for each in found.named:
+        if each.effect.scale is None:
+            continue
+        others = [other for other in found.named if other is not each]
+        base = naming.refit(found.base, others, [*fixed, *others]) if others else found.base
+        old = each.effect
+        shapes = [each.shape, *intervals.between(each)]
+        each.shape, _ = intervals.profile(each, base)
+        each.effect = dataclasses.replace(old, shapes=shapes)
+        out = [each.effect if one is old else one for one in out]
+    if found.named:
+        found.with_named = naming.refit(found.base, found.named, [*fixed, *found.named])
+    return out
+
+
+def _numerical_floor(
+    machine: Machine, recordings: Sequence[Recording], named: Sequence[Named]
+) -> dict[str, tuple[float, ...]]:
+    """By effect, the most that each coefficient moves with half the step and with inputs drawn otherwise."""
+    moved = np.mean([np.max(np.abs(machine.numerical(each)), axis=0, initial=0.0) for each in recordings], axis=0)  # type: ignore[attr-defined]
+    out, first = {}, 0
+    for each in named:
+        count = len(each.coefficients)
+        out[each.effect.name] = tuple(float(size) for size in moved[first : first + count])
+        first += count
+    return out
+
+
+def _below(floor: Mapping[str, tuple[float, ...]], found: likelihood.Selection, effect: Effect) -> bool:
+    """True for a named effect that is not clearly larger than what numerics move it by."""
+    for each in found.named:
+        if each.effect is effect and effect.name in floor:
+            size = math.hypot(*(found.with_named.values[name] for name in each.coefficients))
+            return size < ABOVE_NUMERICS * math.hypot(*floor[effect.name])
+    return False
+
+
+def _unmoved(found: likelihood.Selection, previous: likelihood.Selection, name: str) -> bool:
+    """True when a coefficient is within a tenth of its standard error of what it was before it was simulated."""
+    number = found.with_named.names.index(name)
+    error = math.sqrt(max(0.0, float(found.with_named.covariance[number, number])))
+    return abs(found.with_named.values[name] - previous.with_named.values.get(name, math.inf)) <= MOVED * error
 
 
 def _decided(
-    machine: Machine, recordings: Sequence[Recording], found: likelihood.Selection, fixed: Sequence[Named]
+    machine: Machine,
+    recordings: Sequence[Recording],
+    found: likelihood.Selection,
+    fixed: Sequence[Named],
+    had: Sequence[Named],
 ) -> likelihood.Selection:
     """The selection with each cause held against its nearest rivals in the simulator itself.
 
@@ -163,7 +236,7 @@ def _decided(
         for option in options:
             together = [*others, option]
             extended = naming.refit(found.base, together, [*fixed, *together])
-            simulated = held_out.simulated_again(machine, recordings, together, extended)
+            simulated = held_out.simulated_again(machine, recordings, [*had, *together], extended)
             free = len(option.effect.coefficients) + (len(option.effect.shapes) > 1)
             scores.append(
                 sum(machine.surprise(one) for one in simulated)  # type: ignore[attr-defined]
@@ -375,7 +448,21 @@ def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
         above_noise_floor=tuple(unexplained(found)),
         smallest_visible={each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
         cannot_be_seen=tuple(each.effect.name for each in found.visible if each.sizes is None),
+        too_short_s=_needed_s(found) or None,
+        below_numerics=tuple(found.below_numerics) or None,
     )
+
+
+def _needed_s(found: Diagnosis) -> dict[str, float]:
+    """By equation with too few independent stretches, where nothing was found, the length that would have enough."""
+    if found.detected:
+        return {}
+    seconds = sum(len(each.table) * each.table.step_s for each in found.recordings)
+    return {
+        name: math.ceil(seconds * FEWEST_STRETCHES / number)
+        for name, number in found.stretches.items()
+        if number < FEWEST_STRETCHES
+    }
 
 
 def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:

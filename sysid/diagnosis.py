@@ -61,6 +61,9 @@ class Diagnosis:
     errors: dict[str, HeldOutError] | None = None  # on held-out data, by equation
     floors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     visible: list[Visible] = dataclasses.field(default_factory=list)
+    stretches: dict[str, float] = dataclasses.field(default_factory=dict)  # independent ones, by equation
+    numerics: dict[str, tuple[float, ...]] = dataclasses.field(default_factory=dict)  # moves of coefficients, by effect
+    below_numerics: list[str] = dataclasses.field(default_factory=list)  # effects that are not named for it
     by_candidates: bool = False  # found with the noise that all candidates leave
     result: DiagnosisResult = dataclasses.field(init=False)  # made last, by answer.py alone
 

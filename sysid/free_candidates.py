@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Recording
-from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, shown
+from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, sensed, shown
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording
@@ -55,29 +55,33 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
     """An output's offset, scale, drift and lag."""
     name, place, unit = output.channel, shown(output.channel), _word(output.unit)
 
-    def sensor(cause: str, coefficient: str, make: Callable[[Table, Array], Array]) -> Term:
+    def sensor(cause: str, coefficient: str, make: Callable[[Table, Array], Array], meaning: str) -> Term:
         return Term(
             cause, name, "sensor", (coefficient,),
-            lambda r, shape, values: {place: make(r.table, r.signals[name])}, free=True,
+            lambda r, shape, values: {place: make(r.table, r.signals[sensed(name)])}, meaning=meaning, free=True,
         )  # fmt: skip
 
-    def lag(form: str, late: Callable[[Table, Array, float], Array]) -> Term:
+    def lag(form: str, time: str, late: Callable[[Table, Array, float], Array], meaning: str) -> Term:
         def make(r: Recording, shape: Shape, values: Mapping[str, float]) -> dict[str, Array]:
-            seen, lag_s = r.signals[name], shape["near_s"]
+            seen, lag_s = r.signals[sensed(name)], shape[time]
             return {place: (late(r.table, seen, lag_s) - seen) / lag_s}
 
         return Term(
-            "sensor_lag", name, "sensor", ("lag_s",), make, [{"near_s": each} for each in _lags(recordings)],
-            free=True, form=form, scale="near_s",
+            "sensor_lag", name, "sensor", ("lag_s",), make, [{time: each} for each in _lags(recordings)],
+            meaning=meaning, free=True, form=form, scale=time,
         )  # fmt: skip
 
     return [
-        sensor("sensor_offset", f"offset_{unit}", lambda table, seen: np.ones(len(table))),
-        sensor("sensor_scale", "share", lambda table, seen: seen),
-        sensor("sensor_drift", f"drift_{unit}_per_s", lambda table, seen: table.time_s - table.time_s[0]),
-        lag("delay", delayed),
-        lag("filter", filtered),
-    ]
+        sensor("sensor_offset", f"offset_{unit}", lambda table, seen: np.ones(len(table)),
+               f"{name} shows a constant too much: true value + offset_{unit}"),
+        sensor("sensor_scale", "share", lambda table, seen: seen,
+               f"{name} shows a multiple of what it measures: true value * (1 + share)"),
+        sensor("sensor_drift", f"drift_{unit}_per_s", lambda table, seen: table.time_s - table.time_s[0],
+               f"{name} drifts: true value + drift_{unit}_per_s * time since the recording's start"),
+        lag("delay", "delay_s", delayed, f"{name} is late: it shows the true value of lag_s before"),
+        lag("filter", "time_constant_s", filtered,
+            f"{name} lags: it shows the true value behind a low-pass of first order with the time constant lag_s"),
+    ]  # fmt: skip
 
 
 def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
@@ -88,18 +92,28 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
         return []
     limits = sorted({float(np.quantile(size, each)) for each in CLIPPED} - {largest, 0.0})
 
-    def term(cause: str, coefficient: str, make: Signal, shapes: Sequence[Shape] = ({},)) -> Term:
+    def term(cause: str, coefficient: str, make: Signal, meaning: str, shapes: Sequence[Shape] = ({},)) -> Term:
         return Term(
             cause, name, "input", (coefficient,), lambda r, shape, values: {into(name): make(r.signals, shape)},
-            shapes, lambda found: cause == "input_offset" or found[coefficient] > 0.0, free=True,
+            shapes, lambda found: cause == "input_offset" or found[coefficient] > 0.0, meaning, free=True,
         )  # fmt: skip
 
-    made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]))]
+    made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]),
+                 f"the machine gets {name} + offset")]  # fmt: skip
     if limits:
         beyond: Signal = lambda s, shape: np.clip(s[name], -shape["limit"], shape["limit"]) - s[name]  # noqa: E731
-        made.append(term("saturation", "share", beyond, [{"limit": each} for each in limits]))
+        made.append(
+            term(
+                "saturation",
+                "share",
+                beyond,
+                f"the machine does not get the share of {name} that is beyond the limit",
+                [{"limit": each} for each in limits],
+            )
+        )
     inside: Signal = lambda s, shape: -np.clip(s[name], -shape["limit"], shape["limit"])  # noqa: E731
-    made.append(term("dead_zone", "share", inside, [{"limit": each * largest} for each in DEAD]))
+    text = f"the machine does not get the share of {name} that is within the limit"
+    made.append(term("dead_zone", "share", inside, text, [{"limit": each * largest} for each in DEAD]))
     return made
 
 
@@ -110,12 +124,19 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
     slow = joint.slow or SLOW * usual
     unit = joint.unit
 
-    def term(cause: str, coefficients: tuple[str, ...], make: Signal, shapes: Sequence[Shape] = ({},),
-             admissible: Callable[[Mapping[str, float]], bool] = lambda found: True, phase: bool = False) -> Term:  # fmt: skip
+    def term(
+        cause: str,
+        coefficients: tuple[str, ...],
+        make: Signal,
+        meaning: str,
+        shapes: Sequence[Shape] = ({},),
+        admissible: Callable[[Mapping[str, float]], bool] = lambda found: True,
+        phase: bool = False,
+    ) -> Term:
         return Term(
             cause, joint.rate, "mechanical", coefficients,
             lambda r, shape, values: {on(joint.rate): make(r.signals, shape)}, shapes, admissible,
-            phase_is_free=phase, free=True,
+            f"{joint.rate}: {meaning}", phase_is_free=phase, free=True,
         )  # fmt: skip
 
     def sign(s: Mapping[str, Array]) -> Array:
@@ -129,18 +150,29 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
         return np.column_stack((np.cos(angle), np.sin(angle)))
 
     made = [
-        term("viscous_friction", (f"viscous_{unit}_s",), lambda s, _: -s[joint.rate]),
-        term("coulomb_friction", (f"coulomb_{unit}",), lambda s, _: -sign(s)),
-        term("stribeck", (f"excess_{unit}",), low, [{"speed": each * usual} for each in SPEEDS],
+        term("viscous_friction", (f"viscous_{unit}_s",), lambda s, _: -s[joint.rate],
+             f"further friction, -viscous_{unit}_s * rate"),
+        term("coulomb_friction", (f"coulomb_{unit}",), lambda s, _: -sign(s),
+             f"further dry friction, -coulomb_{unit} * sign(rate)"),
+        term("stribeck", (f"excess_{unit}",), low,
+             f"friction is larger at low speed, -excess_{unit} * sign(rate) * exp(-(rate / speed)^2)",
+             [{"speed": each * usual} for each in SPEEDS],
              lambda found: found[f"excess_{unit}"] > 0.0),
-        term("direction_friction", (f"difference_{unit}",), lambda s, _: -np.abs(sign(s))),
-        term("drag", (f"quadratic_{unit}_s2",), lambda s, _: -s[joint.rate] * np.abs(s[joint.rate])),
+        term("direction_friction", (f"difference_{unit}",), lambda s, _: -np.abs(sign(s)),
+             f"friction differs between the directions, -difference_{unit} * |sign(rate)|"),
+        term("drag", (f"quadratic_{unit}_s2",), lambda s, _: -s[joint.rate] * np.abs(s[joint.rate]),
+             f"drag, -quadratic_{unit}_s2 * rate * |rate|"),
     ]  # fmt: skip
     if joint.load:
-        made.append(term("load_friction", ("share",), lambda s, _: -sign(s) * np.abs(s[joint.load])))
+        friction: Signal = lambda s, _: -sign(s) * np.abs(s[joint.load])  # noqa: E731
+        made.append(
+            term("load_friction", ("share",), friction, f"friction grows with the load, share * |{joint.load}|")
+        )
     if joint.position:
         periods = [{"periods": float(each)} for each in joint.periods]
-        made.append(term("once_per_turn", (f"cosine_{unit}", f"sine_{unit}"), around, periods, phase=True))
+        made.append(term("once_per_turn", (f"cosine_{unit}", f"sine_{unit}"), around,
+                         f"periodic, cosine and sine of periods * {joint.turns:g} * {joint.position}",
+                         periods, phase=True))  # fmt: skip
     return made
 
 

@@ -52,10 +52,15 @@ from ranger_sim.sysid.simulated_terms import (
     Term,
     into,
     on,
+    sensed,
     shown,
 )
 
-__all__ = ["Acting", "Joint", "Output", "Port", "SimulatedEffect", "Term"]  # for machines
+# for machines, which need nothing else
+__all__ = [
+    "Acting", "Joint", "Output", "Port", "Ports", "Predictor", "Shape", "SimulatedEffect", "SimulatedMachine",
+    "SimulatedRecording", "Term", "averaged", "forced", "held", "roughness", "runge_kutta", "standing",
+]  # fmt: skip
 
 ROUNDS = 30  # of Gauss and Newton, at most
 RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
@@ -72,6 +77,12 @@ OPEN_S = 0.01  # memory of dry friction's reaction where it holds; chosen by us
 AGAIN = 12  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
 JUMPS = 0.2  # of the samples at most: an input that changes at no more of them is held in between
 SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
+FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
+FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
+FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
+SMOOTHER = 0.25  # of the straight lines' square that a cubic leaves: there it is the better way between samples
+NUMERICAL = 4  # rounds with other numerics, from the fit without them
+NARROW = 0.25  # of what is open at standstill, in the numerical floor
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 TOGETHER = 24  # responses that are computed side by side
@@ -299,9 +310,7 @@ class SimulatedRecording(Recording):
         entering = [self.entering(ports) for _, _, ports in made]
         held = np.array([port.name in self.held_ports for port in self.ports])
         together = np.concatenate(entering, axis=2)
-        white = predictor.white(
-            predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together))
-        )
+        white = predictor.white(predictor.errors(forced(lin.f_q, _between(together, held)), forced(lin.h_q, together)))
         first = 0
         for (term, place, _), each in zip(made, entering, strict=True):
             self.free[id(term), place] = self._heard(white[:, :, first : first + each.shape[2]])
@@ -356,6 +365,19 @@ def _stays(table: Table, column: Array) -> bool:
         for run in table.runs
         if run.stop - run.start > 1
     )
+
+
+def _is_smooth(table: Table, column: Array) -> bool:
+    """True where a cubic through every second sample meets the samples between better than straight lines do."""
+    straight = cubic = 0.0
+    for run in table.runs:
+        c = column[run]
+        if len(c) < 8:
+            continue
+        middle, near, far = c[3:-3], 0.5 * (c[2:-4] + c[4:-2]), 0.5 * (c[:-6] + c[6:])
+        straight += float(np.sum((middle - near) ** 2))
+        cubic += float(np.sum((middle - (9.0 * near - far) / 8.0) ** 2))
+    return cubic < SMOOTHER * straight
 
 
 def averaged(table: Table, count: int) -> Table:
@@ -500,9 +522,7 @@ class SimulatedMachine(abc.ABC):
         fit = recordings[0].fit
         assert fit is not None
         named = {(each.cause, each.at) for each in own}
-        made = [
-            each for each in candidates(self, list(fit.inputs), recordings) if (each.cause, each.at) not in named
-        ]
+        made = [each for each in candidates(self, list(fit.inputs), recordings) if (each.cause, each.at) not in named]
         first, values = recordings[0], recordings[0].fitted
         known = [_direction(first.respond(each.make(first, shape, values)), first)
                  for each in own for shape in each.shapes if len(each.coefficients) == 1]  # fmt: skip
@@ -545,6 +565,17 @@ class SimulatedMachine(abc.ABC):
         made = tried.recording()
         return made if tried.surprise < fit.surprise else recording
 
+    def numerical(self, recording: Recording) -> Array:
+        """(variants, coefficients): what the coefficients of what acts move by with other numerics."""
+        fit = cast(SimulatedRecording, recording).fit
+        assert fit is not None
+        count = len(fit.names)
+        moved = []
+        for other in fit.otherwise():
+            other.recording(NUMERICAL)
+            moved.append(other.p_at[count:] - fit.p_at[count:])
+        return np.array(moved)
+
     def surprise(self, recording: Recording) -> float:
         """-2 log likelihood of a recording with what acts in its simulator, up to a constant."""
         fit = cast(SimulatedRecording, recording).fit
@@ -583,7 +614,12 @@ class _Fit:
             guess = {name: table[f"first {name}"] for name in guess}
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = given
+        self.parts, self.rest_share = machine.parts, 1.0
         self.held = {*machine.held_inputs, *(name for name in given if _stays(table, given[name]))}
+        self.curved = {name for name in given if name not in self.held and _is_smooth(table, given[name])}
+        self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
+        for run in table.runs:
+            self.inside[run.start + 1 : run.stop - 2] = 1.0
         self.names = [known.name for known in machine.parameters]
         self.x = np.column_stack([guess[name] for name in machine.states])
         self.p = np.array([known.value for known in machine.parameters])
@@ -619,6 +655,7 @@ class _Fit:
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
         self.acting: list[Acting] = []
+        self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.ports = (*machine.ports, *_own_ports(machine, list(given)))
@@ -666,6 +703,20 @@ class _Fit:
         new.noise_y = self.shown_y
         return new
 
+    def otherwise(self) -> "list[_Fit]":
+        """Fits that continue from here with other numerics: half the step; inputs on straight lines instead of cubics,
+        or on straight lines instead of held; a quarter of what is open at standstill."""
+        finer, straight, narrow = (copy.copy(self) for _ in range(3))
+        finer.parts = 2 * self.parts
+        straight.curved, straight.held = set(), set(self.machine.held_inputs)
+        narrow.rest_share = NARROW
+        made = [finer]
+        if self.curved or straight.held != self.held:
+            made.append(straight)
+        if np.any(self._loose() > 1e-6 * self.size_x):
+            made.append(narrow)
+        return made
+
     def _acting_now(self) -> Array:
         """(n, ports, coefficients): the effects' input at the ports along the present trajectory."""
         if not self.acting:
@@ -679,6 +730,9 @@ class _Fit:
         along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         along |= self.inputs | {name: self.u[:, i] for i, name in enumerate(self.noisy)}
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
+        acting = self.at_ports @ self.p[len(self.names) :] if self.acting else np.zeros(self.at_ports.shape[:2])
+        for number, each in enumerate(machine.outputs, len(machine.ports)):
+            along[sensed(each.channel)] = along[each.channel] - acting[:, number]
         along["t"] = table.time_s - table.time_s[0]
         along |= machine.extra_signals(along, table)
         return SimulatedRecording(table, along, {}, ports=self.ports)
@@ -694,24 +748,42 @@ class _Fit:
         at_ports = {each.name: ports[..., i] for i, each in enumerate(self.ports)}
         given = {name: column + at_ports[into(name)] for name, column in given.items()}
         given |= at_ports
-        change = {
-            name: 0.0 * c if name in self.held or name in self.held_ports else np.concatenate((c[:, 1:], c[:, -1:]), axis=1) - c
-            for name, c in given.items()
-        }
+        between = {name: self._between_samples(name, c) for name, c in given.items()}
         after: Quantities = states
-        for part in range(machine.parts):
-            share = (part + 0.5) / machine.parts
-            middle = {name: np.asarray(c + share * change[name]) for name, c in given.items()}
-            after = dict(machine.step(after, middle, values, self.step_s / machine.parts))
+        for part in range(self.parts):
+            share = (part + 0.5) / self.parts
+            middle = {name: at(share) for name, at in between.items()}
+            after = dict(machine.step(after, middle, values, self.step_s / self.parts))
             for joint in machine.joints:
                 inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
-                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / machine.parts / inertia
+                after[joint.rate] = after[joint.rate] + middle[on(joint.rate)] * self.step_s / self.parts / inertia
         seen = dict(machine.observe(states, given, values))
         for each in machine.outputs:
             seen[each.channel] = seen[each.channel] + at_ports[shown(each.channel)]
         f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
         return f, h
+
+    def _between_samples(self, name: str, c: Array) -> Callable[[float], Array]:
+        """An input or port between its samples (m, n), at a share of the way to the next: held, on a cubic through its
+        neighbours where the samples lie on one, or on a straight line."""
+        if name in self.held or name in self.held_ports:
+            return lambda share: c
+        after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
+        if name not in self.curved:
+            return lambda share: c + share * (after - c)
+        before, second = (
+            np.concatenate(each, axis=1) for each in ((c[:, :1], c[:, :-1]), (after[:, 1:], after[:, -1:]))
+        )
+        inside = self.inside if c.shape[1] > 1 else np.zeros(1)
+        bend = after - 2.0 * c + before, second - 2.0 * after + c
+
+        def at(share: float) -> Array:
+            rest = 1.0 - share
+            curve = (rest * (rest * rest - 1.0) * bend[0] + share * (share * share - 1.0) * bend[1]) / 6.0
+            return np.asarray(c + share * (after - c) + inside * curve)
+
+        return at
 
     def linearise(self) -> Jacobians:
         """By central differences, all samples at once; with the effects that act."""
@@ -750,9 +822,7 @@ class _Fit:
             )
         return Jacobians(f[0], h[0], f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
 
-    def _at_ports(
-        self, derivative: Callable[..., tuple[Array, Array]], f_u: Array, h_u: Array
-    ) -> tuple[Array, Array]:
+    def _at_ports(self, derivative: Callable[..., tuple[Array, Array]], f_u: Array, h_u: Array) -> tuple[Array, Array]:
         """(f_q, h_q). What the engine adds itself is known: an output's port moves it alone, a noisy input's as its
         noise does."""
         n, s = self.x.shape
@@ -762,7 +832,10 @@ class _Fit:
             h_q[:, number, names.index(shown(each.channel))] = 1.0
         known = {shown(each.channel) for each in self.machine.outputs} | {into(name) for name in self.noisy}
         for number, name in enumerate(self.noisy):
-            f_q[:, :, names.index(into(name))], h_q[:, :, names.index(into(name))] = f_u[:, :, number], h_u[:, :, number]
+            f_q[:, :, names.index(into(name))], h_q[:, :, names.index(into(name))] = (
+                f_u[:, :, number],
+                h_u[:, :, number],
+            )
         rest = [number for number, name in enumerate(names) if name not in known]
         f_q[:, :, rest], h_q[:, :, rest] = derivative(3, np.ones(len(names)), rest)
         return f_q, h_q
@@ -777,7 +850,11 @@ class _Fit:
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
         # a trace of noise keeps the predictor from being certain of what it has not seen
-        return np.column_stack([found.get(name, nothing) for name in machine.states]) + 1e-9 * self.size_x
+        return (
+            np.column_stack([self.rest_share * found.get(name, nothing) for name in machine.states])
+            + 1e-9 * self.size_x
+            + self.slack
+        )
 
     def round(self) -> float:
         """One round; returns the largest step of a parameter in its standard errors."""
@@ -849,26 +926,58 @@ class _Fit:
 
     def recording(self, rounds: int = ROUNDS) -> SimulatedRecording:
         """Fitted and linearised."""
-        renewed, best = 0, np.inf
+        if not self._settle(rounds) or self.cost > FAR_OFF:
+            self._follow()
+        self.round_again()
+        assert self.predictor is not None
+        return self._told(self.predictor, self.response, self.columns)
+
+    def _settle(self, rounds: int) -> bool:
+        """Rounds until nothing moves any more; False when it still does after them."""
+        renewed, best, share = 0, np.inf, 1.0
         for _ in range(rounds):
             accepted = (self.x, self.u, self.p)
             step = self.round()
             if not self.cost < WORSE * best:
-                # too far: a quarter of the step
-                old = self.came_from
-                self.x, self.u, self.p = (b + 0.25 * (a - b) for a, b in zip(accepted, old, strict=True))
+                # too far: a part of the step from where it began, whose cost is another with the covariances of now
+                (self.x, self.u, self.p), best, share = self.came_from, np.inf, 0.25 * share
                 continue
+            if share < 1.0:
+                self.x, self.u, self.p = (
+                    old + share * (new - old) for old, new in zip(accepted, (self.x, self.u, self.p), strict=True)
+                )
+                share = min(1.0, 2.0 * share)
             self.came_from = accepted
             best = min(best, self.cost)
             if step > STEADY:
                 continue
             if renewed == RENEWED:
-                break
+                return True
             self._renew_noise()
             renewed, best = renewed + 1, np.inf
-        self.round_again()
-        assert self.predictor is not None
-        return self._told(self.predictor, self.response, self.columns)
+        return False
+
+    def _follow(self) -> None:
+        """Fit again from the start, along the measurement: states may leave the law by a share of their steps.
+
+        A simulator without a large fault's cause has no good trajectory, and where its fit ends means nothing. The
+        share becomes smaller as long as it explains what is left.
+        """
+        self.x, self.u, start = self.began
+        self.p = np.concatenate((start[: len(self.names)], np.zeros(len(self.p) - len(self.names))))
+        self.noise_y, self.predictor = self.shown_y, None
+        moved = np.diff(self.x, axis=0)
+        moved[self.ends[:-1]] = 0.0
+        usual = np.sqrt(np.mean(moved**2, axis=0))
+        kept = (self.x, self.u, self.p)
+        for share in FOLLOWED:
+            self.slack = share * usual
+            self.came_from = (self.x, self.u, self.p)
+            self._settle(FOLLOWING)
+            if not self.cost < MISSED and share < FOLLOWED[0]:
+                break
+            kept = (self.x, self.u, self.p)
+        (self.x, self.u, self.p), self.slack, self.predictor = kept, np.zeros_like(usual), None
 
     def free(self) -> SimulatedRecording:
         """Errors of free simulation over windows, about the same trajectory: without noise, each window starts free.

@@ -64,12 +64,16 @@ def _to_neighbours(name: str, ends: tuple[float, float], found: list) -> tuple[f
 
 def _shapes(each: Named) -> list[Mapping[str, float]]:
     """The grid, and between the best and its neighbours more of it where the shape is on a scale."""
-    grid = list(each.effect.shapes)
-    if each.effect.scale is None:
-        return grid
+    return [*each.effect.shapes, *between(each)]
+
+
+def between(each: Named) -> list[Mapping[str, float]]:
+    """Shapes between the best and its neighbours; none where the shape is not on a scale."""
     name = each.effect.scale
-    values = sorted({shape[name] for shape in grid})
-    place = values.index(each.shape[name])
+    if name is None:
+        return []
+    values = sorted({shape[name] for shape in each.effect.shapes})
+    place = int(np.argmin([abs(value - each.shape[name]) for value in values]))
     near = values[max(0, place - 1) : place + 2]
     more = [
         low * (high / low) ** (number / (BETWEEN + 1))
@@ -77,4 +81,4 @@ def _shapes(each: Named) -> list[Mapping[str, float]]:
         if low > 0.0
         for number in range(1, BETWEEN + 1)
     ]
-    return [*grid, *({**each.shape, name: value} for value in more)]
+    return [{**each.shape, name: value} for value in more]

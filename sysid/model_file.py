@@ -19,6 +19,7 @@ from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import terms
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.machine import Machine
+from ranger_sim.sysid.machines import ROBOT
 from ranger_sim.sysid.model_terms import NoFormError, effects_of, parameter_terms, term_of
 from ranger_sim.sysid.results import DiagnosisEvidence, KnownCause
 
@@ -83,9 +84,13 @@ def model_text(found: Diagnosis, evidence: DiagnosisEvidence) -> str:
     if gear is not None:
         lines.append(f"gear = {float(gear)!r}")
     lines += [f"recordings = [{', '.join(map(_quoted, names))}]", "", "[diagnosis.parameters]", *_numbers(values)]
+    meanings = {(each.effect.cause, each.effect.at): each.effect.meaning for each in (*found.had, *found.named)}
     for each in effects:
-        lines += ["", "[[diagnosis.effect]]", f"cause = {_quoted(each.known.cause)}", f"at = {_quoted(each.known.at)}"]
-        if each.term is None:
+        lines += ["", "[[diagnosis.effect]]"]
+        if meaning := meanings.get((each.known.cause, each.known.at)):
+            lines.append(f"# {meaning}")
+        lines += [f"cause = {_quoted(each.known.cause)}", f"at = {_quoted(each.known.at)}"]
+        if each.term is None and found.machine.name in ROBOT:  # other machines have their own simulators
             lines += [f"no_form = {_quoted(each.no_form)}", "left_out = false  # true: simulate without it"]
         for name, numbers in (("coefficients", each.known.coefficients), ("shape", each.known.shape)):
             lines.append(f"{name} = {{ {', '.join(_numbers(dict(numbers)))} }}" if numbers else f"{name} = {{}}")

@@ -197,7 +197,7 @@ class _Ridge:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
     def errors(self, residuals: Array) -> tuple[Array, Array]:
-        """((m,) square of residuals (n, m), (ridges, m) of what is left of it on blocks that had no part in the fit)."""
+        """((m,) square of residuals (n, m), (ridges, m) of what is left on blocks without a part in the fit)."""
         residuals = self.off(residuals)
         products = [self.features[rows].T @ residuals[rows] for rows in self.block]
         whole = np.sum(products, axis=0)

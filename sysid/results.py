@@ -59,7 +59,8 @@ class ChannelMisfit:
 @dataclasses.dataclass(frozen=True)
 class CauseEvidence:
     """Evidence for a cause. bic: gain of the information criterion; ties: effects that explain the data as well;
-    behind: by rival, its deficit in the criterion; predicted: ties that the experiment's structure predicts."""
+    behind: by rival, its deficit in the criterion; predicted: ties that the experiment's structure predicts;
+    moved_by_numerics: by coefficient, the most by which other numerics of the simulator move it."""
 
     chi2: float
     p: float
@@ -67,6 +68,7 @@ class CauseEvidence:
     ties: tuple[str, ...]
     behind: Mapping[str, float]
     predicted: Mapping[str, Any] | None
+    moved_by_numerics: Mapping[str, float] | None = dataclasses.field(default=None, metadata=OPTIONAL)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,7 +175,9 @@ class DiagnosisEvidence:
     Only where noise is what all candidates leave: band_hz, edge of the band of the equations; held_out_errors and
     noise_floor, by equation; above_noise_floor, equations that leave far more than their channel's noise;
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
-    the machine's own parameters explain in these data.
+    the machine's own parameters explain in these data; too_short_s, by equation whose noise is too slow for these
+    recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than
+    what numerics move them by.
     """
 
     p_general: float
@@ -195,6 +199,8 @@ class DiagnosisEvidence:
     above_noise_floor: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     smallest_visible: Mapping[str, Mapping[str, float]] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     cannot_be_seen: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    too_short_s: Mapping[str, float] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    below_numerics: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -65,6 +65,11 @@ def shown(channel: str) -> str:
     return f"shown {channel}"
 
 
+def sensed(channel: str) -> str:
+    """Name of the signal of an output as it reaches its sensor, before anything that enters at its port."""
+    return f"sensed {channel}"
+
+
 def into(name: str) -> str:
     """Name of the port at an input, which the engine adds to it."""
     return f"into {name}"

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.pipeline import diagnose
+from ranger_sim.tools.diagnose import words
 from tests.sysid.robot_joint import Joint
 
 STEP_S = 0.01
@@ -48,3 +49,12 @@ def test_a_sound_joint_has_no_cause_however_slow_its_noise():
     named = [diagnose(Joint(), [run(20 + each, memory, "drag", 0.0)]).result.detected
              for each, memory in enumerate((0.0, 0.5, 0.9, 0.97) * 3)]  # fmt: skip
     assert sum(named) <= 2
+
+
+def test_a_recording_that_is_too_short_for_its_noise_is_called_so_with_the_length_it_would_need():
+    """Noise with a memory of 0.99 is correlated over about 200 samples: 8 s have 4 stretches, 40 s would have 20."""
+    found = diagnose(Joint(), [run(3, 0.99, "drag", 0.0, rows=800)])
+    ((_, needed_s),) = found.result.evidence.too_short_s.items()
+    assert not found.result.detected and 20.0 < needed_s < 160.0
+    assert "too short for this noise" in words.sentence(found)
+    assert diagnose(Joint(), [run(3, 0.5, "drag", 0.0)]).result.evidence.too_short_s is None

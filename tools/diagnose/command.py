@@ -18,7 +18,7 @@ def register(commands: Any) -> None:
         description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
         "says that it cannot, and measures what the extended model gains on held-out data. Exit code 0: nothing was "
         "found; 1: something was; 2: a mistake, or data that contradict their own description; 3: no cause was found, "
-        "and an equation leaves far more than its channel's noise.",
+        "and an equation leaves far more than its channel's noise, or the data are too short for their noise.",
     )
     command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
     command.add_argument(

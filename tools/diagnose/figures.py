@@ -28,6 +28,7 @@ CELLS = 36  # of a signal; each has a mean with its interval
 LEAST_IN_CELL = 12  # samples, of which a mean is drawn
 MAP_CELLS = 14  # of either signal of a map
 MOST_EQUATIONS = 6
+SHOWS = 0.6  # of an effect's square that the means over a signal have: below it the effect is drawn over itself
 ALIKE = 0.95  # correlation above which a measured column shows what a signal shows already
 
 
@@ -58,15 +59,18 @@ def sides(found: Diagnosis) -> dict[str, Sides]:
             continue
         unit = next(r.equations[name].unit for r in found.recordings if name in r.equations)
         stamps = [kept_rows(r, r.table.time_s) for r in found.recordings]
+        shift = np.zeros(len(part.response))
+        if all(r.entries and name in r.table for r in found.recordings):  # a simulator's errors: about its channel
+            shift = kept(found.recordings, [r.table[name] for r in found.recordings]) - part.response
         number = np.concatenate([np.full(len(each), place) for place, each in enumerate(stamps)])
         made[name] = Sides(
             name,
             unit,
             np.concatenate(stamps)[rows],
             number[rows],
-            part.response[rows],
-            modelled(found.plain, name)[rows],
-            modelled(found.extended, name)[rows],
+            part.response[rows] + shift[rows],
+            modelled(found.plain, name)[rows] + shift[rows],
+            modelled(found.extended, name)[rows] + shift[rows],
             rows,
         )
     order = sorted(made, key=lambda name: -gap(made[name]))
@@ -161,8 +165,12 @@ def of_cause(found: Diagnosis, each: Named, made: Mapping[str, Sides]) -> Figure
     else:
         over = candidates(found, side)
         # the course of time tells everything of a short recording: it must tell twice as much as any signal does
-        name = max(over, key=lambda name: explained(over[name], signature) * (0.5 if name == "t" else 1.0))
+        shares = {name: explained(over[name], signature) * (0.5 if name == "t" else 1.0) for name in over}
+        name = max(shares, key=lambda name: shares[name])
         x, label = over[name], label_of(found, name)
+        if shares[name] < SHOWS:
+            x, label = signature, f"what {each.effect.cause} adds by its own equation, {side.unit}"
+            note += " Without the effect the means would lie on the diagonal if it is all that is missing."
     figure = go.Figure()
     dots(figure, x, without)
     means(figure, x, without, "without this effect", BEFORE)

@@ -35,19 +35,23 @@ def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = N
     environment.filters["breakable"] = breakable
     environment.filters["small"] = lambda value: "below 1e-300" if value == 0.0 else f"{value:.2g}"
     answer = found.answer
+    evidence = answer["evidence"]
     sides = figures.sides(found)
     kind, headline = words.verdict(answer)
     telling = figures.telling(found, sides) if answer["detected"] else None
     over_time = [figures.two_sides(found, side) for side in list(sides.values())[: figures.MOST_EQUATIONS]]
     return environment.get_template("template.html.j2").render(
         answer=answer,
-        evidence=answer["evidence"],
+        evidence=evidence,
         name=found.machine.name,
         recordings=[recording.table.name for recording in found.recordings],
         samples=sum(len(recording.table) for recording in found.recordings),
         kind=kind,
         headline=headline,
         told=words.told(found),
+        errors=evidence.get("held_out_errors") or {},
+        unseen=sorted((evidence.get("smallest_visible") or {}).items()),
+        numerics=words.numerics(answer),
         causes=[cause_of(found, each, cause, sides) for each, cause in named(found)],
         telling=telling,
         over_time=over_time,

@@ -31,6 +31,12 @@ def sentence(found: Diagnosis) -> str:
 def nothing(answer: dict[str, Any]) -> str:
     """The sentence for a diagnosis without a finding; a residual far above the noise does not prove a sound machine."""
     evidence = answer["evidence"]
+    if short := evidence.get("too_short_s"):
+        name, needed_s = max(short.items(), key=lambda one: one[1])
+        return (
+            f"too short for this noise: what the {name} equation leaves is so slow that these recordings have fewer "
+            f"than 20 independent stretches of it, and nothing is concluded; {needed_s:g} s like these would be enough"
+        )
     if above := evidence.get("above_noise_floor"):
         each = evidence["noise_floor"][above[0]]
         return (
@@ -69,6 +75,20 @@ def unseen(answer: dict[str, Any]) -> list[str]:
     return lines
 
 
+def numerics(answer: dict[str, Any]) -> list[str]:
+    """What the simulator's own numerics move, a cause a line, and what is not named because of them."""
+    lines = []
+    for each in answer["causes"]:
+        if moved := each["evidence"].get("moved_by_numerics"):
+            sizes = ", ".join(f"{name} by {size:.2g}" for name, size in moved.items())
+            lines.append(f"{each['name']} at {each['at']}: half the step and other ways between samples move {sizes}")
+    lines += [
+        f"{name} is smaller than three times what the simulator's numerics move it by: not named"
+        for name in answer["evidence"].get("below_numerics", ())
+    ]
+    return lines
+
+
 def learned(answer: dict[str, Any]) -> str:
     """The learned term in a sentence that begins with a space, or nothing."""
     term = answer["evidence"].get("residual_term")
@@ -92,6 +112,8 @@ def doubted(answer: dict[str, Any]) -> str:
 
 def verdict(answer: dict[str, Any]) -> tuple[str, str]:
     """(class, headline) for the page."""
+    if answer["evidence"].get("too_short_s"):
+        return "unknown", "Too short for this noise"
     if not answer["detected"]:
         return "sound", "Nothing found"
     if doubts(answer):
@@ -109,7 +131,8 @@ def told(found: Diagnosis) -> str:
         text = doubted(answer)
         return f"{text[0].upper()}{text[1:]}."
     if not answer["detected"]:
-        return "The equations miss nothing that these data could show."
+        text = nothing(answer)
+        return f"{text[0].upper()}{text[1:]}."
     if answer["abstained"]:
         also = ""
         if answer["evidence"]["suspects"]:

@@ -65,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
         _show(found, terminal.console())
     if found.result.detected:
         return EXIT_FOUND
-    return EXIT_ABOVE_NOISE if found.result.evidence.above_noise_floor else EXIT_CLEAN
+    evidence = found.result.evidence
+    return EXIT_ABOVE_NOISE if evidence.above_noise_floor or evidence.too_short_s else EXIT_CLEAN
 
 
 def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:
@@ -152,7 +153,7 @@ def _show(found: Diagnosis, console: Console) -> None:
             for name, value in each["parameters"].items()
         )
         console.print(f"known: {each['name']} at {each['at']}: {values}", highlight=False, soft_wrap=True)
-    for line in [*words.held_out(told), *words.unseen(told)]:
+    for line in [*words.held_out(told), *words.numerics(told), *words.unseen(told)]:
         console.print(line, highlight=False, soft_wrap=True)
     if not told["detected"]:
         return
