@@ -343,7 +343,9 @@ def _over(machine: Machine, regression: Regression, name: str) -> str:
 def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regression: Regression) -> misfit.Misfit:
     """The tests as those of any machine; excess: the share of the residual's square that can be predicted."""
     made = [
-        misfit.Test(each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p, each.share)
+        misfit.Test(
+            each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p, each.share
+        )
         for each in tests
     ]
     made += [misfit.line(name, regression) for name in _with_lines(regression)]
@@ -353,7 +355,9 @@ def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regress
 
 def _with_lines(regression: Regression) -> list[str]:
     """Equations in whose residual's spectrum a line means anything."""
-    made = [each for recording in regression.recordings if not recording.entries for each in recording.equations.items()]
+    made = [
+        each for recording in regression.recordings if not recording.entries for each in recording.equations.items()
+    ]
     return [name for name in regression.equations if any(name == other and each.lines for other, each in made)]
 
 

@@ -62,7 +62,9 @@ def test_a_cause_is_drawn_where_it_shows_and_the_model_with_it_leaves_nothing_th
     assert max(over, key=lambda name: figures.explained(over[name], signature)) == "v"
     # by the truth: what of v |v| straight lines in v and a leave
     v, a = (found.recordings[0].signals[name] for name in ("v", "a"))
-    base, drag = (reduced(found.recordings[0], each, "force") for each in (np.column_stack([v, a]), 0.02 * v * np.abs(v)))
+    base, drag = (
+        reduced(found.recordings[0], each, "force") for each in (np.column_stack([v, a]), 0.02 * v * np.abs(v))
+    )
     truth = (drag - base @ np.linalg.lstsq(base, drag, rcond=None)[0])[side.rows]
     assert np.corrcoef(signature, truth)[0, 1] > 0.999
     # the coefficient is known to some percent
