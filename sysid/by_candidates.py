@@ -43,6 +43,7 @@ BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most 
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
 FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say nothing
+RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
@@ -348,9 +349,10 @@ def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regress
         )
         for each in tests
     ]
-    made += [misfit.line(name, regression) for name in _with_lines(regression)]
-    p = min(1.0, min((each.p for each in made), default=1.0) * len(made))
-    return misfit.Misfit(made, p, max((each.share for each in made if each.p * len(made) <= LEVEL), default=0.0))
+    lines = [misfit.line(name, regression) for name in _with_lines(regression)]
+    chances = [each.p * len(made) for each in made] + [each.p * len(lines) * RARER for each in lines]
+    shares = [each.share for each, chance in zip([*made, *lines], chances, strict=True) if chance <= LEVEL]
+    return misfit.Misfit([*made, *lines], min(1.0, *chances) if chances else 1.0, max(shares, default=0.0))
 
 
 def _with_lines(regression: Regression) -> list[str]:
