@@ -105,7 +105,7 @@ def _same_run(part: Part) -> np.ndarray:
 
 def fitted(stand_ins: Array, columns: Array, values: Array) -> Array:
     """Coefficients (k,) of noisy columns (n, k) by stand-ins (n, k) that have not their noise; of values (n,)."""
-    if stand_ins is columns:
+    if np.array_equal(stand_ins, columns):  # then without squaring, which loses half of the digits
         return least_squares(columns, values)
     scale = np.linalg.norm(stand_ins, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
