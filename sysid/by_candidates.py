@@ -232,12 +232,19 @@ def _decided(
         if not close:
             continue
         base = naming.refit(found.base, others, [*fixed, *others])
-        options = [each, *(_at_best(rival, each, base) for rival in close)]
+        tried = (_at_best(rival, each, base) for rival in close)
+        options = [each, *(option for option in tried if option is not None)]
+        if len(options) == 1:
+            continue
         scores = []
         for option in options:
             together = [*others, option]
             extended = naming.refit(found.base, together, [*fixed, *together])
-            simulated = held_out.simulated_again(machine, recordings, [*had, *together], extended)
+            try:
+                simulated = held_out.simulated_again(machine, recordings, [*had, *together], extended)
+            except (UserError, np.linalg.LinAlgError):  # a rival with which the simulator runs away is none
+                scores.append(math.inf)
+                continue
             free = len(option.effect.coefficients) + (len(option.effect.shapes) > 1)
             scores.append(
                 sum(machine.surprise(one) for one in simulated)  # type: ignore[attr-defined]
@@ -245,7 +252,9 @@ def _decided(
             )  # fmt: skip
         order = sorted(range(len(options)), key=lambda number: scores[number])
         best, least = options[order[0]], scores[order[0]]
-        behind = {id(options[number].effect): scores[number] - least for number in order}
+        if not math.isfinite(least):
+            continue
+        behind = {id(options[n].effect): scores[n] - least for n in order if math.isfinite(scores[n])}
         rivals = [(effect, behind.get(id(effect), far)) for effect, far in [(each.effect, 0.0), *each.rivals]
                   if effect is not best.effect]  # fmt: skip
         rivals.sort(key=lambda one: one[1])
@@ -261,9 +270,12 @@ def _decided(
     )
 
 
-def _at_best(effect: Effect, instead_of: Named, base: Regression) -> Named:
-    """A rival as it would be named, at its best shape."""
-    best = likelihood.ranking(naming.trials([effect], base), base.size)[0]
+def _at_best(effect: Effect, instead_of: Named, base: Regression) -> Named | None:
+    """A rival as it would be named, at its best shape; None where a machine cannot have it so."""
+    ranked = likelihood.ranking(naming.trials([effect], base), base.size)
+    if not ranked or not naming.possible(ranked[0][3]):
+        return None
+    best = ranked[0]
     return dataclasses.replace(
         instead_of, effect=effect, shape=best[3].shape, chi2=best[1], freedom=best[2], bic=best[0]
     )

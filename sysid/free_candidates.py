@@ -22,10 +22,12 @@ from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, sensed, shown
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
+NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, but for the shortest
 MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording
 SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess falls off
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.5, 0.7, 0.85, 0.95)  # quantiles of an input's size at which it may saturate
+LEAST_SHARE = 0.2  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
 DEAD = (0.02, 0.05, 0.1, 0.2)  # of an input's largest size
 
 
@@ -58,7 +60,7 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
     def sensor(cause: str, coefficient: str, make: Callable[[Table, Array], Array], meaning: str) -> Term:
         return Term(
             cause, name, "sensor", (coefficient,),
-            lambda r, shape, values: {place: make(r.table, r.signals[sensed(name)])}, meaning=meaning, free=True,
+            lambda r, shape, values: {place: make(r.table, r.signals[sensed(name)])}, meaning=meaning, independent=True,
         )  # fmt: skip
 
     def lag(form: str, time: str, late: Callable[[Table, Array, float], Array], meaning: str) -> Term:
@@ -66,9 +68,14 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
             seen, lag_s = r.signals[sensed(name)], shape[time]
             return {place: (late(r.table, seen, lag_s) - seen) / lag_s}
 
+        grid = _lags(recordings)
+
+        def fits(found: Mapping[str, float]) -> bool:
+            return found[time] <= grid[0] or 1.0 / NEAR < found["lag_s"] / found[time] < NEAR
+
         return Term(
-            "sensor_lag", name, "sensor", ("lag_s",), make, [{time: each} for each in _lags(recordings)],
-            meaning=meaning, free=True, form=form, scale=time,
+            "sensor_lag", name, "sensor", ("lag_s",), make, [{time: each} for each in grid], fits,
+            meaning=meaning, independent=True, form=form, scale=time,
         )  # fmt: skip
 
     return [
@@ -93,9 +100,10 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
     limits = sorted({float(np.quantile(size, each)) for each in CLIPPED} - {largest, 0.0})
 
     def term(cause: str, coefficient: str, make: Signal, meaning: str, shapes: Sequence[Shape] = ({},)) -> Term:
+        least = LEAST_SHARE if coefficient == "share" else -np.inf
         return Term(
             cause, name, "input", (coefficient,), lambda r, shape, values: {into(name): make(r.signals, shape)},
-            shapes, lambda found: cause == "input_offset" or found[coefficient] > 0.0, meaning, free=True,
+            shapes, lambda found: found[coefficient] > least, meaning, independent=True,
         )  # fmt: skip
 
     made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]),
@@ -136,7 +144,7 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
         return Term(
             cause, joint.rate, "mechanical", coefficients,
             lambda r, shape, values: {on(joint.rate): make(r.signals, shape)}, shapes, admissible,
-            f"{joint.rate}: {meaning}", phase_is_free=phase, free=True,
+            f"{joint.rate}: {meaning}", phase_is_free=phase, independent=True,
         )  # fmt: skip
 
     def sign(s: Mapping[str, Array]) -> Array:

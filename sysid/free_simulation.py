@@ -485,7 +485,7 @@ class SimulatedMachine(abc.ABC):
                 f"{table.name}: the longest stretch without a gap is {longest_s:.3g} s, "
                 f"{self.name} needs {self.shortest_s:g} s"
             )
-        return _Fit(self, table, -(-len(table) // MOST_ROWS)).recording()
+        return _Fit(self, table, -(-len(table) // MOST_ROWS)).recording(follow=True)
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The terms as effects on the outputs."""
@@ -495,7 +495,7 @@ class SimulatedMachine(abc.ABC):
 
         def columns(recording: Recording, shape: Shape, values: Values, term: Term) -> Columns:
             here = cast(SimulatedRecording, recording)
-            return here.of_free(free, term, shape) if term.free else here.respond(term.make(here, shape, values))
+            return here.of_free(free, term, shape) if term.independent else here.respond(term.make(here, shape, values))
 
         return [
             SimulatedEffect(
@@ -562,7 +562,7 @@ class SimulatedMachine(abc.ABC):
         if not acting:
             return recording
         tried = fit.with_all(acting)
-        made = tried.recording()
+        made = tried.recording(follow=True)
         return made if tried.surprise < fit.surprise else recording
 
     def numerical(self, recording: Recording) -> Array:
@@ -924,9 +924,9 @@ class _Fit:
         left = np.median(np.abs(self.rest), axis=0) / 0.6745
         self.noise_y = np.clip(left, 1e-9 * np.ptp(self.y, axis=0), LOUDER * self.shown_y)
 
-    def recording(self, rounds: int = ROUNDS) -> SimulatedRecording:
-        """Fitted and linearised."""
-        if not self._settle(rounds) or self.cost > FAR_OFF:
+    def recording(self, rounds: int = ROUNDS, follow: bool = False) -> SimulatedRecording:
+        """Fitted and linearised. follow: the measurement, where the fit ends far off."""
+        if (not self._settle(rounds) or self.cost > FAR_OFF) and follow:
             self._follow()
         self.round_again()
         assert self.predictor is not None
@@ -937,7 +937,13 @@ class _Fit:
         renewed, best, share = 0, np.inf, 1.0
         for _ in range(rounds):
             accepted = (self.x, self.u, self.p)
-            step = self.round()
+            try:
+                with np.errstate(over="ignore", invalid="ignore"):  # far from a solution a machine may run away
+                    step = self.round()
+            except (UserError, np.linalg.LinAlgError):
+                if self.x is self.came_from[0]:
+                    raise
+                self.cost, self.predictor = np.inf, None
             if not self.cost < WORSE * best:
                 # too far: a part of the step from where it began, whose cost is another with the covariances of now
                 (self.x, self.u, self.p), best, share = self.came_from, np.inf, 0.25 * share

@@ -75,4 +75,6 @@ def surrogates(coefficients: Array, deviation: float, rows: int, count: int, see
     """(rows, count) samples of the noise; deviation: of its innovations; name: of the stream of random numbers."""
     random = generator(seed, name)
     shocks = random.normal(scale=deviation, size=(rows + SETTLE, count))
+    if not len(coefficients):
+        return np.asarray(shocks[SETTLE:])
     return np.asarray(signal.lfilter([1.0], np.concatenate(([1.0], -coefficients)), shocks, axis=0)[SETTLE:])

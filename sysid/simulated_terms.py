@@ -86,7 +86,7 @@ class Term:
 
     make(recording, shape, values) -> by port (n,) for one coefficient or (n, k) for k. recording.signals: states,
     inputs, outputs and `t` along the fitted trajectory, (n,) by name, and the signals that `SimulatedMachine.signals`
-    adds. free: it does not depend on `values`.
+    adds. independent: it does not depend on `values`.
     """
 
     cause: str
@@ -98,7 +98,7 @@ class Term:
     admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
     meaning: str = ""
     phase_is_free: bool = False
-    free: bool = False
+    independent: bool = False
     form: str = ""
     scale: str | None = None
 

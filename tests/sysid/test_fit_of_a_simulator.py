@@ -92,11 +92,14 @@ def test_derivatives_by_differences_are_the_toy_s_own():
         "f_x": stacked((one, H * one), (-2.0 * H * one, 1.0 - 3.0 * H * 0.7 * V**2)),
         "f_u": stacked((0.1 * middle(D),), (H * one,)),
         "f_p": stacked((zero, zero), (-H * X, -H * V**3)),
-        "f_q": stacked((zero, zero), (H * one, zero)),
+        # two of the toy's own, then the engine's: at both outputs, into both inputs
+        "f_q": stacked(
+            (zero, zero, zero, zero, 0.1 * middle(D), 0.1 * middle(U)), (H * one, zero, zero, zero, H * one, zero)
+        ),
         "h_x": stacked((2.0 * one, zero), (zero, one)),
         "h_u": stacked((zero,), (0.5 * one,)),
         "h_p": stacked((X, zero), (zero, zero)),
-        "h_q": stacked((zero, one), (zero, zero)),
+        "h_q": stacked((zero, one, one, zero, zero, zero), (zero, zero, zero, one, 0.5 * one, zero)),
     }
     for name, matrix in wanted.items():
         assert getattr(lin, name).shape == matrix.shape
@@ -243,7 +246,9 @@ def test_signals_along_the_trajectory_are_states_inputs_outputs_time_and_the_mac
     fit = _Fit(Toy(), table())
     fit.lin = fit.linearise()
     seen = fit._seen()
-    assert set(seen.signals) == {"x", "v", "u", "d", "y_m", "z_m_per_s", "t", "gate"}
+    sensed = {"sensed y_m", "sensed z_m_per_s"}
+    assert set(seen.signals) == {"x", "v", "u", "d", "y_m", "z_m_per_s", "t", "gate"} | sensed
+    assert np.array_equal(seen.signals["sensed y_m"], seen.signals["y_m"])
     assert np.array_equal(seen.signals["x"], X) and np.array_equal(seen.signals["v"], V)
     assert np.allclose(seen.signals["y_m"], 2.0 * X) and np.allclose(seen.signals["z_m_per_s"], V + 0.5 * U)
     assert np.allclose(seen.signals["t"], TIME_S - 3.0) and np.array_equal(seen.signals["d"], D)
@@ -274,7 +279,9 @@ def test_what_enters_at_a_port_is_weighed_there_and_seen_by_the_equations_that_i
     one, two = recording.signals["v"], np.column_stack((recording.signals["x"], np.ones(COUNT)))
     gate = recording.signals["gate"]
     entering = recording.entering({"push": one})
-    assert entering.shape == (COUNT, 2, 1) and np.allclose(entering[:, 0, 0], gate * one) and not np.any(entering[:, 1])
+    assert (
+        entering.shape == (COUNT, 6, 1) and np.allclose(entering[:, 0, 0], gate * one) and not np.any(entering[:, 1:])
+    )
     both = recording.entering({"push": two, "shown": 3.0 * two})
     assert np.allclose(both[:, 0], gate[:, None] * two) and np.allclose(both[:, 1], 3.0 * two)
     lin, predictor = recording.linear, recording.predictor
@@ -292,7 +299,7 @@ def test_what_enters_at_a_port_is_weighed_there_and_seen_by_the_equations_that_i
     assert recording.entries["push"].subsystem == "mechanical" and recording.entries["shown"].subsystem == "sensor"
     through = recording.entries["push"].respond(one[:, None])
     assert np.allclose(through["y_m"], found["y_m"])
-    with pytest.raises(UserError, match="a term puts something into pull, pulse; ports are push, shown"):
+    with pytest.raises(UserError, match="a term puts something into pull, pulse; ports are push, shown, "):
         recording.respond({"pull": one, "push": one, "pulse": one})
 
 
@@ -320,7 +327,8 @@ class SeesItself:
 
 
 def test_effects_are_the_terms_with_all_that_they_say(recording):
-    (effect,) = Toy().effects([recording])
+    effect, *free = Toy().effects([recording])
+    assert {each.cause for each in free} >= {"sensor_offset", "sensor_scale", "sensor_lag", "dead_zone", "saturation"}
     assert (effect.cause, effect.at, effect.subsystem, effect.coefficients) == ("a", "there", "mechanical", ("size",))
     assert effect.shapes == ({"n": 2.0},) and effect.meaning == "what it is" and effect.phase_is_free
     assert effect.admissible({"size": 1.0}) and not effect.admissible({"size": -1.0})
@@ -342,7 +350,10 @@ def test_a_recording_must_be_long_enough_and_whole():
 
 
 def test_middles_are_means_of_neighbours_and_the_last_stays():
-    assert _between(np.array([[1.0], [3.0], [4.0]])).tolist() == [[2.0], [3.5], [4.0]]
+    """But for the ports of an input that is held: there a step has what its sample has."""
+    columns = np.array([[[1.0], [1.0]], [[3.0], [3.0]], [[4.0], [4.0]]])
+    found = _between(columns, np.array([False, True]))
+    assert found[:, :, 0].tolist() == [[2.0, 1.0], [3.5, 3.0], [4.0, 4.0]]
 
 
 def test_friction_is_open_within_two_widths_of_standstill():

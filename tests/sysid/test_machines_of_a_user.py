@@ -1,9 +1,16 @@
 """Hidden effects in three machines that a user wrote; all of them by `python -m tests.sysid.hidden_effects`."""
 
+import pathlib
+
+import numpy as np
 import pytest
 
+from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.hidden_effects import CASES
-from tests.sysid.other_machines import elastic_joint, heated_rod
+from tests.sysid.other_machines import elastic_joint, heated_rod, integrated, table
+
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "diagnose-your-machine.md"
 
 BY_TITLE = {each.title: each for each in CASES}
 SHORT = {"elastic-joint": {"seconds": 6.0}, "thrust-stand": {"seconds": 10.0}, "heated-rod": {}}
@@ -39,3 +46,23 @@ def test_the_generators_share_nothing_with_the_diagnosis_and_repeat():
     assert (one["hot_C"] == again["hot_C"]).all() and (one["hot_C"] != other["hot_C"]).any()
     joint = elastic_joint("none", 0.0, 1, seconds=0.4)
     assert len(joint) == 100 and abs(joint["motor_rad"][0]) < 1e-3
+
+
+def test_the_page_s_machine_of_twenty_lines_has_its_candidates_without_a_port_or_a_term():
+    """A disc with drag, which the page's machine does not have; dead zone and lag are other candidates."""
+    _, _, after = PAGE.read_text().partition("```python\n")
+    made = {}
+    exec(after.partition("```")[0], made)
+    draw = generator(5, "disc")
+    fine_s = np.arange(1500 * 8 + 1) / 800.0
+    volts = sum(2.0 * np.sin(f * fine_s + draw.uniform(0.0, 6.28)) for f in (0.7, 1.9, 4.3))
+
+    def rates(x, v):
+        return (6.0 * v - 1.2 * x[0] - 0.05 * x[0] * abs(x[0]),)
+
+    speed = integrated(rates, [0.0], volts.tolist(), 0.01)[:, 0]
+    run = table("disc", fine_s[:-1:8], voltage_V=volts[:-1:8], speed_rad_s=speed + 0.02 * draw.normal(size=1500))
+    result = diagnose(made["Disc"](), [run]).result
+    assert [(each.name, each.at) for each in result.causes] == [("drag", "speed")]
+    assert result.causes[0].parameters["quadratic_acceleration_s2"].value == pytest.approx(0.05, rel=0.03)
+    assert "sensor_scale at speed_rad_s" in result.evidence.cannot_be_seen

@@ -52,9 +52,9 @@ def test_a_sound_joint_has_no_cause_however_slow_its_noise():
 
 
 def test_a_recording_that_is_too_short_for_its_noise_is_called_so_with_the_length_it_would_need():
-    """Noise with a memory of 0.99 is correlated over about 200 samples: 8 s have 4 stretches, 40 s would have 20."""
-    found = diagnose(Joint(), [run(3, 0.99, "drag", 0.0, rows=800)])
+    """Noise with a memory of 0.98 is correlated over 99 samples of 10 ms: 20 stretches of it are 20 s."""
+    found = diagnose(Joint(), [run(3, 0.98, "drag", 0.0, rows=800)])
     ((_, needed_s),) = found.result.evidence.too_short_s.items()
-    assert not found.result.detected and 20.0 < needed_s < 160.0
+    assert not found.result.detected and 9.0 < needed_s < 40.0
     assert "too short for this noise" in words.sentence(found)
     assert diagnose(Joint(), [run(3, 0.5, "drag", 0.0)]).result.evidence.too_short_s is None

@@ -91,7 +91,7 @@ def test_nothing_found_is_reported():
     found = diagnose(Cart(), [cart_run(1)])
     said = text_of(page.render(found))
     assert said.count("Nothing found") == 2
-    assert "The equations miss nothing that these data could show." in said
+    assert "Nothing that these data could show is missing from the equations." in said
     assert "Look at on the machine" not in said and "How sure" not in said
 
 
