@@ -38,7 +38,7 @@ def reduced(recording: Recording, column: Array, equation: str) -> Array:
 
 
 def _averages(recording: Recording, equation: str) -> tuple[sparse.csr_array, np.ndarray]:
-    """(weights of the rows in each kept row, share of the Gaussian that is on rows that count)."""
+    """(weights of the rows in each kept row, share of the Gaussian that is on rows that count: 0 at a run's end)."""
     made = recording.equations.get(equation)
     counts = np.ones(len(recording.table), dtype=bool) if made is None else made.valid
     reach = int(np.ceil(REACH * recording.width))
@@ -59,10 +59,11 @@ def _averages(recording: Recording, equation: str) -> tuple[sparse.csr_array, np
     weight = bell * inside
     counted = weight * counts[place]
     share = counted.sum(axis=1)
+    whole = np.all(inside, axis=1)  # a machine's derivatives are one-sided at the ends of a run
     weight = np.where(share[:, None] > 0.0, counted, weight)
     weight /= weight.sum(axis=1, keepdims=True)
     ends = np.arange(len(rows) + 1) * len(near)
-    return sparse.csr_array((weight.ravel(), place.ravel(), ends), (len(rows), len(counts))), share
+    return sparse.csr_array((weight.ravel(), place.ravel(), ends), (len(rows), len(counts))), share * whole
 
 
 def _rows(recording: Recording) -> np.ndarray:
