@@ -361,10 +361,14 @@ def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regress
         )
         for each in tests
     ]
-    lines = [misfit.line(name, regression) for name in _with_lines(regression)]
-    chances = [each.p * len(made) for each in made] + [each.p * len(lines) * RARER for each in lines]
-    shares = [each.share for each, chance in zip([*made, *lines], chances, strict=True) if chance <= LEVEL]
-    return misfit.Misfit([*made, *lines], min(1.0, *chances) if chances else 1.0, max(shares, default=0.0))
+    chances = [each.p * len(made) for each in made]
+    with_lines = _with_lines(regression)
+    for line in (misfit.line(name, regression) for name in with_lines):
+        chance = line.p * len(with_lines) * RARER
+        if chance <= LEVEL:
+            made.append(line)
+            chances.append(chance)
+    return misfit.Misfit(made, min([1.0, *chances]), max((each.share for each in made), default=0.0))
 
 
 def _with_lines(regression: Regression) -> list[str]:

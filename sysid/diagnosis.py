@@ -105,8 +105,12 @@ class Diagnosis:
         """
         if not self.named:
             return 0.0
-        won = sum(_left(self.plain, name) / _left(self.extended, name) - 1.0 for name in self.plain.equations)
-        return won / (won + self.after.excess) if won > 0.0 else 0.0
+        won = {name: _left(self.plain, name) / _left(self.extended, name) - 1.0 for name in self.plain.equations}
+        total = sum(won.values())
+        more = {
+            name: max((each.share for each in self.after.tests if each.equation == name), default=0.0) for name in won
+        }
+        return total / (total + sum(more.values())) if total > 0.0 else 0.0
 
     @property
     def doubtful(self) -> bool:
