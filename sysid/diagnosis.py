@@ -90,10 +90,9 @@ class Diagnosis:
     def _more_on_held_out(self) -> bool:
         """True unless held-out data show that a black box explains little more than the named effects do.
 
-        They do not show it of what goes with time alone, which the black box does not have there.
+        They do not show it of a line in time, which the black box does not have.
         """
-        telling = self.after.telling.features
-        if not self.errors or telling == "over t" or telling.startswith("a line"):
+        if not self.errors or self.after.telling.features.startswith("a line"):
             return True
         won, possible, _ = gained(self.errors.values())
         return won < EXPLAINED * possible

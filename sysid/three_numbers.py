@@ -56,13 +56,16 @@ class Held:
         left = y - x @ fitted(z, x, y)
         return {name: left[ends[number] : ends[number + 1]] for number, name in enumerate(self.base.equations)}
 
-    def shows(self, each: Named, values: Mapping[str, float]) -> bool:
-        """True when the effect, as large as in training, moves the held-out rows enough to be judged by them."""
+    def shows(self, each: Named, values: Mapping[str, float], left: Mapping[str, Array]) -> bool:
+        """True when the effect, as large as in training, moves the held-out rows enough to be judged by them.
+
+        left: errors there, of the causes before it.
+        """
         _, _, z, _ = self._stacked(None)
         columns = self._columns(each)
         moved = columns @ np.array([values[name] for name in each.coefficients])
         moved = moved - z @ fitted(z, z, moved)
-        return float(np.mean(moved**2)) > SHOWS
+        return float(moved @ moved) > SHOWS * sum(float(one @ one) for one in left.values())
 
     def _stacked(self, extra: Mapping[str, Array] | None) -> tuple[Array, Array, Array, list[int]]:
         """(response, columns, their stand-ins, first row of each equation and the end), rows that count, by size."""
@@ -92,9 +95,9 @@ class Held:
 
     def accepts(self, named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
         """False when the data, which excite the candidate, do not surely show it, or show less than half of it."""
-        if not self.shows(candidate, extended.values):  # then it must show much better in the training data
-            return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
         before = self.residual(named, without.values)
+        if not self.shows(candidate, extended.values, before):  # then it must show much better in the training data
+            return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
         after = self.residual([*named, candidate], extended.values)
         moved = {name: before[name] - after[name] for name in before}
         whole = sum(float(each @ each) for each in moved.values())
