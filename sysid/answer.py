@@ -178,7 +178,7 @@ def _channels(found: Diagnosis) -> list[ChannelMisfit]:
 
 
 def _subsystem(found: Diagnosis) -> str | None:
-    if found.named:
+    if found.named and not found.doubtful:
         return found.named[0].effect.subsystem
     telling = found.before.telling.equation
     parts: dict[str, str] = {}

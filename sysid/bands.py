@@ -83,23 +83,34 @@ def plain(recordings: Sequence[Recording]) -> Regression:
 def _ratio(part: Part) -> float:
     """Error of a whitened fit over that of a plain one, on blocks that neither was fitted to."""
     good = part.valid & ~part.starts
-    y, x = part.response, part.measured[:, np.any(part.measured != 0.0, axis=0)]
+    there = np.any(part.measured != 0.0, axis=0)
+    y, x, z = part.response, part.measured[:, there], part.stand_in[:, there]
     if not np.any(good) or not x.shape[1]:
         return 1.0
-    memory = noise.autoregression(y - x @ least_squares(x[good], y[good]), good & _same_run(part))
-    white_y, white_x = innovations(memory, y), innovations(memory, x)
+    memory = noise.autoregression(y - x @ fitted(z[good], x[good], y[good]), good & _same_run(part))
+    white_y, white_x, white_z = (innovations(memory, each) for each in (y, x, z))
     block = np.arange(len(y)) * BLOCKS // len(y)
     errors = np.zeros(2)
     for each in range(BLOCKS):
-        fitted, held = good & (block != each), good & (block == each)
-        for number, (a, b) in enumerate(((x, y), (white_x, white_y))):
-            errors[number] += np.sum((y[held] - x[held] @ least_squares(a[fitted], b[fitted])) ** 2)
+        used, held = good & (block != each), good & (block == each)
+        for number, (a, b, c) in enumerate(((z, x, y), (white_z, white_x, white_y))):
+            errors[number] += np.sum((y[held] - x[held] @ fitted(a[used], b[used], c[used])) ** 2)
     return float(np.sqrt(errors[1] / max(errors[0], 1e-300)))
 
 
 def _same_run(part: Part) -> np.ndarray:
     """False for the first row of a run, so that no stretch of rows spans a gap."""
     return np.diff(part.run, prepend=part.run[:1]) == 0
+
+
+def fitted(stand_ins: Array, columns: Array, values: Array) -> Array:
+    """Coefficients (k,) of noisy columns (n, k) by stand-ins (n, k) that have not their noise; of values (n,)."""
+    if np.array_equal(stand_ins, columns):  # then without squaring, which loses half of the digits
+        return least_squares(columns, values)
+    scale = np.linalg.norm(stand_ins, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    sized = (stand_ins / scale).T
+    return np.asarray(np.linalg.lstsq(sized @ (columns / scale), sized @ values, rcond=1e-10)[0] / scale)
 
 
 def least_squares(columns: Array, values: Array) -> Array:

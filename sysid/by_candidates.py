@@ -32,7 +32,7 @@ from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
-from ranger_sim.sysid.three_numbers import Held
+from ranger_sim.sysid.three_numbers import Held, gained
 
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
@@ -43,6 +43,7 @@ BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most 
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
 FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say nothing
+RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
@@ -313,9 +314,10 @@ def _band(machine: Machine, recordings: Sequence[Recording], seed: int) -> tuple
         predictor = predictability.predictor(machine, inside, seed)
         if len(suiting) == 1:
             return band, predictor
-        tests = predictability.test(bands.plain(inside), predictor.columns(inside), seed)
+        needed = max(MORE_PREDICTED * best[0], predictability.WORTH) if best is not None else predictability.WORTH
+        tests = predictability.test(bands.plain(inside), predictor.columns(inside), seed, needed)
         share = max((each.share for each in tests if each.p * len(tests) <= LEVEL), default=0.0)
-        if best is None or share > max(MORE_PREDICTED * best[0], predictability.WORTH):
+        if best is None or share > needed:
             best = (share, band, predictor)
     assert best is not None
     return best[1], best[2]
@@ -354,11 +356,27 @@ def _over(machine: Machine, regression: Regression, name: str) -> str:
 def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regression: Regression) -> misfit.Misfit:
     """The tests as those of any machine; excess: the share of the residual's square that can be predicted."""
     made = [
-        misfit.Test(each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p)
+        misfit.Test(
+            each.equation, _over(machine, regression, each.equation), each.share * each.stretches, 1, each.p, each.share
+        )
         for each in tests
     ]
-    p = min(1.0, min((each.p for each in made), default=1.0) * len(made))
-    return misfit.Misfit(made, p, max((each.share for each in tests), default=0.0))
+    chances = [each.p * len(made) for each in made]
+    with_lines = _with_lines(regression)
+    for line in (misfit.line(name, regression) for name in with_lines):
+        chance = line.p * len(with_lines) * RARER
+        if chance <= LEVEL:
+            made.append(line)
+            chances.append(chance)
+    return misfit.Misfit(made, min([1.0, *chances]), max((each.share for each in made), default=0.0))
+
+
+def _with_lines(regression: Regression) -> list[str]:
+    """Equations in whose residual's spectrum a line means anything."""
+    made = [
+        each for recording in regression.recordings if not recording.entries for each in recording.equations.items()
+    ]
+    return [name for name in regression.equations if any(name == other and each.lines for other, each in made)]
 
 
 def _widen(regression: Regression) -> None:
@@ -471,14 +489,8 @@ def _needed_s(found: Diagnosis) -> dict[str, float]:
 
 def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:
     """Share of what can be explained at all that the named causes explain on held-out data, in squares of the error."""
-    possible = won = 0.0
-    ends = np.zeros(2)
-    for each in errors.values():
-        best = min(each.after, each.black_box if each.black_box is not None else each.after)
-        possible += max(0.0, each.before**2 - best**2)
-        won += each.before**2 - each.after**2
-        ends += each.before**2 * (1.0 - np.square(each.ratio95[::-1]))
-    scale = max(possible, won, 1e-12 * sum(each.before**2 for each in errors.values()), 1e-300)
+    won, possible, ends = gained(errors.values())
+    scale = max(possible, won, 1e-300)
     before = math.sqrt(sum(each.before**2 for each in errors.values()))
     after = math.sqrt(sum(each.after**2 for each in errors.values()))
     return gain.Gain(won / scale, (float(ends[0]) / scale, min(1.0, float(ends[1]) / scale)), before, after, holdout)

@@ -11,6 +11,7 @@ from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
 from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
+from ranger_sim.sysid.three_numbers import gained
 
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
@@ -87,22 +88,28 @@ class Diagnosis:
         return float(gained / total) if total > 0.0 else 0.0
 
     def _more_on_held_out(self) -> bool:
-        """True when a black box explains much more of the held-out data than the named effects do."""
-        if not self.errors:
+        """True unless held-out data show that a black box explains little more than the named effects do.
+
+        They do not show it of a line in time, which the black box does not have.
+        """
+        if not self.errors or self.after.telling.features.startswith("a line"):
             return True
-        possible = sum(
-            each.before**2 - min(each.black_box or each.after, each.after) ** 2 for each in self.errors.values()
-        )
-        won = sum(each.before**2 - each.after**2 for each in self.errors.values())
+        won, possible, _ = gained(self.errors.values())
         return won < EXPLAINED * possible
 
     def _explained_of_predictable(self) -> float:
-        """What the named effects take of the residual's square, of that and of what is predictable after them."""
+        """What the named effects take of the residual's square, of that and of what is predictable after them.
+
+        Each equation counts by what it leaves: one may have next to no noise.
+        """
         if not self.named:
             return 0.0
-        was, left = (sum(_left(each, name) for name in each.equations) for each in (self.plain, self.extended))
-        won, more = max(0.0, was - left), left * self.after.excess
-        return won / (won + more) if won > 0.0 else 0.0
+        won = {name: _left(self.plain, name) / _left(self.extended, name) - 1.0 for name in self.plain.equations}
+        total = sum(won.values())
+        more = {
+            name: max((each.share for each in self.after.tests if each.equation == name), default=0.0) for name in won
+        }
+        return total / (total + sum(more.values())) if total > 0.0 else 0.0
 
     @property
     def doubtful(self) -> bool:
@@ -112,9 +119,8 @@ class Diagnosis:
 
 
 def _left(regression: Regression, name: str) -> float:
-    """Sum of squares that an equation leaves, not whitened, over its rows that count, relative to its response."""
+    """Mean square that an equation leaves, not whitened, over its rows that count."""
     part, good = regression.parts[name], regression.good[name]
     values = np.array([regression.values[each] for each in regression.names])
-    response = part.response[good]
-    left = response - part.measured[good] @ values
-    return float(left @ left) / max(float(response @ response), 1e-300)
+    left = part.response[good] - part.measured[good] @ values
+    return max(float(left @ left) / max(1, len(left)), 1e-300)

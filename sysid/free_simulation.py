@@ -431,7 +431,6 @@ class SimulatedMachine(abc.ABC):
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording
     window_s: float = 2.0  # over which the gain is measured in free simulation, or 50 samples
-    noise_by_candidates: bool = True  # `Recording.noise_by_candidates`
 
     @abc.abstractmethod
     def inputs(self, table: Table) -> dict[str, Array]:
@@ -518,7 +517,7 @@ class SimulatedMachine(abc.ABC):
 
     def _free(self, own: Sequence[Term], recordings: Sequence[SimulatedRecording]) -> list[Term]:
         """The free candidates that are not the same as a term of the machine's own."""
-        if not self.free_candidates or not self.noise_by_candidates:
+        if not self.free_candidates:
             return []
         fit = recordings[0].fit
         assert fit is not None
@@ -1055,7 +1054,7 @@ class _Fit:
         along = self._seen().signals
         counts = machine.counts(along, table)
         equations = {}
-        widths = self._standstill(predictor) if machine.noise_by_candidates else {}
+        widths = self._standstill(predictor)
         for number, each in enumerate(machine.outputs):
             own = {name: columns[:, number, i] for i, name in enumerate(self.names)}
             own |= {name: column[:, number] for name, column in widths.items()}
@@ -1076,7 +1075,6 @@ class _Fit:
             held_ports=self.numerics.held_ports,
             outputs=tuple(each.channel for each in machine.outputs),
             fit=self,
-            noise_by_candidates=machine.noise_by_candidates,
         )
 
         def entry(port: Port) -> Entry:

@@ -61,12 +61,6 @@ def judged(
             tells = tells or expected >= TELLS
         else:
             refused.append(each)
-    if found is not None and hasattr(machine, "free"):
-        # the sharpest equations decide on refusal; the free simulation gives the gain
-        recordings = [machine.free(recording) for recording in recordings]
-        general = misfit.general_features(machine, recordings)
-        base = naming.refit(Regression(recordings), skews, values=plain.values)
-        found = gain.measure(base, kept, extended.values, general, seed)
     return Held(found, ", ".join(table.name for table in holdout), refused, found is None or tells)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ranger_sim.sysid import naming, noise
-from ranger_sim.sysid.bands import least_squares, plain
+from ranger_sim.sysid.bands import fitted, least_squares, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Effect, Recording
 from ranger_sim.sysid.naming import Named, Trial
@@ -77,7 +77,7 @@ def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: 
                 kept.append(new)
                 basis = np.linalg.qr(np.hstack([basis, new[good]]))[0]
         wide = np.hstack([x, *kept])
-        residual = y - wide @ least_squares(wide[good], y[good])
+        residual = y - wide @ fitted(np.hstack([z, *kept])[good], wide[good], y[good])
         memory = noise.autoregression(residual, good & _unbroken(part))
         counted = base._good(name, memory)
         shocks = innovations(memory, residual)
@@ -143,7 +143,7 @@ def _stacked(base: Regression, made: Sequence[dict[str, Array]], name: str, widt
     parts = []
     for recording, columns in zip(base.recordings, made, strict=True):
         given = columns.get(name, np.zeros((len(recording.table), width)))
-        parts.append(reduced(recording, given))
+        parts.append(reduced(recording, given, name))
     return np.vstack(parts)
 
 
@@ -183,16 +183,16 @@ def score(chi2: Array | float, freedom: int, shapes: int, size: int) -> Array | 
 
 
 def by_chance(tried: Sequence[Trial], regression: Regression, drawn: Array) -> Array:
-    """(count,) largest score of all trials on each surrogate (N, count)."""
+    """(trials, count) score of each trial on each surrogate (N, count)."""
     together = regression.z.T @ drawn
-    best = np.full(drawn.shape[1], -np.inf)
-    for trial in tried:
+    found = np.empty((len(tried), drawn.shape[1]))
+    for number, trial in enumerate(tried):
         straight = sum((columns.T @ drawn[regression.rows[name]] for name, columns in trial.white.items()), 0.0)
         product = straight - trial.shadow.T @ together
         inverse = np.linalg.pinv(trial.gram, rcond=1e-9, hermitian=True)
         chi2 = np.einsum("km,kl,lm->m", product, inverse, product) / trial.inflation
-        best = np.maximum(best, score(chi2, len(inverse), len(trial.effect.shapes), regression.size))
-    return best
+        found[number] = score(chi2, len(inverse), len(trial.effect.shapes), regression.size)
+    return found
 
 
 def select(
@@ -216,12 +216,18 @@ def select(
     left_out: list[Effect] = []
     refused: list[Named] = []
     thresholds: list[float] = []
+    tried: list[Trial] = []
+    scores = np.empty((0, SURROGATES))
     while True:
-        progress(len(named) / most)
-        tried = [each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN]
+        if not tried:  # first, and with a cause in the base
+            progress(len(named) / most)
+            tried = [each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN]
+            scores = by_chance(tried, regression, surrogates(regression, seed))
+        kept = np.array([any(each.effect is effect for effect in rest) for each in tried], dtype=bool)
+        tried, scores = [each for each, there in zip(tried, kept, strict=True) if there], scores[kept]
         if not tried:
             return Selection(named, refused, base, regression, thresholds, [])
-        chance = by_chance(tried, regression, surrogates(regression, seed))
+        chance = np.max(scores, axis=0)
         threshold = max(float(np.quantile(chance, 1.0 - LEVEL)), LEAST)
         thresholds.append(threshold)
         ranked = ranking(tried, regression.size)
@@ -249,7 +255,7 @@ def select(
             refused.append(found)
         else:
             named.append(found)
-            regression = extended
+            regression, tried = extended, []
         rest = [
             each
             for each in rest

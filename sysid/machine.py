@@ -116,8 +116,8 @@ class Recording:
     priors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests use slopes
     findings: list[Finding] = dataclasses.field(default_factory=list)  # the machine's own findings about the data
-    # False: noise is estimated from the residual, from repeats or above the machine's band, and general tests are
-    # chi-squares over cells of the signals. True: noise is what all candidates leave (sysid/by_candidates.py)
+    # True: noise is what all candidates leave (sysid/by_candidates.py). False, for an ankle and a walk: it is estimated
+    # from repeats or above the machine's band, and general tests are chi-squares over cells of the signals
     noise_by_candidates: bool = True
     left_over: bool = False  # responses are a simulation's errors, not measurements
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous

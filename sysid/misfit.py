@@ -25,13 +25,17 @@ FASTEST = 0.2  # of the spectrum: above it the counts of an encoder at a steady 
 
 @dataclasses.dataclass(frozen=True)
 class Test:
-    """One group of features in one equation: its chi-square, its degrees of freedom, probability by chance."""
+    """One group of features in one equation: its chi-square, its degrees of freedom, probability by chance.
+
+    share: of the residual's square that it explains, where it is known; of a line, among its neighbours.
+    """
 
     equation: str
     features: str
     chi2: float
     freedom: int
     p: float
+    share: float = 0.0
 
 
 @dataclasses.dataclass
@@ -45,7 +49,7 @@ class Misfit:
     @property
     def telling(self) -> Test:
         """The most significant test."""
-        return min(self.tests, key=lambda test: (test.p, -test.chi2))
+        return min(self.tests, key=lambda test: (test.p, -test.share, -test.chi2))
 
 
 def edges(signal: Array, count: int) -> Array:
@@ -86,21 +90,16 @@ def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Arr
     return groups
 
 
-General = list[tuple[str, str, list[Columns]]]  # (equation or entry, group, one {equation: (n, k)} per recording)
-
-
-def _none(_: Recording) -> dict[str, dict[str, Array]]:
-    return {}
+General = list[tuple[str, str, list[Columns]]]  # (equation, group, one {equation: (n, k)} per recording)
 
 
 def general_features(machine: Machine, recordings: Sequence[Recording]) -> General:
-    """All groups of features of all equations and entries."""
+    """All groups of features of all equations."""
     found: General = []
     looked_over = [machine.generic(recording) for recording in recordings]
-    more = [getattr(machine, "features", _none)(recording) for recording in recordings]
-    for equation in dict.fromkeys(name for r in recordings for name in (*r.equations, *r.entries)):
+    for equation in dict.fromkeys(name for r in recordings for name in r.equations):
         signals = [
-            each.get(equation, {}) if equation in recording.equations or equation in recording.entries else {}
+            each.get(equation, {}) if equation in recording.equations else {}
             for recording, each in zip(recordings, looked_over, strict=True)
         ]
         together = {
@@ -113,24 +112,13 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
             [0, *(len(recording.table) if each else 0 for recording, each in zip(recordings, signals, strict=True))]
         )
         groups = features(together, recordings[0].lags)
-        here = [each.get(equation, {}) for each in more]
-        for name in dict.fromkeys(name for each in here for name in each):
-            if all(name in each or not signal for each, signal in zip(here, signals, strict=True)):
-                groups[name] = np.concatenate([each[name] for each in here if name in each])
         for group, matrix in groups.items():
             columns = [
-                _seen(recording, equation, matrix[start:stop]) if stop > start else {}
-                for recording, start, stop in zip(recordings, ends[:-1], ends[1:], strict=True)
+                {equation: matrix[start:stop]} if stop > start else {}
+                for start, stop in zip(ends[:-1], ends[1:], strict=True)
             ]
             found.append((equation, group, columns))
     return found
-
-
-def _seen(recording: Recording, place: str, columns: Array) -> Columns:
-    """Columns of the equations for columns in one of them, or at an entry."""
-    if place in recording.entries:
-        return recording.entries[place].respond(columns)
-    return {place: columns}
 
 
 def look(regression: Regression, general: General) -> Misfit:
@@ -143,7 +131,7 @@ def look(regression: Regression, general: General) -> Misfit:
     tests: list[Test] = []
     if all(recording.whitened for recording in regression.recordings):
         sounds = {name for r in regression.recordings for name, equation in r.equations.items() if equation.lines}
-        tests += [_line(equation, regression) for equation in regression.equations if equation in sounds]
+        tests += [line(equation, regression) for equation in regression.equations if equation in sounds]
     excess = 0.0
     for groups in places.values():
         gram, product = _beside([white for *_, white in groups], regression)
@@ -169,7 +157,7 @@ def _beside(groups: Sequence[Mapping[str, Array]], regression: Regression) -> tu
     return regression.gram(together, shadow), regression.product(together, shadow, regression.residual)
 
 
-def _line(equation: str, regression: Regression) -> Test:
+def line(equation: str, regression: Regression) -> Test:
     """The strongest line in the spectrum of one equation's residual, relative to its neighbours on both sides."""
     good = regression.good[equation]
     even = np.zeros(len(good))
@@ -183,4 +171,5 @@ def _line(equation: str, regression: Regression) -> Test:
     place = low + int(np.argmax(ratio[low:high]))
     chi2 = 2.0 * float(ratio[place])
     p = -math.expm1((high - low) * math.log1p(-math.exp(-min(0.5 * chi2, 700.0))))
-    return Test(equation, f"a line at {place + 1} periods of the data", chi2, 2, max(p, 0.0))
+    share = float(power[place] / np.sum(power[place - BESIDE // 2 : place + BESIDE // 2 + 1]))
+    return Test(equation, f"a line at {place + 1} periods of the data", chi2, 2, max(p, 0.0), share)

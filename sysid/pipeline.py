@@ -10,7 +10,17 @@ from collections.abc import Callable, Sequence
 from threadpoolctl import threadpool_limits
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import answer, by_candidates, held_out, intervals, misfit, naming, plausibility, residual_term
+from ranger_sim.sysid import (
+    answer,
+    bands,
+    by_candidates,
+    held_out,
+    intervals,
+    misfit,
+    naming,
+    plausibility,
+    residual_term,
+)
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.held_out import Held, simulated_again
@@ -18,6 +28,7 @@ from ranger_sim.sysid.machine import Effect, Machine
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.preparation import Prepared
 from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.results import LearnedTerm
 
 NAMED_LEVEL = 0.005  # of the whole selection
 ROUNDS, MOST = 4, 5  # of naming; effects that are named
@@ -47,7 +58,7 @@ def diagnose(
         with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
             found = by_candidates.diagnose(machine, recordings, holdout, seed, known, _had, progress)
         judged = by_candidates.held(found, [table.name for table in holdout])
-        found.result = answer.of(found, found, judged, None, prepared)
+        found.result = answer.of(found, found, judged, _learned(found, holdout), prepared)
         progress("done", 1.0)
         return found
     progress("general tests", 0.1)
@@ -85,16 +96,11 @@ def diagnose(
     found = Diagnosis(
         machine, recordings, plain, extended, skews, had, list(known), named, known_to, before, after, doubts
     )
-    may_learn = found.doubtful and not doubts.forbid
-    term = residual_term.learn(machine, recordings, plain, before) if may_learn else None
-    final, held, holdout_rms = found, None, None
+    final, held = found, None
     if holdout and found.detected:
         progress("gain", 0.85)
         final, held = _hold_out(found, holdout, seed)
-        if term is not None:
-            holdout_rms = _left(machine, term, holdout)
-    learned = term.result(holdout_rms) if term is not None else None
-    final.result = answer.of(found, final, held, learned, prepared)
+    final.result = answer.of(found, final, held, _learned(found, holdout), prepared)
     progress("done", 1.0)
     return final
 
@@ -151,7 +157,12 @@ def _had(known: KnownEffect, effects: Sequence[Effect]) -> Named:
     raise UserError(f"the model has {known.cause} at {known.at}, which these channels cannot show")
 
 
-def _left(machine: Machine, term: residual_term.ResidualTerm, holdout: Sequence[Table]) -> tuple[float, float]:
-    """rms of the equation's residual on held-out data without and with the learned term, in its unit."""
-    recordings = [machine.prepare(table) for table in holdout]
-    return term.left(machine, recordings, Regression(recordings))
+def _learned(found: Diagnosis, holdout: Sequence[Table]) -> LearnedTerm | None:
+    """A table of what is wrong and has no name, and what it leaves of held-out data."""
+    if not found.doubtful or found.doubts.forbid:
+        return None
+    term = residual_term.learn(found.machine, found.recordings, found.plain, found.before)
+    if term is None or not holdout:
+        return term.result() if term is not None else None
+    recordings = [bands.Band(found.band_hz).of(found.machine.prepare(table)) for table in holdout]
+    return term.result(term.left(found.machine, recordings, bands.plain(recordings)))

@@ -8,7 +8,7 @@ predictor reaches on surrogates of the base's residual: noise of the same memory
 
 import dataclasses
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import likelihood, noise
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Machine, Recording
-from ranger_sim.sysid.regression import Regression, reduced
+from ranger_sim.sysid.regression import Regression, Whitening, reduced
 
 SCALES = (0.3, 0.7, 1.5, 3.0)  # lengths of the cosines, in deviations of a signal
 PER_SIGNAL, PER_PAIR, TOGETHER = 12, 8, 24  # cosines over one signal, over two, over all
@@ -106,7 +106,7 @@ class Predictor:
                     columns.append(seen.get(name, np.zeros((len(recording.table), wide))))
             for name, features_here in here.items():
                 if features_here:
-                    parts.setdefault(name, []).append(reduced(recording, np.hstack(features_here)))
+                    parts.setdefault(name, []).append(reduced(recording, np.hstack(features_here), name))
         return {name: np.vstack(each) for name, each in parts.items()}
 
 
@@ -123,32 +123,51 @@ def predictor(machine: Machine, recordings: Sequence[Recording], seed: int, with
     return Predictor(machine, {name: cosines([each[name] for each in general], seed) for name in places})
 
 
-def test(regression: Regression, features: Mapping[str, Array], seed: int) -> list[Predicted]:
-    """Each equation's residual against chance. features: by equation, over all of the regression's rows."""
+def test(regression: Regression, features: Mapping[str, Array], seed: int, worth: float = 0.0) -> list[Predicted]:
+    """Each equation's residual against chance. features: by equation, over all of the regression's rows.
+
+    worth: when no share exceeds it, chance, which costs some hundred times as much, is not asked (p 1).
+    """
     found = []
-    values = np.array([regression.values[each] for each in regression.names])
+    predicted = list(_predicted(regression, features))
+    asked = any(share > worth for *_, share in predicted)
     count = (SURROGATES + 1) * len(regression.parts) - 1
     noises = likelihood.own_noise(regression).whitening
-    for name, part in regression.parts.items():
-        good = regression.good[name]
-        if name not in features or np.count_nonzero(good) < 4 * BLOCKS:
-            continue
-        own = noises[name]
-        drawn = noise.surrogates(own.coefficients, own.deviation, len(good), count, seed, f"chance of {name}")
-        every = max(1, np.count_nonzero(good) // MOST_ROWS)
-        rows = np.flatnonzero(good)[::every]
-        residual = (part.response - part.measured @ values)[rows]
-        ridge = _Ridge(features[name][rows], part.measured[rows])
-        share = float(ridge.shares(residual[:, None])[0])
-        chance = ridge.shares(drawn[rows, :FIRST])
-        p = 1.0 / (1.0 + count)
-        if share < np.mean(chance) + FAR * np.std(chance):
+    for name, ridge, rows, share in predicted:
+        own, good = noises[name], regression.good[name]
+        p = 1.0
+        if asked:
+            chance = ridge.shares(_drawn(own, len(good), FIRST, seed, f"chance of {name}")[rows])
+            p = 1.0 / (1.0 + count)
+        if asked and share < np.mean(chance) + FAR * np.std(chance):
             if np.count_nonzero(chance >= share) < PLAIN:
-                chance = np.concatenate((chance, ridge.shares(drawn[rows, FIRST:])))
+                more = _drawn(own, len(good), count - FIRST, seed, f"further chance of {name}")[rows]
+                chance = np.concatenate((chance, ridge.shares(more)))
             p = (1.0 + float(np.count_nonzero(chance >= share))) / (1.0 + len(chance))
         memory = noise.correlation_time(own.coefficients)
         found.append(Predicted(name, max(0.0, share), p, np.count_nonzero(good) / memory))
     return found
+
+
+def _drawn(own: Whitening, rows: int, count: int, seed: int, name: str) -> Array:
+    """(rows, count) samples of a noise."""
+    return noise.surrogates(own.coefficients, own.deviation, rows, count, seed, name)
+
+
+def _predicted(
+    regression: Regression, features: Mapping[str, Array]
+) -> Iterator[tuple[str, "_Ridge", np.ndarray, float]]:
+    """(equation, its ridges, rows that count in the test, share of its residual's square that they predict)."""
+    values = np.array([regression.values[each] for each in regression.names])
+    for name, part in regression.parts.items():
+        good = np.flatnonzero(regression.good[name])
+        if name not in features or len(good) < 4 * BLOCKS:
+            continue
+        rows = good[:: max(1, len(good) // MOST_ROWS)]
+        # stand-ins: less of a measured column, a feature would show that column's noise, which is in the residual
+        ridge = _Ridge(features[name][rows], part.stand_in[rows])
+        residual = part.response[rows] - part.measured[rows] @ values
+        yield name, ridge, rows, float(ridge.shares(residual[:, None])[0])
 
 
 class _Ridge:

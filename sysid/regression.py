@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy import linalg, ndimage, stats
+from scipy import linalg, sparse, stats
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array
@@ -18,6 +18,8 @@ from ranger_sim.sysid.machine import Columns, Equation, Recording
 LEAST = 1e-9  # of the largest response: noise below it is rounding
 RANK = 1e-8  # a parameter is not separable if the other columns explain its column up to this part
 NOTHING = 1e-9  # of a column's square after the base is projected out: rounding, with columns of up to 1e7 deviations
+REACH = 4.0  # widths of the Gaussian
+HALF = 0.5  # of its weight: a kept row with less of it on rows that count does not count itself
 ORDER = 8  # largest order of the autoregression
 MEMORIES = tuple(0.05 * n for n in range(19))  # memories of noise from sample to sample that the fit tries
 FEWEST_SHARED = 40  # common rows of two equations for their correlation, which is then known to 0.16
@@ -25,14 +27,43 @@ UPPER = 0.95  # noise from repeats is the upper limit of this one-sided interval
 FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual gives the noise
 
 
-def reduced(recording: Recording, column: Array) -> Array:
-    """A column (n,) or (n, k) smoothed by the recording's Gaussian, at every `every`-th row."""
-    if recording.width > 0.0:
-        out = np.empty_like(column, dtype=float)
-        for run in recording.table.runs:
-            out[run] = ndimage.gaussian_filter1d(column[run], recording.width, axis=0, mode="nearest")
-        column = out
-    return column[_rows(recording)]
+def reduced(recording: Recording, column: Array, equation: str) -> Array:
+    """An equation's column (n,) or (n, k) under the recording's Gaussian, at every `every`-th row.
+
+    Rows that do not count have no weight: a mean of rows at which the equation holds is one at which it holds.
+    """
+    if recording.width <= 0.0:
+        return column[_rows(recording)]
+    return np.asarray(_averages(recording, equation)[0] @ column)
+
+
+def _averages(recording: Recording, equation: str) -> tuple[sparse.csr_array, np.ndarray]:
+    """(weights of the rows in each kept row, share of the Gaussian that is on rows that count: 0 at a run's end)."""
+    made = recording.equations.get(equation)
+    counts = np.ones(len(recording.table), dtype=bool) if made is None else made.valid
+    reach = int(np.ceil(REACH * recording.width))
+    near = np.arange(-reach, reach + 1)
+    bell = np.exp(-0.5 * (near / recording.width) ** 2)
+    bell /= bell.sum()
+    rows = _rows(recording)
+    starts, stops = (
+        np.concatenate([np.full(len(range(run.start, run.stop, recording.every)), each) for run, each in ends])
+        for ends in (
+            [(run, run.start) for run in recording.table.runs],
+            [(run, run.stop) for run in recording.table.runs],
+        )
+    )
+    place = rows[:, None] + near
+    inside = (place >= starts[:, None]) & (place < stops[:, None])
+    place = np.where(inside, place, rows[:, None])
+    weight = bell * inside
+    counted = weight * counts[place]
+    share = counted.sum(axis=1)
+    whole = np.all(inside, axis=1)  # a machine's derivatives are one-sided at the ends of a run
+    weight = np.where(share[:, None] > 0.0, counted, weight)
+    weight /= weight.sum(axis=1, keepdims=True)
+    ends = np.arange(len(rows) + 1) * len(near)
+    return sparse.csr_array((weight.ravel(), place.ravel(), ends), (len(rows), len(counts))), share * whole
 
 
 def _rows(recording: Recording) -> np.ndarray:
@@ -45,14 +76,11 @@ def kept_rows(recording: Recording, column: np.ndarray) -> np.ndarray:
     return column[_rows(recording)]
 
 
-def _inside(recording: Recording) -> np.ndarray:
-    """False for kept rows so near an end of their run that the Gaussian reaches over it."""
-    reach = int(np.ceil(4.0 * recording.width)) if recording.width > 0.0 else 0
-    parts = []
-    for run in recording.table.runs:
-        rows = np.arange(run.start, run.stop, recording.every)
-        parts.append((rows >= run.start + reach) & (rows < run.stop - reach))
-    return np.concatenate(parts)
+def _counts(recording: Recording, made: Equation) -> np.ndarray:
+    """True for kept rows of which at least half of the Gaussian's weight is on rows that count."""
+    if recording.width <= 0.0:
+        return made.valid[_rows(recording)]
+    return _averages(recording, made.name)[1] >= HALF
 
 
 def _run_numbers(recording: Recording) -> np.ndarray:
@@ -254,14 +282,14 @@ class Regression:
                 parts.append((np.zeros(rows), measured, measured.copy(), nothing, _starts(recording), repeats, run))
                 continue
             for name, column in made.columns.items():
-                measured[:, self.names.index(name)] = reduced(recording, column)
+                measured[:, self.names.index(name)] = reduced(recording, column, equation)
             stand_in = measured.copy()
             for name, column in made.stand_ins.items():
-                stand_in[:, self.names.index(name)] = reduced(recording, column)
+                stand_in[:, self.names.index(name)] = reduced(recording, column, equation)
             if extra and equation in extra[number]:
                 first = self.count - len(extra_names)
-                measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation])
-            response, valid = reduced(recording, made.response), made.valid[_rows(recording)] & _inside(recording)
+                measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation], equation)
+            response, valid = reduced(recording, made.response, equation), _counts(recording, made)
             parts.append((response, measured, stand_in, valid, _starts(recording), repeats, run))
         return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
@@ -469,7 +497,7 @@ class Regression:
             parts = []
             for recording, each in zip(self.recordings, made, strict=True):
                 if name in each and name in recording.equations:
-                    parts.append(reduced(recording, each[name]))
+                    parts.append(reduced(recording, each[name], name))
                 else:
                     parts.append(np.zeros((len(_rows(recording)), width)))
             out[name] = self._scaled(name, np.vstack(parts))[self.good[name]]

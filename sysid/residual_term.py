@@ -60,7 +60,7 @@ class ResidualTerm:
         """(rms without, with the term) of the equation's residual, the machine's parameters fitted again both times."""
         part = regression.parts[self.equation]
         rows = _counting(part)
-        column = np.concatenate([reduced(r, self.column(machine, r)) for r in recordings])[rows, 0]
+        column = np.concatenate([reduced(r, self.column(machine, r), self.equation) for r in recordings])[rows, 0]
         base, response = part.measured[rows], part.response[rows]
         without, rest = (
             each - base @ np.linalg.lstsq(base, each, rcond=None)[0] for each in (response, response - column)

@@ -7,13 +7,13 @@ or the physics with a flexible rest, whichever is better there: it says how much
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import naming
-from ranger_sim.sysid.bands import least_squares, plain
+from ranger_sim.sysid.bands import fitted, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.naming import Named
@@ -23,7 +23,8 @@ from ranger_sim.sysid.results import HeldOutError
 
 DRAWS = 400
 BLOCKS = 20  # of the bootstrap: each longer than the memory of most residuals
-SURE = 2.33  # standard errors over the blocks by which an effect must improve the held-out prediction: 1 % on one side
+SURE = 2.33  # standard errors over the blocks by which the held-out data must show an effect: 1 % on one side
+HALF = 0.5  # of an effect's size in training: with less of it the prediction is better without it
 BETTER_SHOWN = 5.0  # times in training, where the held-out data do not excite an effect
 SHOWS = 1e-3  # of the error's square: an effect below it on the held-out data is not judged by them
 
@@ -38,43 +39,47 @@ class Held:
         self.base = naming.refit(plain(recordings), fixed, values=values)
         self.sizes = {name: _size(self.recordings, name, self.base) for name in self.base.equations}
         self.rows = {name: part.valid & ~part.starts for name, part in self.base.parts.items()}
+        # An equation counts by what it leaves, and not by what it measures: one may have next to no noise.
+        self.left = dict.fromkeys(self.sizes, 1.0)
+        self.left = {name: _rms(each) or 1.0 for name, each in self.residual([], {}).items()}
 
     def residual(self, named: Sequence[Named], values: Mapping[str, float], extra: Mapping[str, Array] | None = None
                  ) -> dict[str, Array]:  # fmt: skip
-        """By equation (rows that count,), as shares of what was measured. extra: more to take off, by equation."""
-        y, x, ends = self._stacked(extra)
+        """By equation (rows that count,), in units of what the base left. extra: more to take off, by equation."""
+        y, x, z, ends = self._stacked(extra)
         for each in named:
             columns = self._columns(each)
             if not np.any(columns):
                 continue
             sizes = np.array([values[name] for name in each.coefficients])
-            y = y - columns @ _adapted(each, sizes, columns, y, x)
-        left = y - x @ least_squares(x, y)
+            y = y - columns @ _adapted(each, sizes, columns, y, x, z)
+        left = y - x @ fitted(z, x, y)
         return {name: left[ends[number] : ends[number + 1]] for number, name in enumerate(self.base.equations)}
 
-    def square(self, named: Sequence[Named], values: Mapping[str, float]) -> float:
-        """Sum over the equations of the mean square error."""
-        return sum(float(np.mean(each**2)) for each in self.residual(named, values).values() if len(each))
+    def shows(self, each: Named, values: Mapping[str, float], left: Mapping[str, Array]) -> bool:
+        """True when the effect, as large as in training, moves the held-out rows enough to be judged by them.
 
-    def shows(self, each: Named, values: Mapping[str, float]) -> bool:
-        """True when the effect, as large as in training, moves the held-out rows enough to be judged by them."""
-        _, x, _ = self._stacked(None)
+        left: errors there, of the causes before it.
+        """
+        _, _, z, _ = self._stacked(None)
         columns = self._columns(each)
         moved = columns @ np.array([values[name] for name in each.coefficients])
-        moved = moved - x @ least_squares(x, moved)
-        return float(np.mean(moved**2)) * len(self.base.equations) > SHOWS * self.square([], values)
+        moved = moved - z @ fitted(z, z, moved)
+        return float(moved @ moved) > SHOWS * sum(float(one @ one) for one in left.values())
 
-    def _stacked(self, extra: Mapping[str, Array] | None) -> tuple[Array, Array, list[int]]:
-        """(response, columns, first row of each equation and the end), rows that count, by size."""
-        ys, xs = [], []
+    def _stacked(self, extra: Mapping[str, Array] | None) -> tuple[Array, Array, Array, list[int]]:
+        """(response, columns, their stand-ins, first row of each equation and the end), rows that count, by size."""
+        ys, xs, zs = [], [], []
         for name, part in self.base.parts.items():
-            good, size = self.rows[name], self.sizes[name]
+            good, size = self.rows[name], self.sizes[name] * self.left[name]
             response = part.response - (extra[name] if extra and name in extra else 0.0)
             ys.append(response[good] / size)
             xs.append(part.measured[good] / size)
+            zs.append(part.stand_in[good] / size)
         ends = np.cumsum([0, *map(len, ys)]).tolist()
-        x = np.vstack(xs)
-        return np.concatenate(ys), x[:, np.any(x != 0.0, axis=0)], ends
+        x, z = np.vstack(xs), np.vstack(zs)
+        used = np.any(x != 0.0, axis=0)
+        return np.concatenate(ys), x[:, used], z[:, used], ends
 
     def _columns(self, each: Named) -> Array:
         made = [each.effect.columns(recording, each.shape, self.values) for recording in self.recordings]
@@ -82,26 +87,27 @@ class Held:
         out = []
         for name in self.base.equations:
             parts = [
-                reduced(recording, columns.get(name, np.zeros((len(recording.table), wide))))
+                reduced(recording, columns.get(name, np.zeros((len(recording.table), wide))), name)
                 for recording, columns in zip(self.recordings, made, strict=True)
             ]
-            out.append(np.vstack(parts)[self.rows[name]] / self.sizes[name])
+            out.append(np.vstack(parts)[self.rows[name]] / (self.sizes[name] * self.left[name]))
         return np.vstack(out)
 
     def accepts(self, named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
-        """False when the data, which excite the candidate, are not surely predicted better with it than without."""
-        if not self.shows(candidate, extended.values):  # then it must show much better in the training data
-            return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
+        """False when the data, which excite the candidate, do not surely show it, or show less than half of it."""
         before = self.residual(named, without.values)
+        if not self.shows(candidate, extended.values, before):  # then it must show much better in the training data
+            return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
         after = self.residual([*named, candidate], extended.values)
-        won: Array = np.sum(
-            [
-                _by_block(before[name] ** 2 - after[name] ** 2) / max(1, len(before[name]))
-                for name in self.base.equations
-            ],
-            axis=0,
+        moved = {name: before[name] - after[name] for name in before}
+        whole = sum(float(each @ each) for each in moved.values())
+        share = sum(float(each @ before[name]) for name, each in moved.items()) / max(whole, 1e-300)
+        # blocks: a residual remembers; an effect may be in few of them, and scatters no less where it is strong
+        scatter: Array = np.sum(
+            [_by_block(each * (before[name] - share * each)) for name, each in moved.items()], axis=0
         )
-        return float(np.mean(won)) > SURE * float(np.std(won, ddof=1)) / math.sqrt(len(won))
+        error = math.sqrt(float(scatter @ scatter)) / max(whole, 1e-300)
+        return share > max(HALF, SURE * error)
 
     def errors(
         self,
@@ -125,11 +131,27 @@ class Held:
         for name in self.base.equations:
             if not len(before[name]):
                 continue
-            best = min(_rms(each[name]) for each in boxes) if len(boxes) > 1 else None
+            best = min(_rms(each[name]) for each in boxes) * self.left[name] if len(boxes) > 1 else None
             out[name] = HeldOutError(
-                _rms(before[name]), _rms(after[name]), best, _ratio(before[name], after[name], seed)
+                _rms(before[name]) * self.left[name],
+                _rms(after[name]) * self.left[name],
+                best,
+                _ratio(before[name], after[name], seed),
             )
         return out
+
+
+def gained(errors: Iterable[HeldOutError]) -> tuple[float, float, Array]:
+    """(gain of all equations together, the possible one, (2,) 95 % limits), in squares of the least possible error."""
+    won = possible = 0.0
+    ends = np.zeros(2)
+    for each in errors:
+        best = min(each.after, each.black_box if each.black_box is not None else each.after)
+        scale = max(best**2, 1e-12 * each.before**2, 1e-300)
+        won += (each.before**2 - each.after**2) / scale
+        possible += max(0.0, each.before**2 - best**2) / scale
+        ends += each.before**2 * (1.0 - np.square(each.ratio95[::-1])) / scale
+    return won, possible, ends
 
 
 def _learned(regression: Regression, trained: Mapping[str, Array], seen: Mapping[str, Array]) -> dict[str, Array]:
@@ -139,26 +161,24 @@ def _learned(regression: Regression, trained: Mapping[str, Array], seen: Mapping
     for name, part in regression.parts.items():
         if name in trained and name in seen:
             good = part.valid & ~part.starts
-            used = part.measured[good]
-            residual = part.response[good] - used @ values
-            found = learned(trained[name][good], used[:, np.any(used != 0.0, axis=0)], residual)
+            residual = part.response[good] - part.measured[good] @ values
+            found = learned(trained[name][good], part.stand_in[good], residual)
             out[name] = seen[name] @ found
     return out
 
 
-def _adapted(each: Named, sizes: Array, columns: Array, y: Array, x: Array) -> Array:
+def _adapted(each: Named, sizes: Array, columns: Array, y: Array, x: Array, z: Array) -> Array:
     """Coefficients of training, with what another run does not share fitted here."""
     if not each.effect.phase_is_free and not each.effect.free:
         return sizes
-    off = columns - x @ least_squares(x, columns)
-    left = y - x @ least_squares(x, y)
     if each.effect.phase_is_free:
-        here = least_squares(off, left).reshape(-1, 2)
+        here = fitted(np.hstack([z, columns]), np.hstack([x, columns]), y)[x.shape[1] :].reshape(-1, 2)
         lengths = np.linalg.norm(sizes.reshape(-1, 2), axis=1) / np.maximum(np.linalg.norm(here, axis=1), 1e-300)
         return np.asarray((here * lengths[:, None]).ravel())
     free = np.array([name in each.effect.free for name in each.effect.coefficients])
     found = np.where(free, 0.0, sizes)
-    found[free] = least_squares(off[:, free], left - off @ found)
+    some = columns[:, free]
+    found[free] = fitted(np.hstack([z, some]), np.hstack([x, some]), y - columns @ found)[x.shape[1] :]
     return found
 
 

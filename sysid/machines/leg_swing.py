@@ -114,7 +114,7 @@ class _Leg(SimulatedMachine):
     quantities = LegSwing.quantities
     states = ("q", "w")
     shortest_s = 3.0
-    noise_by_candidates = False
+    free_candidates = False  # its own terms are the catalogue's; a scale of the current is in its parameters
 
     def __init__(self, with_voltage: bool, gear: float, first_moment_kg_m: float) -> None:
         self.gear, self.with_voltage = gear, with_voltage

@@ -31,7 +31,7 @@ def main(arguments=None):
     parser.add_argument("--seed", type=int, help="drawn from the system when left out")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--truth", type=pathlib.Path, help="folder of the truth (default OUT/truth)")
-    parser.add_argument("--check", action="store_true", help="the 60 cases of continuous integration, whatever --count")
+    parser.add_argument("--check", action="store_true", help="the cases of continuous integration, whatever --count")
     parser.add_argument("--seconds", type=float, help="length of a run (default 20)")
     parser.add_argument("--kinds", help="only these, by comma: single,null,pair,outside,confusable")
     parser.add_argument("--causes", help="only these causes as single effects and in pairs, by comma")

@@ -139,7 +139,7 @@ def test_a_misfit_is_reported_for_all_rows_and_each_regime_of_fifty():
 def test_letters_and_subsystems_are_those_of_the_equations():
     one = plain(np.zeros(N), {"p": np.zeros(N)})
     assert answer._letters(named(), [one]) == "M"
-    assert answer._subsystem(SimpleNamespace(named=[named()])) == "mechanical"
+    assert answer._subsystem(SimpleNamespace(named=[named()], doubtful=False)) == "mechanical"
     found = diagnosis(p=1e-9)
     found.plain = SimpleNamespace(recordings=[one])
     assert answer._subsystem(found) == "mechanical"

@@ -284,7 +284,6 @@ def test_signals_of_a_noiseless_bench_are_the_motion_s_own(measured):
     # by two ways that have no noise in common with what they stand for
     dw = np.gradient(ndimage.gaussian_filter1d(s["w"], 5.0, mode="nearest") if measured else s["w_by_voltage"], 0.001)
     assert np.allclose(s["dw"], dw, rtol=1e-9, atol=1e-9 * np.ptp(dw))
-    assert made.lags == ((0, 10, 30, 100) if measured else (0, 100, 250))
     assert set(made.equations) == {"electric", "mechanical", *(["transmission"] if measured else [])}
 
 
@@ -399,23 +398,6 @@ def test_a_misfit_is_looked_for_over_signals_without_the_noise_of_what_is_asked(
     bare = machine.prepare(driven(measured=False)[0])
     assert list(machine.generic(bare)) == ["electric", "mechanical"]
     assert machine.generic(bare)["mechanical"]["w"] is bare.signals["w_by_voltage"]
-
-
-def test_waves_of_the_rotor_are_looked_at_by_fours_also_as_large_as_voltage_and_current():
-    made = recording()
-    groups = MotorBench().features(made)["mechanical"]
-    kinds = {"": 1.0, " as large as the voltage": SIGNALS["V"], " as large as the current": SIGNALS["I"]}
-    assert list(groups) == [
-        f"{low} to {low + 3} waves a turn of the rotor{kind}" for kind in kinds for low in (1, 5, 9, 13, 17, 21)
-    ]
-    cogging = periodic()[0]
-    for kind, size in kinds.items():
-        wanted = [
-            (size * cogging.columns({"periods_per_turn": float(n)})["mechanical"].T).T if kind == "" else
-            cogging.columns({"periods_per_turn": float(n)})["mechanical"] * np.asarray(size)[:, None]
-            for n in range(5, 9)
-        ]  # fmt: skip
-        assert groups[f"5 to 8 waves a turn of the rotor{kind}"] == pytest.approx(np.hstack(wanted), abs=1e-12)
 
 
 # --- stand-ins --------------------------------------------------------------------------------------------------------

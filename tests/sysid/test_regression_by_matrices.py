@@ -12,7 +12,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import gain, intervals, misfit, naming, regression
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.machine import Effect, Entry, Equation, Recording
+from ranger_sim.sysid.machine import Effect, Equation, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression, Whitening
 
@@ -224,27 +224,31 @@ def test_a_parameter_needs_ten_samples_unless_it_is_known_before():
 # --- rows, repeats and noise ------------------------------------------------------------------------------------------
 
 
-def test_rows_are_kept_from_each_run_s_start_under_a_separate_gaussian():
+def test_rows_are_kept_from_each_run_s_start_under_a_separate_gaussian_of_the_rows_that_count():
     runs = (slice(0, 31), slice(31, 60))
-    one = Recording(table(60, *runs), {}, {}, width=1.5, every=3)
+    valid = np.ones(60, dtype=bool)
+    valid[[12, 13, 14, 40]] = False
+    made = Equation("one", "M", "m", "N", np.zeros(60), {}, valid)
+    one = Recording(table(60, *runs), {}, {"one": made}, width=1.5, every=3)
     column = RNG.normal(size=(60, 2))
-    found = regression.reduced(one, column)
+    found = regression.reduced(one, column, "one")
     rows = [*range(0, 31, 3), *range(31, 60, 3)]
     reach = 6  # four deviations
-    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / 1.5) ** 2)
-    weights /= weights.sum()
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / 1.5) ** 2)
+    bell /= bell.sum()
     for place, row in enumerate(rows):
         run = runs[0] if row < 31 else runs[1]
-        near = np.clip(np.arange(row - reach, row + reach + 1), run.start, run.stop - 1)
-        assert found[place] == pytest.approx(weights @ column[near])
+        there = [n for n in range(max(run.start, row - reach), min(run.stop, row + reach + 1)) if valid[n]]
+        weights = bell[np.array(there) - row + reach]
+        assert found[place] == pytest.approx(weights / weights.sum() @ column[there])
+        whole = run.start + reach <= row < run.stop - reach
+        assert regression._counts(one, made)[place] == (whole and weights.sum() >= 0.5)
+    assert not regression._counts(one, made)[rows.index(12)]  # three of the rows under its top do not count
     assert np.array_equal(regression.kept_rows(one, column), column[rows])
-    inside = [
-        run.start + reach <= row < run.stop - reach for row in rows for run in runs if run.start <= row < run.stop
-    ]
-    assert regression._inside(one).tolist() == inside
     assert regression._starts(one).tolist() == [row - (0 if row < 31 else 31) < 24 for row in rows]
-    plain = Recording(table(60, *runs), {}, {})
-    assert np.array_equal(regression.reduced(plain, column), column) and regression._inside(plain).all()
+    plain = Recording(table(60, *runs), {}, {"one": made})
+    assert np.array_equal(regression.reduced(plain, column, "one"), column)
+    assert np.array_equal(regression._counts(plain, made), valid)
 
 
 def test_pure_error_is_what_repeats_differ_by():
@@ -510,7 +514,7 @@ def test_a_line_in_the_spectrum_stands_over_the_median_next_to_it(periods):
     response = rng.normal(size=count) + 0.15 * np.sin(2.0 * math.pi * periods * np.arange(count) / count)
     e = Equation("one", "M", "m", "N", response, {"p": np.ones(count)}, np.ones(count, dtype=bool))
     made = Regression([Recording(table(count), {}, {"one": e})], noise=QUIET)
-    found = misfit._line("one", made)
+    found = misfit.line("one", made)
     assert (found.equation, found.features, found.freedom) == ("one", f"a line at {periods} periods of the data", 2)
     even = np.concatenate((np.zeros(8), made.residual))
     power = np.abs(np.fft.rfft(even)) ** 2
@@ -520,26 +524,19 @@ def test_a_line_in_the_spectrum_stands_over_the_median_next_to_it(periods):
     tried = int(0.2 * 3999) - 201
     assert found.p == pytest.approx(1.0 - (1.0 - math.exp(-0.5 * found.chi2)) ** tried, rel=1e-6)
     none = dataclasses.replace(e, response=rng.normal(size=count))
-    assert misfit._line("one", Regression([Recording(table(count), {}, {"one": none})], noise=QUIET)).p > 0.001
+    assert misfit.line("one", Regression([Recording(table(count), {}, {"one": none})], noise=QUIET)).p > 0.001
 
 
-def test_features_are_made_of_each_equation_s_and_entry_s_signals_of_all_recordings():
+def test_features_are_made_of_each_equation_s_signals_of_all_recordings():
     one, other = asked(NOISE).recordings[0], asked(NOISE).recordings[0]
-    other.entries = {"port": Entry("m", lambda columns: {"one": 2.0 * columns})}
-    looked = {id(one): {"one": {"a": A}}, id(other): {"one": {"a": B}, "port": {"t": C}}}
-    more = np.arange(float(N))[:, None]
-    machine = SimpleNamespace(
-        generic=lambda r: looked[id(r)], features=lambda r: {"one": {"waves": more if r is one else 2.0 * more}}
-    )
+    looked = {id(one): {"one": {"a": A}}, id(other): {"one": {"a": B}, "two": {"t": C}}}
+    machine = SimpleNamespace(generic=lambda r: looked[id(r)])
     found = {(place, group): columns for place, group, columns in misfit.general_features(machine, [one, other])}
-    assert list(found) == [("one", "over a"), ("one", "history of a"), ("one", "waves"), ("port", "over t")]
+    assert list(found) == [("one", "over a"), ("one", "history of a")]
     both = misfit.features({"a": np.concatenate((A, B))}, (0, 10, 30, 100))
     for group in ("over a", "history of a"):
         first, second = found["one", group]
         assert np.array_equal(first["one"], both[group][:N]) and np.array_equal(second["one"], both[group][N:])
-    assert np.array_equal(found["one", "waves"][1]["one"], 2.0 * more)
-    first, second = found["port", "over t"]
-    assert first == {} and np.array_equal(second["one"], 2.0 * misfit.features({"t": C}, (0,))["over t"])
 
 
 # --- intervals and gains ----------------------------------------------------------------------------------------------

@@ -186,7 +186,7 @@ def beside(found: Diagnosis, each: Named, equation: str) -> Array | None:
     for recording in found.recordings:
         made = each.effect.columns(recording, each.shape, found.plain.values)
         count = len(kept_rows(recording, recording.table.time_s))
-        parts.append(reduced(recording, made[equation]) if equation in made else np.zeros((count, 0)))
+        parts.append(reduced(recording, made[equation], equation) if equation in made else np.zeros((count, 0)))
     width = max(part.shape[1] for part in parts)
     if not width:
         return None

@@ -17,10 +17,9 @@ from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
-from ranger_sim.sysid.machines.forms import column
 from ranger_sim.sysid.machines.motor_bench.electrical import electrical
 from ranger_sim.sysid.machines.motor_bench.friction import friction
-from ranger_sim.sysid.machines.motor_bench.rotor import periodic, waves
+from ranger_sim.sysid.machines.motor_bench.rotor import periodic
 from ranger_sim.sysid.machines.motor_bench.sensors import sensors
 from ranger_sim.sysid.machines.motor_bench.stand_ins import (
     away,
@@ -48,7 +47,6 @@ SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
 OWN_I, OWN_W = 0.3, 0.5
 SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
 SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
-MOST_WAVES = 24  # per turn of the rotor, in the general tests
 
 
 class MotorBench:
@@ -175,8 +173,7 @@ class MotorBench:
                 "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, no_kink, lines=False
             )
         regimes = _regimes(s, firm_w)
-        lags = (0, 10, 30, 100) if measured else (0, 100, 250)
-        return Recording(table, s, equations, regimes, lags=lags, noise_by_candidates=False)
+        return Recording(table, s, equations, regimes)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is examined without a cause in mind."""
@@ -190,17 +187,6 @@ class MotorBench:
         of_speed = {**of_torque, "w": s["w_by_voltage"], "I": measured_I}
         made = {"electric": of_voltage, "mechanical": of_torque, "transmission": of_speed}
         return {name: made[name] for name in recording.equations}
-
-    def features(self, recording: Recording) -> dict[str, dict[str, Array]]:
-        """More groups of columns (n, k) for that examination: waves over the rotor's angle, also as large as V or I."""
-        s = recording.signals
-        groups = {}
-        sizes = {"": np.ones_like(s["V"]), " as large as the voltage": s["V"], " as large as the current": s["I"]}
-        for kind, size in sizes.items():
-            for low in range(1, MOST_WAVES + 1, 4):
-                each = [wave * size for n in range(low, low + 4) for wave in waves(recording, self.gear, n)]
-                groups[f"{low} to {low + 3} waves a turn of the rotor{kind}"] = column(*each)
-        return {"mechanical": groups}
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
         """The catalogue's causes that such a bench can have."""

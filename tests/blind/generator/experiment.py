@@ -68,7 +68,7 @@ class Experiment:
         return self.fill(seed, wanted, causes)
 
     def check_plan(self, seed):
-        """The subset for continuous integration, 60 cases: by ONLY_IN and CHECK_KINDS."""
+        """The subset for continuous integration, 52 cases of the motor bench: by ONLY_IN and CHECK_KINDS."""
         rng = generator(seed, "check plan")
         wanted = []
         for names in self.ONLY_IN.values():

@@ -38,7 +38,7 @@ class MotorBench(Experiment):
     }
     CHECK_AT_4 = 8
     # Singles at 2. Ten outside the catalogue: fewer would bound nothing at a risk of a millionth (0.15^9 = 4e-8).
-    CHECK_KINDS = (("single", 8), ("null", 10), ("pair", 6), ("outside", 10), ("confusable", 2))
+    CHECK_KINDS = (("single", 8), ("null", 10), ("outside", 10))
     SAMPLES = int(20.0 / STEP_S)
     MOVES_RAD_S = 0.15
 

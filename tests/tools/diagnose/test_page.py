@@ -62,7 +62,9 @@ def test_a_cause_is_drawn_where_it_shows_and_the_model_with_it_leaves_nothing_th
     assert max(over, key=lambda name: figures.explained(over[name], signature)) == "v"
     # by the truth: what of v |v| straight lines in v and a leave
     v, a = (found.recordings[0].signals[name] for name in ("v", "a"))
-    base, drag = (reduced(found.recordings[0], each) for each in (np.column_stack([v, a]), 0.02 * v * np.abs(v)))
+    base, drag = (
+        reduced(found.recordings[0], each, "force") for each in (np.column_stack([v, a]), 0.02 * v * np.abs(v))
+    )
     truth = (drag - base @ np.linalg.lstsq(base, drag, rcond=None)[0])[side.rows]
     assert np.corrcoef(signature, truth)[0, 1] > 0.999
     # the coefficient is known to some percent
@@ -74,7 +76,7 @@ def test_a_cause_is_drawn_where_it_shows_and_the_model_with_it_leaves_nothing_th
 def test_both_models_are_drawn_against_the_measurement(found):
     side = figures.sides(found)["force"]
     run = found.recordings[0].table
-    np.testing.assert_allclose(side.measured, reduced(found.recordings[0], run["force_N"])[side.rows])
+    np.testing.assert_allclose(side.measured, reduced(found.recordings[0], run["force_N"], "force")[side.rows])
     after, before = (np.std(side.measured - each) for each in (side.after, side.before))
     # noise of 0.05 N is what the right model leaves, under the band's Gaussian
     under = max(1.0, 2.0 * found.recordings[0].width * np.sqrt(np.pi))
