@@ -98,14 +98,14 @@ def test_a_voltage_or_a_speed_with_its_sign_turned_round_is_not_a_machine(bench,
 
 
 @pytest.mark.parametrize(("late", "told"), [(0, False), (10, True)])
-def test_a_voltage_that_is_late_is_reported_by_an_inductance_far_off_and_given_no_name(bench, late, told):
+def test_a_voltage_that_is_late_is_detected_by_an_impossible_inductance_and_given_no_name(bench, late, told):
     """The column of the inductance is the slope of the current, nearly that of the voltage: it takes the delay."""
     count = len(bench)
     columns = {name: values[late:] for name, values in bench.columns.items()}
     columns["voltage_V"] = bench["voltage_V"][: count - late]
     found = diagnose(MotorBench(), [Table(bench.time_s[late:], columns, (slice(0, count - late),), "late")]).answer
-    far_off = [each["channel"] for each in found["data_findings"] if each["kind"] == "far_off"]
-    assert ("inductance_H" in far_off) is told and found["causes"] == []
+    impossible = [each["channel"] for each in found["data_findings"] if each["kind"] == "impossible"]
+    assert ("inductance_H" in impossible) is told and found["detected"] is told and found["causes"] == []
 
 
 def test_a_torque_with_its_sign_turned_round_is_another_signal(bench):

@@ -79,7 +79,8 @@ class MotorBench:
             Known("resistance_ohm", "ohm", 1.3, 0.0, 130.0, "winding, brushes and leads"),
             Known("contact_drop_V", "V", 0.7, 0.0, 70.0, "at the brushes, both together"),
             Known("torque_constant_Nm_per_A", "N m/A", k, 0.0, 100.0 * k, "at the output, gear included"),
-            Known("inductance_H", "H", 1e-4, -0.01, 0.1, "of the winding; next to nothing at this sampling"),
+            # below zero by what a channel a few milliseconds late does to it, at any sampling
+            Known("inductance_H", "H", 1e-4, -0.005, 0.1, "of the winding; next to nothing at this sampling"),
             Known("constant_friction_Nm", "N m", 0.01, 0.0, 1.0, "of motor and gearbox"),
             Known("viscous_friction_Nms", "N m s/rad", 0.0, -0.01, 1.0, "of motor and gearbox"),
             Known("load_friction_Nm_per_A", "N m/A", 0.1 * k, 0.0, 10.0 * k, "mu K G"),
