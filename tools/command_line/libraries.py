@@ -45,7 +45,7 @@ def installs(package: str, command: str = "") -> str:
 
 
 def _requirement(package: str) -> tuple[str, list[str]]:
-    """(requirement as pip takes it, our extras that have it) of a package; an extra that has another extra has its own."""
+    """(requirement as pip takes it, our extras that have it) of a package; an extra has what its extras have."""
     base: list[str] = []
     by_extra: dict[str, list[str]] = {}
     for line in _listed():
