@@ -63,6 +63,7 @@ class RunFolder:
         self.report = report
         self.files: dict[str, str] = {}  # "complete", or why it is not
         self.is_done = False
+        self.lock = -1  # the descriptor of the record, while this run owns the folder
         self._claim()
 
     def __enter__(self) -> Self:
