@@ -41,6 +41,7 @@ TRANSLATED = HERE / "build" / "cython"
 IN_PLACE = loading.COMPILED or HERE  # the folder of the libraries in a checkout; in other trees next to the sources
 # no fused multiply-add, no fast-math: both change the last bit of a trajectory
 COMPILE_ARGUMENTS = ["-g0", "-ffp-contract=off", "-fno-fast-math", "-w"]
+MICROSOFTS = ["/fp:precise", "/w"]  # the same of its compiler, which contracts nothing by itself
 TOGETHER = [
     "-fno-plt",
     "-fvisibility=hidden",
@@ -240,7 +241,9 @@ def why_not_compiled():
 
 def extensions():
     """The extension modules: those of the sources that are compiled, and the one that they share."""
-    together = TOGETHER if understood(TOGETHER) else []
+    is_microsofts = compiler_type() == "msvc"
+    often, seldom = ("/O2", "/O1") if is_microsofts else (OPTIMISE, OPTIMISE_LITTLE)
+    arguments = MICROSOFTS if is_microsofts else [*COMPILE_ARGUMENTS, *(TOGETHER if understood(TOGETHER) else [])]
     return [
         Extension(
             name,
@@ -248,10 +251,17 @@ def extensions():
             depends=["setup.py"],
             # linked by name, libm provides its present functions; found through Python, those for old programs
             libraries=["m"] if os.name == "posix" else [],
-            extra_compile_args=[OPTIMISE if name in OFTEN_RUN else OPTIMISE_LITTLE, *COMPILE_ARGUMENTS, *together],
+            extra_compile_args=[often if name in OFTEN_RUN else seldom, *arguments],
         )
         for name in [*declarations.Sources(HERE).compiled_modules(), SHARED]
     ]
+
+
+def compiler_type():
+    """The kind of the compiler as setuptools names it: `unix` for gcc and clang, `msvc` for Microsoft's."""
+    from distutils.ccompiler import get_default_compiler
+
+    return get_default_compiler()
 
 
 def understood(arguments):

@@ -1,13 +1,12 @@
 """One run in a forked process: a branch of a robot that walks already, or a new robot.
 
 The branch has the robot's whole state at that time, and returns only its result. A branch that raises, dies or takes
-too long is a result as well, and harms no other process.
+too long is a result as well, and harms no other process. Where the system cannot fork, this process does the work.
 """
 
 import contextlib
 import json
 import os
-import resource
 import signal
 import sys
 import traceback
@@ -15,7 +14,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from ranger_sim.foundation import descriptors, wallclock
+from ranger_sim.foundation import descriptors, systems, wallclock
 
 CHUNK = 1 << 16
 
@@ -48,8 +47,14 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     """Return what `work` returns in a forked process; BranchError when it raises, dies, or takes too long.
 
     cpu_s: of computing, which other load of the machine does not change. wall_s: of the wall clock, for work that waits
-    for ever and computes nothing.
+    for ever and computes nothing. Both hold only where the system can fork.
     """
+    if not systems.can_fork():
+        try:
+            in_here: dict[str, Any] = json.loads(json.dumps(work()))
+        except Exception as error:
+            raise BranchError("crashed", _raised(error)) from None
+        return in_here
     sys.stdout.flush()
     sys.stderr.flush()
     reading, writing = os.pipe()
@@ -81,8 +86,16 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     return result
 
 
+def _raised(error: BaseException) -> str:
+    """An exception in one line, with its place."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"
+
+
 def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int, writing: int, cpu_s: float) -> None:
     """Work, write the result, and end without any of the parent's clean-up."""
+    import resource
+
     code = 1
     try:
         os.close(reading)
@@ -93,9 +106,7 @@ def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int
         try:
             answer = json.dumps(work())
         except BaseException as error:
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            where = f"{os.path.basename(place.filename)}:{place.lineno}"
-            answer = json.dumps({"raised": f"{type(error).__name__}: {error} ({where})"})
+            answer = json.dumps({"raised": _raised(error)})
         with os.fdopen(writing, "w", encoding="utf-8") as pipe:
             pipe.write(answer)
         code = 0

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import BusError
 
 VERSION = 1
@@ -104,7 +105,7 @@ def unpacked(layout: struct.Struct, body: bytes) -> tuple[Any, ...]:
 
 def address_of(name: str) -> str:
     """The abstract socket address of a robot or a host of private buses. UserError for an impossible name."""
-    if not sys.platform.startswith("linux"):
+    if not systems.is_linux():
         raise BusError(f"attaching to {name!r}: abstract unix sockets exist on Linux only, this is {sys.platform}")
     if not 1 <= len(name) <= NAME_LIMIT or not all(c.isascii() and (c.isalnum() or c in "._-") for c in name):
         raise BusError(f"name {name!r} is not 1 ... {NAME_LIMIT} letters, digits, dots, hyphens or underscores")

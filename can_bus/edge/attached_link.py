@@ -4,6 +4,7 @@ import select
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.links import (
@@ -29,6 +30,7 @@ from ranger_sim.can_bus.edge.taps import (
     overflow_frame,
 )
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.descriptors import Readers
 from ranger_sim.foundation.user_error import BusError, UserError
 
 HANDSHAKE_S = 60.0  # chosen by us: a robot answers once its boards have started, on a slow machine after half a minute
@@ -55,9 +57,9 @@ class AttachedLink(Link):
         self.outstanding = 0
         self.reading = False
         self.gone = ""
-        self.waiter = select.poll()
-        self.waiter.register(self.socket, select.POLLIN)
-        self.epoll: select.epoll | None = None
+        self.waiter = Readers()
+        self.waiter.add(self.socket.fileno())
+        self.epoll: Any = None  # a `select.epoll` of `socket` and `signal`
         with self.changed:
             self._understand()  # frames may have arrived directly after the welcome
 
@@ -124,7 +126,7 @@ class AttachedLink(Link):
                 self.epoll = select.epoll()
                 self.epoll.register(self.socket, select.EPOLLIN)
                 self.epoll.register(self.signal, select.EPOLLIN)
-            return self.epoll.fileno()
+            return int(self.epoll.fileno())
 
     def close(self) -> None:
         """Leave; the other side still sends queued frames."""
@@ -181,7 +183,7 @@ class AttachedLink(Link):
             self.reading = True
             self.changed.release()
             try:
-                self.waiter.poll(timeout * 1000.0)
+                self.waiter.ready(timeout)
             finally:
                 self.changed.acquire()
                 self.reading = False

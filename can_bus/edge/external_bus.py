@@ -15,7 +15,6 @@ The robot uses a small set of plain methods (`from_board`, `poll`), as for the o
 import argparse
 import collections
 import errno
-import select
 import shlex
 import socket
 import struct
@@ -28,6 +27,7 @@ from can import cli as can_options
 
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
 from ranger_sim.can_bus.frame import INTERMISSION_BITS, LENGTH_CODE, frame_bits
+from ranger_sim.foundation.descriptors import Readers
 from ranger_sim.foundation.events import (
     CAN_ABORT,
     CAN_MODE,
@@ -261,7 +261,7 @@ class ExternalBus:
         self.bit_rate = bit_rate
         self.open_peer = open_peer
         self.peers: list[Peer] = []
-        self.poller = select.poll()
+        self.poller = Readers()
         self.sinks: list[Callable[[int, int, int, int, int], Any]] = []
         self.frames_in = 0
         self.frames_out = 0
@@ -283,19 +283,19 @@ class ExternalBus:
         peer = Peer(self, label, (open_peer or self.open_peer)(), inbox, controller, order)
         self.peers.append(peer)
         if peer.descriptor >= 0:
-            self.poller.register(peer.descriptor, select.POLLIN)
+            self.poller.add(peer.descriptor)
         return peer
 
     def remove_peer(self, peer: Peer) -> None:
         """Remove a peer of `add_peer` from the bus; its waiting frames are not sent."""
         self.peers.remove(peer)
         if peer.descriptor >= 0:
-            self.poller.unregister(peer.descriptor)
+            self.poller.remove(peer.descriptor)
         peer.connection.shutdown()
 
     def poll(self, now_ns: int) -> int:
         """Receive frames and send waiting ones; returns the time of the next poll."""
-        ready = {descriptor for descriptor, _ in self.poller.poll(0)}  # one query for all: recv queries again
+        ready = self.poller.ready()  # one query for all: recv queries again
         for peer in self.peers:
             if peer.waiting:
                 peer.flush(now_ns)

@@ -6,14 +6,13 @@ A link is used from any number of threads. No thread is started here, except in 
 
 import logging
 import os
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
 from ranger_sim.can_bus.edge.taps import DROPPED, ERROR_ACTIVE, SENT, STATE, Event, overflow_frame
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import systems, wallclock
 
 log = logging.getLogger("can.ranger_sim")
 
@@ -125,7 +124,7 @@ class Link:
             os.eventfd_write(self.signal, 1)
 
     def _make_signal(self) -> None:
-        if not sys.platform.startswith("linux"):
+        if not systems.is_linux():
             raise NotImplementedError("a descriptor to wait on exists on Linux only")
         self.signal = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._raise_signal()

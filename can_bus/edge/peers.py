@@ -15,8 +15,9 @@ open`. Nothing here blocks, uses a thread, or raises because of a peer.
 5. A peer that breaks the rule is disconnected and counted by reason (REASONS), which is shown to the user. Its
    unfinished requests are dropped.
 6. Only programs of this user and of root are served, and no other server is trusted: SO_PEERCRED on local sockets; on
-   loopback the kernel reports the owner of the other end. Owners on other machines are unknown, so listening beyond
-   this machine must be requested explicitly.
+   loopback the kernel of Linux reports the owner of the other end. Owners on other machines are unknown, so listening
+   beyond this machine must be requested explicitly. Other systems do not report owners: there a server on loopback
+   serves every user of this machine, which its line of output says.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ import errno
 import ipaddress
 import math
 import os
-import select
 import socket
 import struct
 import sys
@@ -36,7 +36,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import systems, wallclock
+from ranger_sim.foundation.descriptors import Readers
 from ranger_sim.foundation.user_error import BusError
 
 
@@ -261,9 +262,9 @@ class PeerServer(Generic[P]):
         self.clock = wallclock.monotonic_s  # patience is measured on it
         self.polled_s = self.moved_s = -math.inf  # on `clock`: the last poll, the last one with virtual time advanced
         self.arrivals = 2.0 * self.limits.peers  # connections allowed now
-        self.watch = select.poll()
+        self.watch = Readers()
         if listener is not None:
-            self.watch.register(listener, select.POLLIN)
+            self.watch.add(listener.fileno())
 
     # ---- what a protocol adds
 
@@ -335,13 +336,13 @@ class PeerServer(Generic[P]):
     def let_in(self, peer: P) -> None:
         """Start serving this peer."""
         self.peers.append(peer)
-        self.watch.register(peer.stream.fileno(), select.POLLIN)
+        self.watch.add(peer.stream.fileno())
 
     def drop(self, peer: P) -> None:
         """Close."""
         if peer in self.peers:
             self.peers.remove(peer)
-            self.watch.unregister(peer.stream.fileno())
+            self.watch.remove(peer.stream.fileno())
             if not peer.ending:
                 self._closed(peer)
             peer.stream.close()
@@ -377,7 +378,7 @@ class PeerServer(Generic[P]):
 
     def _ready(self) -> set[int]:
         """Descriptors with something to read."""
-        return {number for number, _ in self.watch.poll(0)}
+        return self.watch.ready()
 
     def _accept(self) -> list[P]:
         """Accept connections; return the new peers, which may have sent something already."""
@@ -480,7 +481,7 @@ def trusted(user: int | None) -> bool:
 
 def user_behind(connection: socket.socket) -> int | None:
     """User id that owns the other end of a connection on this machine; None when that is unknown."""
-    if connection.family == socket.AF_UNIX:
+    if connection.family == getattr(socket, "AF_UNIX", None):
         return int(struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1])
     with suppress(OSError, ValueError):
         here, there = connection.getsockname()[:2], connection.getpeername()[:2]
@@ -540,9 +541,16 @@ def _as_in_table(end: tuple[str, int]) -> str:
     return f"{int.from_bytes(socket.inet_aton(end[0]), sys.byteorder):08X}:{end[1]:04X}"
 
 
+def owners_are_known() -> bool:
+    """True where the system reports the user behind a connection of its loopback address: on Linux."""
+    return systems.is_linux()
+
+
 def fault_of_owner(connection: socket.socket) -> str | None:
-    """Why a connection is refused; None for this user's, root's, and network connections, whose owner is unknown."""
-    if connection.family != socket.AF_UNIX and not loopback(connection.getsockname()[0]):
+    """Why a connection is refused; None for this user's, root's, and TCP connections whose owner the system does not
+    report."""
+    is_local = connection.family == getattr(socket, "AF_UNIX", None)
+    if not is_local and not (owners_are_known() and loopback(connection.getsockname()[0])):
         return None
     user = user_behind(connection)
     if user is None:

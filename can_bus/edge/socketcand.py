@@ -1,8 +1,8 @@
 """Emulated buses over TCP in the raw mode of the socketcand protocol, which several CAN programs use.
 
 `< open can1 >`, `< rawmode >`, then `< send 123 2 11 22 >` in and `< frame 123 1.000000 1122 >` out. Remote frames
-have no text in that mode (they are counted as not carried). On loopback this user's programs and root's are served;
-beyond it, where it must be allowed, all users' are.
+have no text in that mode (they are counted as not carried). On loopback this user's programs and root's are served,
+and all users' where the system does not report owners (Windows, macOS); beyond it, where it must be allowed, all are.
 """
 
 import socket
@@ -15,6 +15,7 @@ from ranger_sim.can_bus.edge.peers import FULL, LIMITS, MALFORMED, REASONS, Sock
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError
 
@@ -54,7 +55,8 @@ class SocketcandServer(StreamServer[_Client]):
         address = listening_address(host, f"socketcand on {host}:{port}", allow_network)
         listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if not systems.is_windows():  # there it would let another server take the port away
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.setblocking(False)
             listener.bind((address, port))
             listener.listen(LIMITS["socketcand"].peers)

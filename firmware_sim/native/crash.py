@@ -21,7 +21,8 @@ OVERFLOW = 256  # OVERFLOW_FLAG of runtime.c
 EXITED = 512  # EXIT_FLAG of runtime.c
 LARGEST_PLACE = 1 << 48  # bytes; a library is smaller by far
 UNREADABLE = "the record of its end is not readable: its program wrote over it"
-ASKED = signal.SIGXCPU  # sent to a program that lets no time pass, to get its place
+# Sent to a program that lets no time pass, to get its place; 0: a system without it, where no process of a board runs.
+ASKED: int = getattr(signal, "SIGXCPU", 0)
 LONGEST_S = 20.0  # binutils read some megabytes of debug information at most
 UNKNOWN = "??"  # addr2line's output for an unknown place
 

@@ -18,6 +18,7 @@ from collections.abc import Collection, Iterable
 
 from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.firmware_sim.native.crash import lines_of
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import FirmwareError
 
 # Each place is reported once. Leaks are not checked: the program allocates nothing, Python does. crash.py reports
@@ -34,6 +35,7 @@ FRAME = re.compile(r"^\s*#\d+ .*/(?P<name>[^/]+)-[^/-]{8}\.so\+0x(?P<offset>[0-9
 
 def is_ready() -> bool:
     """True in a process that has the runtime of the address sanitizer."""
+    systems.require_linux("sanitizers of firmware in C", "personality, prctl")
     return hasattr(ctypes.CDLL(None), "__asan_init")
 
 

@@ -5,12 +5,12 @@ machine stopped is cut off; a result that comes twice (a worker was thought dead
 write one file at a time.
 """
 
-import fcntl
 import json
 import os
 import pathlib
 from typing import Any
 
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import CampaignError
 
 
@@ -23,7 +23,7 @@ class Store:
         self.repeated = 0
         self.file = open(path, "a+b")  # noqa: SIM115
         try:
-            fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            systems.lock(self.file.fileno())
         except OSError:
             self.file.close()
             raise CampaignError(f"{path}: another campaign is writing here") from None

@@ -10,8 +10,10 @@ import contextlib
 import os
 import pickle
 import signal
+import sys
 from typing import Any
 
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import FaultError
 from ranger_sim.harness.branching import fork
 from ranger_sim.harness.faults.evidence import Evidence, Record
@@ -27,6 +29,10 @@ class Twin:
     def __init__(self, robot: Any) -> None:
         if robot.polled:
             raise FaultError("proof of a fault: something outside takes part in this run, so it has no golden twin")
+        if not systems.can_fork():
+            raise FaultError(
+                f"proof of a fault: its golden run needs a system that can fork (Linux, macOS), this is {sys.platform}"
+            )
         self.evidence = Evidence(robot)
         self.robot = robot
         self.closed = False

@@ -8,6 +8,8 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
+from ranger_sim.foundation import systems
+
 VERSION = 1
 PREFIX = "\0ranger-sim-feed/"
 RECORD_LIMIT = 1 << 24  # bytes of type and body; chosen by us: a second of every stream of the robot is below 4 MB
@@ -23,6 +25,7 @@ HEAD = struct.Struct("<IB")
 
 def address(name: str) -> str:
     """The abstract address of robot `name`; it has no file, so nothing of it remains."""
+    systems.require_linux(f"robot {name}: robots under a name", "abstract sockets", "`walk` runs everywhere")
     return PREFIX + name
 
 

@@ -110,6 +110,8 @@ class RealPort:
 
 def hung_up(number: int) -> bool:
     """True when the other side of a terminal is gone: reading it then looks like silence."""
+    if not hasattr(select, "poll"):  # Windows: its ports have no descriptor
+        return False
     watch = select.poll()
     watch.register(number, select.POLLIN)
     return any(events & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, events in watch.poll(0))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.can_bus.edge.peers import LIMITS, REASONS, Peer, PeerServer, SocketStream, connected
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import RequestError, UserError
 
 ANSWER_S = 10.0  # a client waits so long
@@ -15,6 +15,7 @@ LONGEST_ANSWER = 1 << 20  # bytes; a status has below 10,000
 
 def address(name: str) -> str:
     """The abstract address of robot `name`; it has no file, so nothing of it remains."""
+    systems.require_linux(f"robot {name}: robots under a name", "abstract sockets", "`walk` runs everywhere")
     return f"\0ranger-sim-ctl/{name}"
 
 

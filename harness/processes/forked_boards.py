@@ -18,8 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
 from ranger_sim.firmware_sim.native import crash
-from ranger_sim.foundation import descriptors
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation import descriptors, systems
 from ranger_sim.harness.processes import board_process, kernel, places
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
 from ranger_sim.harness.processes.guard import Guard
@@ -39,11 +38,9 @@ class ForkedBoards:
 
     def __init__(self, robot: Any, names: tuple[str, ...], deadline_s: float = DEADLINE_S) -> None:
         self.robot = robot
-        if not sys.platform.startswith("linux"):
-            raise UserError(
-                f"{', '.join(names)}: a separate process needs Linux (eventfd, pidfd); elsewhere --in-process, or "
-                "Ranger(in_process=True)"
-            )
+        systems.require_linux(
+            f"{', '.join(names)}: boards as processes", "eventfd, pidfd", "--in-process, Ranger(in_process=True) work"
+        )
         self.names = names
         self.used = processor_for_this_worker()
         self.settings = Settings(speed=None, real_time=False, processor=self.used)

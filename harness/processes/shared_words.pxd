@@ -3,9 +3,18 @@
 cdef extern from *:
     """
     #include <stdint.h>
+    #ifdef _MSC_VER  /* so that it compiles: Windows runs no board as a process */
+    #include <intrin.h>
+    #include <io.h>
+    #define read _read
+    #define write _write
+    static inline long long rs_load(long long *p) { return _InterlockedOr64(p, 0); }
+    static inline void rs_store(long long *p, long long v) { _InterlockedExchange64(p, v); }
+    #else
     #include <unistd.h>
     static inline long long rs_load(long long *p) { return __atomic_load_n(p, __ATOMIC_SEQ_CST); }
     static inline void rs_store(long long *p, long long v) { __atomic_store_n(p, v, __ATOMIC_SEQ_CST); }
+    #endif
     static inline long long rs_mix(long long h, long long w) {
         return (long long)(((uint64_t)h ^ (uint64_t)w) * 1099511628211ULL);
     }

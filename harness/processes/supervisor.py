@@ -20,7 +20,7 @@ from typing import Any
 from ranger_sim.can_bus.edge.peers import REASONS
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import crash
-from ranger_sim.foundation import descriptors, wallclock
+from ranger_sim.foundation import descriptors, systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, new_stage, words_shown
@@ -600,5 +600,4 @@ class Supervisor:
 
 def check_platform() -> None:
     """UserError on a platform without processes of this kind."""
-    if not sys.platform.startswith("linux"):
-        raise UserError("up: boards as processes need Linux (eventfd, abstract sockets); `walk` runs everywhere")
+    systems.require_linux("up: boards as processes", "eventfd, abstract sockets", "`walk` runs everywhere")

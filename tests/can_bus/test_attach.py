@@ -3,6 +3,7 @@
 import pathlib
 import socket
 import struct
+import sys
 import threading
 
 import pytest
@@ -283,7 +284,7 @@ def test_an_impossible_name_is_reported(name):
 
 
 def test_on_other_systems_than_linux_the_reason_is_reported(monkeypatch):
-    monkeypatch.setattr(wire.sys, "platform", "darwin")
+    monkeypatch.setattr(sys, "platform", "darwin")
     with pytest.raises(UserError, match="exist on Linux only, this is darwin"):
         AttachServer("x", {})
 

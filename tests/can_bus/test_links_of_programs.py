@@ -11,7 +11,7 @@ import can
 import pytest
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge import attached_link, benchmark, links, paced, python_can
+from ranger_sim.can_bus.edge import attached_link, benchmark, paced, python_can
 from ranger_sim.can_bus.edge.attached_link import AttachedLink, channels_of, handshake
 from ranger_sim.can_bus.edge.links import Link, LinkError, QueueFullError
 from ranger_sim.can_bus.edge.paced import PacedBus, alone_and_passive, hold_off, is_quiet
@@ -95,7 +95,7 @@ def test_a_descriptor_is_readable_while_something_is_there():
 
 
 def test_other_systems_have_no_such_descriptor(monkeypatch):
-    monkeypatch.setattr(links.sys, "platform", "darwin")
+    monkeypatch.setattr(sys, "platform", "darwin")
     with pytest.raises(NotImplementedError):
         Link("here", False, 9)._make_signal()
 

@@ -2,16 +2,17 @@
 
 import argparse
 import math
+import sys
 from contextlib import ExitStack, closing
 from typing import Any
 
 from ranger_sim.can_bus.edge.attach import DEFAULT_NAME, AttachServer
 from ranger_sim.can_bus.edge.host import BusHost
 from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
-from ranger_sim.can_bus.edge.peers import loopback
+from ranger_sim.can_bus.edge.peers import loopback, owners_are_known
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.stop_rule import MOST_TIME_S
 from ranger_sim.tools.buses import server_options
@@ -64,9 +65,14 @@ def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: i
         raise UserError("--allow-network: nothing would listen there; give --socketcand HOST:PORT with it")
     with ExitStack() as opened:
         first = next(iter(buses))
-        servers: list[Any] = [opened.enter_context(closing(AttachServer(name, buses, epoch_ns)))]
-        prefix = "" if name == DEFAULT_NAME else f"{name}/"
-        lines = [f'python-can: can.Bus(interface="ranger_sim", channel="{prefix}{first}")']
+        servers: list[Any] = []
+        lines = []
+        if systems.is_linux():
+            servers.append(opened.enter_context(closing(AttachServer(name, buses, epoch_ns))))
+            prefix = "" if name == DEFAULT_NAME else f"{name}/"
+            lines.append(f'python-can: can.Bus(interface="ranger_sim", channel="{prefix}{first}")')
+        elif socketcand is None:
+            systems.require_linux("bus: names to attach by", "abstract sockets", "give --socketcand PORT")
         for channel in options.slcan:
             if channel not in buses:
                 raise UserError(f"--slcan {channel}: no such bus; there are {', '.join(buses)}")
@@ -80,7 +86,11 @@ def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: i
             server = SocketcandServer(buses, int(port), host or "127.0.0.1", epoch_ns, options.allow_network)
             tcp = opened.enter_context(closing(server))
             servers.append(tcp)
-            open_to_all = "" if loopback(tcp.host) else ", open to the network: any client there may send frames"
+            open_to_all = ""
+            if not loopback(tcp.host):
+                open_to_all = ", open to the network: any client there may send frames"
+            elif not owners_are_known():
+                open_to_all = f", open to every user of this machine: {sys.platform} does not report whose a client is"
             lines.append(f"socketcand: {tcp.host}:{tcp.port}{open_to_all}")
         opened.pop_all()
         return servers, lines

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from ranger_sim import loading
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
 from ranger_sim.ranger.walks import REFERENCE
@@ -100,7 +100,7 @@ def check_scheduler(options: argparse.Namespace) -> None:
 
 def pool_of(options: argparse.Namespace) -> Any:
     """The pool that does the runs: processes of this machine, or Dask on request."""
-    jobs = options.jobs or len(os.sched_getaffinity(0))
+    jobs = options.jobs or systems.processors()
     if options.scheduler and not options.scheduler.startswith(ENCRYPTED):
         terminal.console(stderr=True).print(  # with --quiet as well
             f"warning: the Dask scheduler at {options.scheduler} is used without TLS: any client that reaches it can "

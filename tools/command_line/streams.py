@@ -15,6 +15,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from ranger_sim.foundation import systems
+
 # The errors of a terminal, a pipe or a socket without a reader, and of a closed descriptor.
 GONE = (errno.EIO, errno.EPIPE, errno.EBADF, errno.ENXIO, errno.ECONNRESET)
 OUT, ERR = 1, 2
@@ -53,7 +55,8 @@ def is_on_disk(descriptor: int) -> bool:
 
 
 def take_over() -> bool:
-    """Give the process its two streams; False, and no change, if another program has replaced them.
+    """Give the process its two streams; False, and no change, if another program has replaced them, and on
+    Windows, whose console takes text through Python's own streams only.
 
     A descriptor that is closed at the start leads to /dev/null from now on (else the next file would get its number,
     and all output with it). A letter that the stream's encoding lacks is written as its escape.
@@ -61,7 +64,7 @@ def take_over() -> bool:
     global _own
     if _own is not None and sys.stdout is _own:
         return True
-    if sys.stdout is not sys.__stdout__ or sys.stderr is not sys.__stderr__:
+    if systems.is_windows() or sys.stdout is not sys.__stdout__ or sys.stderr is not sys.__stderr__:
         return False
     for number in (0, OUT, ERR):
         try:

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ranger_sim.can_bus.edge.peers import listening_address
-from ranger_sim.foundation import wallclock
+from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
 from ranger_sim.tools.command_line import terminal
@@ -104,14 +104,18 @@ def source_of(options: argparse.Namespace, report: Any) -> Iterator[Any]:
         with contextlib.closing(LinkSource(options.port)) as link:
             yield link
     elif options.walk:
+        systems.require_linux(
+            "panel: boards as processes", "eventfd, abstract sockets", "it opens recordings everywhere"
+        )
         with own_robot(report) as source:
             os.nice(GIVES_WAY)
             yield source
     else:
         from ranger_sim.tools.panel.robot import RobotSource
 
+        source = RobotSource(options.name)
         os.nice(GIVES_WAY)
-        yield RobotSource(options.name)
+        yield source
 
 
 @contextlib.contextmanager

@@ -17,6 +17,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
+from ranger_sim.foundation import systems
+
 HEADER = struct.Struct("<4sIQQ")  # id, reserved, length, number of links: in front of every block
 ID_BYTES = 64
 TOOL = b"rngrsim\0"
@@ -70,7 +72,7 @@ class MdfWriter:
     """A file with `groups`; `properties` go into its header. OSError when it cannot be written."""
 
     def __init__(self, path: pathlib.Path, groups: Sequence[Group], properties: Mapping[str, str]) -> None:
-        self.file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644)
+        self.file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | systems.O_BINARY, 0o644)
         self.path = path
         self.texts: dict[tuple[bytes, str], int] = {}
         self.rows: list[Rows] = []
@@ -193,5 +195,5 @@ class MdfWriter:
     def _write(self, at: int, data: bytes) -> None:
         """Write all of `data`; a nearly full disk takes a part of it first."""
         while data:
-            taken = os.pwrite(self.file, data, at)
+            taken = systems.write_at(self.file, data, at)
             at, data = at + taken, data[taken:]

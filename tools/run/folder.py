@@ -7,14 +7,13 @@ partial.
 """
 
 import contextlib
-import fcntl
 import json
 import os
 import pathlib
 from collections.abc import Callable, Iterator
 from typing import Any, Self
 
-from ranger_sim.foundation import json_text
+from ranger_sim.foundation import json_text, systems
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.command_line.files import writable_folder
 
@@ -64,6 +63,7 @@ class RunFolder:
         self.report = report
         self.files: dict[str, str] = {}  # "complete", or why it is not
         self.is_done = False
+        self.lock = -1  # the descriptor of the record, while this run owns the folder
         self._claim()
 
     def __enter__(self) -> Self:
@@ -74,7 +74,7 @@ class RunFolder:
             with contextlib.suppress(*FAILURES):  # a failure to record it must not hide the error itself
                 why = f"{type(error).__name__}: {error}" if error is not None else BROKEN_OFF
                 self._write_record({**self._record(), "ended": why})
-        os.close(self.lock)
+        self._release()
 
     @contextlib.contextmanager
     def file(self, name: str) -> Iterator[pathlib.Path]:
@@ -114,6 +114,8 @@ class RunFolder:
         """Write the summary, with the complete files, in its reserved place, and give the folder its final state."""
         summary.update(complete=self.is_complete, files=self.files)
         self._write_record(summary)
+        if systems.is_windows():
+            self._release()
         try:
             (self.path / OPEN).replace(self.path / SUMMARY)
         except OSError as error:
@@ -122,21 +124,28 @@ class RunFolder:
 
     # --- ownership ------------------------------------------------------------------------------------------
 
+    def _release(self) -> None:
+        if self.lock >= 0:
+            os.close(self.lock)
+            self.lock = -1
+
     def _claim(self) -> None:
         record = self.path / OPEN
         is_new = not record.exists()
         try:
-            self.lock = os.open(record, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
+            self.lock = os.open(record, os.O_RDWR | os.O_CREAT | systems.O_NOFOLLOW | systems.O_BINARY, 0o644)
         except OSError as error:
             raise UserError(f"{record}: {cause_of(error)}") from None
         try:
-            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            systems.lock(self.lock)
             self._remove_older_run(is_new)
             self._write_record(self._record())
         except BaseException as error:
+            if systems.is_windows():
+                self._release()
             if is_new:
                 record.unlink(missing_ok=True)
-            os.close(self.lock)
+            self._release()
             if isinstance(error, BlockingIOError):
                 raise UserError(f"{self.path}: another run is writing there") from None
             if isinstance(error, OSError):
@@ -171,7 +180,7 @@ class RunFolder:
         data = data.ljust(RESERVED if "what" in content else len(data))
         at = 0
         while at < len(data):
-            at += os.pwrite(self.lock, data[at:], at)
+            at += systems.write_at(self.lock, data[at:], at)
         os.ftruncate(self.lock, len(data))
         os.fsync(self.lock)
 

@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import signal
+import sys
 from types import SimpleNamespace as Made
 
 import pytest
@@ -410,6 +411,6 @@ def test_the_state_has_every_board_with_its_counts(alone):
 def test_words_are_shown_as_many_as_a_board_has_and_elsewhere_than_linux_nothing_runs(monkeypatch):
     assert supervisor.words_shown(Made(memory=None)) == 0 and supervisor.words_shown(Made(memory=[1, 2])) == 2
     supervisor.check_platform()
-    monkeypatch.setattr(supervisor.sys, "platform", "darwin")
+    monkeypatch.setattr(sys, "platform", "darwin")
     with pytest.raises(UserError, match="need Linux"):
         supervisor.check_platform()

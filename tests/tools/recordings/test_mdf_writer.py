@@ -1,11 +1,11 @@
 """Measurement files that grow: other people's reader finds every row, also when the writer never came to its end."""
 
-import os
 import warnings
 
 import numpy as np
 import pytest
 
+from ranger_sim.foundation import systems
 from ranger_sim.tools.recordings import mdf_writer
 from ranger_sim.tools.recordings.mdf_writer import Channel, Group, MdfWriter
 
@@ -68,14 +68,14 @@ def test_a_full_disk_leaves_the_rows_that_fitted(tmp_path, monkeypatch, room):
     """Wherever the disk ends: within compressed rows, within the block that lists them, or in a later one."""
     path = tmp_path / "a.mf4"
     writer = MdfWriter(path, [BODY, FLAG], {})
-    end, real = writer.end + room, os.pwrite
+    end, real = writer.end + room, systems.write_at
 
     def pwrite(file, data, at):
         if at >= end:
             raise OSError(28, "No space left on device")
         return real(file, data[: end - at], at)
 
-    monkeypatch.setattr(os, "pwrite", pwrite)
+    monkeypatch.setattr(systems, "write_at", pwrite)
     written = 0
     with pytest.raises(OSError, match="No space left"):
         for begin in range(0, 100, 10):

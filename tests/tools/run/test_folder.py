@@ -3,10 +3,10 @@
 import errno
 import json
 import os
-import types
 
 import pytest
 
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.run import folder as run_folder
 from ranger_sim.tools.run.folder import RunFolder
@@ -120,13 +120,13 @@ def test_a_run_that_breaks_off_gives_the_reason(tmp_path, lines):
 def test_a_summary_finds_space_on_a_disk_that_is_full(tmp_path, lines, monkeypatch):
     """Nothing but the bytes that were reserved at the start may be written at the end."""
     with RunFolder(tmp_path, "", lines.append) as folder:
-        reserved, real = (tmp_path / "incomplete.json").stat().st_size, os.pwrite
+        reserved, real = (tmp_path / "incomplete.json").stat().st_size, systems.write_at
 
         def pwrite(file, data, at):
             if at + len(data) > reserved:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             return real(file, data, at)
 
-        monkeypatch.setattr(run_folder, "os", types.SimpleNamespace(**{**vars(os), "pwrite": pwrite}))
+        monkeypatch.setattr(systems, "write_at", pwrite)
         folder.finish({**SUMMARY, "text": "x" * 30_000})  # a summary of a walk with its faults has some 20 kB
     assert record(tmp_path, "summary.json")["steps"] == 3

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel.inside.candump_rows import rows_of
 from ranger_sim.tools.panel.inside.frames import counted, nothing
@@ -45,7 +46,7 @@ class LogFrames:
     def read(self) -> Piece | None:
         """The next piece; None after the last one. Changes no state, so that another thread may call it."""
         while self.offset < self.size:
-            text = os.pread(self.file.fileno(), PIECE_BYTES, self.offset)
+            text = systems.read_at(self.file.fileno(), PIECE_BYTES, self.offset)
             end = self.offset + len(text)
             if end < self.size:
                 text = text[: text.rfind(b"\n") + 1]
@@ -84,7 +85,7 @@ class LogFrames:
         rows = self.cached.pop(number, None)
         if rows is None:
             begin, end = self.starts[number]
-            rows = self._rows_of(os.pread(self.file.fileno(), end - begin, begin))
+            rows = self._rows_of(systems.read_at(self.file.fileno(), end - begin, begin))
         self._keep(number, rows)
         return rows
 
