@@ -3,6 +3,7 @@
 #   scenarios compiled and interpreted, to the byte.
 # make docs: the documentation as a site, and every command and program of its tutorial and how-to pages run; then
 #   README and tutorial in order, in an environment that only their commands make.
+# make test-blind: the diagnosis on fresh cases with hidden effects, against bounds.
 # make test-suites: other projects' CAN tests on our buses, and our tests that need other people's libraries.
 # make test-vm: the tests on real SocketCAN, in a virtual machine where this kernel has none (dev/vm/README.md).
 PYTHON ?= python3
@@ -11,7 +12,7 @@ STEPS  ?= 100
 RUN    := $(VENV)/bin/python
 SOURCES := $(shell find -L ranger_sim \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null) dev/declarations.py
 
-.PHONY: walk test test-interpreted test-suites test-vm docs lint setup bench lock clean
+.PHONY: walk test test-interpreted test-blind test-suites test-vm docs lint setup bench lock clean
 
 walk: $(VENV)/.walk
 	$(RUN) -m ranger_sim walk --steps $(STEPS) --out runs/walk
@@ -29,7 +30,7 @@ WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_daq.py te
 PAGES = tests/pages
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways" $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
+	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways and not blind" $(addprefix --ignore=,$(WITH_A_CLOCK) $(PAGES))
 	$(RUN) -m pytest -q -rs $(WITH_A_CLOCK)
 
 # The packages' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
@@ -48,6 +49,9 @@ docs: $(VENV)/.all
 	$(RUN) -m pytest -q -n 2 $(PAGES)
 	$(RUN) -m dev.readme
 	@echo "build/site/docs/index.html"
+
+test-blind: $(VENV)/.all
+	$(RUN) -m pytest -q -rs -m blind tests/blind
 
 test-suites: $(VENV)/.all
 	$(RUN) -m dev.suites

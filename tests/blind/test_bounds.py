@@ -1,8 +1,8 @@
 """The bounds of a blind run: kept by a method that meets the targets, broken by what must not pass.
 
 Here diagnoses are played: an oracle that is right as often as the targets ask, and comparators that need no data. The
-diagnosis itself is held to these bounds on fresh cases in every run; RANGER_SIM_BLIND (a seed, or "fresh") has the
-comparators as well, on the cases of that seed.
+diagnosis itself is held to these bounds on fresh cases by `make test-blind`, minutes of processor; RANGER_SIM_BLIND (a
+seed, or "fresh") has the comparators as well, on the cases of that seed.
 """
 
 import os
@@ -215,6 +215,7 @@ def fresh_cases(tmp_path_factory):
     return generated(tmp_path_factory.mktemp("blind"), "--check", "--seconds", SECONDS, *seed)
 
 
+@pytest.mark.blind
 def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
     data, hidden = fresh_cases
     found = answered(DIAGNOSIS, data, tmp_path)
@@ -224,6 +225,7 @@ def test_the_diagnosis_keeps_the_bounds_on_fresh_cases(fresh_cases, tmp_path):
     assert not refusals(figures), said
 
 
+@pytest.mark.blind
 @pytest.mark.skipif(not GIVEN, reason="beside the diagnosis: set RANGER_SIM_BLIND to a seed or to fresh")
 @pytest.mark.parametrize("name", COMPARATORS)
 def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
@@ -236,6 +238,7 @@ def test_comparators_are_refused_on_the_cases(name, fresh_cases, tmp_path):
     assert refusals(figures)
 
 
+@pytest.mark.blind
 @pytest.mark.parametrize("letter", "EMT")
 def test_the_diagnosis_with_a_balance_taken_out_of_the_machine_is_refused(letter, fresh_cases, tmp_path):
     """It sees none of the eight cases at strength 4 that show in that balance alone, but for a false alarm: four of
