@@ -43,6 +43,7 @@ nitpicky = True
 # classes of single boards and of other libraries are named in signatures and have no page here
 nitpick_ignore_regex = [
     ("py:class", r"(ranger_sim\.boards|ranger_sim\.sysid\.dataset|can|numpy|collections|pathlib|rich)\..*"),
+    ("py:class", "ForkedBoards"),
 ]
 default_role = "code"
 autodoc_member_order = "bysource"
