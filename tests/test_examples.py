@@ -47,6 +47,8 @@ WALKED = {
 }
 # Its examples, tests and a law beside them, are run in a project of their own: harness/testing/test_in_a_project.py.
 IN_A_PROJECT = "docs/testing.md"
+# Its machine diagnoses hidden effects: sysid/test_machines_of_a_user.py.
+A_MACHINE = "docs/diagnose-your-machine.md"
 
 
 def examples(name):
@@ -62,7 +64,7 @@ def test_every_document_with_python_examples_is_run():
         for path in documents
         if not {".venv", "build", "tests", ".pytest_cache"} & set(path.parts) and examples(path)
     }
-    assert found == {*PRINTED, IN_A_PROJECT, *WALKED}
+    assert found == {*PRINTED, IN_A_PROJECT, A_MACHINE, *WALKED}
 
 
 @pytest.mark.parametrize("name", PRINTED)
