@@ -105,6 +105,8 @@ OUR_TESTS = (
     "tests/test_examples.py::test_the_example_of_co_simulation_lets_the_robot_fall_six_times",
 )
 LIBRARIES, PLUGINS = "libraries", "plugins"
+# tests whose outcome depends on which thread comes first
+RACES = {"canopen": {"test_time_producer": "it reads the bus while a Notifier reads it"}}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,9 +256,13 @@ def main(arguments: list[str] | None = None) -> int:
             f"{name:12} {len(virtual.passed):5} of {count:4} {len(ours.passed):5} of {count:4} {taken:>16}", flush=True
         )
         only_ours = sorted((virtual.passed - ours.passed) | (ours.failed - virtual.failed))
-        expected = EXPECTED.get(name, {})
+        expected, races = EXPECTED.get(name, {}), RACES.get(name, {})
+        if any(not any(part in test for part in expected | races) for test in only_ours):
+            # their tests wait for the wall clock: one that passes the second time was late
+            again = run(python, suite, top, on_ours=True)
+            only_ours = [test for test in only_ours if test not in again.passed]
         for test in only_ours[:SHOWN]:
-            reason = next((text for part, text in expected.items() if part in test), None)
+            reason = next((text for part, text in (expected | races).items() if part in test), None)
             print(f"    {test}: {reason or 'fails on our bus only'}", flush=True)
             wrong += [test] * (reason is None)
         for part in expected:
