@@ -48,7 +48,7 @@ def shown(command, printed):
 
 
 def main():
-    console = Console(record=True, width=WIDTH, file=open(os.devnull, "w", encoding="utf-8"), force_terminal=True)
+    console = Console(record=True, width=WIDTH + 8, file=open(os.devnull, "w", encoding="utf-8"), force_terminal=True)
     path = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     with tempfile.TemporaryDirectory() as folder:
         os.symlink(ROOT / "examples", pathlib.Path(folder, "examples"))
