@@ -136,7 +136,7 @@ def diagnose(
         known_to,
         _misfit(before, machine, found.base),
         _misfit(after, machine, extended),
-        plausibility.look(machine, extended, found.named, by_candidates=True),
+        plausibility.look(machine, extended, found.named, by_candidates=True, base=found.base),
         level=LEVEL,
         band_hz=band.edge_hz,
         refused=found.refused,

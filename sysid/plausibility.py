@@ -58,11 +58,18 @@ class Doubts:
     forbid: bool
 
 
-def look(machine: Machine, regression: Regression, named: Sequence[Named] = (), by_candidates: bool = False) -> Doubts:
+def look(
+    machine: Machine,
+    regression: Regression,
+    named: Sequence[Named] = (),
+    by_candidates: bool = False,
+    base: Regression | None = None,
+) -> Doubts:
     """Implausible values of a fit. regression: with every named cause in it.
 
     by_candidates: the noise is what all candidates leave. Then a slow residual is what a model error looks like, and a
-    start value only starts: neither forbids a name.
+    start value only starts: neither forbids a name. base: without the named causes; a scale of a channel could hide that
+    its equations contradict each other.
     """
     findings: list[Finding] = []
     if len(named) >= MOST and not by_candidates:
@@ -103,7 +110,7 @@ def look(machine: Machine, regression: Regression, named: Sequence[Named] = (), 
                 "noise is so slow; a channel is late, or is not what its name says"
             )
             findings.append(_finding(name, "slow", new, "", text))
-    findings += _contradictions(machine, regression)
+    findings += _contradictions(machine, regression if base is None else base)
     return Doubts(findings, any(each.kind in FORBID for each in findings))
 
 
