@@ -128,7 +128,7 @@ def test_an_effect_that_is_taken_back_leaves_the_simulator_as_it_was():
     arm = Exact()
     without = arm.prepare(log(1).part(slice(0, 1000)))
     (drag,) = (each for each in arm.effects([without]) if each.cause == "drag")
-    acting = arm.again(without, [(drag, {}, [0.05])], fixed=True)
+    acting = arm.again(without, [(drag, {}, [0.5])], fixed=True)
     assert abs(acting.fitted["damping_Nms"] - without.fitted["damping_Nms"]) > 0.01
     back = arm.again(acting, [])
     assert back.fitted == pytest.approx(without.fitted, rel=1e-4)

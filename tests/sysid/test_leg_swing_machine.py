@@ -28,7 +28,7 @@ TRUE = {
 }
 
 
-def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, tight=0.0, with_voltage=True):
+def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, with_voltage=True):
     """A leg under a voltage of some sines: V = R I + V_c sgn I + K w, Coulomb's friction with true standstill."""
     rng = generator(seed, "swing")
     parts = [(rng.uniform(0.9, 2.0), rng.uniform(0.4, 7.0), rng.uniform(0.0, 6.0)) for _ in range(5)]
@@ -46,7 +46,7 @@ def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, tight=0.0, with_voltage=Tru
             out[n // FINE] = V, current, q
         middle = q + 0.5 * dt * w  # at the old angle Euler's rule would damp like a viscous friction of its own
         torque = K * current - k * middle - 0.72 * 9.81 * math.sin(middle) + 9.81 * ahead * math.cos(middle) - C1 * w
-        torque -= bend * middle**3
+        torque -= bend * middle**3 + unknown * math.exp(-(((middle - 0.1) / 0.05) ** 2))
         free = w + dt / J * torque
         arc = tight * math.exp(-(((middle - 0.1) / 0.05) ** 2))
         w_new = math.copysign(max(abs(free) - dt / J * (C0 + arc + mu * abs(current)), 0.0), free)
@@ -90,8 +90,9 @@ def test_what_is_wrong_is_named_with_its_size(fault, cause, coefficient):
     assert first["value"] == pytest.approx(coefficient, rel=0.2)
 
 
-def test_friction_in_a_part_of_the_way_is_detected_and_given_no_name():
-    found = told(3, tight=0.3)
+@pytest.mark.parametrize("fault", [{"unknown": 0.1}, {"unknown": 0.2}, {"tight": 0.3}])
+def test_a_torque_or_a_friction_of_no_known_kind_is_detected_and_given_no_name(fault):
+    found = told(3, **fault)
     assert found["detected"] and found["abstained"] and found["causes"] == []
     assert found["subsystem"] == "mechanical"
 
