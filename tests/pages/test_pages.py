@@ -9,17 +9,15 @@ an adapter, a right or a second terminal, and is not run.
 import dataclasses
 import os
 import pathlib
-import re
 import subprocess
 import sys
 
 import pytest
 
+from dev.readme import BLOCK, EXIT_CODE, FILE_NAME
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "how-to").glob("*.md"))]
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-FILE_NAME = re.compile(r"(?:# ([\w-]+\.(?:py|toml))|/\* ([\w-]+\.c) \*/)\n")
-EXIT_CODE = re.compile(r"#.*\bexit code (\d+)")
 KINDS = {"sh", "text", "python", "toml", "c", "console"}
 
 

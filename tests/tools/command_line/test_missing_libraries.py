@@ -77,10 +77,10 @@ def folder(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize(("library", "command"), [(name, each) for name, several in NEEDED.items() for each in several])
-def test_a_missing_library_is_named_in_one_line_with_what_installs_it(library, command, folder):
-    done = subprocess.run(
-        [sys.executable, "-c", HIDING, library, *command.split()],
+def without(library, words, folder):
+    """A command run where a library is not installed."""
+    return subprocess.run(
+        [sys.executable, "-c", HIDING, library, *words],
         cwd=folder,
         env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(folder)},
         capture_output=True,
@@ -88,6 +88,11 @@ def test_a_missing_library_is_named_in_one_line_with_what_installs_it(library, c
         check=False,
         timeout=120,
     )
+
+
+@pytest.mark.parametrize(("library", "command"), [(name, each) for name, several in NEEDED.items() for each in several])
+def test_a_missing_library_is_named_in_one_line_with_what_installs_it(library, command, folder):
+    done = without(library, command.split(), folder)
     assert done.returncode == 2, done.stderr
     *before, line = done.stderr.splitlines()
     package = libraries.PACKAGES.get(library, library)
@@ -99,15 +104,7 @@ def test_a_missing_library_is_named_in_one_line_with_what_installs_it(library, c
 
 
 def test_a_walk_without_the_library_of_its_report_keeps_everything_else_and_says_what_installs_it(folder):
-    done = subprocess.run(
-        [sys.executable, "-c", HIDING, "plotly", "walk", "--time", "50ms", "--out", "o"],
-        cwd=folder,
-        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(folder)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+    done = without("plotly", ["walk", "--time", "50ms", "--out", "o"], folder)
     assert done.returncode == 0, done.stderr
     assert "report.html needs the library plotly, which is not installed; this installs it: " in done.stderr
     assert done.stderr.splitlines()[-1] == "summary: o/summary.json"
