@@ -149,13 +149,13 @@ function achieved({ rate_hz, promised_hz }, name) {
 const gaps = (row) => [row.gaps, row.gaps ? `${row.longest_ms} ms` : "–", seconds(row.last_s)];
 
 export function linkLists(rows) {
-  return table("lists of the data link", ["list", "#variables", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
+  return table("lists of the data link", ["list", "#variables", "#received, 1/s", "of what is expected", "#expected, 1/s", "#gaps", "#longest", "#last"],
     rows.map((row) => [row.list, row.variables, rate(row.rate_hz), achieved(row, row.list), rate(row.promised_hz), ...gaps(row)]));
 }
 
 export function linkRows(rows) {
   if (!rows.length) return note("nothing yet: the robot has not sent its lists");
-  return table("variables on the fast and the medium list", ["variable", "list", "#came, 1/s", "of the promise", "#promised, 1/s", "#gaps", "#longest", "#last"],
+  return table("variables on the fast and the medium list", ["variable", "list", "#received, 1/s", "of what is expected", "#expected, 1/s", "#gaps", "#longest", "#last"],
     rows.map((row) => [row.name, row.list, rate(row.rate_hz), achieved(row, row.name), `${row.regular ? "" : "≥ "}${rate(row.promised_hz)}`, ...gaps(row)]));
 }
 
