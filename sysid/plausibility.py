@@ -68,8 +68,8 @@ def look(
     """Implausible values of a fit. regression: with every named cause in it.
 
     by_candidates: the noise is what all candidates leave. Then a slow residual is what a model error looks like, and a
-    start value only starts: neither forbids a name. base: without the named causes; a scale of a channel could hide that
-    its equations contradict each other.
+    start value only starts: neither forbids a name. base: without the named causes; a scale of a channel could hide
+    that its equations contradict each other.
     """
     findings: list[Finding] = []
     if len(named) >= MOST and not by_candidates:
