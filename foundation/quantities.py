@@ -3,6 +3,7 @@
 import math
 import numbers
 import re
+from collections.abc import Callable, Mapping
 
 from ranger_sim.foundation.user_error import UserError
 
@@ -10,6 +11,8 @@ LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3}
 ENERGIES_WH = {"Wh": 1.0, "kWh": 1e3}
 SHARES = {"%": 1e-2}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
+Unit = float | Callable[[float], float]  # how many of the base unit, or how a number becomes the base unit
+SLOPES: dict[str, Unit] = {**ANGLES, "%": lambda percent: math.atan(percent / 100.0)}
 TIMES = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 Duration = str | float  # "20 ms", or a number of seconds
@@ -17,12 +20,13 @@ Duration = str | float  # "20 ms", or a number of seconds
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
-def in_base_units(text: str, units: dict[str, float]) -> float | None:
+def in_base_units(text: str, units: Mapping[str, Unit]) -> float | None:
     """A number with an optional unit of `units`, in that unit's base; None when `text` is not one."""
     match = re.fullmatch(rf"\s*({NUMBER})\s*([a-zA-Z%]*)\s*", text, re.ASCII)
     if match is None or match.group(2) not in {"", *units}:
         return None
-    return float(match.group(1)) * units.get(match.group(2), 1.0)
+    value, unit = float(match.group(1)), units.get(match.group(2), 1.0)
+    return unit(value) if callable(unit) else value * unit
 
 
 def nanoseconds(duration: str, what: str = "duration") -> int:

@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from ranger_sim.foundation.quantities import TIMES, duration_ns, duration_text, given_text, in_base_units, nanoseconds
+from ranger_sim.foundation.quantities import (
+    SLOPES,
+    TIMES,
+    duration_ns,
+    duration_text,
+    given_text,
+    in_base_units,
+    nanoseconds,
+)
 from ranger_sim.foundation.user_error import UserError
 
 
@@ -62,3 +70,17 @@ def test_a_unit_may_be_left_out_where_a_base_is_known():
 )
 def test_a_duration_is_printed_in_the_unit_that_reads_best(ns, text):
     assert duration_text(ns) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "rad"),
+    [
+        ("0.1", 0.1),
+        ("100 mrad", 0.1),
+        ("45deg", 0.7853981633974483),
+        ("100%", 0.7853981633974483),
+        ("-10 %", -0.09966865),
+    ],
+)
+def test_a_slope_in_percent_is_height_over_distance(text, rad):
+    assert in_base_units(text, SLOPES) == pytest.approx(rad, abs=1e-8)

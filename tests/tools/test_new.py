@@ -1,7 +1,9 @@
 """`ranger-sim new`: a project whose tests pass at once, written whole or not at all."""
 
+import json
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -90,3 +92,32 @@ def test_its_tests_pass_at_once_and_it_needs_nothing_of_ranger(tmp_path):
     assert "4 passed" in done.stdout
     libraries = [path for path in everything(tmp_path / "wheel") if path.endswith(".so")]
     assert libraries == ["panel/build/panel.so", "wheel/build/wheel.so"]
+
+
+GDB = next(filter(None, map(shutil.which, ("gdb", "gdb-multiarch"))), None)
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
+@pytest.mark.skipif(GDB is None, reason="no gdb (apt-get install gdb)")
+def test_the_editors_configuration_debugs_a_boards_c_while_the_tests_run(tmp_path):
+    """gdb is called as cppdbg calls it with this configuration: what it sets up, the program, its arguments."""
+    project = tmp_path / "wheel"
+    assert cli.main(["new", str(project)]) == 0
+    both = json.loads((project / ".vscode" / "launch.json").read_text())["configurations"]
+    (chosen,) = (each for each in both if each["type"] == "cppdbg")
+    assert chosen["program"] == "${command:python.interpreterPath}" and chosen["cwd"] == "${workspaceFolder}"
+    commands = [each["text"] for each in chosen["setupCommands"]]
+    commands += ["break observe if ms == 6", "run", "print ms", "next", "next", "print ms", "delete", "continue"]
+    done = subprocess.run(
+        [GDB, "-nx", "-batch", *(part for each in commands for part in ("-ex", each))]
+        + ["--args", sys.executable, *chosen["args"], "-p", "no:cacheprovider", *how_to_find_the_plugin(), "."],
+        cwd=project,
+        env=environment() | {"PYTHONPATH": str(pathlib.Path(__file__).resolve().parents[2])},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert "hit Breakpoint 1" in done.stdout and "wheel.c" in done.stdout, done.stdout + done.stderr
+    assert "$1 = 6" in done.stdout and "$2 = 7" in done.stdout, done.stdout
+    assert "3 passed" in done.stdout, done.stdout

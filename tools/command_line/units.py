@@ -7,6 +7,7 @@ name in front. `text(value)` writes a value so that it is read back as the very 
 import argparse
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -16,11 +17,13 @@ from ranger_sim.foundation.quantities import (
     LENGTHS,
     NUMBER,
     SHARES,
+    SLOPES,
     TIMES,
+    Unit,
     in_base_units,
 )
 
-__all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
+__all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "SLOPES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
 __all__ += ["duration_text", "figure", "length_text", "number", "quantity", "whole_number", "word"]
 
 # Text of this form is a value, not an option: so `--time -1s` reaches its check (`-1` alone would by default).
@@ -50,7 +53,7 @@ class Quantity:
     above: exclusive lower limit; least, most: inclusive ones. Infinities and NaN are always refused.
     """
 
-    units: dict[str, float] = field(default_factory=dict)
+    units: Mapping[str, Unit] = field(default_factory=dict)
     base: str = ""
     above: float | None = None
     least: float | None = None
@@ -129,7 +132,7 @@ class Word:
 
 
 def quantity(
-    units: dict[str, float],
+    units: Mapping[str, Unit],
     base: str,
     above: float | None = None,
     least: float | None = None,

@@ -27,8 +27,12 @@ FILES: dict[str, tuple[str, str]] = {
     "panel/firmware.toml": ("firmware.toml.j2", "panel"),
     "panel/panel.c": ("panel.c.j2", ""),
 }
-# Separate files, so that a configuration in a folder above has no effect; and the list of files not for a repository.
-WRITTEN = {"pytest.ini": "[pytest]\naddopts = --strict-markers\n", ".gitignore": "build/\nruns/\n__pycache__/\n"}
+# pytest.ini: a separate file, so that a configuration in a folder above has no effect. launch.json: for Visual Studio Code
+WRITTEN = {
+    "pytest.ini": "[pytest]\naddopts = --strict-markers\n",
+    ".gitignore": "build/\nruns/\n__pycache__/\n",
+    ".vscode/launch.json": (HERE / "launch.json").read_text(encoding="utf-8"),
+}
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,59}")
 
 
@@ -91,12 +95,11 @@ def write(project: pathlib.Path, name: str) -> None:
     from ranger_sim.datatable import generate
     from ranger_sim.datatable.loader import load_table
 
-    for path, (template, board) in FILES.items():
-        text = (HERE / template).read_text(encoding="utf-8").replace("[% name %]", name).replace("[% board %]", board)
-        (project / path).parent.mkdir(parents=True, exist_ok=True)
-        (project / path).write_text(text, encoding="utf-8")
-    for path, text in WRITTEN.items():
-        (project / path).write_text(text, encoding="utf-8")
+    files = {
+        path: (HERE / template).read_text(encoding="utf-8").replace("[% name %]", name).replace("[% board %]", board)
+        for path, (template, board) in FILES.items()
+    }
+    write_files(project, {path: text.encode("utf-8") for path, text in files.items()})
     generate.write(load_table(project / "table"), project / "table" / "generated")
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+from collections.abc import Mapping
 from typing import Any
 
 from ranger_sim.harness.stop_rule import MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, StopRule
@@ -10,12 +11,13 @@ from ranger_sim.ranger.scenario import LIMITS, Scenario
 from ranger_sim.tools import faults
 from ranger_sim.tools.command_line.options import Option, add_all, add_verbosity
 from ranger_sim.tools.command_line.units import (
-    ANGLES,
     ENERGIES_WH,
     LENGTHS,
     SHARES,
+    SLOPES,
     TIMES,
     Quantity,
+    Unit,
     quantity,
     whole_number,
     word,
@@ -30,7 +32,7 @@ from ranger_sim.tools.timing import trace
 LOGS = ("full", "window", "none")
 
 
-def of_scenario(field: str, units: dict[str, float], base: str) -> Quantity:
+def of_scenario(field: str, units: Mapping[str, Unit], base: str) -> Quantity:
     """A quantity with the scenario's own limits."""
     low, high, _ = LIMITS[field]
     return quantity(units, base, least=low, most=high)
@@ -76,7 +78,7 @@ SCENARIO = (
     Option(
         "--slope",
         "slope of the floor, positive downhill (default 0)",
-        of_scenario("slope_rad", ANGLES, "rad"),
+        of_scenario("slope_rad", SLOPES, "rad"),
         "0.01rad",
         Scenario.slope_rad,
     ),

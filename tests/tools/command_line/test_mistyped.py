@@ -20,7 +20,7 @@ from ranger_sim.tools.cli import main
         ("walk --step 5", "unrecognized arguments: --step 5; did you mean '--steps'?"),
         ("walk --floor 1mm", "unrecognized arguments: --floor 1mm; did you mean '--floor-roughness'?"),
         ("walk --seed -1", "argument --seed: '-1' is below 0"),
-        ("walk --slope 10%", "'10%' is not a number with one of the units rad, mrad, deg"),
+        ("walk --slope 10kg", "'10kg' is not a number with one of the units rad, mrad, deg, %"),
         (
             "walk --fault MCH.joint_encoder:stuck@step5..step3",
             "it ends at 'step3', which is not after its start, 'step5'",
