@@ -170,7 +170,7 @@ class Campaign:
         ]
         for result in pool.run(requests):
             self.store.add(result)
-            report(self.done, "healthy walks")
+            report(self.done, "healthy runs")
         return {key: self.store.results[key] for key in wanted}
 
     def healthy_of(self, case: Case) -> dict[str, Any] | None:

@@ -17,7 +17,7 @@ CRITERIA = {
     "no effect": "the fault acted, and no frame, no variable of the main brain and no error count differs",
     "masked": "the firmware differs, no error reports it, and the gait stays inside its band",
     "detected and safe": "an error, or its rate, that healthy walks do not have; the gait stays inside its band",
-    "degraded gait": "detected; the robot walks on, its gait outside the band",
+    "degraded": "detected; the robot walks on, its gait outside the band",
     "undetected wrong": "the robot walks on with its gait outside the band, and no error reports it",
 }
 OUTCOMES = tuple(CRITERIA)
@@ -26,7 +26,7 @@ SEVERITY = {
     "damage": 5,
     "fall": 4,
     "undetected wrong": 3,
-    "degraded gait": 2,
+    "degraded": 2,
     "detected and safe": 1,
     "masked": 1,
     "no effect": 0,
@@ -91,7 +91,7 @@ def classify(proof: Proof, gait: Gait, golden: Gait, overload: str, band: Band) 
     outside = beyond(gait, golden, band)
     if proof.detected is not None:
         detection = f"{proof.detected.code} from {proof.detected.board}"
-        return ("degraded gait", f"{outside}; {detection}") if outside else ("detected and safe", detection)
+        return ("degraded", f"{outside}; {detection}") if outside else ("detected and safe", detection)
     return ("undetected wrong", outside) if outside else ("masked", "")
 
 

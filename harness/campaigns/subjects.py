@@ -35,7 +35,7 @@ CRITERIA = {
     "no effect": "the fault acted, and no frame and no error count differs",
     "masked": "the firmware differs, no error reports it, and the body stays inside its band",
     "detected and safe": "an error, or its rate, that healthy runs do not have; the body stays inside its band",
-    "degraded gait": "detected; a quantity of the body leaves its band",
+    "degraded": "detected; a quantity of the body leaves its band",
     "undetected wrong": "a quantity of the body leaves its band, and no error reports it",
 }
 
@@ -178,7 +178,7 @@ class OwnMachine:
         elif proof.first_firmware is None:
             outcome, why = "no effect", ""
         elif beyond:
-            outcome = "degraded gait" if detection else "undetected wrong"
+            outcome = "degraded" if detection else "undetected wrong"
             why = "; ".join(part for part in (beyond, detection) if part)
         else:
             outcome, why = ("detected and safe", detection) if detection else ("masked", "")

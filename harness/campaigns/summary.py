@@ -287,7 +287,7 @@ def codes(felt: Sequence[Row]) -> list[dict[str, Any]]:
 def worst(valid: Sequence[Row]) -> list[Row]:
     """The worst cases, worst first; earlier falls before later ones."""
     once = {result["key"]: (case, result) for case, result in valid}.values()  # a search may repeat a point
-    bad = [row for row in once if SEVERITY[row[1]["outcome"]] >= SEVERITY["degraded gait"]]
+    bad = [row for row in once if SEVERITY[row[1]["outcome"]] >= SEVERITY["degraded"]]
     return sorted(bad, key=lambda row: -severity(row[1]))[:WORST]
 
 

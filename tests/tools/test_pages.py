@@ -27,7 +27,7 @@ def test_a_page_has_the_same_bytes_every_time_and_is_under_three_megabytes(ident
 
 
 @pytest.mark.skipif(browser.BROWSER is None, reason="no chromium on this machine")
-@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("width", [390, 768, 1400])
 def test_every_figure_is_drawn_within_the_width_of_the_window(identified, tmp_path, width):
     figures_there = identified[0].read_text().count('class="figure"')
     assert figures_there == 6  # stall, torque constant, friction, swings, two springs

@@ -6,7 +6,6 @@ from typing import Any
 import jinja2
 import plotly.graph_objects as go
 
-from ranger_sim.harness.campaigns.outcomes import CRITERIA
 from ranger_sim.harness.campaigns.summary import worst_of
 from ranger_sim.tools.report.figures import library, placed
 
@@ -16,7 +15,7 @@ COLOURS = {
     "no effect": "#e3e7eb",
     "masked": "#cfe3f4",
     "detected and safe": "#8fc7a3",
-    "degraded gait": "#f6d68b",
+    "degraded": "#f6d68b",
     "undetected wrong": "#e8894a",
     "fall": "#c8453c",
     "damage": "#6d1a4e",
@@ -29,7 +28,7 @@ SHORT = {
     "no effect": "none",
     "masked": "mask",
     "detected and safe": "safe",
-    "degraded gait": "gait",
+    "degraded": "degr",
     "undetected wrong": "wrong",
     "fall": "fall",
     "damage": "dmg",
@@ -53,11 +52,13 @@ def render(results: dict[str, Any]) -> str:
     return environment.get_template("template.html.j2").render(
         results=results,
         colours=COLOURS,
-        criteria=CRITERIA,
         heat_html=heat_map(heat) if heat["places"] else "",
         extremes=[extremes_text(each) for each in results["extremes"]],
-        setting_columns=SETTING_COLUMNS,
-        settings=[(list(each["axes"].values()), setting_cells(each)) for each in results["settings"]],
+        coverage=coverage(results),
+        happened=[name for name, share in results["outcomes"].items() if share["count"]],
+        healthy=healthy_texts(results),
+        setting_columns=setting_columns(results["settings"]),
+        settings=[(list(each["axes"].values()), cells) for each, cells in setting_rows(results["settings"])],
         times_html=times(results["rows"]) if any(row["detection_ms"] is not None for row in results["rows"]) else "",
         library=library(),
     )
@@ -109,7 +110,7 @@ def heat_map(heat: dict[str, Any]) -> str:
         yaxis={"autorange": "reversed"},
         font={"size": 11},
     )
-    return placed(figure)
+    return placed(figure, least_width=180 + 40 * len(heat["modes"]))
 
 
 def counts_text(outcomes: list[str] | None) -> str:
@@ -157,21 +158,14 @@ def markdown(results: dict[str, Any]) -> str:
         "|---|---|---|---|",
     ]
     for name, share in results["outcomes"].items():
-        lines.append(f"| {name} | {share['count']} | {share_text(share)} | {CRITERIA[name]} |")
+        lines.append(f"| {name} | {share['count']} | {share_text(share)} | {results['criteria'][name]} |")
     lines += ["", "| Coverage | Share | Runs |", "|---|---|---|"]
-    for what, share in results["coverage"].items():
+    for what, share in coverage(results).items():
         lines.append(f"| {what} | {share_text(share)} | {share['count']} of {share['of']} |")
     for each in results["tolerances"]:
         lines += ["", tolerance_text(each)]
-    for each in results["healthy"]:
-        count, total = each["false_alarms"]
-        codes = ", ".join(each["false_alarm_codes"])
-        lines += [
-            "",
-            f"Healthy walks of seeds {', '.join(map(str, each['seeds']))}, each judged by the others "
-            "from four times: "
-            f"{count} false alarms of {total}" + (f" ({codes})." if codes else "."),
-        ]
+    for text in healthy_texts(results):
+        lines += ["", text]
     heat = results["heat"]
     if heat["places"]:
         lines += ["", "## Worst outcome by place and mode", ""]
@@ -192,14 +186,11 @@ def markdown(results: dict[str, Any]) -> str:
     for each in results["extremes"]:
         lines += ["", extremes_text(each)]
     if results["settings"]:
-        axes = list(results["settings"][0]["axes"])
+        axes, columns = list(results["settings"][0]["axes"]), setting_columns(results["settings"])
         lines += ["", "## Settings", ""]
-        lines += [
-            "| " + " | ".join([*axes, *SETTING_COLUMNS]) + " |",
-            "|---" * (len(axes) + len(SETTING_COLUMNS)) + "|",
-        ]
-        lines += [f"| {' | '.join([str(each['axes'][name]) for name in axes] + setting_cells(each))} |"
-                  for each in results["settings"]]  # fmt: skip
+        lines += ["| " + " | ".join([*axes, *columns]) + " |", "|---" * (len(axes) + len(columns)) + "|"]
+        lines += [f"| {' | '.join([str(each['axes'][name]) for name in axes] + cells)} |"
+                  for each, cells in setting_rows(results["settings"])]  # fmt: skip
     for title, name in (("Worst cases", "worst"), ("Runs that prove nothing", "unsure")):
         if results[name]:
             lines += ["", f"## {title}", "", "| Outcome | Fault | Why | Detected | Again |", "|---|---|---|---|---|"]
@@ -220,20 +211,52 @@ def why_text(each: dict[str, Any]) -> str:
     return f"{each['why']}{fallen} {each['fall_ms']:.0f} ms"
 
 
-SETTING_COLUMNS = ("outcome", "why", "step length", "step time", "motor power", "least slot margin", "overruns")
+def coverage(results: dict[str, Any]) -> dict[str, Any]:
+    """The shares that are shares of anything; a machine that cannot fall has none of its falls."""
+    return {what: share for what, share in results["coverage"].items() if share["of"]}
 
 
-def setting_cells(each: dict[str, Any]) -> list[str]:
-    """A line of the table of settings, after the settings themselves."""
+def healthy_texts(results: dict[str, Any]) -> list[str]:
+    """The false alarms of healthy runs, a sentence for each different result."""
+    texts = []
+    for each in results["healthy"]:
+        count, total = each["false_alarms"]
+        codes = f" ({', '.join(each['false_alarm_codes'])})" if each["false_alarm_codes"] else ""
+        texts.append(
+            f"Healthy runs of seeds {', '.join(map(str, each['seeds']))}, each judged by the others as if a fault had "
+            f"begun, from several times on: {count} false alarms of {total}{codes}."
+        )
+    return list(dict.fromkeys(texts))
 
-    def of_gait(name: str, unit: str) -> str:
-        value = each["gait"].get(name)
-        return "" if value is None else f"{value:.3g} {unit}"
 
-    slot = each["slot"]
-    margin = "" if slot["margin"] is None else f"{100.0 * slot['margin']:.1f} % ({slot['board']})"
-    gait = [of_gait("step_length_m", "m"), of_gait("step_time_s", "s"), of_gait("motor_power_W", "W")]
-    return [each["outcome"], each["why"], *gait, margin, "" if slot["overruns"] is None else str(slot["overruns"])]
+UNITS = ("m", "s", "W")  # of a gait's quantities, at the end of their names
+
+
+def measured(settings: list[dict[str, Any]]) -> list[str]:
+    """The quantities by which a sweep's runs were judged: the gait's, or those of the machine's body."""
+    return list(dict.fromkeys(name for each in settings for name in each["gait"]))
+
+
+def setting_columns(settings: list[dict[str, Any]]) -> list[str]:
+    """Headings of the table of settings, after the settings themselves."""
+    names = []
+    for name in measured(settings):
+        words, _, unit = name.rpartition("_")
+        names.append(f"{words}, {unit}".replace("_", " ") if unit in UNITS else name.replace("_", " "))
+    return ["outcome", "why", *names, "least slot margin", "overruns"]
+
+
+def setting_rows(settings: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str]]]:
+    """(the run, its cells after the settings themselves) for each line of the table of settings."""
+    names = measured(settings)
+    rows = []
+    for each in settings:
+        slot, values = each["slot"], [each["gait"].get(name) for name in names]
+        margin = "" if slot["margin"] is None else f"{100.0 * slot['margin']:.1f} % ({slot['board']})"
+        numbers = ["" if value is None else f"{value:.3g}" for value in values]
+        overruns = "" if slot["overruns"] is None else str(slot["overruns"])
+        rows.append((each, [each["outcome"], each["why"], *numbers, margin, overruns]))
+    return rows
 
 
 def extremes_text(each: dict[str, Any]) -> str:

@@ -19,9 +19,9 @@ def proof_text(case: Case, result: dict[str, Any]) -> str:
         if found := result.get(name):
             lines.append(f"  {what}: {found['name']} ({found['where']}) after {found['ms']:g} ms")
     for found in result.get("detected") or []:
-        rate = ", oftener than healthy walks" if found["rate"] else ""
+        rate = ", oftener than in healthy runs" if found["rate"] else ""
         lines.append(f"  detected: {found['code']} from {found['board']} after {found['ms']:g} ms{rate}")
-    for name, what in (("reaction", "reaction"), ("unusual", "a change that no healthy walk has")):
+    for name, what in (("reaction", "reaction"), ("unusual", "a change that no healthy run has")):
         if found := result.get(name):
             lines.append(
                 f"  {what}: {found['machine']} in {found['state']}, not {found['instead_of']}, after {found['ms']:g} ms"

@@ -205,7 +205,7 @@ def show(results: dict[str, Any], console: Console) -> None:
         if share["count"]:
             table.add_row(name, str(share["count"]), page.share_text(share))
     console.print(table)
-    for what, share in results["coverage"].items():
+    for what, share in page.coverage(results).items():
         console.print(
             f"{what}: {page.share_text(share)} ({share['count']} of {share['of']})", highlight=False, soft_wrap=True
         )

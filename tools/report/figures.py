@@ -37,12 +37,16 @@ def finished(figure: Any, title: str, note: str = "", height: int = 420, **layou
     return Figure(title, placed(figure), note)
 
 
-def placed(figure: Any) -> Markup:
-    """A figure's place on the page and its numbers as JSON, which `library` draws; the same bytes every time."""
+def placed(figure: Any, least_width: int = 0) -> Markup:
+    """A figure's place on the page and its numbers as JSON, which `library` draws; the same bytes every time.
+
+    least_width: px, below which it is not squeezed; what holds it scrolls.
+    """
     height = figure.layout.height or 450  # px, plotly's own
     numbers = Markup(to_json(figure, validate=False))  # has < and > as escapes
+    width = f";min-width:{least_width}px" if least_width else ""
     return Markup(
-        f'<div style="height:{height}px"></div><script type="application/json" class="figure">{numbers}</script>'
+        f'<div style="height:{height}px{width}"></div><script type="application/json" class="figure">{numbers}</script>'
     )
 
 

@@ -56,7 +56,7 @@ def test_an_error_with_the_same_gait_is_detected_and_safe():
 
 def test_an_error_and_another_gait_is_a_degraded_gait():
     outcome, why = judged(with_error(with_short_steps(differing())))
-    assert outcome == "degraded gait" and why == "step length -20 %; MCFO_CBL_STRCH from MCFO"
+    assert outcome == "degraded" and why == "step length -20 %; MCFO_CBL_STRCH from MCFO"
 
 
 def test_another_gait_without_an_error_is_undetected_wrong():
@@ -131,7 +131,7 @@ def test_severity_orders_outcomes_and_the_sooner_fall_is_worse():
         result("no effect"),
         result("masked", deviation=0.1),
         result("masked", deviation=0.9),
-        result("degraded gait", deviation=1.5),
+        result("degraded", deviation=1.5),
         result("undetected wrong", deviation=1.2),
         result("fall", fall_ms=4000.0),
         result("fall", fall_ms=300.0),

@@ -187,7 +187,7 @@ def test_first_detecting_errors_are_counted_with_those_of_the_faults_own_board()
 def test_the_worst_cases_are_those_from_a_degraded_gait_on_and_each_is_listed_once():
     rows = [
         run("a", "detected and safe"),
-        run("b", "degraded gait", deviation=2.0),
+        run("b", "degraded", deviation=2.0),
         run("c", "fall", fall_ms=900.0),
         run("d", "fall", fall_ms=90.0),
         run("c", "fall", fall_ms=900.0),
@@ -195,7 +195,7 @@ def test_the_worst_cases_are_those_from_a_degraded_gait_on_and_each_is_listed_on
     ]
     assert [result["key"] for _, result in summary.worst(rows)] == ["d", "c", "e", "b"]
     assert len(summary.worst([run(str(n), "fall") for n in range(21)])) == 20
-    assert summary.worst_of(["masked", "fall", "degraded gait"]) == "fall"
+    assert summary.worst_of(["masked", "fall", "degraded"]) == "fall"
     assert summary.worst_of(["masked", "detected and safe"]) == "detected and safe"
 
 
@@ -339,7 +339,7 @@ def test_severity_is_the_rank_and_how_soon_it_fell_or_how_far_it_went():
     def of(outcome, **more):
         return outcomes.severity({"outcome": outcome, **more})
 
-    ranks = {"damage": 5, "fall": 4, "undetected wrong": 3, "degraded gait": 2, "detected and safe": 1, "masked": 1}
+    ranks = {"damage": 5, "fall": 4, "undetected wrong": 3, "degraded": 2, "detected and safe": 1, "masked": 1}
     ranks |= {"no effect": 0, "invalid": -1, "timed out": -1, "crashed": -1}
     assert {name: of(name) for name in ranks} == ranks
     assert of("fall", fall_ms=1000.0) == 4.5 and of("fall", fall_ms=3000.0) == 4.25 and of("fall", fall_ms=-5.0) == 5.0
@@ -370,7 +370,7 @@ def test_an_own_machines_run_is_judged_by_the_bands_of_its_body():
     reported = (Detection("A", "E", 1, False),)
     assert judged([9, 2, 0, 0]) == ("masked", "", 1.0)  # what was before does not count; just at its band
     assert judged([0, 0, 3, 0]) == ("undetected wrong", "angle off by 3 rad", 1.5)
-    assert judged([0, 0, -3, 0], detections=reported) == ("degraded gait", "angle off by 3 rad; E from A", 1.5)
+    assert judged([0, 0, -3, 0], detections=reported) == ("degraded", "angle off by 3 rad; E from A", 1.5)
     assert judged([0, 0, 3, 0], rate=[0, 0, 0, 7]) == ("undetected wrong", "rate off by 7 rad/s", 1.75)
     assert judged([0, 0, 0, 0], detections=reported) == ("detected and safe", "E from A", 0.0)
     assert judged([0, 0, 3, 0], first_firmware=None)[0] == "no effect"

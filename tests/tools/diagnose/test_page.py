@@ -10,6 +10,7 @@ from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.regression import reduced
 from ranger_sim.tools.diagnose import figures, page, words
 from ranger_sim.tools.report.figures import library
+from tests import browser
 from tests.sysid.test_diagnose import Cart, cart_run
 
 
@@ -146,3 +147,16 @@ def test_cosine_and_sine_are_reported_as_an_amplitude():
 def test_a_rival_is_a_tie_only_when_it_could_be():
     assert words.standing(3.0) == "as near, with a value that no machine has"
     assert words.standing(8.0) == "close" and words.standing(30.0) == "behind"
+
+
+@pytest.mark.skipif(browser.BROWSER is None, reason="no chromium on this machine")
+def test_nothing_is_wider_than_the_window(drawn, tmp_path):
+    (tmp_path / "report.html").write_text(drawn, encoding="utf-8")
+    with browser.opened(tmp_path / "profile") as window:
+        for width in (390, 768, 1400):
+            window.open(tmp_path / "report.html", width)
+            window.until("document.documentElement?.dataset.plots === 'drawn'")
+            assert window.value("document.documentElement.scrollWidth") <= width
+            assert window.errors == []
+        clipped = "[...document.querySelectorAll('.wide')].filter(e => e.scrollWidth > e.clientWidth).length"
+        assert window.value(clipped) == 0  # nothing needs to be scrolled on a wide window
