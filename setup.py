@@ -8,6 +8,7 @@ Each module is a separate extension module. The output of Cython and the compile
 shows the progress of the build. In a checkout the libraries go to build/compiled, one folder per kind of Python.
 
 RANGER_SIM_BUILD_JOBS: how many modules are translated and compiled at once (default: one per processor).
+RANGER_SIM_ADDRESS: of the project's repository, for links of a release (dev/publication.py).
 RANGER_SIM_BUILT=1: an editable install does not build again what `make` has just built.
 """
 
@@ -30,7 +31,7 @@ from setuptools.modified import newer_group
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 try:
-    from dev import declarations, stubs  # not in the package: an installation does not need them
+    from dev import declarations, publication, stubs  # not in the package: an installation does not need them
     from ranger_sim import loading
 except ImportError as error:
     sys.exit(f"ranger-sim cannot be built: {error}")
@@ -398,7 +399,15 @@ def one_line(error):
 
 
 if __name__ == "__main__":
+    import ranger_sim
+
+    address = os.environ.get("RANGER_SIM_ADDRESS", "")
     setup(
+        long_description=publication.readme(
+            (HERE / "README.md").read_text(encoding="utf-8"), address, ranger_sim.__version__
+        ),
+        long_description_content_type="text/markdown",
+        project_urls=publication.addresses(address, ranger_sim.__version__),
         packages=find_namespace_packages(include=["ranger_sim", "ranger_sim.*"], exclude=["*__pycache__*"]),
         package_dir={"ranger_sim": "ranger_sim"},
         ext_modules=[] if why_not_compiled() else extensions(),

@@ -17,7 +17,7 @@ import venv
 
 import pytest
 
-from dev import declarations
+from dev import declarations, publication
 from ranger_sim import __version__, loading
 from ranger_sim.tools import cli
 from set_up import SetUpError, for_a_walk, name_of, part_of_lock
@@ -169,7 +169,7 @@ def checkout(tmp_path):
     for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
     (tmp_path / "dev").mkdir()
-    for name in ("__init__.py", "declarations.py", "stubs.py"):
+    for name in ("__init__.py", "declarations.py", "publication.py", "stubs.py"):
         shutil.copy(ROOT / "dev" / name, tmp_path / "dev")
     (tmp_path / "ranger_sim").mkdir()
     for name in ("__init__.py", "__main__.py", "loading.py", "py.typed"):
@@ -544,3 +544,33 @@ robot.replace("NOPE", "mc_compliant_control", lambda: None, cost=1)
         ("7", "call-arg"),
         ("8", "arg-type"),
     ]
+
+
+# --- what the package index shows
+
+
+def test_the_readmes_links_lead_to_files_of_the_tag_and_images_to_their_bytes():
+    address, text = "https://host.example/owner/name", (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = publication.readme(text, address + "/", "1.2.3")
+    assert not re.search(r"\]\((?!https?://|#)", shown)
+    kinds = re.findall(rf"\]\({address}/(blob|raw)/v1\.2\.3/([^)#]+)", shown)
+    assert len(kinds) > 20 and [path for _, path in kinds if not (ROOT / path).exists()] == []
+    assert {kind for kind, path in kinds if path.endswith((".svg", ".png"))} == {"raw"}
+    assert {kind for kind, path in kinds if path.endswith(".md")} == {"blob"}
+    assert publication.readme(text, "", "1.2.3") == text
+
+
+def test_a_link_around_an_image_and_a_link_elsewhere():
+    text = "[![a](docs/a.svg)](docs/a.md) [b](https://b.example/c) [d](#e)"
+    there = "https://h/o/n"
+    assert publication.readme(text, there, "1") == (
+        f"[![a]({there}/raw/v1/docs/a.svg)]({there}/blob/v1/docs/a.md) [b](https://b.example/c) [d](#e)"
+    )
+
+
+def test_a_build_has_addresses_only_where_it_gets_one():
+    asked = ["setup.py", "-q", "--name", "--url", "--long-description"]
+    assert publication.addresses("", "1") == {}
+    without = run(asked, ROOT).stdout
+    with_one = run(asked, ROOT, RANGER_SIM_ADDRESS="https://h/o/n").stdout
+    assert "](docs/" in without and "](docs/" not in with_one and f"/blob/v{__version__}/docs/" in with_one
