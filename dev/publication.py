@@ -1,6 +1,6 @@
 """What the package index shows of a release: the README with absolute links, and where the project lives.
 
-A checkout has no address of its own. The release's workflow gives it in RANGER_SIM_ADDRESS
+A checkout does not know its address. The workflow of a release gives it in RANGER_SIM_ADDRESS
 (https://HOST/OWNER/NAME of a GitHub repository); without it links stay relative and there are no addresses.
 """
 
