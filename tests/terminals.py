@@ -18,13 +18,14 @@ PATIENCE_S = 120.0
 
 
 class Terminal:
-    """`ranger-sim WORDS` in a session of its own whose terminal has so many columns. A context manager."""
+    """`ranger-sim WORDS`, or those of another module, in a session of its own whose terminal has so many columns. A context manager."""
 
-    def __init__(self, *words: object, folder: pathlib.Path, columns: int = 80) -> None:
+    def __init__(self, *words: object, folder: pathlib.Path, columns: int = 80, module: str = "ranger_sim") -> None:
         self.shown = ""
         self.stopped = self.code = None
-        command = [sys.executable, "-m", "ranger_sim", *map(str, words)]
+        command = [sys.executable, "-m", module, *map(str, words)]
         environment = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
+        environment |= {"TERM": "xterm", "PYTHONPATH": str(pathlib.Path.cwd())}
         # The size is set before the program begins: it waits for the end of this pipe.
         go_read, go_write = os.pipe()
         self.process, self.master = pty.fork()
@@ -32,7 +33,7 @@ class Terminal:
             os.close(go_write)
             os.read(go_read, 1)
             os.chdir(folder)
-            os.execve(command[0], command, environment | {"TERM": "xterm", "PYTHONPATH": str(pathlib.Path.cwd())})
+            os.execve(command[0], command, environment)
         os.close(go_read)
         fcntl.ioctl(self.master, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
         os.close(go_write)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, MalformedError
-from ranger_sim.can_bus.edge.peers import FOREIGN, FULL, LIMITS, MALFORMED, REASONS, SocketStream
+from ranger_sim.can_bus.edge.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import (
     DROPPED,
@@ -71,11 +71,9 @@ class AttachServer(StreamServer[_Client]):
 
     def _last_bytes(self, reason: str) -> bytes:
         """A REFUSED."""
-        words = {
-            FOREIGN: f"{self.name!r} belongs to another user",
-            FULL: f"{self.name!r} has {self.limits.peers} clients already",
-        }
-        return self._refused(words.get(reason, f"this client {REASONS[reason]}"))
+        if reason == FULL:
+            return self._refused(f"{self.name!r} has {self.limits.peers} clients already")
+        return self._refused(f"this client {REASONS[reason]}")
 
     def _refused(self, reason: str) -> bytes:
         self.totals["refused"] += 1

@@ -14,7 +14,8 @@ open`. Nothing here blocks, uses a thread, or raises because of a peer.
    has sent nothing for longest.
 5. A peer that breaks the rule is disconnected and counted by reason (REASONS), which is shown to the user. Its
    unfinished requests are dropped.
-6. Only programs of this user and of root are served, and no other server is trusted: SO_PEERCRED on local sockets; on
+6. Only programs of this user and of root are served, others are disconnected before the first byte either way, and no
+   other server is trusted: SO_PEERCRED on local sockets; on
    loopback the kernel of Linux reports the owner of the other end. Owners on other machines are unknown, so listening
    beyond this machine must be requested explicitly. Other systems do not report owners: there a server on loopback
    serves every user of this machine, which its line of output says.
@@ -390,6 +391,10 @@ class PeerServer(Generic[P]):
             except OSError:
                 break
             self.arrivals -= 1.0
+            if (fault := fault_of_owner(connection)) is not None:  # before anything is read or written
+                self.sent_away[fault] += 1
+                connection.close()
+                continue
             peer = self._welcome(connection)
             self.arrived += 1
             peer.last = self.worked + self.arrived
@@ -399,9 +404,7 @@ class PeerServer(Generic[P]):
             if full and idle is not None:
                 self.send_away(idle, IDLE)
             self.let_in(peer)
-            if (fault := fault_of_owner(connection)) is not None:
-                self.send_away(peer, fault)
-            elif full and idle is None:
+            if full and idle is None:
                 self.send_away(peer, FULL)
             if peer.ending:  # it takes no place while the reason is sent to it
                 self._write(peer)

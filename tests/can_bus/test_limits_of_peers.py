@@ -264,12 +264,12 @@ def test_while_a_robot_waits_for_its_time_no_requests_are_carried_out_and_while_
     assert done[-1] - done[waiting + 5] == pytest.approx((395 - waiting) * LIMIT.requests, rel=0.02)
 
 
-def test_another_users_program_gets_the_reason_and_is_closed(server, monkeypatch):
+def test_another_users_program_is_closed_before_the_first_byte(server, monkeypatch):
     monkeypatch.setattr(peers, "user_behind", lambda connection: os.getuid() + 1)
+    monkeypatch.setattr(server, "_welcome", lambda connection: pytest.fail("it was greeted"))
     client = server.connect()
-    client.send(b"\n")
     server.receive(0)
-    assert client.recv(100) == b"foreign" and server.sent_away == {"foreign": 1} and not server.peers
+    assert client.recv(100) == b"" and server.sent_away == {"foreign": 1} and not server.peers
 
 
 def test_a_server_of_another_user_is_not_trusted(server, monkeypatch):

@@ -14,6 +14,8 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from ranger_sim.can_bus.edge.peers import REASONS, fault_of_owner
+
 MOST = 64  # chosen by us: 16 pages, and 8 browsers that load one by six connections each
 PATIENCE_S = 2.0  # for a client to read why it is refused; as can_bus/edge/peers.py
 MADE_ROOM, NO_HTTP = "a connection that was not a page, dropped for a new one", "no HTTP"
@@ -35,6 +37,11 @@ class Connections:
 
             def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
                 super().connection_made(transport)
+                fault = fault_of_owner(transport.get_extra_info("socket"))
+                if fault is not None:  # before anything is read or written
+                    transport.abort()
+                    connections.refuse(f"a connection that {REASONS[fault]}")
+                    return
                 connections.on_connection(transport)
 
             def data_received(self, data: bytes) -> None:

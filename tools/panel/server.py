@@ -64,6 +64,11 @@ def place_of(origin: str) -> str:
         return ""
 
 
+def cookie_of(asked: HTTPConnection) -> str:
+    """Name of the cookie with the token: a browser keeps cookies by host, and every panel has a port of its host."""
+    return f"{COOKIE}-{asked.scope['server'][1]}"
+
+
 class PanelServer:
     """Serves one source. `app` is the ASGI application; `log` receives messages for the user."""
 
@@ -105,7 +110,7 @@ class PanelServer:
         origin = asked.headers.get("origin")
         if origin is not None and place_of(origin) != host:
             return "a page of another site"
-        token = asked.query_params.get("token") or asked.cookies.get(COOKIE) or ""
+        token = asked.query_params.get("token") or asked.cookies.get(cookie_of(asked)) or ""
         return None if hmac.compare_digest(token.encode(), self.token.encode()) else "a wrong token"
 
     async def page(self, request: Request) -> Response:
@@ -114,7 +119,7 @@ class PanelServer:
         if fault is not None:
             return self.refusal(fault)
         answer = FileResponse(PAGE / "index.html", media_type=TYPES[".html"])
-        answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict")
+        answer.set_cookie(cookie_of(request), self.token, httponly=True, samesite="strict")
         answer.headers["Content-Security-Policy"] = (
             "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:"
         )

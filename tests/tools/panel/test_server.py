@@ -158,15 +158,19 @@ def test_a_small_message_does_not_wait_for_the_one_before_to_be_acknowledged():
     assert asyncio.run(delays()) != 0
 
 
+def cookie(address):
+    return f"{COOKIE}-{address.rpartition(':')[2]}"
+
+
 def test_the_page_is_served_to_clients_with_the_token_and_leaves_it_in_a_cookie(panel):
     _, address, _ = panel
     status, headers, body = get(address, f"/?token={TOKEN}")
     assert status == 200 and b"<title>" in body
-    assert headers["set-cookie"].startswith(f"{COOKIE}={TOKEN}; HttpOnly")
+    assert headers["set-cookie"].startswith(f"{cookie(address)}={TOKEN}; HttpOnly")
     for name in server.FILES:
-        status, headers, body = get(address, f"/{name}", Cookie=f"{COOKIE}={TOKEN}")
+        status, headers, body = get(address, f"/{name}", Cookie=f"{cookie(address)}={TOKEN}")
         assert status == 200 and body, name
-    status, _, body = get(address, "/panel.py", Cookie=f"{COOKIE}={TOKEN}")
+    status, _, body = get(address, "/panel.py", Cookie=f"{cookie(address)}={TOKEN}")
     assert status == 404 and b"there is no such file" in body
 
 
@@ -350,7 +354,7 @@ def test_a_page_gets_two_pictures_ahead_of_what_it_has_shown_and_no_third(panel)
 
 
 def exported(address, query, kind="csv"):
-    return get(address, f"/export/{kind}?{query}", Cookie=f"{COOKIE}={TOKEN}")
+    return get(address, f"/export/{kind}?{query}", Cookie=f"{cookie(address)}={TOKEN}")
 
 
 def test_what_the_plots_show_stays_wanted_while_another_view_hides_them(panel):
