@@ -123,7 +123,7 @@ COMMANDS = {
 
 
 def processes(session):
-    """The processes of a session and their children, also those in sessions of their own."""
+    """The processes of a session and all their descendants, in whatever session."""
     parents = {}
     for each in pathlib.Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):

@@ -34,23 +34,23 @@ def test_another_user_is_refused_before_the_first_byte(name, folder):
         assert not {place: answer for place, answer in got.items() if answer not in listeners.REFUSALS}
 
 
-def test_the_stranger_would_see_a_greeting_and_an_open_connection(tmp_path):
-    """The oracle can fail: a server that greets, one that waits, and one that hangs up."""
+def test_the_stranger_would_see_data_sent_at_once_and_an_open_connection(tmp_path):
+    """The oracle can fail: a server that sends at once, one that waits, and one that closes."""
     kept = []
 
-    def serve(listener, greeting, keep):
+    def serve(listener, data, keep):
         for _ in range(2 if keep else 1):  # the stranger comes again, with TLS
             connection, _ = listener.accept()
-            connection.sendall(greeting)
+            connection.sendall(data)
             if keep:
                 kept.append(connection)
             else:
                 connection.close()
 
     found = {}
-    for greeting, keep, wanted in ((b"hello", False, "5 bytes"), (b"", True, "open"), (b"", False, "closed")):
+    for data, keep, wanted in ((b"hello", False, "5 bytes"), (b"", True, "open"), (b"", False, "closed")):
         with socket.create_server(("127.0.0.1", 0)) as listener:
-            thread = threading.Thread(target=serve, args=(listener, greeting, keep), daemon=True)
+            thread = threading.Thread(target=serve, args=(listener, data, keep), daemon=True)
             thread.start()
             port = str(listener.getsockname()[1])
             assert ("tcp", port) in listeners.endpoints([os.getpid()])
