@@ -218,11 +218,9 @@ EMPS = Source(
     Carriage,
     {"position_m": "position_measured_m", "voltage_V": "motor_voltage_command_V"},
 )
-PENDULUM = Source(
-    ("public/pendulum_ddp.csv",),
-    Pendulum,
-    {"position_rad": "position", "velocity_rad_per_s": "velocity", "torque_Nm": "torque"},
-    0.6,
+TORQUE = {"position_rad": "position", "velocity_rad_per_s": "velocity", "torque_Nm": "torque"}
+BY_HAND, SWING_UP = (
+    Source((f"public/pendulum_{each}.csv",), Pendulum, TORQUE, 0.6) for each in ("by_hand", "swing_up")
 )
 COULOMB, VISCOUS = (("coulomb_friction",), "size"), (("viscous_friction",), "size")
 TERMS = (
@@ -233,7 +231,8 @@ TERMS = (
     Term("joint 1, viscous friction", _joint(1), ("viscous_As_per_rad",), _rate, *VISCOUS),
     Term("EMPS, Coulomb friction", EMPS, ("coulomb_V",), _sign, *COULOMB),
     Term("EMPS, viscous friction", EMPS, ("viscous_Vs_per_m",), _rate, *VISCOUS),
-    Term("pendulum, gravity", PENDULUM, ("weight_Nm",), _sine, ("gravity",), "sine"),
+    Term("pendulum by hand, gravity", BY_HAND, ("weight_Nm",), _sine, ("gravity",), "sine"),
+    Term("pendulum swinging up, gravity", SWING_UP, ("weight_Nm",), _sine, ("gravity",), "sine"),
 )
 
 

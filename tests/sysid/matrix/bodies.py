@@ -282,7 +282,7 @@ class Hidden:
 
     law: object
     names: tuple
-    numbers: object = dict
+    numbers: object = lambda draw: {}
     coefficient: str = ""
     factor: float = 1.0
 

@@ -1,5 +1,7 @@
 """Recordings of a cell, sound or with a hidden effect of a known strength, and what the diagnosis says about them."""
 
+import functools
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -78,8 +80,7 @@ def size_of(cell, seed, hidden, numbers):
     then the length UNIT.
     """
     run = made(cell, seed, none(0.0, {}), "a")
-    channels, per = list(run.channels.values()), round(1.0 / cell.rate_hz / H_S)
-    del channels
+    per = round(1.0 / cell.rate_hz / H_S)
     fine_law, rates, places = hidden.law(1.0, numbers), *_motion(cell.machine, run)
     effect = np.array([fine_law(rate, place, 0.0) for rate, place in zip(rates[::per], places[::per], strict=True)])
     rows = len(effect)
@@ -113,14 +114,21 @@ def _motion(machine, run):
     return np.gradient(there, H_S), there
 
 
+@functools.cache
+def one(cell, seed, name):
+    """(size of strength 1, numbers) of an effect of HIDDEN in a case."""
+    hidden = HIDDEN[cell.machine][name]
+    numbers = hidden.numbers(generator(seed, f"matrix {cell.name} {name}"))
+    return size_of(cell, seed, hidden, numbers), numbers
+
+
 def recordings(cell, seed, name="", strength=0.0):
     """(columns to train with, columns held out, size, numbers) of a case; name: of HIDDEN, "" for a sound one."""
     law, size, numbers = none(0.0, {}), 0.0, {}
     if name:
-        hidden = HIDDEN[cell.machine][name]
-        numbers = hidden.numbers(generator(seed, f"matrix {cell.name} {name}")) if hidden.numbers is not dict else {}
-        size = strength * size_of(cell, seed, hidden, numbers)
-        law = hidden.law(size, numbers)
+        unit, numbers = one(cell, seed, name)
+        size = strength * unit
+        law = HIDDEN[cell.machine][name].law(size, numbers)
     found = [
         shown(cell, generator(seed, f"matrix {cell.name} noise {tag}"), made(cell, seed, law, tag).channels)
         for tag in "ab"
