@@ -14,12 +14,12 @@ UNIT = 4.85  # standard errors: one of 28 candidates is then detected nine times
 MEMORY = 0.9  # of coloured noise, from row to row
 MUCH = 0.1  # of a row, between two channels of a multiplexer
 SETTLED = 2  # fine steps after a held voltage has changed: the bench's current has settled, its motion has not begun
-# standard deviations; what has none is a command, and exact
+# Standard deviations; what has none is a command, and exact. Positioning: its encoder counts 0.1 um, as that of EMPS
 NOISE = {
     "bench": {"voltage_V": 0.008, "current_A": 0.02, "speed_rad_per_s": 0.04, "torque_Nm": 0.008},
     "leg": {"hip_angle_rad": 3e-4, "current_A": 0.02, "voltage_V": 0.008},
     "ankle": {"joint_angle_rad": 5e-4},
-    "positioning": {"position_m": 1e-6, "voltage_V": 1e-3},
+    "positioning": {"position_m": 1e-7, "voltage_V": 1e-3},
     "axis": {"voltage_V": 0.01, "current_A": 0.03, "position_m": 2e-5},
 }
 COUNT_RAD = 2.0 * np.pi / 2048.0  # of the bench's encoder
