@@ -46,8 +46,11 @@ class Case:
 
 def cases(seed):
     for each in hidden_effects.CASES:
-        made = [each.make(each.cause, each.size, one) for one in (seed, seed + 100)]
-        yield Case(each.title, each.machine, tuple(name for name, _ in each.names), lambda made=made: made)
+
+        def made(each=each):
+            return [each.make(each.cause, each.size, one) for one in (seed, seed + 100)]
+
+        yield Case(each.title, each.machine, tuple(name for name, _ in each.names), made)
     for name in HIDDEN:
         cell = next(each for each in CELLS if each.machine == name)
         for effect, hidden in HIDDEN[name].items():

@@ -30,6 +30,7 @@ from tests.sysid.matrix.__main__ import save
 
 BLIND = ("motor-bench", "leg-swing", "ankle")
 LOW, HIGH = 0.90, 0.98  # of the target
+ENOUGH = 50  # intervals: fewer keep no target, and may miss one
 
 
 def of_machine(title, seed):
@@ -111,9 +112,8 @@ class Row:
         if not self.intervals:
             return [*shown[:2], "", "", "", ""]
         low, high = share_interval(self.held, self.intervals)
-        verdict = (
-            "**missed**" if high < LOW or low > HIGH else ("kept" if LOW <= self.held / self.intervals else "open")
-        )
+        verdict = "kept" if self.held / self.intervals >= LOW and self.intervals >= ENOUGH else "open"
+        verdict = "**missed**" if high < LOW or low > HIGH else verdict
         return [*shown, f"{low:.0%} to {high:.0%}", verdict, f"{statistics.median(self.errors):.1%}"]
 
 
