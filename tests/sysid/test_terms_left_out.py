@@ -12,6 +12,7 @@ import pytest
 
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.pipeline import diagnose
+from tests.sysid.left_out_terms import TERMS
 from tests.sysid.robot_joint import HeavyJoint, Joint
 
 DATA = pathlib.Path(os.environ.get("RANGER_SIM_DATA", pathlib.Path(__file__).parents[3] / "shared" / "data"))
@@ -69,3 +70,16 @@ def test_a_term_too_small_for_these_data_has_its_smallest_visible_size_printed()
     answer, _ = diagnosed("joint4", 0.02)
     assert "gravity" not in [each["name"] for each in answer["causes"]]
     assert answer["evidence"]["smallest_visible"]["gravity at angle_rad"]["cosine"] > 0.02 * abs(GRAVITY_A)
+
+
+BY_HAND = next(each for each in TERMS if each.title == "pendulum by hand, gravity")
+
+
+@pytest.mark.skipif(not BY_HAND.source.there(), reason="the public pendulum is not here (RANGER_SIM_DATA)")
+@pytest.mark.parametrize("share", [0.2, 1.0])
+def test_gravity_of_a_pendulum_that_others_measured_is_named_with_its_size(share):
+    """Turned slowly by hand; its torque is 3.31 N m times the sine of its angle, by least squares of both parts."""
+    value, _, _ = BY_HAND.fitted()
+    first = BY_HAND.diagnosed(share, value).causes[0]
+    assert first.name == "gravity"
+    assert first.parameters["sine"].value == pytest.approx(share * value, rel=0.03)
