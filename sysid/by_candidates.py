@@ -27,7 +27,6 @@ from ranger_sim.sysid import (
 )
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
-from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
@@ -419,7 +418,7 @@ def _own(recording: Recording, name: str) -> float:
     predictor = getattr(recording, "predictor", None)
     if predictor is not None:
         return float(predictor.unit[list(getattr(recording, "outputs", ())).index(name)])
-    alone = roughness(recording.table, recording.equations[name].response)
+    alone = signals.roughness(recording.table, recording.equations[name].response)
     return alone / math.sqrt(max(1.0, 2.0 * recording.width * math.sqrt(math.pi)))
 
 

@@ -10,7 +10,9 @@ import pytest
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.free_simulation import Jacobians, Predictor, averaged, forced, held, roughness, runge_kutta
+from ranger_sim.sysid.free_simulation import held, runge_kutta
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forced
+from ranger_sim.sysid.signals import averaged, roughness
 
 N, S, IN, OUT = 24, 2, 2, 2
 STARTS = np.array([0, 10])
