@@ -12,39 +12,56 @@ from ranger_sim.sysid.machine import Values
 
 NUDGE = 1e-6  # of a state's size: step of a central difference
 
+SAME = 1e-6  # of what enters
 
-def entering(acting: Sequence[Acting], seen: SimulatedRecording, values: Values) -> Array:
-    """(n, ports, coefficients): the effects' input at the ports, for a unit of each coefficient."""
-    return np.concatenate([seen.entering(each.term.make(seen, each.shape, values)) for each in acting], axis=2)
+Entering = dict[int, Array]  # by number of the port (n, k), for a unit of each of an effect's k coefficients
+
+
+def entering(each: Acting, seen: SimulatedRecording, values: Values) -> Entering:
+    """What an effect puts into the ports along a trajectory."""
+    return seen.entering(each.term.make(seen, each.shape, values))
+
+
+def total(enter: Sequence[Entering], coefficients: Sequence[Array], rows: int, ports: int) -> Array:
+    """(rows, ports) of effects together."""
+    out = np.zeros((rows, ports))
+    for each, own in zip(enter, coefficients, strict=True):
+        for number, column in each.items():
+            out[:, number] += column @ own
+    return out
+
+
+def same(one: Entering, other: Entering) -> bool:
+    """True where an effect puts the same into the ports, to a part of its size."""
+    return one.keys() == other.keys() and all(
+        np.max(np.abs(one[number] - other[number])) <= SAME * np.max(np.abs(one[number])) for number in one
+    )
 
 
 def fed_back(
-    acting: Sequence[Acting],
-    seen: SimulatedRecording,
-    values: Values,
-    coefficients: Array,
-    sizes: Mapping[str, float],
-) -> Array:
-    """(n, ports, states): what acts depends on the states, as gravity does on an angle; by differences.
+    each: Acting, enter: Entering, seen: SimulatedRecording, values: Values, own: Array, sizes: Mapping[str, float]
+) -> dict[tuple[int, str], Array]:
+    """By port and state (n,): how what acts depends on the states, as gravity does on an angle; by differences.
 
-    Only where it depends on the states of its own sample: what remembers is not fed back. sizes: of the states.
+    Only where it depends on the states of its own sample: what remembers is not fed back. own: its coefficients;
+    sizes: of the states.
     """
     rows = len(seen.table)
-    out = np.zeros((rows, len(seen.ports), len(sizes)))
     every_second = np.arange(rows) % 2 == 0
-    first = 0
-    for each in acting:
-        own = coefficients[first : first + len(each.coefficients)]
-        first += len(each.coefficients)
+    now = total([enter], [own], rows, len(seen.ports))
 
-        def moved(name: str, by: Array, each: Acting = each, own: Array = own) -> Array:
-            there = dataclasses.replace(seen, signals=seen.signals | {name: seen.signals[name] + by})
-            return np.asarray(there.entering(each.term.make(there, each.shape, values)) @ own)
+    def moved(by: Mapping[str, Array | float]) -> Array:
+        there = dataclasses.replace(seen, signals=seen.signals | {name: seen.signals[name] + by[name] for name in by})
+        return total([entering(each, there, values)], [own], rows, len(seen.ports))
 
-        for number, (name, size) in enumerate(sizes.items()):
-            nudge = NUDGE * size
-            up, down = moved(name, nudge * every_second), moved(name, -nudge * every_second)
-            if np.array_equal(up[~every_second], down[~every_second]) and not np.array_equal(up, down):
-                up, down = moved(name, np.full(rows, nudge)), moved(name, np.full(rows, -nudge))
-                out[:, :, number] += (up - down) / (2.0 * nudge)
+    out: dict[tuple[int, str], Array] = {}
+    if np.array_equal(moved({name: NUDGE * size for name, size in sizes.items()}), now):
+        return out
+    for name, size in sizes.items():
+        nudge = NUDGE * size
+        up = moved({name: nudge * every_second})
+        if np.array_equal(up, now) or not np.array_equal(up[~every_second], now[~every_second]):
+            continue
+        slope = (moved({name: nudge}) - moved({name: -nudge})) / (2.0 * nudge)
+        out |= {(number, name): slope[:, number] for number in enter}
     return out

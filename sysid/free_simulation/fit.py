@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,17 +12,25 @@ from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation import acting as effects
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
-from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, between, forced
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.simulator import Simulator
 from ranger_sim.sysid.free_simulation.terms import Acting, sensed
+from ranger_sim.sysid.machine import Values
 
 ROUNDS = 30  # of Gauss and Newton, at most
 RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
 WORSE = 4.0  # times the least sum of squares: a round that ended there went too far
+# Of a step, after one that went too far, or after which the errors rose by so much, and otherwise: what acts may depend
+# on what the simulator shows, which the derivatives do not have, and then full steps go to and fro for ever
+SHORTER, RISES, SHORT, LONGER = 0.25, 1.1, 0.6, 1.2
 STEADY = 0.1  # standard errors of a parameter: a smaller step of all of them ends the rounds
+CLOSING = 5  # times that outputs and what acts are computed from each other, at most
 AWAY = 30.0  # a free initial state's deviation, in rms of the state: practically unknown
 LOUDER = 2.0  # times the channel's own noise estimate (`signals.roughness`), which misses slower noise. Chosen by us
+# Rounds, and the part to which the errors' square must fall within them, while a parameter still moves by so many of
+# its standard errors: otherwise the rounds end
+PATIENCE, FALLS, WANDERING = 5, 0.9, 10.0
 FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
@@ -74,11 +83,10 @@ class TrajectoryFit:
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
         self.acting: list[Acting] = []
+        self.enter: list[effects.Entering] = []  # of what acts, along the trajectory of the last round
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
-        # (n, ports, coefficients): input at the ports for a unit of each coefficient of what acts
-        self.at_ports = np.zeros((len(table), len(self.simulator.ports), 0))
 
     @property
     def count(self) -> int:
@@ -107,7 +115,7 @@ class TrajectoryFit:
         new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
         new.damped = np.zeros(len(new.p))
         new.came_from = (new.x, new.u, new.p)
-        new.at_ports = np.zeros((*self.at_ports.shape[:2], len(added)))  # filled by the first round, if any effect acts
+        new.enter = []  # until the first round
         return new
 
     def with_all(self, acting: Sequence[Acting]) -> "TrajectoryFit":
@@ -131,33 +139,61 @@ class TrajectoryFit:
         along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         along |= simulator.inputs | {name: self.u[:, i] for i, name in enumerate(simulator.noisy)}
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
+        entering = self._entering()
         for number, each in enumerate(machine.outputs, len(machine.ports)):
-            along[sensed(each.channel)] = along[each.channel] - self._entering()[:, number]
+            along[sensed(each.channel)] = along[each.channel] - entering[:, number]
         along["t"] = self.table.time_s - self.table.time_s[0]
         along |= machine.extra_signals(along, self.table)
         return SimulatedRecording(self.table, along, {}, ports=simulator.ports)
 
+    def _coefficients(self) -> list[Array]:
+        """Of each effect that acts."""
+        ends = np.cumsum([self.count, *(len(each.coefficients) for each in self.acting)])
+        return [self.p[a:b] for a, b in itertools.pairwise(ends)]
+
     def _entering(self) -> Array:
         """(n, ports): what acts puts into the ports."""
-        return self.at_ports @ self.p[self.count :]
+        coefficients = self._coefficients() if self.enter else []
+        return effects.total(self.enter, coefficients, len(self.x), len(self.simulator.ports))
 
-    def linearise(self) -> Jacobians:
-        """About the present trajectory; with the effects that act."""
-        count, values = self.count, dict(zip(self.simulator.names, self.p, strict=False))
-        ports = np.zeros((1, len(self.simulator.ports)))
-        if self.acting:
-            self.at_ports = effects.entering(self.acting, self.seen(), values)
-            ports = self._entering()
-        sizes = self.size_x, self.size_u, self.size_p[:count]
-        lin = self.simulator.linearised(self.x, self.u, self.p, ports, sizes)
-        if self.acting:
-            states = dict(zip(self.machine.states, self.size_x, strict=True))
-            back = effects.fed_back(self.acting, self.seen(), values, self.p[count:], states)
+    def _closed(self, values: Values) -> SimulatedRecording:
+        """Signals along the trajectory, and `enter` by them: what acts may depend on an output that it changes.
+
+        Half of each change: where an effect takes more away than there was, as a winding that heats by its own current
+        does, the whole change would go to and fro.
+        """
+        for _ in range(CLOSING):
+            if self.enter:
+                driven = self.simulator.driven(self.u, self._entering())
+                shown = self.simulator.at(self.x, self.p, driven)[1]
+                self.lin = dataclasses.replace(self.lin, output=0.5 * (self.lin.output + shown))
+            seen, before = self.seen(), self.enter
+            self.enter = [effects.entering(each, seen, values) for each in self.acting]
+            if before and all(effects.same(one, other) for one, other in zip(before, self.enter, strict=True)):
+                break
+        return seen
+
+    def linearise(self, every_port: bool = True) -> Jacobians:
+        """About the present trajectory, with the effects that act; by all ports, or only by those in which one acts."""
+        simulator, states = self.simulator, self.machine.states
+        values = dict(zip(simulator.names, self.p, strict=False))
+        seen = self._closed(values) if self.acting else None
+        there = sorted({number for each in self.enter for number in each})
+        sizes = self.size_x, self.size_u, self.size_p[: self.count]
+        lin = simulator.linearised(
+            self.x, self.u, self.p, self._entering(), sizes, range(len(simulator.ports)) if every_port else there
+        )
+        back = np.zeros((len(self.x), len(simulator.ports), len(states)))
+        for each, enter, own in zip(self.acting, self.enter, self._coefficients(), strict=True):
+            assert seen is not None
+            slopes = effects.fed_back(each, enter, seen, values, own, dict(zip(states, self.size_x, strict=True)))
+            for (number, name), slope in slopes.items():
+                back[:, number, states.index(name)] += slope
+            state, output = forcing(lin, enter, simulator.held_ports)
+            lin.f_p, lin.h_p = np.concatenate((lin.f_p, state), axis=2), np.concatenate((lin.h_p, output), axis=2)
+        if np.any(back):
             after = np.concatenate((back[1:], back[-1:]))  # a step has the mean of its two ends
-            held = self.simulator.is_held()
             lin.f_x, lin.h_x = lin.f_x + 0.5 * lin.f_q @ (back + after @ lin.f_x), lin.h_x + lin.h_q @ back
-            lin.f_p = np.concatenate((lin.f_p, forced(lin.f_q, between(self.at_ports, held))), axis=2)
-            lin.h_p = np.concatenate((lin.h_p, forced(lin.h_q, self.at_ports)), axis=2)
         numbers = (lin.next_state, lin.output, lin.f_x, lin.h_x, lin.f_p, lin.h_p)
         if not all(np.all(np.isfinite(each)) for each in numbers):
             raise UserError(
@@ -182,9 +218,9 @@ class TrajectoryFit:
             + self.slack
         )
 
-    def round(self) -> float:
+    def round(self, every_port: bool = False) -> float:
         """One round; returns the largest step of a parameter in its standard errors."""
-        self.lin = lin = self.linearise()
+        self.lin = lin = self.linearise(every_port)
         self.predictor = Predictor(
             lin, self.noise_u, self.noise_y, self.loose(), self.starts, AWAY * self.size_x, self.predictor
         )
@@ -195,9 +231,12 @@ class TrajectoryFit:
         gap[self.ends] = 0.0
         self.state = -(gap + (lin.f_u @ offset[:, :, None])[:, :, 0])
         self.output = self.y - lin.output - (lin.h_u @ offset[:, :, None])[:, :, 0]
-        errors = wide.errors(self.state[:, :, None], self.output[:, :, None])
-        moved = wide.errors(lin.f_p, lin.h_p)
-        self.response, self.columns = wide.white(errors)[:, :, 0], wide.white(moved)
+        x, errors = wide.predicted(
+            np.concatenate((self.state[:, :, None], lin.f_p), axis=2),
+            np.concatenate((self.output[:, :, None], lin.h_p), axis=2),
+        )
+        white = wide.white(errors)
+        self.response, self.columns = white[:, :, 0], white[:, :, 1:]
         n = self.response.size
         self.cost = float(np.mean((self.response / wide.unit) ** 2))
         a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * (self.size_p * self.moves)
@@ -207,11 +246,10 @@ class TrajectoryFit:
         ratio = np.divide(self.p + change, self.p, out=np.ones_like(self.p), where=self.low > 0.0)
         change *= min(1.0, *(0.5 / (1.0 - r) if r < 0.5 else 1.0 / (r - 1.0) if r > 2.0 else 1.0 for r in ratio))
         # the rest of the response, after the parameters' step, gives trajectory and inputs
-        state = self.state - (lin.f_p @ change)
-        output = self.output - (lin.h_p @ change)
-        dx, du = wide.smoothed(state, output, lin.f_u, lin.h_u, self.noise_u)
+        step = np.concatenate(([1.0], -change))
+        self.rest = errors @ step
+        dx, du = wide.smoothed(x @ step, self.rest, lin.f_u, lin.h_u, self.noise_u)
         self.x, self.u, self.p = self.x + dx, self.u + offset + du, self.p + change
-        self.rest = wide.errors(state[:, :, None], output[:, :, None])[:, :, 0]
         return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
 
     def _step(self, a: Array, b: Array) -> tuple[Array, Array]:
@@ -225,9 +263,11 @@ class TrajectoryFit:
         wanted = np.concatenate((b, -self.damped * self.p * length / self.size_p))
         change, error = np.zeros(len(self.p)), np.zeros(len(self.p))
         free = np.ones(len(self.p), dtype=bool)
+        # a triangle with the same products of columns: of few rows, and none of the digits is lost by squaring
+        triangle = np.linalg.qr(np.column_stack((scaled, wanted)), mode="r")
+        scaled, wanted = triangle[:, :-1], triangle[:, -1]
         while np.any(free):
-            columns = scaled[:, free]
-            u, sv, vt = np.linalg.svd(columns, full_matrices=False)
+            u, sv, vt = np.linalg.svd(scaled[:, free], full_matrices=False)
             strong = sv > 1e-6 * sv[0]
             found = vt[strong].T @ ((u.T @ wanted)[strong] / sv[strong])
             scale = self.size_p[free] / length[free]
@@ -256,9 +296,10 @@ class TrajectoryFit:
             self._follow()
 
     def _settled(self, rounds: int) -> bool:
-        """False when parameters still move after these rounds."""
-        renewed, best, share = 0, np.inf, 1.0
-        for _ in range(rounds):
+        """False when parameters still move after these rounds, or go far and lead nowhere."""
+        renewed, best, before, share = 0, np.inf, np.inf, 1.0
+        fell, low = 0, np.inf  # round in which the errors last fell, and to what
+        for number in range(rounds):
             accepted = (self.x, self.u, self.p)
             try:
                 with np.errstate(over="ignore", invalid="ignore"):  # far from a solution a machine may run away
@@ -269,28 +310,36 @@ class TrajectoryFit:
                 self.cost, self.predictor = np.inf, None
             if not self.cost < WORSE * best:
                 # too far: a part of the step from where it began, whose cost is another with the covariances of now
-                (self.x, self.u, self.p), best, share = self.came_from, np.inf, 0.25 * share
+                (self.x, self.u, self.p), best, share = self.came_from, np.inf, SHORTER * share
+                before = np.inf
                 continue
+            if self.cost > RISES * before:
+                share *= SHORT
+            before = self.cost
             if share < 1.0:
                 self.x, self.u, self.p = (
                     old + share * (new - old) for old, new in zip(accepted, (self.x, self.u, self.p), strict=True)
                 )
-                share = min(1.0, 2.0 * share)
+                share = min(1.0, LONGER * share)
             self.came_from = accepted
             best = min(best, self.cost)
+            if best < FALLS * low or step < WANDERING:
+                fell, low = number, best
+            elif number - fell >= PATIENCE:
+                return False
             if step > STEADY:
                 continue
             if renewed == RENEWED:
                 return True
             self._renew_noise()
-            renewed, best = renewed + 1, np.inf
+            renewed, best, before = renewed + 1, np.inf, np.inf
         return False
 
     def _follow(self) -> None:
         """Fit again from the start, along the measurement: states may leave the law by a share of their steps.
 
         A simulator without a large fault's cause has no good trajectory, and where its fit ends means nothing. The
-        share becomes smaller as long as it explains what is left.
+        share becomes smaller as long as it explains what is left; a law that explains all of it is fitted from there.
         """
         self.x, self.u, start = self.began
         self.p = np.concatenate((start[: self.count], np.zeros(len(self.p) - self.count)))
@@ -306,11 +355,15 @@ class TrajectoryFit:
             if not self.cost < MISSED and share < FOLLOWED[0]:
                 break
             kept = (self.x, self.u, self.p)
+        else:
+            self.slack, self.came_from = np.zeros_like(usual), kept
+            if self._settled(ROUNDS) and self.cost < FAR_OFF:
+                return
         (self.x, self.u, self.p), self.slack, self.predictor = kept, np.zeros_like(usual), None
 
     def round_again(self) -> None:
         """Linearise where the last round ended, without moving."""
         self.p_at = self.p.copy()
         x, u = self.x, self.u
-        self.round()
+        self.round(every_port=True)
         self.x, self.u = x, u

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.free_simulation.fit import AWAY, TrajectoryFit
-from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, between, forced
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.terms import Port, Ports, Shape, Term
 from ranger_sim.sysid.machine import Columns, Entry, Equation
@@ -34,17 +33,10 @@ class LinearisedRecording(SimulatedRecording):
 
     def respond(self, entries: Ports) -> Columns:
         """First-order response of the equations to an input at the ports: (n, k) each."""
-        unknown = [name for name in entries if name not in {port.name for port in self.ports}]
-        if unknown:
-            there = ", ".join(port.name for port in self.ports)
-            raise UserError(f"a term puts something into {', '.join(unknown)}; ports are {there}")
-        return self._reached(self._through(self.entering(entries)))
+        return self._reached(self.predictor.white(self.predictor.errors(*self._forcing(entries))))
 
-    def _through(self, entering: Array) -> Array:
-        """(n, outputs, k): white errors of an input at the ports (n, ports, k)."""
-        lin, held = self.linear, self.fit.simulator.is_held()
-        state, output = forced(lin.f_q, between(entering, held)), forced(lin.h_q, entering)
-        return self.predictor.white(self.predictor.errors(state, output))
+    def _forcing(self, entries: Ports) -> tuple[Array, Array]:
+        return forcing(self.linear, self.entering(entries), self.fit.simulator.held_ports)
 
     def _reached(self, white: Array) -> Columns:
         """(n, k) of each equation that has the effect."""
@@ -66,10 +58,11 @@ class LinearisedRecording(SimulatedRecording):
         return self.free[id(term), place]
 
     def _fill(self, made: Sequence[tuple[Term, int, Ports]]) -> None:
-        entering = [self.entering(ports) for _, _, ports in made]
-        white = self._through(np.concatenate(entering, axis=2))
+        forcings = [self._forcing(ports) for _, _, ports in made]
+        state, output = (np.concatenate(each, axis=2) for each in zip(*forcings, strict=True))
+        white = self.predictor.white(self.predictor.errors(state, output))
         first = 0
-        for (term, place, _), each in zip(made, entering, strict=True):
+        for (term, place, _), (each, _) in zip(made, forcings, strict=True):
             self.free[id(term), place] = self._reached(white[:, :, first : first + each.shape[2]])
             first += each.shape[2]
 

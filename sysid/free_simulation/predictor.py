@@ -1,6 +1,7 @@
 """The Kalman predictor and smoother of a simulator that was linearised about a trajectory."""
 
 import dataclasses
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from scipy.linalg import lapack
@@ -102,41 +103,47 @@ class Predictor:
 
     def errors(self, state: Array, output: Array) -> Array:
         """(n, o, k) prediction errors of forcings, not whitened."""
-        driven = self.into * (state - self.gain @ output)
-        x = self._march(np.concatenate((np.zeros_like(driven[:1]), driven[:-1])))
-        return self.h_x @ x + output
+        return self.predicted(state, output)[1]
+
+    def predicted(self, state: Array, output: Array) -> tuple[Array, Array]:
+        """((n, s, k) deviations of the predicted states, (n, o, k) prediction errors) of forcings, not whitened."""
+        driven = np.zeros_like(state)
+        driven[1:] = (self.into * (state - self.gain @ output))[:-1]
+        x = self._march(driven)
+        return x, self.h_x @ x + output
 
     def white(self, errors: Array) -> Array:
         """(n, o, k) of one deviation each, in the channels' units."""
         return (self.unspread @ errors) * self.unit[None, :, None]
 
-    def smoothed(self, state: Array, output: Array, f_u: Array, h_u: Array, noise_u: Array) -> tuple[Array, Array]:
+    def smoothed(self, x: Array, error: Array, f_u: Array, h_u: Array, noise_u: Array) -> tuple[Array, Array]:
         """(n, s) and (n, i): the most probable deviations of states and noisy inputs, given all samples.
 
-        state, output: (n, s), (n, o), forcings of the response (Bryson and Frazier's form of the smoother).
+        x, error: (n, s), (n, o), of the response, as `predicted` (Bryson and Frazier's form of the smoother).
         """
-        driven = self.into * (state[:, :, None] - self.gain @ output[:, :, None])
-        x = self._march(np.concatenate((np.zeros_like(driven[:1]), driven[:-1])))
-        error = self.h_x @ x + output[:, :, None]
-        weighed = self.unspread.transpose(0, 2, 1) @ (self.unspread @ error)
+        weighed = self.unspread.transpose(0, 2, 1) @ (self.unspread @ error[:, :, None])
         adjoint = self._march(self.h_x.transpose(0, 2, 1) @ weighed, backward=True)
         after = self.into * np.concatenate((adjoint[1:], np.zeros_like(adjoint[:1])))
-        states = -x + self.covariance @ adjoint
+        states = -x[:, :, None] + self.covariance @ adjoint
         weighed_less = weighed - self.gain.transpose(0, 2, 1) @ after
         inputs = h_u.transpose(0, 2, 1) @ weighed_less + f_u.transpose(0, 2, 1) @ after
         return states[:, :, 0], noise_u**2 * inputs[:, :, 0]
 
 
-def between(column: Array, held: np.ndarray) -> Array:
-    """(n, ports, k): means of each sample and the next, for the step between them; a held port's are the samples."""
+def between(column: Array) -> Array:
+    """(n, k): means of each sample and the next, for the step between them."""
     after = np.concatenate((column[1:], column[-1:]))
-    return np.where(held[None, :, None], column, 0.5 * (column + after))
+    return np.asarray(0.5 * (column + after))
 
 
-def forced(sensitivity: Array, entering: Array) -> Array:
-    """(n, r, k): the input at the ports, (n, q, k), times sensitivities (n, r, q) to it."""
-    out = np.zeros((len(entering), sensitivity.shape[1], entering.shape[2]))
-    for number in range(entering.shape[1]):
-        if np.any(entering[:, number]):
-            out += sensitivity[:, :, number, None] * entering[:, None, number]
-    return out
+def forcing(lin: Jacobians, entering: Mapping[int, Array], held: Collection[int]) -> tuple[Array, Array]:
+    """((n, s, k), (n, o, k)) forcings of what enters, (n, k) by number of its port; held: ports that hold a sample's
+    value until the next."""
+    n, s = lin.next_state.shape
+    count = next(iter(entering.values())).shape[1]
+    state, output = np.zeros((n, s, count)), np.zeros((n, lin.output.shape[1], count))
+    for number, column in entering.items():
+        through = column if number in held else between(column)
+        state += lin.f_q[:, :, number, None] * through[:, None]
+        output += lin.h_q[:, :, number, None] * column[:, None]
+    return state, output

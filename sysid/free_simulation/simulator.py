@@ -2,7 +2,7 @@
 
 import copy
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.integration import Quantities
 from ranger_sim.sysid.free_simulation.predictor import Jacobians
-from ranger_sim.sysid.free_simulation.terms import Port, into, on, shown
+from ranger_sim.sysid.free_simulation.terms import Joint, Port, into, on, shown
 
 NUDGE = 1e-6  # of a quantity's size: step of a central difference
 
@@ -30,6 +30,15 @@ class Numerics:
     def held_ports(self) -> frozenset[str]:
         """Ports of the inputs that are held."""
         return frozenset(into(name) for name in self.held)
+
+
+@dataclasses.dataclass(frozen=True)
+class Driven:
+    """Inputs and ports, (1, n) or one number for all samples, by name: at the samples, and in the middle of each part
+    of a step."""
+
+    samples: Quantities
+    middles: list[dict[str, Array]]
 
 
 class Simulator:
@@ -59,38 +68,50 @@ class Simulator:
         new.numerics = numerics
         return new
 
-    def is_held(self) -> np.ndarray:
-        """(q,) flags: the port of an input that is held."""
-        return np.array([port.name in self.numerics.held_ports for port in self.ports], dtype=bool)
+    @property
+    def held_ports(self) -> frozenset[int]:
+        """Numbers of the ports of the inputs that are held."""
+        names = self.numerics.held_ports
+        return frozenset(number for number, port in enumerate(self.ports) if port.name in names)
 
-    def at(self, x: Array, u: Array, p: Array, ports: Array) -> tuple[Array, Array]:
-        """(f, h) as (m, n, s) and (m, n, o). x: (m, n, s), u: (m, n, i), p: (m, n or 1, p), ports: (m, n or 1, q)."""
-        machine = self.machine
-        shape = np.broadcast_shapes(x.shape[:2], u.shape[:2], p.shape[:2], ports.shape[:2])
-        states = {name: x[..., i] for i, name in enumerate(machine.states)}
-        values = {name: p[..., i] for i, name in enumerate(self.names)}
+    def driven(self, u: Array, ports: Array) -> Driven:
+        """Inputs and ports. u: (n, i), ports: (n, q)."""
         given = {name: column[None] for name, column in self.inputs.items()}
-        given |= {name: u[..., i] for i, name in enumerate(self.noisy)}
-        at_ports = {each.name: ports[..., i] for i, each in enumerate(self.ports)}
+        given |= {name: u[None, :, i] for i, name in enumerate(self.noisy)}
+        # what is the same at all samples, as nothing at most ports, is one number
+        at_ports = {
+            each.name: ports[None, :1, i] if np.all(ports[:, i] == ports[0, i]) else ports[None, :, i]
+            for i, each in enumerate(self.ports)
+        }
         given = {name: column + at_ports[into(name)] for name, column in given.items()}
         given |= at_ports
         between = {name: self._between_samples(name, c) for name, c in given.items()}
+        shares = [(part + 0.5) / self.numerics.parts for part in range(self.numerics.parts)]
+        return Driven(given, [{name: at(share) for name, at in between.items()} for share in shares])
+
+    def at(self, x: Array, p: Array, driven: Driven) -> tuple[Array, Array]:
+        """(f, h) as (n, s) and (n, o). x: (n, s), p: (p,)."""
+        machine, shape = self.machine, (1, len(x))
+        states = {name: x[None, :, i] for i, name in enumerate(machine.states)}
+        values = {name: p[None, None, i] for i, name in enumerate(self.names)}
         after: Quantities = states
-        for part in range(self.numerics.parts):
-            share = (part + 0.5) / self.numerics.parts
-            middle = {name: at(share) for name, at in between.items()}
-            after = dict(machine.step(after, middle, values, self.step_s / self.numerics.parts))
-            for joint in machine.joints:
-                inertia = values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
-                after[joint.rate] = (
-                    after[joint.rate] + middle[on(joint.rate)] * self.step_s / self.numerics.parts / inertia
-                )
-        seen = dict(machine.observe(states, given, values))
+        part_s = self.step_s / self.numerics.parts
+        for middle in driven.middles:
+            # half of a joint's push before the step and half after it: the position gets its share
+            pushed = {joint.rate: 0.5 * part_s * middle[on(joint.rate)] / self._inertia(joint, values)
+                      for joint in machine.joints}  # fmt: skip
+            before = {**after, **{name: after[name] + push for name, push in pushed.items()}}
+            after = dict(machine.step(before, middle, values, part_s))
+            after |= {name: after[name] + push for name, push in pushed.items()}
+        seen = dict(machine.observe(states, driven.samples, values))
         for each in machine.outputs:
-            seen[each.channel] = seen[each.channel] + at_ports[shown(each.channel)]
-        f = np.stack([np.broadcast_to(after[name], shape) for name in machine.states], axis=-1)
-        h = np.stack([np.broadcast_to(seen[each.channel], shape) for each in machine.outputs], axis=-1)
+            seen[each.channel] = seen[each.channel] + driven.samples[shown(each.channel)]
+        f = np.stack([np.broadcast_to(after[name], shape)[0] for name in machine.states], axis=-1)
+        h = np.stack([np.broadcast_to(seen[each.channel], shape)[0] for each in machine.outputs], axis=-1)
         return f, h
+
+    def _inertia(self, joint: Joint, values: Quantities) -> Array | float:
+        return values[joint.inertia] if isinstance(joint.inertia, str) else joint.inertia or 1.0
 
     def _between_samples(self, name: str, c: Array) -> Callable[[float], Array]:
         """An input or port between its samples (m, n), at a share of the way to the next: held, on a cubic through its
@@ -98,8 +119,9 @@ class Simulator:
         if name in self.numerics.held or name in self.numerics.held_ports:
             return lambda share: c
         after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
+        rise = after - c
         if name not in self.numerics.curved:
-            return lambda share: c + share * (after - c)
+            return lambda share: c + share * rise
         before, second = (
             np.concatenate(each, axis=1) for each in ((c[:, :1], c[:, :-1]), (after[:, 1:], after[:, -1:]))
         )
@@ -109,44 +131,52 @@ class Simulator:
         def at(share: float) -> Array:
             rest = 1.0 - share
             curve = (rest * (rest * rest - 1.0) * bend[0] + share * (share * share - 1.0) * bend[1]) / 6.0
-            return np.asarray(c + share * (after - c) + inside * curve)
+            return np.asarray(c + share * rise + inside * curve)
 
         return at
 
-    def linearised(self, x: Array, u: Array, p: Array, ports: Array, sizes: tuple[Array, Array, Array]) -> Jacobians:
-        """By central differences. x: (n, s), u: (n, i), p: (p,), ports: (n or 1, q); sizes: of x, u and p."""
-        given = [x[None], u[None], p[None, None], ports[None]]
-        f, h = self.at(*given)
+    def linearised(
+        self, x: Array, u: Array, p: Array, ports: Array, sizes: tuple[Array, Array, Array], by: Iterable[int]
+    ) -> Jacobians:
+        """By central differences. x: (n, s), u: (n, i), p: (p,), ports: (n, q); sizes: of x, u and p.
 
-        def derivative(which: int, sizes: Array, some: Sequence[int]) -> tuple[Array, Array]:
-            if not len(some):
-                return np.zeros((*f.shape[1:], 0)), np.zeros((*h.shape[1:], 0))
-            columns = []
-            for number in some:
-                nudge = NUDGE * sizes[number]
-                up, down = given[which].copy(), given[which].copy()
-                up[..., number] += nudge
-                down[..., number] -= nudge
-                high = self.at(*(up if i == which else each for i, each in enumerate(given)))
-                low = self.at(*(down if i == which else each for i, each in enumerate(given)))
-                columns.append([(a[0] - b[0]) / (2.0 * NUDGE * sizes[number]) for a, b in zip(high, low, strict=True)])
-            return np.stack([a for a, _ in columns], axis=-1), np.stack([b for _, b in columns], axis=-1)
+        by: numbers of the ports that have derivatives; those of the others are 0.
+        """
+        driven = self.driven(u, ports)
+        f, h = self.at(x, p, driven)
 
-        (f_x, h_x), (f_u, h_u), (f_p, h_p) = (
-            derivative(which, each, range(len(each))) for which, each in enumerate(sizes)
-        )
-        # What the engine adds itself is known: an output's port moves it alone, a noisy input's as its noise does.
-        f_q, h_q = np.zeros((*f.shape[1:], len(self.ports))), np.zeros((*h.shape[1:], len(self.ports)))
-        names = [each.name for each in self.ports]
-        for number, each in enumerate(self.machine.outputs):
-            h_q[:, number, names.index(shown(each.channel))] = 1.0
-        for number, name in enumerate(self.noisy):
-            place = names.index(into(name))
-            f_q[:, :, place], h_q[:, :, place] = f_u[:, :, number], h_u[:, :, number]
-        known = {shown(each.channel) for each in self.machine.outputs} | {into(name) for name in self.noisy}
-        rest = [number for number, name in enumerate(names) if name not in known]
-        f_q[:, :, rest], h_q[:, :, rest] = derivative(3, np.ones(len(names)), rest)
-        return Jacobians(f[0], h[0], f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
+        def derivative(which: int, size: float, number: int) -> tuple[Array, Array]:
+            """By x, p, u or a port."""
+            ends = []
+            for nudge in (NUDGE * size, -NUDGE * size):
+                given = [x, p, u, ports]
+                given[which] = given[which].copy()
+                given[which][..., number] += nudge
+                there = driven if which < 2 else self.driven(given[2], given[3])
+                ends.append(self.at(given[0], given[1], there))
+            (f_up, h_up), (f_down, h_down) = ends
+            return (f_up - f_down) / (2.0 * NUDGE * size), (h_up - h_down) / (2.0 * NUDGE * size)
+
+        def stacked(which: int, sizes: Array) -> tuple[Array, Array]:
+            f_by, h_by = np.zeros((*f.shape, len(sizes))), np.zeros((*h.shape, len(sizes)))
+            for number, size in enumerate(sizes):
+                f_by[:, :, number], h_by[:, :, number] = derivative(which, size, number)
+            return f_by, h_by
+
+        (f_x, h_x), (f_u, h_u), (f_p, h_p) = stacked(0, sizes[0]), stacked(2, sizes[1]), stacked(1, sizes[2])
+        f_q, h_q = np.zeros((*f.shape, len(self.ports))), np.zeros((*h.shape, len(self.ports)))
+        outputs = {shown(each.channel): number for number, each in enumerate(self.machine.outputs)}
+        noisy = {into(name): number for number, name in enumerate(self.noisy)}
+        for number in by:
+            name = self.ports[number].name
+            # what the engine adds itself is known: an output's port moves it alone, a noisy input's as its noise does
+            if name in outputs:
+                h_q[:, outputs[name], number] = 1.0
+            elif name in noisy:
+                f_q[:, :, number], h_q[:, :, number] = f_u[:, :, noisy[name]], h_u[:, :, noisy[name]]
+            else:
+                f_q[:, :, number], h_q[:, :, number] = derivative(3, 1.0, number)
+        return Jacobians(f, h, f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
 
 
 def _own_ports(machine: DeclaredMachine, inputs: Sequence[str]) -> list[Port]:

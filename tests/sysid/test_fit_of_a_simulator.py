@@ -10,15 +10,16 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.free_simulation import (
+    Joint,
     Output,
     Port,
     SimulatedMachine,
     SimulatedRecording,
     Term,
+    runge_kutta,
     standing,
 )
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
-from ranger_sim.sysid.free_simulation.predictor import between
 from ranger_sim.sysid.free_simulation.terms import Acting
 from ranger_sim.sysid.machine import Known, Quantity
 from ranger_sim.sysid.signals import roughness
@@ -125,7 +126,8 @@ def test_an_effect_that_acts_pushes_with_its_size_and_is_a_parameter():
     lin = acting.linearise()
     # where it enters is weighed by the gate
     push = 2.0 * V * np.where(X > 0.0, 1.0, 0.25)
-    assert np.allclose(acting.at_ports[:, 0, 0], push) and not np.any(acting.at_ports[:, 1])
+    (entering,) = acting.enter
+    assert list(entering) == [0] and np.allclose(entering[0][:, 0], push)
     free = V + H * (-2.0 * X - 0.7 * V**3 + middle(U))
     assert np.allclose(lin.next_state[:, 1], free + 0.3 * H * middle(push))
     assert lin.f_p.shape == (COUNT, 2, 3) and np.allclose(lin.f_p[:, 1, 2], H * middle(push), atol=1e-9)
@@ -279,11 +281,9 @@ def test_what_enters_at_a_port_is_weighed_there_and_seen_by_the_equations_that_i
     one, two = recording.signals["v"], np.column_stack((recording.signals["x"], np.ones(COUNT)))
     gate = recording.signals["gate"]
     entering = recording.entering({"push": one})
-    assert (
-        entering.shape == (COUNT, 6, 1) and np.allclose(entering[:, 0, 0], gate * one) and not np.any(entering[:, 1:])
-    )
+    assert list(entering) == [0] and np.allclose(entering[0], (gate * one)[:, None])
     both = recording.entering({"push": two, "shown": 3.0 * two})
-    assert np.allclose(both[:, 0], gate[:, None] * two) and np.allclose(both[:, 1], 3.0 * two)
+    assert np.allclose(both[0], gate[:, None] * two) and np.allclose(both[1], 3.0 * two)
     lin, predictor = recording.linear, recording.predictor
     states, outputs = np.zeros((COUNT, 2, 1)), np.zeros((COUNT, 2, 1))
     states[:, 1, 0] = H * middle(gate * one)
@@ -349,11 +349,36 @@ def test_a_recording_must_be_long_enough_and_whole():
     assert isinstance(toy.prepare(table()), SimulatedRecording)
 
 
-def test_middles_are_means_of_neighbours_and_the_last_stays():
-    """But for the ports of an input that is held: there a step has what its sample has."""
-    columns = np.array([[[1.0], [1.0]], [[3.0], [3.0]], [[4.0], [4.0]]])
-    found = between(columns, np.array([False, True]))
-    assert found[:, :, 0].tolist() == [[2.0, 1.0], [3.5, 3.0], [4.0, 4.0]]
+class Sliding(SimulatedMachine):
+    """x' = v, v' = (u + what a joint gets) / 2: without friction a push moves it by half its acceleration times t^2."""
+
+    name = "sliding"
+    quantities = (Quantity("y_m", "m", ""),)
+    parameters = (Known("m", "", 2.0, 0.5, 9.0, ""),)
+    states = ("x", "v")
+    outputs = (Output("y_m", "M", "mechanical", "m"),)
+    joints = (Joint("v", inertia="m"),)
+
+    def inputs(self, table):
+        return {"u": table["u"]}
+
+    def first_guess(self, table):
+        return {"x": table["y_m"], "v": table["v"]}
+
+    def step(self, x, u, p, step_s):
+        return runge_kutta(lambda x, u, p: {"x": x["v"], "v": u["u"] / p["m"]}, x, u, p, step_s)
+
+    def observe(self, x, u, p):
+        return {"y_m": x["x"]}
+
+
+def test_a_push_at_a_joint_moves_it_as_the_same_push_inside_the_law_does():
+    """By the recording's own sample: rates by the push's impulse, positions by half of it."""
+    fit = TrajectoryFit(Sliding(), table())
+    lin = fit.linearise()
+    into, on = (["shown y_m", "into u", "on v"].index(name) for name in ("into u", "on v"))
+    assert np.allclose(lin.f_q[:, :, on], lin.f_q[:, :, into], atol=1e-9)
+    assert np.allclose(lin.f_q[:, :, on], [0.25 * H**2, 0.5 * H], atol=1e-9)
 
 
 def test_friction_is_open_within_two_widths_of_standstill():
