@@ -73,9 +73,9 @@ def diagnose(
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
         rest = _others(effects, skews)
         base = naming.refit(bands.plain(recordings), skews)
-        accepts = Held(held, skews, base.values).accepts if held else likelihood.everything
+        judge = Held(held, skews, base.values) if held else None
         found = likelihood.select(
-            recordings, rest, skews, seed, accepts, progress=lambda share: progress("causes", begin + 0.2 * share)
+            recordings, rest, skews, seed, judge, progress=lambda share: progress("causes", begin + 0.2 * share)
         )
         return _decided(machine, recordings, found, skews, had) if hasattr(machine, "surprise") else found
 
