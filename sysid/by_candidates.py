@@ -45,6 +45,7 @@ FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say n
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
+Z95 = 1.96  # standard errors on each side of a 95 % interval
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
 
 
@@ -115,6 +116,7 @@ def diagnose(
     if found.named:
         extended = naming.refit(found.base, found.named, [*skews, *found.named])
     _widen(extended)
+    _add_numerics(extended, found.named, floor)
     after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
@@ -394,6 +396,14 @@ def _widen(regression: Regression) -> None:
     if len(kept) == len(ratio):
         wider[kept] = np.sqrt(np.maximum(1.0, ratio * BLOCKS / max(1, BLOCKS - len(kept))))
     regression.covariance = regression.covariance * np.outer(wider, wider)
+
+
+def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping[str, tuple[float, ...]]) -> None:
+    """Widen the covariance by what numerics move each coefficient by, as 95 % of an error of its own."""
+    for each in named:
+        for name, moved in zip(each.coefficients, floor.get(each.effect.name, ()), strict=False):
+            number = regression.names.index(name)
+            regression.covariance[number, number] += (moved / Z95) ** 2
 
 
 def floors(regression: Regression) -> dict[str, tuple[float, float]]:
