@@ -76,6 +76,7 @@ class TrajectoryFit:
         self.measured_u = self.u.copy()
         self.size_x, self.size_u = (np.maximum(np.sqrt(np.mean(each**2, axis=0)), 1e-9) for each in (self.x, self.u))
         self.size_p = np.where(self.p != 0.0, np.abs(self.p), 0.01 * np.minimum(self.high - self.low, 1e6))
+        self.lin: Jacobians  # of the last round
         self.predictor: Predictor | None = None
         self.came_from = self.began = (self.x, self.u, self.p)
         reach = len(table) if not np.isfinite(machine.horizon_s) else max(2, round(machine.horizon_s / self.step_s))
@@ -206,7 +207,7 @@ class TrajectoryFit:
         machine, simulator = self.machine, self.simulator
         states = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         values = {name: np.full(len(self.x), self.p[i]) for i, name in enumerate(simulator.names)}
-        given = dict(simulator.inputs) | {name: self.u[:, i] for i, name in enumerate(simulator.noisy)}
+        given = simulator.inputs | {name: self.u[:, i] for i, name in enumerate(simulator.noisy)}
         entering = self._entering()
         given |= {each.name: entering[:, i] for i, each in enumerate(simulator.ports)}
         found = machine.loose(states, given, values, self.step_s)
@@ -264,7 +265,7 @@ class TrajectoryFit:
         change, error = np.zeros(len(self.p)), np.zeros(len(self.p))
         free = np.ones(len(self.p), dtype=bool)
         # a triangle with the same products of columns: of few rows, and none of the digits is lost by squaring
-        triangle = np.linalg.qr(np.column_stack((scaled, wanted)), mode="r")
+        triangle: Array = np.asarray(np.linalg.qr(np.column_stack((scaled, wanted)), mode="r"))
         scaled, wanted = triangle[:, :-1], triangle[:, -1]
         while np.any(free):
             u, sv, vt = np.linalg.svd(scaled[:, free], full_matrices=False)

@@ -2,7 +2,7 @@
 
 import copy
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class Simulator:
     adds at every output, input and joint.
     """
 
-    def __init__(self, machine: DeclaredMachine, table: Table, inputs: Mapping[str, Array]) -> None:
+    def __init__(self, machine: DeclaredMachine, table: Table, inputs: dict[str, Array]) -> None:
         """inputs: (n,) by name."""
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = inputs
