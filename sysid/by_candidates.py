@@ -399,7 +399,7 @@ def _widen(regression: Regression) -> None:
 
 
 def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping[str, tuple[float, ...]]) -> None:
-    """Widen the covariance by what numerics move each coefficient by, as 95 % of an error of its own."""
+    """Widen the covariance by what numerics move each coefficient by, as a further error at 95 %."""
     for each in named:
         for name, moved in zip(each.coefficients, floor.get(each.effect.name, ()), strict=False):
             number = regression.names.index(name)
