@@ -30,6 +30,7 @@ from ranger_sim.sysid.results import (
 )
 
 RIVALS = 6  # that an answer lists
+Z95 = 1.96  # standard errors on each side of a 95 % interval
 NEXT = {
     frozenset(
         {"sensor_offset", "direction_friction"}
@@ -135,6 +136,7 @@ def _cause(found: Diagnosis, each: Named) -> Cause:
         balance=_letters(each, extended.recordings),
         parameters=parameters,
         tied_with=tuple(dict.fromkeys(tie.cause for tie in each.tied if tie.cause != each.effect.cause)),
+        waves=waves(extended, each) or None,
         evidence=CauseEvidence(
             chi2=each.chi2,
             p=each.p,
@@ -147,6 +149,31 @@ def _cause(found: Diagnosis, each: Named) -> Cause:
             else None,
         ),
     )
+
+
+def waves(extended: Regression, each: Named) -> dict[str, Value]:
+    """Amplitude and phase of each pair of cosine and sine among an effect's coefficients, with their intervals."""
+    out: dict[str, Value] = {}
+    full = dict(zip(each.effect.coefficients, each.coefficients, strict=True))
+    for cosine, rest in ((name, name.removeprefix("cosine")) for name in full if name.startswith("cosine")):
+        if f"sine{rest}" not in full:
+            continue
+        pair = [full[cosine], full[f"sine{rest}"]]
+        values = np.array([extended.values[name] for name in pair])
+        places = [extended.names.index(name) for name in pair]
+        spread = extended.covariance[np.ix_(places, places)]
+        size = float(np.hypot(*values))
+        if size == 0.0:
+            continue
+        along, across = values / size, np.array([-values[1], values[0]]) / size
+        reach = Z95 * math.sqrt(max(0.0, float(along @ spread @ along)))
+        turn = min(math.pi, Z95 * math.sqrt(max(0.0, float(across @ spread @ across))) / size)
+        phase = math.atan2(values[1], values[0])  # size cos(x - phase)
+        out[f"amplitude{rest}"] = Value(size, (max(0.0, size - reach), size + reach))
+        out["phase_twice_rad" if rest.startswith("_twice") else "phase_rad"] = Value(
+            phase, (phase - turn, phase + turn)
+        )
+    return out
 
 
 def _channels(found: Diagnosis) -> list[ChannelMisfit]:
@@ -193,7 +220,7 @@ def _impossible(found: Diagnosis) -> list[str]:
     regression, out = found.extended, []
     for known in found.machine.parameters:
         if known.name in regression.values:
-            value, reach = regression.values[known.name], 1.96 * _error(regression, known.name)
+            value, reach = regression.values[known.name], Z95 * _error(regression, known.name)
             if value + reach < known.low or value - reach > known.high:
                 out.append(known.name)
     return out
@@ -209,7 +236,7 @@ def _known(had: Named, was: KnownEffect, extended: Regression) -> KnownCause:
 
 
 def _value(regression: Regression, name: str) -> Value:
-    value, reach = regression.values[name], 1.96 * _error(regression, name)
+    value, reach = regression.values[name], Z95 * _error(regression, name)
     return Value(value, (value - reach, value + reach))
 
 

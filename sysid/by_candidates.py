@@ -27,7 +27,6 @@ from ranger_sim.sysid import (
 )
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
-from ranger_sim.sysid.free_simulation import roughness
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
@@ -46,6 +45,7 @@ FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say n
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
+Z95 = 1.96  # standard errors on each side of a 95 % interval
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
 
 
@@ -74,9 +74,9 @@ def diagnose(
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
         rest = _others(effects, skews)
         base = naming.refit(bands.plain(recordings), skews)
-        accepts = Held(held, skews, base.values).accepts if held else likelihood.everything
+        judge = Held(held, skews, base.values) if held else None
         found = likelihood.select(
-            recordings, rest, skews, seed, accepts, progress=lambda share: progress("causes", begin + 0.2 * share)
+            recordings, rest, skews, seed, judge, progress=lambda share: progress("causes", begin + 0.2 * share)
         )
         return _decided(machine, recordings, found, skews, had) if hasattr(machine, "surprise") else found
 
@@ -116,6 +116,7 @@ def diagnose(
     if found.named:
         extended = naming.refit(found.base, found.named, [*skews, *found.named])
     _widen(extended)
+    _add_numerics(extended, found.named, floor)
     after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
@@ -397,6 +398,14 @@ def _widen(regression: Regression) -> None:
     regression.covariance = regression.covariance * np.outer(wider, wider)
 
 
+def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping[str, tuple[float, ...]]) -> None:
+    """Widen the covariance by what numerics move each coefficient by, as a further error at 95 %."""
+    for each in named:
+        for name, moved in zip(each.coefficients, floor.get(each.effect.name, ()), strict=False):
+            number = regression.names.index(name)
+            regression.covariance[number, number] += (moved / Z95) ** 2
+
+
 def floors(regression: Regression) -> dict[str, tuple[float, float]]:
     """By equation (rms of the residual, noise of the channel itself), both in the band and in the equation's unit.
 
@@ -419,7 +428,7 @@ def _own(recording: Recording, name: str) -> float:
     predictor = getattr(recording, "predictor", None)
     if predictor is not None:
         return float(predictor.unit[list(getattr(recording, "outputs", ())).index(name)])
-    alone = roughness(recording.table, recording.equations[name].response)
+    alone = signals.roughness(recording.table, recording.equations[name].response)
     return alone / math.sqrt(max(1.0, 2.0 * recording.width * math.sqrt(math.pi)))
 
 

@@ -9,6 +9,7 @@ an autoregression without any cause, pass through the same selection.
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -27,7 +28,15 @@ BLOCKS = 8  # of the cross-validation within the training data
 HIDDEN = 1e-4  # of a candidate's square: when the others explain all but this, an equation does not show it
 FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
 
-Accepts = Callable[[Sequence[Named], Named, Regression, Regression], bool]
+
+class Judge(Protocol):
+    """Held-out data, while causes are sought. extended: the regression with all of the causes."""
+
+    def accepts(self, named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
+        """False where the data refuse a further candidate; without: the regression with the causes before it."""
+
+    def square(self, named: Sequence[Named], extended: Regression) -> float:
+        """Square of the errors with these causes."""
 
 
 @dataclasses.dataclass
@@ -44,11 +53,6 @@ class Selection:
     with_named: Regression
     thresholds: list[float]
     best: list[tuple[Effect, float]]
-
-
-def everything(named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
-    """For `accepts` where there are no held-out data."""
-    return True
 
 
 def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: Sequence[Named]) -> Noise:
@@ -174,7 +178,8 @@ def surrogates(regression: Regression, seed: int, count: int = SURROGATES) -> Ar
         )
         out[regression.rows[name]] = regression._scaled(name, raw)[regression.good[name]]
     left = out - regression.phi @ (regression.inverse @ (regression.z.T @ out))
-    return np.asarray(out * np.sqrt(regression.chi2 / np.maximum(np.sum(left**2, axis=0), 1e-300)))
+    out *= np.sqrt(regression.chi2 / np.maximum(np.einsum("nm,nm->m", left, left), 1e-300))
+    return out
 
 
 def score(chi2: Array | float, freedom: int, shapes: int, size: int) -> Array | float:
@@ -186,9 +191,17 @@ def by_chance(tried: Sequence[Trial], regression: Regression, drawn: Array) -> A
     """(trials, count) score of each trial on each surrogate (N, count)."""
     together = regression.z.T @ drawn
     found = np.empty((len(tried), drawn.shape[1]))
+    straight = [np.zeros((len(trial.gram), drawn.shape[1])) for trial in tried]
+    for name, rows in regression.rows.items():  # all columns of an equation at once
+        having = [number for number, trial in enumerate(tried) if name in trial.white]
+        if not having:
+            continue
+        products = np.hstack([tried[number].white[name] for number in having]).T @ drawn[rows]
+        ends = np.cumsum([len(straight[number]) for number in having])[:-1]
+        for number, part in zip(having, np.split(products, ends), strict=True):
+            straight[number] += part
     for number, trial in enumerate(tried):
-        straight = sum((columns.T @ drawn[regression.rows[name]] for name, columns in trial.white.items()), 0.0)
-        product = straight - trial.shadow.T @ together
+        product = straight[number] - trial.shadow.T @ together
         inverse = np.linalg.pinv(trial.gram, rcond=1e-9, hermitian=True)
         chi2 = np.einsum("km,kl,lm->m", product, inverse, product) / trial.inflation
         found[number] = score(chi2, len(inverse), len(trial.effect.shapes), regression.size)
@@ -200,14 +213,12 @@ def select(
     effects: Sequence[Effect],
     fixed: Sequence[Named] = (),
     seed: int = 0,
-    accepts: Accepts = everything,
+    judge: Judge | None = None,
     most: int = MOST,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Selection:
-    """The causes that these data support. fixed: effects that are in the base.
-
-    accepts(named, candidate, without, extended), the last two the regressions without the candidate and with it: False
-    where held-out data refuse the candidate; naming goes on without it.
+    """The causes that these data support. fixed: effects that are in the base. judge: where it refuses a candidate,
+    naming goes on without it; of causes that tie here it takes the one that predicts its data best.
     """
     known = noise_of(recordings, effects, fixed)
     base = naming.refit(Regression(recordings, noise=known), fixed)
@@ -236,22 +247,17 @@ def select(
             return Selection(
                 named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranked]
             )
-        bic, chi2, freedom, trial = chosen
-        others = [each for each in ranked if each[3].effect is not trial.effect]
-        found = Named(
-            trial.effect,
-            trial.shape,
-            chi2,
-            freedom,
-            (1.0 + float(np.count_nonzero(chance >= bic))) / (1.0 + len(chance)),
-            bic,
-            [each[3].effect for each in others if bic - each[0] < naming.TIE and naming.possible(each[3])],
-            [(each[3].effect, bic - each[0]) for each in others],
-        )
-        extended = naming.refit(base, [*named, found], [*fixed, *named, found])
+        near = [each for each in ranked if abs(chosen[0] - each[0]) < naming.TIE and naming.possible(each[3])]
+        options = [_named(each, ranked, near, chance) for each in near if each is chosen or judge is not None]
+        extensions = [naming.refit(base, [*named, each], [*fixed, *named, each]) for each in options]
+        best = 0
+        if judge is not None and len(options) > 1:
+            errors = [judge.square([*named, one], each) for one, each in zip(options, extensions, strict=True)]
+            best = int(np.argmin(errors))
+        found, extended = options[best], extensions[best]
         if not _predicts(regression, extended):
-            left_out.append(trial.effect)
-        elif not accepts(named, found, regression, extended):
+            left_out.append(found.effect)
+        elif judge is not None and not judge.accepts(named, found, regression, extended):
             refused.append(found)
         else:
             named.append(found)
@@ -265,15 +271,33 @@ def select(
         ]
 
 
+Scored = tuple[float, float, int, Trial]  # (score, chi-square, freedom, trial)
+
+
+def _named(one: Scored, ranked: Sequence[Scored], near: Sequence[Scored], chance: Array) -> Named:
+    """One of the ranking as a named effect. near: those that tie; chance: best scores of surrogates."""
+    score, chi2, freedom, trial = one
+    return Named(
+        trial.effect,
+        trial.shape,
+        chi2,
+        freedom,
+        (1.0 + float(np.count_nonzero(chance >= score))) / (1.0 + len(chance)),
+        score,
+        [each[3].effect for each in near if each is not one],
+        [(each[3].effect, score - each[0]) for each in ranked if each is not one],
+    )
+
+
 def own_part(trial: Trial) -> float:
     """Part of an effect's square that the base does not explain."""
     whole = sum(float(np.sum(columns**2)) for columns in trial.white.values())
     return float(np.trace(trial.gram)) / max(whole, 1e-300)
 
 
-def ranking(tried: Sequence[Trial], size: int) -> list[tuple[float, float, int, Trial]]:
-    """(score, chi-square, freedom, trial) of each effect at its best shape, best first."""
-    best: dict[int, tuple[float, float, int, Trial]] = {}
+def ranking(tried: Sequence[Trial], size: int) -> list[Scored]:
+    """Of each effect at its best shape, best first."""
+    best: dict[int, Scored] = {}
     for trial in tried:
         chi2, freedom = explained(trial.gram, trial.product)
         if not freedom:

@@ -164,7 +164,7 @@ class Machine(Protocol):
     its label on the report's axes}; `gear`, of its gearbox, and `motor`, the name of the measured motor in the
     simulator (plant/terms.py), for the model file; `again(recording, [(effect, shape, coefficients)], fixed)`, the
     recording with these effects in its simulation, and `free(recording)`, its equations as errors of free simulation
-    (sysid/free_simulation.py has both).
+    (sysid/free_simulation has both).
     """
 
     name: str

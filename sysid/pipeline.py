@@ -53,9 +53,10 @@ def diagnose(
     already; like the machine's parameters they are fitted again and are not findings.
     """
     progress("equations", 0.0)
-    recordings = [machine.prepare(table) for table in tables]
+    with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
+        recordings = [machine.prepare(table) for table in tables]
     if all(each.noise_by_candidates for each in recordings):
-        with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
+        with threadpool_limits(1):
             found = by_candidates.diagnose(machine, recordings, holdout, seed, known, _had, progress)
         judged = by_candidates.held(found, [table.name for table in holdout])
         found.result = answer.of(found, found, judged, _learned(found, holdout), prepared)

@@ -74,7 +74,8 @@ class CauseEvidence:
 @dataclasses.dataclass(frozen=True)
 class Cause:
     """A named cause of the catalogue. balance: letters of the equations in which it acts; form: of several forms of
-    one cause, None where there is one only; parameters: by name, which carries the unit."""
+    one cause, None where there is one only; parameters: by name, which carries the unit; waves: of what is periodic and
+    given by cosine and sine, the amplitude, and the phase in radians at which it is largest."""
 
     name: str
     at: str
@@ -83,6 +84,7 @@ class Cause:
     parameters: Mapping[str, Value]
     tied_with: tuple[str, ...]
     evidence: CauseEvidence
+    waves: Mapping[str, Value] | None = dataclasses.field(default=None, metadata=OPTIONAL)
 
 
 @dataclasses.dataclass(frozen=True)

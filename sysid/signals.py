@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy import ndimage
-from scipy.signal import lfilter
+from scipy.signal import lfilter, savgol_filter
 
 from ranger_sim.sysid.dataset import Array, Table
 
@@ -20,6 +20,9 @@ JUMP, JUMPS_BY = 0.1, 8.0  # of the range, and times the median change: larger i
 # Of a channel that is cut off: samples of one number in a stretch, stretches, part of the usual slope at which it
 # arrives there, and different numbers of a channel that has only states
 FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
+ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
+HELD_JUMPS = 0.2  # of the samples at most: a channel that changes at no more of them is held in between
+SMOOTHER = 0.25  # of the straight lines' square that a cubic leaves: there it is the better way between samples
 
 
 def per_run(table: Table, work: Callable[..., Array], *columns: Array) -> Array:
@@ -152,3 +155,62 @@ def near_jumps(table: Table, column: Array) -> np.ndarray:
         for at in np.flatnonzero(change[run.start : run.stop - 1] > limit).tolist():
             out[max(run.start, run.start + at - 1) : min(run.stop, run.start + at + 3)] = True
     return out
+
+
+def roughness(table: Table, column: Array) -> float:
+    """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps."""
+    size = max(7, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
+    parts = [savgol_filter(column[run], size, 2) - column[run] for run in table.runs if run.stop - run.start > size]
+    if not parts:
+        return 0.0
+    rest = np.concatenate(parts)
+    # the parabola uses three of these degrees of freedom
+    return float(np.median(np.abs(rest))) / 0.6745 * float(np.sqrt(size / (size - 3.0)))
+
+
+def stays(table: Table, column: Array) -> bool:
+    """True for a channel that stays at a value for several samples and then jumps: its source holds it."""
+    return all(
+        np.count_nonzero(np.diff(column[run])) < HELD_JUMPS * (run.stop - run.start)
+        for run in table.runs
+        if run.stop - run.start > 1
+    )
+
+
+def is_smooth(table: Table, column: Array) -> bool:
+    """True where a cubic through every second sample meets the samples between better than straight lines do."""
+    straight = cubic = 0.0
+    for run in table.runs:
+        c = column[run]
+        if len(c) < 8:
+            continue
+        middle, near, far = c[3:-3], 0.5 * (c[2:-4] + c[4:-2]), 0.5 * (c[:-6] + c[6:])
+        straight += float(np.sum((middle - near) ** 2))
+        cubic += float(np.sum((middle - (9.0 * near - far) / 8.0) ** 2))
+    return cubic < SMOOTHER * straight
+
+
+def averaged(table: Table, count: int) -> Table:
+    """The table with every `count` samples of a run averaged into one."""
+    if count == 1:
+        return table
+    runs, start = [], 0
+    stamps: list[Array] = []
+    columns: dict[str, list[Array]] = {name: [] for name in table.columns}
+    for run in table.runs:
+        size = (run.stop - run.start) // count
+        if not size:
+            continue
+        inside = slice(run.start, run.start + size * count)
+        stamps.append(table.time_s[inside].reshape(size, count).mean(axis=1))
+        for name, column in table.columns.items():
+            columns[name].append(column[inside].reshape(size, count).mean(axis=1))
+        runs.append(slice(start, start + size))
+        start += size
+    return Table(
+        np.concatenate(stamps),
+        {name: np.concatenate(parts) for name, parts in columns.items()},
+        tuple(runs),
+        table.name,
+        table.resolution,
+    )

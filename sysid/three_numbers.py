@@ -109,6 +109,10 @@ class Held:
         error = math.sqrt(float(scatter @ scatter)) / max(whole, 1e-300)
         return share > max(HALF, SURE * error)
 
+    def square(self, named: Sequence[Named], extended: Regression) -> float:
+        """Square of the errors with these causes, each equation in units of what the base left."""
+        return sum(float(each @ each) for each in self.residual(named, extended.values).values())
+
     def errors(
         self,
         named: Sequence[Named],

@@ -4,7 +4,7 @@
     mechanical   J q'' = K I - k_h q - m g (c sin q - w cos q) - C_1 q' - (C_0 + mu K |I|) sgn q'      eq. 33 to 35
 
 q from the vertical, K at the joint, gear included. m c is known (from the leg held level, appendix 7.2): without
-one known torque nothing here has a scale. The leg is simulated (sysid/free_simulation.py): driven by the measured
+one known torque nothing here has a scale. The leg is simulated (sysid/free_simulation): driven by the measured
 voltage, with angle and current as outputs; without a voltage driven by the measured current, and then the leg follows
 the current's noise.
 """

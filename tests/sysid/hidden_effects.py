@@ -1,7 +1,7 @@
 """Hidden effects of three machines that a user wrote, in data of separate integrators: what is named, and how well.
 
     python -m tests.sysid.hidden_effects --seeds 3
-    python -m tests.sysid.hidden_effects --only "elastic joint" --seeds 10
+    python -m tests.sysid.hidden_effects --only "elastic joint" --seeds 10 --short
 
 A line for each machine and effect: how often it was named first, how often its 95 % interval holds the true value, the
 median error of the value, and the processor time.
@@ -46,6 +46,7 @@ class Case:
 
 STAND = (other_machines.thrust_stand, machines_of_a_user.ThrustStand)
 ROD = (other_machines.heated_rod, machines_of_a_user.HeatedRod)
+SHORT = {"elastic-joint": {"seconds": 6.0}, "thrust-stand": {"seconds": 10.0}, "heated-rod": {}}
 JOINT = (other_machines.elastic_joint, machines_of_a_user.ElasticJoint)
 CASES = (
     Case(*STAND, "none", 0.0, ()),
@@ -70,6 +71,7 @@ def main():
     options.add_argument("--seeds", type=int, default=2, help="of each case")
     options.add_argument("--first", type=int, default=1)
     options.add_argument("--only", default="", help="cases whose title has this")
+    options.add_argument("--short", action="store_true", help="recordings of 6 and 10 s instead of 20 s")
     given = options.parse_args()
     for case in CASES:
         if given.only not in case.title:
@@ -77,7 +79,7 @@ def main():
         right = inside = 0
         errors, names, before = [], [], process_cpu_s()
         for seed in range(given.first, given.first + given.seeds):
-            result = case.found(seed).result
+            result = case.found(seed, **(SHORT[case.machine.name] if given.short else {})).result
             first = case.named(result)
             names.append(" + ".join(each.name for each in result.causes) or ("abstains" if result.detected else "-"))
             right += first is not None if case.names else not result.detected

@@ -10,18 +10,19 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.free_simulation import (
-    Acting,
+    Joint,
     Output,
     Port,
     SimulatedMachine,
     SimulatedRecording,
     Term,
-    _between,
-    _Fit,
-    roughness,
+    runge_kutta,
     standing,
 )
+from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
+from ranger_sim.sysid.free_simulation.terms import Acting
 from ranger_sim.sysid.machine import Known, Quantity
+from ranger_sim.sysid.signals import roughness
 
 H, COUNT = 0.01, 400
 TIME_S = 3.0 + H * np.arange(COUNT) + 1.0 * (np.arange(COUNT) >= 250)
@@ -80,7 +81,7 @@ def middle(values):
 
 
 def test_derivatives_by_differences_are_the_toy_s_own():
-    fit = _Fit(Toy(), table())
+    fit = TrajectoryFit(Toy(), table())
     fit.p = np.array([2.0, 0.7])
     lin = fit.linearise()
     zero, one = np.zeros(COUNT), np.ones(COUNT)
@@ -112,7 +113,7 @@ def test_derivatives_by_differences_are_the_toy_s_own():
 def test_an_effect_that_acts_pushes_with_its_size_and_is_a_parameter():
     """A push of 2 v gate, of which the simulator has 0.3; a step sees the middle of a sample and the next."""
     toy = Toy()
-    fit = _Fit(toy, table())
+    fit = TrajectoryFit(toy, table())
     fit.p_at, fit.lin = np.array([2.0, 0.7]), fit.linearise()
     (term,) = toy.terms([])
     acting = fit.acted_on([Acting(term, {"n": 2.0}, (0.3,))], fixed=False)
@@ -125,20 +126,21 @@ def test_an_effect_that_acts_pushes_with_its_size_and_is_a_parameter():
     lin = acting.linearise()
     # where it enters is weighed by the gate
     push = 2.0 * V * np.where(X > 0.0, 1.0, 0.25)
-    assert np.allclose(acting.at_ports[:, 0, 0], push) and not np.any(acting.at_ports[:, 1])
+    (entering,) = acting.enter
+    assert list(entering) == [0] and np.allclose(entering[0][:, 0], push)
     free = V + H * (-2.0 * X - 0.7 * V**3 + middle(U))
     assert np.allclose(lin.next_state[:, 1], free + 0.3 * H * middle(push))
     assert lin.f_p.shape == (COUNT, 2, 3) and np.allclose(lin.f_p[:, 1, 2], H * middle(push), atol=1e-9)
     assert not np.any(lin.h_p[:, :, 2])
     # the law leaves open what it says at the ports as they are, and a trace in every state
-    loose = acting._loose()
+    loose = acting.loose()
     assert np.allclose(loose[:, 1], 0.2 * abs(X) + 2.0 * H + 0.003 * abs(push) + 1e-9 * fit.size_x[1], rtol=1e-9)
     assert np.allclose(loose[:, 0], 1e-9 * np.sqrt(np.mean(X**2)), rtol=1e-9)
 
 
 def test_noises_sizes_and_starts_are_reported_by_the_recording():
     rough = [roughness(table(), column) for column in (2.0 * X, V + 0.5 * U)]
-    fit = _Fit(Toy(), table())
+    fit = TrajectoryFit(Toy(), table())
     # a lattice of 0.6 has an error of 0.6 / sqrt(12) beside the channel's own noise
     assert fit.noise_y == pytest.approx([math.hypot(rough[0], 0.6 / math.sqrt(12.0)), rough[1]])
     assert fit.noise_u.tolist() == [0.3]
@@ -153,7 +155,7 @@ def test_noises_sizes_and_starts_are_reported_by_the_recording():
         horizon_s = 1.2
         parameters = (Known("k", "", -2.0, -9.0, 9.0, ""), Known("c", "", 0.0, -1e9, 1e9, ""))
 
-    other = _Fit(Other(), table())
+    other = TrajectoryFit(Other(), table())
     assert other.noise_u == pytest.approx([roughness(table(), U)])
     assert other.starts.tolist() == [0, 120, 240, 250, 370] and other.size_p.tolist() == [2.0, 1e4]
 
@@ -161,21 +163,21 @@ def test_noises_sizes_and_starts_are_reported_by_the_recording():
         horizon_s = 0.001
         noisy_inputs = {}  # noqa: RUF012
 
-    short = _Fit(Short(), table())
+    short = TrajectoryFit(Short(), table())
     assert short.starts.tolist() == [*range(0, 250, 2), *range(250, COUNT, 2)] and short.u.shape == (COUNT, 0)
     # a channel without any noise is known to a thousand millionth of its range
-    line = _Fit(Toy(), table(z_m_per_s=5.0 * np.arange(COUNT)))
+    line = TrajectoryFit(Toy(), table(z_m_per_s=5.0 * np.arange(COUNT)))
     assert line.noise_y[1] == pytest.approx(1e-9 * 5.0 * (COUNT - 1), rel=0.5)
     with pytest.raises(UserError, match="toy run: y_m never changes; toy can be judged in motion only"):
-        _Fit(Toy(), table(y_m=np.full(COUNT, 3.0)))
+        TrajectoryFit(Toy(), table(y_m=np.full(COUNT, 3.0)))
 
 
 def test_a_long_recording_is_averaged_with_what_the_machine_makes_of_it():
-    fit = _Fit(Toy(), table(), 3)
+    fit = TrajectoryFit(Toy(), table(), 3)
     assert len(fit.table) == 83 + 50 and fit.step_s == pytest.approx(3.0 * H)
     for found, whole in (
-        (fit.inputs["u"], U),
-        (fit.inputs["d"], D),
+        (fit.simulator.inputs["u"], U),
+        (fit.simulator.inputs["d"], D),
         (fit.x[:, 0], X),
         (fit.x[:, 1], V),
         (fit.y[:, 0], 2.0 * X),
@@ -206,14 +208,14 @@ def swinging(stiffness):
 
 @pytest.mark.parametrize(("true", "after_one"), [(8.0, 4.0), (0.9, 1.0)])
 def test_a_round_goes_no_farther_than_to_a_half_or_the_double_of_what_must_be_positive(true, after_one):
-    fit = _Fit(Still(), swinging(true))
+    fit = TrajectoryFit(Still(), swinging(true))
     fit.noise_y = np.array([0.01, 0.01])
     step = fit.round()
     assert fit.p[0] == pytest.approx(after_one, rel=1e-6) and step > 1.0
 
 
 def test_rounds_end_at_the_toy_s_own_numbers():
-    fit = _Fit(Still(), swinging(2.4))
+    fit = TrajectoryFit(Still(), swinging(2.4))
     fit.noise_y = np.array([0.01, 0.01])
     steps = [fit.round() for _ in range(6)]
     assert fit.p == pytest.approx([2.4, 0.2], abs=0.005)
@@ -225,14 +227,14 @@ def test_limits_hold_in_every_round(true, limit):
     class Narrow(Still):
         parameters = (Known("k", "", 2.0, 1.9, 2.05, ""), Known("c", "", 0.0, -1.0, 3.0, ""))
 
-    fit = _Fit(Narrow(), swinging(true))
+    fit = TrajectoryFit(Narrow(), swinging(true))
     fit.noise_y = np.array([0.01, 0.01])
     fit.round()
     assert fit.p[0] == limit
 
 
 def test_noise_is_found_anew_as_what_is_left_between_nothing_and_twice_what_was_shown():
-    fit = _Fit(Toy(), table())
+    fit = TrajectoryFit(Toy(), table())
     fit.rest = np.column_stack((np.full(COUNT, 1e-30), np.full(COUNT, 1e6)))
     fit._renew_noise()
     assert fit.noise_y == pytest.approx([1e-9 * np.ptp(2.0 * X), 2.0 * fit.shown_y[1]])
@@ -243,9 +245,9 @@ def test_noise_is_found_anew_as_what_is_left_between_nothing_and_twice_what_was_
 
 
 def test_signals_along_the_trajectory_are_states_inputs_outputs_time_and_the_machine_s_own():
-    fit = _Fit(Toy(), table())
+    fit = TrajectoryFit(Toy(), table())
     fit.lin = fit.linearise()
-    seen = fit._seen()
+    seen = fit.seen()
     sensed = {"sensed y_m", "sensed z_m_per_s"}
     assert set(seen.signals) == {"x", "v", "u", "d", "y_m", "z_m_per_s", "t", "gate"} | sensed
     assert np.array_equal(seen.signals["sensed y_m"], seen.signals["y_m"])
@@ -279,11 +281,9 @@ def test_what_enters_at_a_port_is_weighed_there_and_seen_by_the_equations_that_i
     one, two = recording.signals["v"], np.column_stack((recording.signals["x"], np.ones(COUNT)))
     gate = recording.signals["gate"]
     entering = recording.entering({"push": one})
-    assert (
-        entering.shape == (COUNT, 6, 1) and np.allclose(entering[:, 0, 0], gate * one) and not np.any(entering[:, 1:])
-    )
+    assert list(entering) == [0] and np.allclose(entering[0], (gate * one)[:, None])
     both = recording.entering({"push": two, "shown": 3.0 * two})
-    assert np.allclose(both[:, 0], gate[:, None] * two) and np.allclose(both[:, 1], 3.0 * two)
+    assert np.allclose(both[0], gate[:, None] * two) and np.allclose(both[1], 3.0 * two)
     lin, predictor = recording.linear, recording.predictor
     states, outputs = np.zeros((COUNT, 2, 1)), np.zeros((COUNT, 2, 1))
     states[:, 1, 0] = H * middle(gate * one)
@@ -349,11 +349,36 @@ def test_a_recording_must_be_long_enough_and_whole():
     assert isinstance(toy.prepare(table()), SimulatedRecording)
 
 
-def test_middles_are_means_of_neighbours_and_the_last_stays():
-    """But for the ports of an input that is held: there a step has what its sample has."""
-    columns = np.array([[[1.0], [1.0]], [[3.0], [3.0]], [[4.0], [4.0]]])
-    found = _between(columns, np.array([False, True]))
-    assert found[:, :, 0].tolist() == [[2.0, 1.0], [3.5, 3.0], [4.0, 4.0]]
+class Sliding(SimulatedMachine):
+    """x' = v, v' = (u + what a joint gets) / 2: without friction a push moves it by half its acceleration times t^2."""
+
+    name = "sliding"
+    quantities = (Quantity("y_m", "m", ""),)
+    parameters = (Known("m", "", 2.0, 0.5, 9.0, ""),)
+    states = ("x", "v")
+    outputs = (Output("y_m", "M", "mechanical", "m"),)
+    joints = (Joint("v", inertia="m"),)
+
+    def inputs(self, table):
+        return {"u": table["u"]}
+
+    def first_guess(self, table):
+        return {"x": table["y_m"], "v": table["v"]}
+
+    def step(self, x, u, p, step_s):
+        return runge_kutta(lambda x, u, p: {"x": x["v"], "v": u["u"] / p["m"]}, x, u, p, step_s)
+
+    def observe(self, x, u, p):
+        return {"y_m": x["x"]}
+
+
+def test_a_push_at_a_joint_moves_it_as_the_same_push_inside_the_law_does():
+    """By the recording's own sample: rates by the push's impulse, positions by half of it."""
+    fit = TrajectoryFit(Sliding(), table())
+    lin = fit.linearise()
+    into, on = (["shown y_m", "into u", "on v"].index(name) for name in ("into u", "on v"))
+    assert np.allclose(lin.f_q[:, :, on], lin.f_q[:, :, into], atol=1e-9)
+    assert np.allclose(lin.f_q[:, :, on], [0.25 * H**2, 0.5 * H], atol=1e-9)
 
 
 def test_friction_is_open_within_two_widths_of_standstill():

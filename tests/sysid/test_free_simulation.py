@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.free_simulation import Predictor, _Fit
+from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
+from ranger_sim.sysid.free_simulation.predictor import Predictor
 from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
 
@@ -80,7 +81,7 @@ def test_sensitivities_are_those_of_another_integrator():
     """
     volts = waves(5)
     time_s, angle, rate = swung(volts, step_s=0.001)
-    fit = _Fit(Exact(), Table(time_s, {"voltage_V": volts(time_s), "angle_rad": angle}, (slice(0, COUNT),)))
+    fit = TrajectoryFit(Exact(), Table(time_s, {"voltage_V": volts(time_s), "angle_rad": angle}, (slice(0, COUNT),)))
     fit.x = np.column_stack((angle, rate))
     fit.p = np.array(list(TRUE.values()))
     lin = fit.linearise()

@@ -7,13 +7,12 @@ import pytest
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.pipeline import diagnose
-from tests.sysid.hidden_effects import CASES
+from tests.sysid.hidden_effects import CASES, SHORT
 from tests.sysid.other_machines import elastic_joint, heated_rod, integrated, table
 
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "diagnose-your-machine.md"
 
 BY_TITLE = {each.title: each for each in CASES}
-SHORT = {"elastic-joint": {"seconds": 6.0}, "thrust-stand": {"seconds": 10.0}, "heated-rod": {}}
 
 
 def found(title, seed=1):

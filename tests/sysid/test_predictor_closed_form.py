@@ -10,7 +10,9 @@ import pytest
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.free_simulation import Jacobians, Predictor, averaged, forced, held, roughness, runge_kutta
+from ranger_sim.sysid.free_simulation import held, runge_kutta
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
+from ranger_sim.sysid.signals import averaged, roughness
 
 N, S, IN, OUT = 24, 2, 2, 2
 STARTS = np.array([0, 10])
@@ -100,7 +102,8 @@ def test_the_most_probable_states_and_inputs_are_the_conditional_mean(seed):
     system = System(seed)
     predictor, lin = system.predictor(), system.lin
     state, output = system.rng.normal(size=(N, S)), system.rng.normal(size=(N, OUT))
-    dx, du = predictor.smoothed(state, output, lin.f_u, lin.h_u, system.noise_u)
+    x, errors = predictor.predicted(state[:, :, None], output[:, :, None])
+    dx, du = predictor.smoothed(x[:, :, 0], errors[:, :, 0], lin.f_u, lin.h_u, system.noise_u)
     for start, end in zip(STARTS, ENDS, strict=True):
         states, inputs, outputs, deviations, driven = system.segment(start, end)
         n = end - start
@@ -126,9 +129,15 @@ def test_stretches_side_by_side_come_to_the_covariances_of_one_after_the_other()
 
 
 def test_what_enters_at_several_ports_adds_up():
-    rng = generator(1, "ports")
-    sensitivity, entering = rng.normal(size=(5, 3, 2)), rng.normal(size=(5, 2, 4))
-    assert forced(sensitivity, entering) == pytest.approx(np.einsum("nrq,nqk->nrk", sensitivity, entering))
+    """A step has the mean of its two samples, and the last one its own; but for a port that is held."""
+    lin = System(1).lin
+    lin.f_q, lin.h_q = (np.repeat(each, 2, axis=2) for each in (lin.f_x[:, :, :1], lin.h_x[:, :, :1]))
+    lin.f_q[:, :, 1] *= 3.0
+    one, two = generator(1, "ports").normal(size=(2, N, 4))
+    middle = np.concatenate((0.5 * (one[1:] + one[:-1]), one[-1:]))
+    state, output = forcing(lin, {0: one, 1: two}, {1})
+    assert state == pytest.approx(np.einsum("ns,nk->nsk", lin.f_x[:, :, 0], middle + 3.0 * two))
+    assert output == pytest.approx(np.einsum("no,nk->nok", lin.h_x[:, :, 0], one + two))
 
 
 def test_dry_friction_brings_a_rate_to_rest_and_not_beyond():

@@ -36,7 +36,7 @@ def diagnosed(joint, left_in=1.0, machine=Joint):
     return found.answer, found.answer["evidence"]["held_out_errors"]["current_A"]
 
 
-@pytest.mark.parametrize("left_in", [0.2, 0.5, 1.0])
+@pytest.mark.parametrize("left_in", [0.05, 0.1, 0.2, 0.5, 1.0])
 def test_gravity_that_a_model_lacks_is_named_first_with_its_size(left_in):
     answer, _ = diagnosed("joint4", left_in)
     first = answer["causes"][0]

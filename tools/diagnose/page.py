@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import pathlib
 from typing import Any
 
 import jinja2
-import numpy as np
 from markupsafe import Markup, escape
 
 from ranger_sim.sysid import inspection, predicted_ties
@@ -88,7 +86,7 @@ def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[s
         "balance": cause["balance"],
         "meaning": words.meaning(found, cause),
         "parameters": cause["parameters"],
-        "amplitude": amplitude(found, each),
+        "waves": cause.get("waves", {}),
         "chi2": cause["evidence"]["chi2"],
         "p": cause["evidence"]["p"],
         "bic": cause["evidence"]["bic"],
@@ -109,27 +107,6 @@ def once(texts: dict[str, str]) -> dict[str, str]:
         if text and text not in first.values():
             first[name] = text
     return first
-
-
-def amplitude(found: Diagnosis, each: Named) -> dict[str, float] | None:
-    """Amplitude with interval and phase of an effect that is given by cosine and sine."""
-    names = each.effect.coefficients
-    if len(names) != 2 or not (names[0].startswith("cosine") and names[1].startswith("sine")):
-        return None
-    values = np.array([found.extended.values[name] for name in each.coefficients])
-    size = float(np.hypot(*values))
-    if size == 0.0:
-        return None
-    place = [found.extended.names.index(name) for name in each.coefficients]
-    spread = found.extended.covariance[np.ix_(place, place)]
-    reach = 1.96 * math.sqrt(max(0.0, float(values @ spread @ values))) / size
-    # size cos(x - lead): the phase at which it is largest
-    return {
-        "value": size,
-        "low": max(0.0, size - reach),
-        "high": size + reach,
-        "phase_rad": math.atan2(values[1], values[0]),
-    }
 
 
 def parameters(found: Diagnosis) -> list[dict[str, Any]]:

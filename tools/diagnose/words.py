@@ -152,6 +152,13 @@ def told(found: Diagnosis) -> str:
     return " ".join(parts)
 
 
+def sizes(cause: dict[str, Any]) -> dict[str, Any]:
+    """A cause's values by name; a cosine and a sine as their amplitude and phase."""
+    waves = cause.get("waves", {})
+    pairs = ("cosine", "sine") if waves else ()
+    return waves | {name: value for name, value in cause["parameters"].items() if not name.startswith(pairs)}
+
+
 def meaning(found: Diagnosis, cause: dict[str, Any]) -> str:
     """A named cause in words."""
     for each in found.named:

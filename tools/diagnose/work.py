@@ -171,7 +171,7 @@ def _show(found: Diagnosis, console: Console) -> None:
     for cause in told["causes"]:
         values = ", ".join(
             f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])})"
-            for name, value in cause["parameters"].items()
+            for name, value in words.sizes(cause).items()
         )
         tied = f"; ties with {', '.join(cause['evidence']['ties'])}" if cause["evidence"]["ties"] else ""
         form = f" ({cause['form']})" if cause.get("form") else ""

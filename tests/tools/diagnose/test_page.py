@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from ranger_sim.sysid import answer
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.regression import reduced
@@ -121,16 +122,14 @@ def test_names_from_a_file_are_text_and_no_markup():
     assert "<script>alert(1)" not in html and "&lt;script&gt;alert(1)" in html
 
 
-def test_cosine_and_sine_are_reported_as_an_amplitude():
-    """3 cos x + 4 sin x has amplitude 5; its deviation is along that direction: sqrt((9 * 0.01 + 16 * 0.04) / 25)."""
+def test_cosine_and_sine_are_reported_as_an_amplitude_and_a_phase():
+    """3 cos x + 4 sin x has amplitude 5; its deviation is along that direction: sqrt((9 * 0.01 + 16 * 0.04) / 25), that
+    of the phase across it: sqrt((16 * 0.01 + 9 * 0.04) / 25) / 5."""
 
     class Extended:
         names = ("a:cosine", "a:sine")
         values = {"a:cosine": 3.0, "a:sine": 4.0}
         covariance = np.diag([0.01, 0.04])
-
-    class Found:
-        extended = Extended
 
     class Each:
         coefficients = ("a:cosine", "a:sine")
@@ -138,10 +137,21 @@ def test_cosine_and_sine_are_reported_as_an_amplitude():
         class effect:  # noqa: N801
             coefficients = ("cosine_Nm", "sine_Nm")
 
-    told = page.amplitude(Found, Each)
-    assert told["value"] == 5.0
-    assert told["high"] - 5.0 == pytest.approx(1.96 * np.sqrt((9 * 0.01 + 16 * 0.04) / 25))
-    assert told["phase_rad"] == pytest.approx(np.arctan2(4.0, 3.0))
+    found = answer.waves(Extended, Each)
+    size, phase = found["amplitude_Nm"], found["phase_rad"]
+    assert size.value == 5.0 and phase.value == pytest.approx(np.arctan2(4.0, 3.0))
+    assert size.ci95[1] - 5.0 == pytest.approx(1.96 * np.sqrt((9 * 0.01 + 16 * 0.04) / 25))
+    assert phase.ci95[1] - phase.value == pytest.approx(1.96 * np.sqrt((16 * 0.01 + 9 * 0.04) / 25) / 5.0)
+
+
+def test_a_first_line_has_the_amplitude_and_the_shape_and_no_cosine():
+    values = {"value": 1.0, "ci95": [0.9, 1.1]}
+    cause = {
+        "parameters": {"cosine_Nm": values, "sine_Nm": values, "periods": values},
+        "waves": {"amplitude_Nm": values},
+    }
+    assert list(words.sizes(cause)) == ["amplitude_Nm", "periods"]
+    assert list(words.sizes({"parameters": {"lag_s": values}})) == ["lag_s"]
 
 
 def test_a_rival_is_a_tie_only_when_it_could_be():

@@ -4,7 +4,7 @@ At every output an offset, a scale, a drift and a lag, as a pure delay or as a f
 saturation and a dead zone; at every joint that the machine declares viscous, Coulomb and Stribeck friction, friction
 that differs between the directions or grows with the load, drag, and what is periodic in the position. Lags, speeds,
 limits and periods are on grids that suit the recordings. They enter at places that the engine adds to the simulator
-(`free_simulation.py`), so that `step` and `observe` need not know of them.
+(`simulator.py`), so that `step` and `observe` need not know of them.
 
 A candidate that the machine's own parameters explain cannot be seen and is not named; one that a term of the user's
 equals is left out.
@@ -18,8 +18,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.free_simulation.terms import Joint, Output, Shape, Term, into, on, sensed, shown
 from ranger_sim.sysid.machine import Recording
-from ranger_sim.sysid.simulated_terms import Joint, Output, Shape, Term, into, on, sensed, shown
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, but for the shortest

@@ -1,0 +1,151 @@
+"""A `Machine` (sysid/machine.py) of a simulator: what the diagnosis calls."""
+
+import functools
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import signals
+from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.free_simulation import linearised, numerical_floor
+from ranger_sim.sysid.free_simulation.candidates import candidates
+from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
+from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
+from ranger_sim.sysid.free_simulation.linearised import LinearisedRecording
+from ranger_sim.sysid.free_simulation.terms import Acting, Shape, SimulatedEffect, Term
+from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
+
+MOST_ROWS = 12000  # of a recording; a longer one is averaged over neighbours
+AGAIN = 12  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
+SAME = 1.0 - 1e-6  # cosine of two responses: candidates of two names for one effect
+
+
+class SimulatedMachine(DeclaredMachine):
+    """An ordinary differential equation with measured inputs, as a user declares it."""
+
+    def prepare(self, table: Table) -> LinearisedRecording:
+        """Fit the simulator to one recording and linearise it there."""
+        missing = [each.name for each in self.quantities if each.needed and each.name not in table]
+        if missing:
+            there = ", ".join(table.columns)
+            raise UserError(f"{table.name}: {self.name} needs {', '.join(missing)}; there are {there}")
+        table = signals.uniform(table)
+        longest_s = max((run.stop - run.start) * table.step_s for run in table.runs)
+        if longest_s < self.shortest_s:
+            raise UserError(
+                f"{table.name}: the longest stretch without a gap is {longest_s:.3g} s, "
+                f"{self.name} needs {self.shortest_s:g} s"
+            )
+        fit = TrajectoryFit(self, table, -(-len(table) // MOST_ROWS))
+        fit.settle(follow=True)
+        return linearised.one_step_ahead(fit)
+
+    def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """The terms as effects on the outputs."""
+        simulated = cast(Sequence[LinearisedRecording], recordings)
+        own = self.terms(simulated)
+        free = self._free(own, simulated)
+
+        def columns(recording: Recording, shape: Shape, values: Values, term: Term) -> Columns:
+            here = cast(LinearisedRecording, recording)
+            return here.of_free(free, term, shape) if term.independent else here.respond(term.make(here, shape, values))
+
+        return [
+            SimulatedEffect(
+                term.cause,
+                term.at,
+                term.subsystem,
+                term.coefficients,
+                term.shapes,
+                functools.partial(columns, term=term),
+                term.admissible,
+                term.meaning,
+                phase_is_free=term.phase_is_free,
+                form=term.form,
+                scale=term.scale,
+                term=term,
+            )
+            for term in (*own, *free)
+        ]
+
+    def _free(self, own: Sequence[Term], recordings: Sequence[LinearisedRecording]) -> list[Term]:
+        """The free candidates that are not the same as a term of the machine's own."""
+        if not self.free_candidates:
+            return []
+        inputs = list(recordings[0].fit.simulator.inputs)
+        named = {(each.cause, each.at) for each in own}
+        made = [each for each in candidates(self, inputs, recordings) if (each.cause, each.at) not in named]
+        first, values = recordings[0], recordings[0].fitted
+        known = [_direction(first.respond(each.make(first, shape, values)), first)
+                 for each in own for shape in each.shapes if len(each.coefficients) == 1]  # fmt: skip
+        return [
+            each
+            for each in made
+            if len(each.coefficients) > 1
+            or all(
+                abs(float(_direction(first.of_free(made, each, shape), first) @ other)) < SAME
+                for shape in each.shapes
+                for other in known
+            )
+        ]
+
+    def again(
+        self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
+    ) -> Recording:
+        """The recording fitted and linearised with these effects in the simulator; fixed: their coefficients stay."""
+        acting = [
+            Acting(effect.term, shape, tuple(coefficients))
+            for effect, shape, coefficients in effects
+            if isinstance(effect, SimulatedEffect) and effect.term is not None
+        ]
+        fit = _fit(recording).acted_on(acting, fixed)
+        fit.settle(AGAIN)
+        return linearised.one_step_ahead(fit)
+
+    def about_all(self, recording: Recording, effects: Sequence[tuple[Effect, Shape]]) -> Recording:
+        """The recording linearised where the simulator fits with all of these effects in it, and not only without."""
+        acting = [
+            Acting(effect.term, shape, (0.0,) * len(effect.coefficients))
+            for effect, shape in effects
+            if isinstance(effect, SimulatedEffect) and effect.term is not None
+        ]
+        if not acting:
+            return recording
+        fit = _fit(recording)
+        tried = fit.with_all(acting)
+        tried.settle(follow=True)
+        made = linearised.one_step_ahead(tried)
+        return made if tried.surprise < fit.surprise else recording
+
+    def numerical(self, recording: Recording) -> Array:
+        """(variants, coefficients): what the coefficients of what acts move by with other numerics."""
+        return numerical_floor.moved(_fit(recording))
+
+    def surprise(self, recording: Recording) -> float:
+        """-2 log likelihood of a recording with what acts in its simulator, up to a constant."""
+        return _fit(recording).surprise
+
+    def free(self, recording: Recording) -> Recording:
+        """The recording with errors of free simulation as its equations: the outputs' errors over `window_s`, with the
+        simulator started at the most probable state of each window. Inputs count as exact."""
+        return linearised.free(_fit(recording))
+
+    def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
+        """The signals of `looked_over`."""
+        return self.looked_over(cast(LinearisedRecording, recording))
+
+
+def _fit(recording: Recording) -> TrajectoryFit:
+    return cast(LinearisedRecording, recording).fit
+
+
+def _direction(columns: Columns, recording: LinearisedRecording) -> Array:
+    """An effect's response with one coefficient as a vector of length 1, each output in its noise."""
+    nothing = np.zeros((len(recording.table), 1))
+    stacked = np.concatenate(
+        [columns.get(name, nothing)[:, 0] / unit
+         for name, unit in zip(recording.outputs, recording.predictor.unit, strict=True)]
+    )  # fmt: skip
+    return np.asarray(stacked / max(float(np.linalg.norm(stacked)), 1e-300))

@@ -1,0 +1,149 @@
+"""The Kalman predictor and smoother of a simulator that was linearised about a trajectory."""
+
+import dataclasses
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from scipy.linalg import lapack
+
+from ranger_sim.sysid.dataset import Array
+
+STRETCH = 400  # samples of a stretch; covariances of all stretches are computed side by side
+
+
+@dataclasses.dataclass
+class Jacobians:
+    """The simulator about a trajectory. n samples, s states, i noisy inputs, p parameters, o outputs, q ports.
+
+    next_state: (n, s) f; output: (n, o) h; the rest: their derivatives, `f_x` (n, s, s) to `h_q` (n, o, q).
+    """
+
+    next_state: Array
+    output: Array
+    f_x: Array
+    f_u: Array
+    f_p: Array
+    f_q: Array
+    h_x: Array
+    h_u: Array
+    h_p: Array
+    h_q: Array
+
+
+class Predictor:
+    """The Kalman predictor of a linearised simulator: turns forcings into white prediction errors.
+
+    A forcing has a part in the states, (n, s, k), and a part in the outputs, (n, o, k).
+    """
+
+    def __init__(self, lin: Jacobians, noise_u: Array, noise_y: Array, loose: Array, starts: np.ndarray, away: Array,
+                 before: "Predictor | None" = None, stretch: int = STRETCH) -> None:  # fmt: skip
+        """noise_u: (i,), noise_y: (o,) standard deviations; loose: (n, s) of each step; starts: samples at which the
+        state is free, with standard deviations `away` (s,). before: of the last round of a fit."""
+        n, s = lin.next_state.shape
+        o = lin.output.shape[1]
+        self.n, self.s, self.o = n, s, o
+        self.h_x = lin.h_x
+        self.ends: Array  # (stretches, s, s) covariances at the end of each stretch
+        self.gain = np.empty((n, s, o))
+        self.spread = np.empty((n, o, o))  # Cholesky factor of the prediction error's covariance
+        self.covariance = np.empty((n, s, s))
+        variance = noise_u**2
+        state_noise = (lin.f_u * variance) @ lin.f_u.transpose(0, 2, 1)
+        state_noise[:, np.arange(s), np.arange(s)] += loose**2
+        output_noise = (lin.h_u * variance) @ lin.h_u.transpose(0, 2, 1)
+        output_noise[:, np.arange(o), np.arange(o)] += noise_y**2
+        both_noise = (lin.f_u * variance) @ lin.h_u.transpose(0, 2, 1)
+        is_start = np.zeros(n, dtype=bool)
+        is_start[starts] = True
+        # Side by side in stretches, each from the covariance at the end of the one before in the last round; in the
+        # first round a stretch has no prior knowledge, which is textbook multiple shooting.
+        free = np.asarray(np.diag(away**2), dtype=float)
+        length = min(n, stretch)
+        P: Array = np.tile(free, (-(-n // length), 1, 1))
+        if before is not None:
+            P[1:] = before.ends[:-1]
+        self.ends = P.copy()
+        for k in range(length):
+            at = np.arange(k, n, length)
+            P = P[: len(at)]
+            P[is_start[at]] = free
+            A, C = lin.f_x[at], lin.h_x[at]
+            PC = P @ C.transpose(0, 2, 1)
+            error = C @ PC + output_noise[at]
+            K = np.linalg.solve(error, (A @ PC + both_noise[at]).transpose(0, 2, 1)).transpose(0, 2, 1)
+            self.covariance[at], self.gain[at], self.spread[at] = P, K, error
+            P = A @ P @ A.transpose(0, 2, 1) + state_noise[at] - K @ error @ K.transpose(0, 2, 1)
+            P[:] = 0.5 * (P + P.transpose(0, 2, 1))
+            self.ends[: len(at)] = P
+        self.spread = np.asarray(np.linalg.cholesky(self.spread), dtype=float)
+        self.unspread = np.linalg.inv(self.spread)
+        self.inner = lin.f_x - self.gain @ lin.h_x
+        self.inner[starts[1:] - 1] = 0.0
+        self.into = np.ones((n, 1, 1))  # a start forgets the forcing of the sample before it
+        self.into[starts[1:] - 1] = 0.0
+        # Rows of the recursion x[k+1] - inner[k] x[k] = forcing[k] as a banded lower triangle
+        self.band = np.zeros((2 * s, n * s))
+        self.band[0] = 1.0
+        for row in range(s):
+            for column in range(s):
+                place = np.arange(n - 1) * s + column
+                self.band[s + row - column, place] = -self.inner[:-1, row, column]
+        # in units of the channels: the errors are white, and as large as the middle one
+        self.unit = np.median(np.abs(self.spread[:, np.arange(o), np.arange(o)]), axis=0)
+
+    def _march(self, forcing: Array, backward: bool = False) -> Array:
+        """x (n, s, k) with x[0] = forcing[0] and x[k] = inner[k-1] x[k-1] + forcing[k]; or its transpose."""
+        k = forcing.shape[2]
+        flat = forcing.reshape(self.n * self.s, k)
+        out, info = lapack.dtbtrs(self.band, flat, uplo="L", trans="T" if backward else "N", diag="U")
+        if info:
+            raise AssertionError(f"dtbtrs: {info}")
+        return np.asarray(out, dtype=float).reshape(self.n, self.s, k)
+
+    def errors(self, state: Array, output: Array) -> Array:
+        """(n, o, k) prediction errors of forcings, not whitened."""
+        return self.predicted(state, output)[1]
+
+    def predicted(self, state: Array, output: Array) -> tuple[Array, Array]:
+        """((n, s, k) deviations of the predicted states, (n, o, k) prediction errors) of forcings, not whitened."""
+        driven = np.zeros_like(state)
+        driven[1:] = (self.into * (state - self.gain @ output))[:-1]
+        x = self._march(driven)
+        return x, self.h_x @ x + output
+
+    def white(self, errors: Array) -> Array:
+        """(n, o, k) of one deviation each, in the channels' units."""
+        return (self.unspread @ errors) * self.unit[None, :, None]
+
+    def smoothed(self, x: Array, error: Array, f_u: Array, h_u: Array, noise_u: Array) -> tuple[Array, Array]:
+        """(n, s) and (n, i): the most probable deviations of states and noisy inputs, given all samples.
+
+        x, error: (n, s), (n, o), of the response, as `predicted` (Bryson and Frazier's form of the smoother).
+        """
+        weighed = self.unspread.transpose(0, 2, 1) @ (self.unspread @ error[:, :, None])
+        adjoint = self._march(self.h_x.transpose(0, 2, 1) @ weighed, backward=True)
+        after = self.into * np.concatenate((adjoint[1:], np.zeros_like(adjoint[:1])))
+        states = -x[:, :, None] + self.covariance @ adjoint
+        weighed_less = weighed - self.gain.transpose(0, 2, 1) @ after
+        inputs = h_u.transpose(0, 2, 1) @ weighed_less + f_u.transpose(0, 2, 1) @ after
+        return states[:, :, 0], noise_u**2 * inputs[:, :, 0]
+
+
+def between(column: Array) -> Array:
+    """(n, k): means of each sample and the next, for the step between them."""
+    after = np.concatenate((column[1:], column[-1:]))
+    return np.asarray(0.5 * (column + after))
+
+
+def forcing(lin: Jacobians, entering: Mapping[int, Array], held: Collection[int]) -> tuple[Array, Array]:
+    """((n, s, k), (n, o, k)) forcings of what enters, (n, k) by number of its port; held: ports that hold a sample's
+    value until the next."""
+    n, s = lin.next_state.shape
+    count = next(iter(entering.values())).shape[1]
+    state, output = np.zeros((n, s, count)), np.zeros((n, lin.output.shape[1], count))
+    for number, column in entering.items():
+        through = column if number in held else between(column)
+        state += lin.f_q[:, :, number, None] * through[:, None]
+        output += lin.h_q[:, :, number, None] * column[:, None]
+    return state, output

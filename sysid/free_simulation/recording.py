@@ -1,0 +1,32 @@
+"""A recording along a simulated trajectory."""
+
+import dataclasses
+
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Array
+from ranger_sim.sysid.free_simulation.terms import Port, Ports
+from ranger_sim.sysid.machine import Recording
+
+
+@dataclasses.dataclass(kw_only=True)
+class SimulatedRecording(Recording):
+    """What terms are made of: `signals` along the trajectory, and the ports at which something can enter."""
+
+    ports: tuple[Port, ...]
+
+    def entering(self, entries: Ports) -> dict[int, Array]:
+        """By number of its port (n, k): the input at the ports, (n,) or (n, k) by name, weighted by their `where`.
+
+        UserError for an unknown port.
+        """
+        numbers = {port.name: number for number, port in enumerate(self.ports)}
+        unknown = [name for name in entries if name not in numbers]
+        if unknown:
+            raise UserError(f"a term puts something into {', '.join(unknown)}; ports are {', '.join(numbers)}")
+        out = {}
+        for name, each in entries.items():
+            number = numbers[name]
+            column = each[:, None] if each.ndim == 1 else each
+            where = self.ports[number].where
+            out[number] = column * self.signals[where][:, None] if where else column
+        return out
