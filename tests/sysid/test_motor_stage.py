@@ -54,7 +54,7 @@ def test_a_meter_that_reads_low_shows_in_the_mechanical_power_too():
     assert stage.values["factor"].differs and stage.values["factor"].value == pytest.approx(0.7, abs=0.03)
 
 
-def test_gates_that_switch_are_told_from_gates_that_do_not():
+def test_gates_that_switch_and_gates_that_do_not_are_different_findings():
     for scheme, more in (("switching", 0.2), ("powered", 0.0)):
         motor = dataclasses.replace(ANKLE_MOTOR, gate_power_W=0.4, gate_scheme=scheme)
         found = of_drive(Drive(motor, 5, brushes_V=0.0), motor).values
