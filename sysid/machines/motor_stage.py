@@ -337,7 +337,7 @@ def fitted(
     weight = 1.0 / deviation
     for _ in range(20):
         a, y = columns * weight[:, None], response * weight
-        values = np.linalg.lstsq(a, y, rcond=None)[0]
+        values = np.asarray(np.linalg.lstsq(a, y, rcond=None)[0], dtype=np.float64)
         left = (response - columns @ values) / deviation
         scale = max(1.4826 * float(np.median(np.abs(left))), least)
         weight = np.sqrt(np.minimum(1.0, 2.5 * scale / np.maximum(np.abs(left), 1e-300))) / deviation
@@ -354,7 +354,12 @@ def fitted(
         sums = np.array([a[groups == number].T @ rest[groups == number] for number in numbers])
         count = len(numbers)
         meat = sums.T @ sums * count / max(count - 1, 1)
-    return Fit(values, bread @ meat @ bread, max(1, count - columns.shape[1]), left)
+    return Fit(
+        np.asarray(values, dtype=float),
+        np.asarray(bread @ meat @ bread, dtype=float),
+        max(1, count - columns.shape[1]),
+        left,
+    )
 
 
 def simulated_of(motor: MotorParameters) -> dict[str, float]:
