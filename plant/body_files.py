@@ -54,7 +54,7 @@ MOTOR_KEYS = (
     ("viscous_friction_Nms", "N m s/rad", (0.0, 10.0), "C_1 at the joint (robot.md P3)"),
 )
 # Of MotorParameters as well, for the steering's motor too.
-GATE_KEYS = (
+GATE_KEYS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("gate_power_W", {"unit": "W", "limits": (0.0, 10.0)}, "of a board's MOSFET drive at 30 V, 100 kHz (appendix 3.7)"),
     ("gate_scheme", {"unit": "", "allowed": GATE_SCHEMES}, "when that is drawn: chosen by us, see motor_parameters.py"),
 )
@@ -81,9 +81,9 @@ def keys() -> dict[str, Key]:
             metadata = {"unit": unit, "limits": limits, "source": source}
             found[key] = Key(key, getattr(getattr(electrics, motor), name), metadata)
     for motor in GATES:
-        for name, metadata, source in GATE_KEYS:
+        for name, limits_and_unit, source in GATE_KEYS:
             key = f"{motor}_{name}"
-            found[key] = Key(key, getattr(getattr(electrics, motor), name), {**metadata, "source": source})
+            found[key] = Key(key, getattr(getattr(electrics, motor), name), {**limits_and_unit, "source": source})
     for name, unit, limits, source in SENSOR_KEYS:
         metadata = {"unit": unit, "limits": limits, "source": source}
         found[name] = Key(name, getattr(electrics, name), metadata)

@@ -146,7 +146,12 @@ FIGURES = (
     # boards
     Figure("slots.{board}.count", COUNT, "", "slots that began"),
     Figure("slots.{board}.overruns", COUNT, "", "slots that began before the work of the one before was done"),
-    Figure("slots.{board}.max_execution_us", REAL, "us", "longest work of a slot, interrupts included"),
+    Figure(
+        "slots.{board}.max_execution_us",
+        REAL,
+        "us",
+        "longest work of a slot with interrupts; an image's that polls: the slot",
+    ),
     Figure("slots.{board}.budget_us", REAL, "us", "length of a slot"),
     Figure(
         "errors.{board}.{error}",

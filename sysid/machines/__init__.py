@@ -14,6 +14,9 @@ MACHINES = {
     "walk": "walk:Walk",
 }
 
+MOTOR_STAGE = "motor-stage"  # sparse samples of meters without a time base in common: it has a diagnosis of its own
+EXPERIMENTS = (*MACHINES, MOTOR_STAGE)
+
 ROBOT = ("motor-bench", "leg-swing", "ankle", "walk")  # those that measure the robot, whose simulator can have a cause
 
 
@@ -45,10 +48,11 @@ def machine_of(machine: str | Machine, gear: float | None = None) -> Machine:
         if gear is not None:
             raise ModelError(f"--gear {gear:g}: only the motor bench has a gearbox, not {machine.name}")
         return machine
+    if machine == MOTOR_STAGE:
+        raise ModelError(f"{machine}: its function is ranger_sim.sysid.machines.motor_stage.diagnose(datasets)")
     if machine not in MACHINES:
-        raise ModelError(
-            f"--experiment {machine}: {unknown('experiment', machine, MACHINES)}; a machine of yours is module:object"
-        )
+        text = unknown("experiment", machine, EXPERIMENTS)
+        raise ModelError(f"--experiment {machine}: {text}; a machine of yours is module:object")
     if gear is None:
         return made(machine)()
     if machine != "motor-bench":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.sysid.machines import EXPERIMENTS, MOTOR_STAGE
 from ranger_sim.tools.command_line.options import add_verbosity
 from ranger_sim.tools.command_line.units import number, whole_number
 from ranger_sim.tools.recordings import datasets
@@ -34,13 +34,13 @@ def register(commands: Any) -> None:
         "--experiment",
         required=True,
         metavar="NAME",
-        help=f"{', '.join(MACHINES)}, or a machine of your own as module:object",
+        help=f"{', '.join(EXPERIMENTS)}, or a machine of your own as module:object",
     )
     command.add_argument(
         "--model",
         metavar="FILE",
         help="model to start from: the extended.toml of an earlier diagnosis, or [[term]] tables; terms that it "
-        "has are not findings",
+        "has are not findings; for motor-stage a body, by name or as a .toml file (ranger)",
     )
     command.add_argument(
         "--gear", type=number(least=0.01, most=1e4), metavar="N", help="of the motor bench's gearbox (14)"
@@ -65,6 +65,10 @@ def register(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """The command."""
+    if options.experiment == MOTOR_STAGE:
+        from ranger_sim.tools.diagnose import motor_stages
+
+        return motor_stages.run(options)
     from ranger_sim.tools.diagnose import work
 
     return work.run(options)
