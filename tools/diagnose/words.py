@@ -43,6 +43,11 @@ def nothing(answer: dict[str, Any]) -> str:
             f"no cause was found, and the {above[0]} equation leaves {each['left'] / max(each['channel'], 1e-300):.3g} "
             "times its channel's own noise: something may be missing that these data do not show"
         )
+    if evidence["impossible"]:
+        return (
+            "no cause was found, and the equations fit only with values that no machine has: the model lacks something, "
+            "or a channel is not what its name says"
+        )
     if evidence.get("noise_floor"):
         return "nothing that these data could show is missing from the equations"
     return f"nothing that these data could show is missing from the equations (p {evidence['p_general']:.2g})"

@@ -27,7 +27,7 @@ from ranger_sim.tools.command_line.files import json_target, replace_file, writa
 from ranger_sim.tools.diagnose import words
 from ranger_sim.tools.recordings import datasets
 
-EXIT_CLEAN, EXIT_FOUND, EXIT_ABOVE_NOISE = 0, 1, 3  # 2 is a user's mistake
+EXIT_CLEAN, EXIT_FOUND, EXIT_DOUBTFUL = 0, 1, 3  # 2 is a user's mistake
 MOST_GAPS = 4  # more of them are one line on a screen; report and JSON have all
 
 
@@ -66,7 +66,8 @@ def run(options: argparse.Namespace) -> int:
     if found.result.detected:
         return EXIT_FOUND
     evidence = found.result.evidence
-    return EXIT_ABOVE_NOISE if evidence.above_noise_floor or evidence.too_short_s else EXIT_CLEAN
+    doubtful = evidence.above_noise_floor or evidence.too_short_s or evidence.impossible
+    return EXIT_DOUBTFUL if doubtful else EXIT_CLEAN
 
 
 def write(found: Diagnosis, folder: pathlib.Path, command: str) -> None:

@@ -205,3 +205,14 @@ def test_a_slow_machine_of_ones_own_may_have_slow_samples(tmp_path, capsys):
     columns = np.column_stack([1e3 * run.time_s, *run.columns.values()])[:2000]  # steps of some seconds
     code, told = diagnosed(tmp_path / "a.csv", capsys, text_of(["t_s", *run.columns], columns))
     assert code in (0, 1) and "slow_samples" in {each["kind"] for each in told["data_findings"]}
+
+
+def test_values_that_no_machine_has_do_not_end_with_the_code_of_a_sound_one(tmp_path, capsys):
+    """A force that counts the other way round: the mass and the damping come out negative."""
+    run = cart_run(1)
+    rows = np.column_stack((run.time_s, -run["force_N"], run["v_m_per_s"]))
+    path = tmp_path / "backwards.csv"
+    np.savetxt(path, rows, delimiter=",", header="t_s,force_N,v_m_per_s", comments="")
+    assert main(["diagnose", str(path), "--experiment", "tests.sysid.test_diagnose:Cart"]) != 0
+    shown = capsys.readouterr().out
+    assert "mass_kg comes out as" in shown and "nothing that these data could show is missing" not in shown
