@@ -14,10 +14,11 @@ from ranger_sim.sysid.fit import Parameter
 from ranger_sim.sysid.identification import run
 from ranger_sim.sysid.identification.motor import GEAR
 from ranger_sim.sysid.machine import Machine
-from ranger_sim.sysid.machines import machine_of
+from ranger_sim.sysid.machines import is_ours, machine_of
 from ranger_sim.sysid.preparation import parted, prepared
 from ranger_sim.sysid.reading import open_recording
 from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
+from ranger_sim.sysid.twins import evidence
 
 File = str | pathlib.Path | Dataset
 
@@ -78,10 +79,8 @@ def diagnosis(
         raise UserError(f"--holdout-part {holdout_part:g}: allowed is what lies between 0 and 1")
     machine = machine_of(machine, gear)
     known = model_file.read(model, machine).effects if model is not None else []
-    data, held = (
-        [prepared(_dataset(each, mapping, time_unit), machine, accept_loss, repair) for each in _several(group)]
-        for group in (files, holdout)
-    )
+    read = [[_dataset(each, mapping, time_unit) for each in _several(group)] for group in (files, holdout)]
+    data, held = ([prepared(each, machine, accept_loss, repair) for each in group] for group in read)
     if not data:
         raise UserError("files: none is given, a diagnosis needs at least one recording")
     ready = [*data, *held]
@@ -96,6 +95,9 @@ def diagnosis(
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
+    if machine.name == "walk" and is_ours(machine):
+        twins, _ = evidence.of(read[0], read[1], holdout_part)
+        found.result = evidence.combined(found.result, twins)
     if wrong := _not_finite(found.answer):
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")
     return found

@@ -87,9 +87,12 @@ def _step(time_s: Array) -> float:
 
 def of_all(channels: dict[str, Channel]) -> Iterator[Finding]:
     """Recordings that were joined, or whose rows are mixed: what happens to all channels of one time base at a row."""
-    for group in _by_stamps(channels):
-        smooth = [channel for channel in group if _is_smooth(channel.value)]
-        yield from _joined(smooth)
+    groups = _by_stamps(channels)
+    most = max(map(len, groups), default=0)
+    for group in groups:
+        if 2 * len(group) > most + 1:  # a few of a robot's variables restart together; a joint is in all channels
+            smooth = [channel for channel in group if _is_smooth(channel.value)]
+            yield from _joined(smooth)
         yield from _mixed(group)
 
 

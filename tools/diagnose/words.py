@@ -17,6 +17,12 @@ def sentence(found: Diagnosis) -> str:
         return f"{name}: {doubted(answer)}."
     if not answer["detected"]:
         return f"{name}: {nothing(answer)}."
+    if answer["abstained"] and answer["subsystem"] == "gait":
+        likeliest = " or ".join(answer["evidence"]["suspects"])
+        return (
+            f"{name}: the gait is not that of a sound robot, and no cause of the catalogue explains it; the nearest: "
+            f"{likeliest}."
+        )
     if answer["abstained"]:
         suspects = answer["evidence"]["suspects"]
         also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""

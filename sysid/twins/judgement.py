@@ -1,0 +1,231 @@
+"""Which cause moves a walk away from its sound twins, how far, and since which step."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg
+
+from ranger_sim.sysid.dataset import Array
+from ranger_sim.sysid.twins.model import Direction, Mean, View, mean_of, scatter
+from ranger_sim.sysid.twins.step_map import Rest
+
+CURVATURE = 0.12  # of an effect's length: what a line and a square leave of it; chosen by leaving out
+GRID = 61  # sizes of either sign
+FARTHEST = 2.5  # times the largest size that was made
+TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
+ALIKE = 0.95  # cosine of directions above which they never are
+ALARM = 0.98  # quantile of sound walks
+HOLDS = 3.84  # of twice the log-likelihood: 95 %
+ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 6, 8  # steps: between onsets, before the first, after the last
+ONSET_PAYS = 14.0  # of twice the log-likelihood that a later begin must gain
+UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """One cause. gain: of twice the log-likelihood; left: distance with it, over its degrees of freedom."""
+
+    direction: Direction
+    size: float
+    low: float
+    high: float
+    gain: float
+    left: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """The comparison of a walk with its twins.
+
+    detected; named: the best cause, None when nothing is detected or what is left is not sound; fits: all causes, the
+    best first; ties, alike: names that explain as well, and that these channels can never distinguish from it; since:
+    step from which on, 0 for all; distance: over its degrees of freedom; gain: of the best cause; limits: of both;
+    visible: (cause, least size, unit) for every cause; unseen: causes without a size; floor_m; steps that counted;
+    unusual: (feature, deviations) of the largest.
+    """
+
+    detected: bool
+    named: Fit | None
+    fits: tuple[Fit, ...]
+    ties: tuple[Direction, ...]
+    alike: tuple[Direction, ...]
+    since: int
+    distance: float
+    limits: tuple[float, float]
+    visible: tuple[tuple[Direction, float], ...]
+    unseen: tuple[Direction, ...]
+    floor_m: float
+    steps: int
+    unusual: tuple[tuple[str, float], ...]
+
+
+class Space:
+    """The vector of a walk in coordinates in which a sound walk is white noise of deviation 1."""
+
+    def __init__(self, view: View, mean: Mean, weights: Array, without: str = "") -> None:
+        self.there = np.isfinite(mean.value)
+        covariance = scatter(view, weights, mean.steps, without)[np.ix_(self.there, self.there)]
+        self.lower = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) / len(covariance) * np.eye(len(covariance)))
+        self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
+        self.directions = view.directions
+        self.linear = np.array([self.of(each.linear) for each in view.directions])
+        self.square = np.array([self.of(each.square) for each in view.directions])
+        self.steps = sum(mean.steps)
+
+    @property
+    def freedom(self) -> int:
+        """Number of features."""
+        return len(self.value)
+
+    def of(self, vector: Array) -> Array:
+        """A vector of features in these coordinates."""
+        return np.asarray(linalg.solve_triangular(self.lower, vector[self.there], lower=True))
+
+    def moved(self, number: int, size: float) -> Array:
+        """Where a cause of this size moves a sound walk."""
+        each = self.directions[number]
+        edge = each.high if size > 0.0 else -each.low
+        inside = min(abs(size), edge) * np.sign(size)
+        return (inside * self.linear[number] + inside**2 * self.square[number]) * (size / inside if inside else 1.0)
+
+    def profile(self, number: int, sizes: Array, value: Array | None = None) -> Array:
+        """Twice the log-likelihood of each size, against that of a sound walk."""
+        value = self.value if value is None else value
+        each = self.directions[number]
+        edge = np.where(sizes > 0.0, each.high, -each.low)
+        inside = np.minimum(np.abs(sizes), edge) * np.sign(sizes)
+        stretch = np.where(inside != 0.0, sizes / np.where(inside == 0.0, 1.0, inside), 1.0)
+        a, b = inside * stretch, inside**2 * stretch
+        l, q = self.linear[number], self.square[number]
+        length = a**2 * (l @ l) + 2 * a * b * (l @ q) + b**2 * (q @ q)
+        left = value @ value - 2 * a * (value @ l) - 2 * b * (value @ q) + length
+        unsure = 1.0 + sizes**2 * self.steps / max(each.weight, 1e-30) + CURVATURE**2 * length / self.freedom
+        return np.asarray(value @ value - left / unsure - self.freedom * np.log(unsure))
+
+    def fit(self, number: int, value: Array | None = None) -> Fit:
+        """The likeliest size of a cause with its interval."""
+        each = self.directions[number]
+        value = self.value if value is None else value
+        sizes = np.concatenate([sign for sign in (
+            np.linspace(FARTHEST * each.low, 0.0, GRID)[:-1] if each.low < 0.0 else np.empty(0),
+            np.linspace(0.0, FARTHEST * each.high, GRID)[1:],
+        ) if len(sign)])  # fmt: skip
+        gains = self.profile(number, sizes, value)
+        for _ in range(2):  # finer about the best
+            best = int(np.argmax(gains))
+            width = sizes[1] - sizes[0]
+            finer = sizes[best] + np.linspace(-1.0, 1.0, 41) * width
+            finer = finer[(finer != 0.0) & (finer > min(each.low, 0.0) * FARTHEST) & (finer > (0.0 if each.low >= 0.0 else -np.inf))]
+            sizes = np.unique(np.concatenate((sizes, finer)))
+            gains = self.profile(number, sizes, value)
+        best = int(np.argmax(gains))
+        within = sizes[gains > gains[best] - HOLDS]
+        left = value - self.moved(number, float(sizes[best]))
+        unsure = 1.0 + sizes[best] ** 2 * self.steps / max(each.weight, 1e-30)
+        unsure += CURVATURE**2 * float(np.sum(self.moved(number, float(sizes[best])) ** 2)) / self.freedom
+        return Fit(each, float(sizes[best]), float(within.min()), float(within.max()), float(gains[best]),
+                   float(left @ left / unsure) / self.freedom)  # fmt: skip
+
+    def fits(self) -> list[Fit]:
+        """All causes, the likeliest first."""
+        found = [self.fit(number) for number in range(len(self.directions))]
+        return sorted(found, key=lambda each: -each.gain)
+
+
+def limits_of(view: View) -> tuple[float, float]:
+    """Gain and distance that one sound walk in fifty exceeds."""
+    return float(np.quantile(view.alarms[:, 0], ALARM)), float(np.quantile(view.alarms[:, 1], ALARM))
+
+
+def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdict | None:
+    """The verdict about what the map leaves of a walk. names: of the features; spread: of the footholds' heights, m.
+    None for a walk with too few steps."""
+    mean = mean_of(found)
+    if mean is None:
+        return None
+    floor_m, weights = view.floor(spread)
+    space = Space(view, mean, weights)
+    fits, since = space.fits(), 0
+    for onset in _onsets(found):
+        part = mean_of(found, found.step >= onset)
+        if part is None:
+            continue
+        later = Space(view, part, weights)
+        tried = later.fits()
+        if tried[0].gain - ONSET_PAYS > fits[0].gain and tried[0].gain - ONSET_PAYS > (fits[0].gain if since else -1.0):
+            fits, since, space, mean = [dataclasses.replace(each, gain=each.gain - ONSET_PAYS) for each in tried], onset, later, part
+    gain_limit, distance_limit = limits_of(view)
+    distance = float(space.value @ space.value) / space.freedom
+    best = fits[0]
+    detected = best.gain > gain_limit or distance > distance_limit
+    named = None
+    if detected and best.gain > gain_limit and best.left < UNEXPLAINED * distance_limit:
+        named = _sized(view, mean, weights, best)
+    ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE)
+    return Verdict(
+        detected,
+        named,
+        tuple(fits),
+        ties if named else (),
+        _alike(space, best) if named else (),
+        since,
+        distance,
+        (gain_limit, distance_limit),
+        *_visible(space, gain_limit),
+        floor_m,
+        sum(mean.steps),
+        _unusual(view, mean, weights, names),
+    )
+
+
+def _onsets(found: Rest) -> range:
+    last = int(found.step[found.inside][-1]) if found.inside.any() else 0
+    return range(ONSET_AFTER, last - ONSET_LEAST, ONSET_EVERY)
+
+
+def _sized(view: View, mean: Mean, weights: Array, best: Fit) -> Fit:
+    """The cause's size and interval without its tolerance: it is the size that is asked for."""
+    if not best.direction.tolerance:
+        return best
+    space = Space(view, mean, weights, without=best.direction.name)
+    number = next(n for n, each in enumerate(view.directions) if each is best.direction)
+    sized = space.fit(number)
+    return dataclasses.replace(best, size=sized.size, low=sized.low, high=sized.high)
+
+
+def _alike(space: Space, best: Fit) -> tuple[Direction, ...]:
+    """Causes whose direction is the best one's in the present features."""
+    number = next(n for n, each in enumerate(space.directions) if each is best.direction)
+    own = space.moved(number, best.size)
+    out = []
+    for other, each in enumerate(space.directions):
+        if each is not best.direction:
+            cosine = own @ space.linear[other] / (np.linalg.norm(own) * np.linalg.norm(space.linear[other]) + 1e-30)
+            if abs(cosine) > ALIKE:
+                out.append(each)
+    return tuple(out)
+
+
+def _visible(space: Space, limit: float) -> tuple[tuple[tuple[Direction, float], ...], tuple[Direction, ...]]:
+    """The least size of each cause that would have passed the limit, and the causes that have none."""
+    seen, unseen = [], []
+    for number, each in enumerate(space.directions):
+        squared = float(space.linear[number] @ space.linear[number])
+        squared -= space.freedom * space.steps / max(each.weight, 1e-30)  # what the direction's own error adds
+        size = np.sqrt(limit / squared) if squared > 0.0 else np.inf
+        if size < FARTHEST * max(each.high, -each.low):
+            seen.append((each, float(size)))
+        else:
+            unseen.append(each)
+    return tuple(seen), tuple(unseen)
+
+
+def _unusual(view: View, mean: Mean, weights: Array, names: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """Every feature's distance from sound walks in their deviations, the largest first."""
+    deviation = np.sqrt(np.diag(scatter(view, weights, mean.steps)))
+    away = (mean.value - weights @ view.middle) / deviation
+    legs = ("outer", "inner")
+    labels = [f"{name}, {leg} legs swing" for leg in legs for name in names]
+    order = np.argsort(-np.nan_to_num(np.abs(away)))
+    return tuple((labels[place], float(away[place])) for place in order if np.isfinite(away[place]))
