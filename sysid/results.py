@@ -178,13 +178,15 @@ class TwinCause:
 class TwinsEvidence:
     """A walk compared with its twins, emulated walks of sound robots and of robots with one cause each.
 
-    controller: whose twins; rate: "full", "link" (50 Hz) or "few" (hip and leg angle alone); steps: that counted; since_step:
+    controller: whose twins; rate: "full", "link" (50 Hz) or "few" (hip and leg angle alone); steps: that counted;
+    since_step:
     the first step with the cause, 0 for all; distance: from sound walks, over its degrees of freedom; gain: of the
     likeliest cause; limits: of gain and distance, which one sound walk in fifty exceeds; named: None where nothing was
     detected, or what is left with the likeliest cause is not sound; refused_by_holdout: it does not explain held-out
     steps; ties: causes that explain these steps as well; never_distinguished: whose direction is the same; unusual:
     features with their distance from sound walks, in their deviations; smallest_visible: by cause the least size that
-    would have been detected; cannot_be_seen: causes that these channels do not show; other_parameters: of the controller,
+    would have been detected; cannot_be_seen: causes that these channels do not show; other_parameters: of the
+    controller,
     whose values in the recording are others; held_out: distance of held-out steps without and with the cause; note: why
     there is no comparison, "" where there is one.
     """

@@ -9,8 +9,8 @@ Addition = Mapping[str, float]  # {key of a file: what a size of 1 adds}
 @dataclasses.dataclass(frozen=True)
 class Kind:
     """One kind. right: "cause at place" that counts as right; parameter: the diagnosis's, of which the size is; body,
-    controller: what a size of 1 adds; relative: it multiplies by 1 + size instead; term: (form, place, key, value at size
-    0); fault: (places, mode, key, factor); one_sided: sizes above 0 only."""
+    controller: what a size of 1 adds; relative: it multiplies by 1 + size instead; term: (form, place, key, value at
+    size 0); fault: (places, mode, key, factor); one_sided: sizes above 0 only."""
 
     name: str
     right: str
@@ -57,7 +57,8 @@ KINDS = (
     Kind("mass", "inertia at body", "mass_kg", {"total_mass_kg": 1.0}),
     Kind("hip spring", "spring_value at hip_spring", "stiffness_Nm_per_rad", {"hip_spring_Nm_per_rad": 1.0}),
     Kind("cables' stiffness", "spring_value at cables", "stiffness_Nm_per_rad", {"ankle_spring_Nm_per_rad": 1.0}),
-    Kind("hip friction", "coulomb_friction at hip_motor", "change_Nm", {"hip_constant_friction_Nm": 1.0}, one_sided=True),
+    Kind("hip friction", "coulomb_friction at hip_motor", "change_Nm", {"hip_constant_friction_Nm": 1.0},
+         one_sided=True),
     Kind("rolling resistance", "contact_loss at feet", "rolling_Nms",
          {"outer_rolling_friction_Nms": 1.0, "inner_rolling_friction_Nms": 1.0}, one_sided=True),
     Kind("slope", "floor at floor", "slope_rad", scenario="slope_rad"),
@@ -73,8 +74,10 @@ KINDS = (
          one_sided=True),
     Kind("hip current's scale", "sensor_scale at hip_current_A", "change",
          term=("sensor_scale", "hip_motor_current", "factor", 1.0)),
-    Kind("stance gain", "firmware_parameter at C_F_ST_F_ANG", "relative", controller={"C_F_ST_F_ANG": 1.0}, relative=True),
-    Kind("push-off gain", "firmware_parameter at C_F_PP_F_ANG", "relative", controller={"C_F_PP_F_ANG": 1.0}, relative=True),
+    Kind("stance gain", "firmware_parameter at C_F_ST_F_ANG", "relative", controller={"C_F_ST_F_ANG": 1.0},
+         relative=True),
+    Kind("push-off gain", "firmware_parameter at C_F_PP_F_ANG", "relative", controller={"C_F_PP_F_ANG": 1.0},
+         relative=True),
     Kind("CAN 1 late", "clock_drift at can1_delay", "delay_s", fault=(("CSR.can1",), "delay", "late_us", 1e6),
          one_sided=True),
     Kind("CAN 3 late", "clock_drift at can3_delay", "delay_s", fault=(("CSR.can3",), "delay", "late_us", 1e6),

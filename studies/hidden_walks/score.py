@@ -84,12 +84,18 @@ def case_of(hidden: Hidden, multiple: float, floor: str, row: str, found: TwinsE
     tied = kind.right in (*found.ties, *found.never_distinguished)
     value = next(iter(named.parameters.values())) if named else None
     low, high = value.ci95 if value else (0.0, 0.0)
-    return Case(kind.name, multiple, floor, row, kind.right, hidden.size, found.steps, found.detected, text, right, tied,
-                bool(right and low <= hidden.size <= high), value.value if value else 0.0, low, high, found.since_step)  # fmt: skip
+    return Case(kind.name, multiple, floor, row, kind.right, hidden.size, found.steps, found.detected, text, right,
+         tied,
+                bool(right and low <= hidden.size <= high), value.value if value else 0.0, low, high,
+                     found.since_step)  # fmt: skip
 
 
 def all_cases(
-    seed: int, floors: Sequence[str], rows: Sequence[str], kinds: Sequence[str] = (), each: Callable[[Case], None] = lambda case: None
+    seed: int,
+    floors: Sequence[str],
+    rows: Sequence[str],
+    kinds: Sequence[str] = (),
+    each: Callable[[Case], None] = lambda case: None,
 ) -> list[Case]:
     """Every kind at every multiple on every floor, by the full row's smallest sizes."""
     found = []

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-
 from threadpoolctl import threadpool_limits
 
 from ranger_sim.sysid import causes
@@ -64,7 +63,10 @@ def walked(dataset: Dataset) -> Walked | None:
 
 def view_of(file: TwinFile, walks: Sequence[Walked]) -> tuple[str, View]:
     """The view that the recordings' rate and channels allow."""
-    needed = [name for name in step_map.START if name not in (step_map.FOOTHOLD,)] + [step_map.FOOTHOLD, step_map.VOLTAGE]
+    needed = [name for name in step_map.START if name not in (step_map.FOOTHOLD,)] + [
+        step_map.FOOTHOLD,
+        step_map.VOLTAGE,
+    ]
     rich = all(np.isfinite(each.found[:, step_map.columns(needed)]).any(0).all() for each in walks)
     if not rich:
         return twin_file.FEW, file.views[twin_file.FEW]
@@ -96,7 +98,9 @@ def of(
         )  # fmt: skip
         return TwinsEvidence(controller, note=why), None
     rate, view = view_of(file, walks)
-    view = dataclasses.replace(view, directions=tuple(each for each in view.directions if _is_open(each, file, datasets)))
+    view = dataclasses.replace(
+        view, directions=tuple(each for each in view.directions if _is_open(each, file, datasets))
+    )
     part = (0.0, 1.0 if holdout_part is None else 1.0 - holdout_part)
     found = rest_of(view, walks, part=part)
     spread = step_map.roughness(found, view.few)
@@ -218,12 +222,16 @@ def combined(result: DiagnosisResult, found: TwinsEvidence) -> DiagnosisResult:
     if agreed and not result.abstained:
         first = agreed[0]
         if (first.name, first.at) == (own.name, own.at) and first.parameters.keys() == own.parameters.keys():
-            first = dataclasses.replace(first, parameters={n: _nearer(first.parameters[n], own.parameters[n]) for n in own.parameters})
+            first = dataclasses.replace(
+                first, parameters={n: _nearer(first.parameters[n], own.parameters[n]) for n in own.parameters}
+            )
         rest = [each for each in result.causes if each is not agreed[0]]
         return dataclasses.replace(result, causes=(first, *rest))
     tied = tuple(each.name for each in result.causes)
     own = dataclasses.replace(own, tied_with=tuple(dict.fromkeys((*own.tied_with, *tied))))
-    return dataclasses.replace(result, detected=True, abstained=False, causes=(own,), subsystem=SUBSYSTEMS.get(own.name, "mechanical"))
+    return dataclasses.replace(
+        result, detected=True, abstained=False, causes=(own,), subsystem=SUBSYSTEMS.get(own.name, "mechanical")
+    )
 
 
 def _nearer(one: Value, other: Value) -> Value:
@@ -234,14 +242,18 @@ def _nearer(one: Value, other: Value) -> Value:
 def result_cause(found: TwinsEvidence) -> Cause:
     """The twins' cause as a diagnosis lists causes."""
     assert found.named is not None
-    own, behind = found.named, {f"{each.name} at {each.at}": found.named.gain - each.gain for each in found.likeliest[1:]}
+    own, behind = (
+        found.named,
+        {f"{each.name} at {each.at}": found.named.gain - each.gain for each in found.likeliest[1:]},
+    )
     return Cause(
         name=own.name,
         at=own.at,
         form=None,
         balance="".join(causes.CAUSES[own.name].balances),
         parameters=dict(own.parameters),
-        tied_with=tuple(dict.fromkeys(each.partition(" at ")[0] for each in found.ties if not each.startswith(f"{own.name} at"))),
+        tied_with=tuple(
+            dict.fromkeys(each.partition(" at ")[0] for each in found.ties if not each.startswith(f"{own.name} at"))
+        ),
         evidence=CauseEvidence(own.gain, 0.0, own.gain, found.ties, behind, None),
     )
-

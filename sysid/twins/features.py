@@ -78,7 +78,12 @@ _TABLE: tuple[tuple[str, str], ...] = (
     ),
     ("battery voltage", "median"),
 )
-_STATES = (("hip state", range(1, 9)), ("leg state", range(6)), ("outer state", range(1, 6)), ("inner state", range(1, 6)))
+_STATES = (
+    ("hip state", range(1, 9)),
+    ("leg state", range(6)),
+    ("outer state", range(1, 6)),
+    ("inner state", range(1, 6)),
+)
 FEATURES: tuple[tuple[str, str, str], ...] = (
     *((f"{signal} {each}", signal, each) for signal, how in _TABLE for each in how.split()),
     *((f"{signal} {n}", signal, f"in state {n}") for signal, numbers in _STATES for n in numbers),

@@ -66,7 +66,9 @@ class Space:
     def __init__(self, view: View, mean: Mean, weights: Array, without: str = "") -> None:
         self.there = np.isfinite(mean.value)
         covariance = scatter(view, weights, mean.steps, without)[np.ix_(self.there, self.there)]
-        self.lower = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) / len(covariance) * np.eye(len(covariance)))
+        self.lower = np.linalg.cholesky(
+            covariance + 1e-9 * np.trace(covariance) / len(covariance) * np.eye(len(covariance))
+        )
         self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
         self.directions = view.directions
         self.linear = np.array([self.of(each.linear) for each in view.directions])
@@ -97,9 +99,9 @@ class Space:
         inside = np.minimum(np.abs(sizes), edge) * np.sign(sizes)
         stretch = np.where(inside != 0.0, sizes / np.where(inside == 0.0, 1.0, inside), 1.0)
         a, b = inside * stretch, inside**2 * stretch
-        l, q = self.linear[number], self.square[number]
-        length = a**2 * (l @ l) + 2 * a * b * (l @ q) + b**2 * (q @ q)
-        left = value @ value - 2 * a * (value @ l) - 2 * b * (value @ q) + length
+        line, bend = self.linear[number], self.square[number]
+        length = a**2 * (line @ line) + 2 * a * b * (line @ bend) + b**2 * (bend @ bend)
+        left = value @ value - 2 * a * (value @ line) - 2 * b * (value @ bend) + length
         unsure = 1.0 + sizes**2 * self.steps / max(each.weight, 1e-30) + CURVATURE**2 * length / self.freedom
         return np.asarray(value @ value - left / unsure - self.freedom * np.log(unsure))
 
@@ -116,7 +118,11 @@ class Space:
             best = int(np.argmax(gains))
             width = sizes[1] - sizes[0]
             finer = sizes[best] + np.linspace(-1.0, 1.0, 41) * width
-            finer = finer[(finer != 0.0) & (finer > min(each.low, 0.0) * FARTHEST) & (finer > (0.0 if each.low >= 0.0 else -np.inf))]
+            finer = finer[
+                (finer != 0.0)
+                & (finer > min(each.low, 0.0) * FARTHEST)
+                & (finer > (0.0 if each.low >= 0.0 else -np.inf))
+            ]
             sizes = np.unique(np.concatenate((sizes, finer)))
             gains = self.profile(number, sizes, value)
         best = int(np.argmax(gains))
@@ -154,7 +160,12 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
         later = Space(view, part, weights)
         tried = later.fits()
         if tried[0].gain - ONSET_PAYS > fits[0].gain and tried[0].gain - ONSET_PAYS > (fits[0].gain if since else -1.0):
-            fits, since, space, mean = [dataclasses.replace(each, gain=each.gain - ONSET_PAYS) for each in tried], onset, later, part
+            fits, since, space, mean = (
+                [dataclasses.replace(each, gain=each.gain - ONSET_PAYS) for each in tried],
+                onset,
+                later,
+                part,
+            )
     gain_limit, distance_limit = limits_of(view)
     distance = float(space.value @ space.value) / space.freedom
     best = fits[0]

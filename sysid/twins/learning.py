@@ -20,8 +20,8 @@ SIDES = (OUTER, INNER)
 
 @dataclasses.dataclass(frozen=True)
 class Twinned:
-    """One twin. floor: its number; leg: (k,); found: (k, all features); key: of its cause, "" for a sound robot; loose: of
-    a body within tolerances."""
+    """One twin. floor: its number; leg: (k,); found: (k, all features); key: of its cause, "" for a sound robot;
+    loose: of a body within tolerances."""
 
     floor: int
     leg: np.ndarray
@@ -153,7 +153,9 @@ def _direction(view: View, cause: Cause, pairs: Sequence[tuple[Twinned, Rest]]) 
     basis = np.column_stack((size, size**2))
     if len(np.unique(np.round(size, 9))) < 2:
         basis = basis[:, :1]
-    solved = np.linalg.lstsq(basis * np.sqrt(weight)[:, None], np.array(vectors) * np.sqrt(weight)[:, None], rcond=None)[0]
+    solved = np.linalg.lstsq(
+        basis * np.sqrt(weight)[:, None], np.array(vectors) * np.sqrt(weight)[:, None], rcond=None
+    )[0]
     square = solved[1] if len(solved) > 1 else np.zeros_like(solved[0])
     return Direction(cause.cause, cause.at, cause.parameter, cause.form, solved[0], square, min(0.0, float(size.min())),
                      max(0.0, float(size.max())), float(weight @ size**2), cause.tolerance)  # fmt: skip
@@ -168,4 +170,3 @@ def _alarm(view: View, twin: Twinned, rest: Rest) -> tuple[float, float] | None:
     space = judgement.Space(view, mean, weights)
     fits = space.fits()
     return fits[0].gain if fits else 0.0, float(space.value @ space.value) / space.freedom
-

@@ -1,7 +1,7 @@
 """Everything that a walk is compared with: maps, scatter and directions of one controller by one rate of the log.
 
-A walk is one vector: the trimmed mean of what the map leaves, in its deviations, of the steps of either leg, shape (2 p,).
-"""
+A walk is one vector: the trimmed mean of what the map leaves, in its deviations, of the steps of either leg, shape (2
+p,)."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ FEWEST = 3  # steps of either leg
 
 @dataclasses.dataclass(frozen=True)
 class Direction:
-    """How a cause moves the vector: linear and square by its size, shape (2 p,) each; largest: size that was made, either
-    sign; weight: sum of sizes squared times steps; tolerance: deviation of the size among sound robots."""
+    """How a cause moves the vector: linear and square by its size, shape (2 p,) each; largest: size that was made,
+    either sign; weight: sum of sizes squared times steps; tolerance: deviation of the size among sound robots."""
 
     cause: str
     at: str
@@ -42,7 +42,8 @@ class Direction:
 class View:
     """Of one rate of the log. few: of the hip's and the leg's angle and the walk's state alone.
 
-    floors_m: (f,) roughness; footholds: (f,) what `step_map.roughness` gives there; middle: (f, 2 p); deviation: (f, 2 p)
+    floors_m: (f,) roughness; footholds: (f,) what `step_map.roughness` gives there; middle: (f, 2 p); deviation: (f,
+    2 p)
     of one step; correlation: (2, p, p) of a leg's steps; between: (k, 2 p), in which walks differ as a whole; steps: of
     the twins; alarms: (a, 2) gain of the best cause and distance, each sound walk that had no part in the scatter.
     """
@@ -71,7 +72,8 @@ class View:
 
 @dataclasses.dataclass(frozen=True)
 class Mean:
-    """A walk or a part of it as one vector. value: (2 p,), not a number where a feature is missing; steps: of either leg."""
+    """A walk or a part of it as one vector. value: (2 p,), not a number where a feature is missing; steps: of either
+    leg."""
 
     value: Array
     steps: tuple[int, int]
@@ -99,8 +101,8 @@ def trimmed(left: Array) -> Array:
 
 
 def scatter(view: View, weights: Array, steps: Sequence[int], without: str = "") -> Array:
-    """Covariance (2 p, 2 p) of the vector of a sound walk with so many steps of either leg. without: the name of a cause
-    whose tolerance does not count."""
+    """Covariance (2 p, 2 p) of the vector of a sound walk with so many steps of either leg. without: the name of a
+    cause whose tolerance does not count."""
     p = view.correlation.shape[1]
     deviation = np.sqrt(weights @ view.deviation**2)
     out = view.between.T @ view.between

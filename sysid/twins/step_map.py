@@ -1,4 +1,5 @@
-"""What a sound robot's step is, given the state at its start: linear and square in that state, by the leg that swings."""
+"""What a sound robot's step is, given the state at its start: linear and square in that state, by the leg that
+swings."""
 
 import dataclasses
 from collections.abc import Sequence

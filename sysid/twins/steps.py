@@ -135,9 +135,7 @@ def of_dataset(dataset: Dataset) -> Steps | None:
     start, stop = float(hip[0][0]), float(hip[0][-1])
     grid = start + CLOCK_S * np.arange(int((stop - start) / CLOCK_S + 1e-6) + 1)
     every_s = float(np.median(np.diff(hip[0])))
-    columns = {
-        name: on_clock(name, time_s, value, grid, every_s < FAST_S) for name, (time_s, value) in found.items()
-    }
+    columns = {name: on_clock(name, time_s, value, grid, every_s < FAST_S) for name, (time_s, value) in found.items()}
     return of_columns(columns, every_s)
 
 
@@ -172,8 +170,8 @@ def by_link(columns: Mapping[str, Array], every: int, phases: Sequence[int]) -> 
 
 
 def on_clock(name: str, time_s: Array, value: Array, grid: Array, fast: bool) -> Array:
-    """A variable's values at the grid's times: held, as the main brain has them; of a slow log in straight lines, but for
-    what changes once per step."""
+    """A variable's values at the grid's times: held, as the main brain has them; of a slow log in straight lines, but
+    for what changes once per step."""
     if fast or name.startswith(ONCE_PER_STEP):
         rows = np.searchsorted(time_s, grid + 0.25 * CLOCK_S, side="right") - 1
         return np.asarray(value[np.maximum(rows, 0)])
@@ -187,4 +185,3 @@ def usual(steps: Steps) -> np.ndarray:
     alternate = np.ones(len(good), dtype=bool)
     alternate[1:] = steps.leg[1:] != steps.leg[:-1]
     return good & alternate
-

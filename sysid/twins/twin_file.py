@@ -50,7 +50,10 @@ def written(file: TwinFile) -> bytes:
                 np.save(buffer, np.asarray(values, dtype="<f4"), allow_pickle=False)
                 _add(archive, f"{name}/{part}.npy", buffer.getvalue())
             texts = [
-                {key: getattr(each, key) for key in ("cause", "at", "parameter", "form", "low", "high", "weight", "tolerance")}
+                {
+                    key: getattr(each, key)
+                    for key in ("cause", "at", "parameter", "form", "low", "high", "weight", "tolerance")
+                }
                 for each in view.directions
             ]
             _add(archive, f"{name}/directions.json", json.dumps({"few": view.few, "directions": texts}).encode())

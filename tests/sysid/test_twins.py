@@ -23,7 +23,9 @@ def leg_machine(count):
 def swinging(count):
     """Columns of a walk whose hip angle is positive at the end of every other step."""
     state = leg_machine(count).astype(float)
-    hip = np.concatenate([np.linspace(-0.3, 0.3, STEP_ROWS) * (1 if number % 2 == 0 else -1) for number in range(count)])
+    hip = np.concatenate(
+        [np.linspace(-0.3, 0.3, STEP_ROWS) * (1 if number % 2 == 0 else -1) for number in range(count)]
+    )
     return {"FSM_LEG": state, "MCH_ANGLE": hip, "MCH_MOTOR_CURRENT": np.full(len(hip), 2.0)}
 
 

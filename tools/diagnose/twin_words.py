@@ -5,7 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 MOST = 6  # causes of a list that are in one line
-RATES = {"full": "at the table's rate", "link": "at the data link's 50 Hz", "few": "by hip angle, leg angle and state alone"}
+RATES = {
+    "full": "at the table's rate",
+    "link": "at the data link's 50 Hz",
+    "few": "by hip angle, leg angle and state alone",
+}
 
 
 def lines(answer: dict[str, Any]) -> list[str]:
@@ -15,10 +19,11 @@ def lines(answer: dict[str, Any]) -> list[str]:
         return []
     if found["note"]:
         return [f"twins: no comparison: {found['note']}"]
+    floor_mm, (gain, distance) = 1e3 * found["floor_roughness_m"], found["limits"]
     out = [
-        f"twins: {found['steps']} steps {RATES[found['rate']]} against sound walks of {found['controller']} on a floor of "
-        f"{1e3 * found['floor_roughness_m']:.1f} mm: distance {found['distance']:.2f} (sound below {found['limits'][1]:.2f}), "
-        f"likeliest cause gains {found['gain']:.0f} (sound below {found['limits'][0]:.0f})"
+        f"twins: {found['steps']} steps {RATES[found['rate']]} against sound walks of {found['controller']} on a floor "
+        f"of {floor_mm:.1f} mm: distance {found['distance']:.2f} (sound below {distance:.2f}), likeliest cause gains "
+        f"{found['gain']:.0f} (sound below {gain:.0f})"
     ]
     if found["other_parameters"]:
         names = shortened(found["other_parameters"])
@@ -28,7 +33,11 @@ def lines(answer: dict[str, Any]) -> list[str]:
     unusual = ", ".join(f"{name} {away:+.1f}" for name, away in found["unusual"][:3])
     out.append(f"twins: most unusual, in deviations of sound walks: {unusual}")
     if found["named"] is None:
-        why = "held-out steps do not have it" if found["refused_by_holdout"] else "what is left with it is not a sound walk"
+        why = (
+            "held-out steps do not have it"
+            if found["refused_by_holdout"]
+            else "what is left with it is not a sound walk"
+        )
         nearest = cause(found["likeliest"][0])
         out.append(f"twins: the gait is not that of a sound robot; the nearest cause is {nearest}, and {why}")
     else:

@@ -106,7 +106,9 @@ def learned(answer: dict[str, Any]) -> str:
 
 
 def doubts(answer: dict[str, Any]) -> list[dict[str, Any]]:
-    """The findings after which no cause is named."""
+    """The findings after which no cause is named; none of them where the gait has one all the same."""
+    if answer["causes"]:
+        return []
     return [each for each in answer["data_findings"] if each["kind"] in plausibility.FORBID]
 
 
@@ -139,6 +141,9 @@ def told(found: Diagnosis) -> str:
     if not answer["detected"]:
         text = nothing(answer)
         return f"{text[0].upper()}{text[1:]}."
+    if answer["abstained"] and answer["subsystem"] == "gait":
+        near = " or ".join(answer["evidence"]["suspects"])
+        return f"The gait is not that of a sound robot, and no cause of the catalogue explains it; the nearest: {near}."
     if answer["abstained"]:
         also = ""
         if answer["evidence"]["suspects"]:

@@ -19,7 +19,9 @@ def built(tasks: list[Task], folder: pathlib.Path) -> TwinFile:
     """Maps, scatter and directions by all rates, from the walks in a folder."""
     walks = list(made(tasks, folder))
     first = tasks[0]
-    causes = [learning.Cause(each.key, each.cause, each.at, each.parameter, each.form, each.tolerance) for each in TWINS]
+    causes = [
+        learning.Cause(each.key, each.cause, each.at, each.parameter, each.form, each.tolerance) for each in TWINS
+    ]
     with threadpool_limits(1):  # threads of the linear algebra change the last digits
         views = {
             name: learning.learned(twins(walks, name), causes, FLOORS_M, few=name == FEW) for name in (FULL, LINK, FEW)

@@ -25,7 +25,8 @@ class Change:
 @dataclasses.dataclass(frozen=True)
 class Twin:
     """One cause. change: makes it of a size, given the sound body's and controller's values; one_sided: sizes above 0
-    alone; tolerance: standard deviation among sound robots, in the same unit, 0 where it is small against what shows."""
+    alone; tolerance: standard deviation among sound robots, in the same unit, 0 where it is small against what
+    shows."""
 
     cause: str
     at: str
@@ -97,10 +98,12 @@ def _legs() -> list[Twin]:
     found = []
     for leg, board in (("outer", "MCFO"), ("inner", "MCFI")):
         found += [
-            Twin("geometry", f"{leg}_feet", "foot_height_m", both(0.0015, 0.003), of_body(f"{leg}_ankle_offset_m"), 0.0005),
+            Twin("geometry", f"{leg}_feet", "foot_height_m", both(0.0015, 0.003), of_body(f"{leg}_ankle_offset_m"),
+                 0.0005),
             Twin("inertia", f"{leg}_leg", "moment_kg_m", both(0.02, 0.04), of_body(f"{leg}_mass_moment_kg_m"), 0.002),
             Twin("inertia", f"{leg}_leg", "offset_kg_m", both(0.012, 0.024), of_body(f"{leg}_mass_offset_kg_m"), 0.001),
-            Twin("inertia", f"{leg}_leg", "inertia_kg_m2", both(0.015, 0.03), of_body(f"{leg}_hip_inertia_kg_m2"), 0.003),
+            Twin("inertia", f"{leg}_leg", "inertia_kg_m2", both(0.015, 0.03), of_body(f"{leg}_hip_inertia_kg_m2"),
+                 0.003),
             Twin("coulomb_friction", f"{leg}_ankle", "change_Nm", (-0.03, 0.05, 0.1), of_friction(leg), 0.004),
             Twin("sensor_offset", f"{leg}_ankle_angle_rad", "offset_rad", both(0.008, 0.016),
                  of_term("sensor_offset", f"{leg}_ankle_absolute", "value"), 0.001),
@@ -122,8 +125,10 @@ def _legs() -> list[Twin]:
 
 TWINS: tuple[Twin, ...] = (
     *_legs(),
-    Twin("geometry", "feet", "foot_height_m", both(0.003, 0.006), of_body("outer_ankle_offset_m", "inner_ankle_offset_m")),
-    Twin("geometry", "soles", "radius_m", both(0.005, 0.01), of_body("outer_foot_radius_m", "inner_foot_radius_m"), 0.0005),
+    Twin("geometry", "feet", "foot_height_m", both(0.003, 0.006), of_body("outer_ankle_offset_m",
+         "inner_ankle_offset_m")),
+    Twin("geometry", "soles", "radius_m", both(0.005, 0.01), of_body("outer_foot_radius_m", "inner_foot_radius_m"),
+         0.0005),
     Twin("geometry", "legs", "length_m", both(0.006, 0.012), of_body("leg_length_m"), 0.001),
     Twin("inertia", "body", "mass_kg", both(0.2, 0.4), of_body("total_mass_kg"), 0.02),
     Twin("spring_value", "hip_spring", "stiffness_Nm_per_rad", both(0.5, 1.1), of_body("hip_spring_Nm_per_rad"), 0.076),
@@ -141,7 +146,8 @@ TWINS: tuple[Twin, ...] = (
     Twin("sensor_scale", "hip_angle_rad", "change", both(0.01, 0.02),
          of_term("sensor_scale", "hip_absolute", "factor", 1.0)),
     Twin("sensor_scale", "gyro", "change", both(0.02, 0.04), of_term("sensor_scale", "gyro", "factor", 1.0), 0.001),
-    Twin("sensor_offset", "gyro", "offset_rad_s", both(0.008, 0.016), of_term("sensor_offset", "gyro", "value"), 0.0005),
+    Twin("sensor_offset", "gyro", "offset_rad_s", both(0.008, 0.016), of_term("sensor_offset", "gyro", "value"),
+         0.0005),
     Twin("sensor_lag", "gyro", "time_constant_s", (0.005, 0.01), of_term("sensor_lag", "gyro", "time_constant_s")),
     Twin("torque_constant_temperature", "hip_motor", "relative", both(0.05, 0.1),
          of_term("torque_constant_change", "hip_motor", "factor", 1.0), 0.005, "torque_constant_change"),
@@ -154,13 +160,15 @@ TWINS: tuple[Twin, ...] = (
     Twin("sensor_scale", "hip_battery_current", "change", both(0.05, 0.1),
          of_term("sensor_scale", "hip_battery_current", "factor", 1.0), 0.005),
     Twin("firmware_parameter", "C_F_ST_F_ANG", "relative", both(0.12, 0.24), of_gains("C_F_ST_F_ANG")),
-    Twin("firmware_parameter", "C_HI_SH_H_ANG", "relative", both(0.12, 0.24), of_gains("C_HI_SH_H_ANG", "C_H_EH_H_ANG")),
+    Twin("firmware_parameter", "C_HI_SH_H_ANG", "relative", both(0.12, 0.24), of_gains("C_HI_SH_H_ANG",
+         "C_H_EH_H_ANG")),
     Twin("firmware_parameter", "C_F_PP_F_ANG", "relative", both(0.1, 0.2), of_gains("C_F_PP_F_ANG")),
     Twin("firmware_parameter", "P_HI_SH_H_TANG", "change_rad", both(0.015, 0.03),
          of_targets("P_HI_SH_H_TANG", "P_H_EH_H_TANG")),
     Twin("firmware_parameter", "C_F_FU_F_ANG", "relative", both(0.15, 0.3), of_gains("C_F_FU_F_ANG", "C_F_FD_F_ANG")),
     *(
-        Twin("clock_drift", f"{bus}_delay", "delay_s", (0.003, 0.006), of_faults("delay", "late_us", 1e6, f"CSR.{bus}"), seeds=0.6)
+        Twin("clock_drift", f"{bus}_delay", "delay_s", (0.003, 0.006), of_faults("delay", "late_us", 1e6, f"CSR.{bus}"),
+             seeds=0.6)
         for bus in ("can1", "can2", "can3", "can4")
     ),
 )  # fmt: skip

@@ -14,13 +14,15 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "twins",
         description="Lets sound robots, and robots with one cause each, walk in the emulator, and makes the file that "
-        "`ranger-sim diagnose --experiment walk` compares a walk with. After a kill, the same command continues. The same "
-        "version, controller and body make the same bytes.",
+        "`ranger-sim diagnose --experiment walk` compares a walk with. After a kill, the same command continues. The "
+        "same version, controller and body make the same bytes.",
     )
     command.add_argument(
         "controller", nargs="?", default="record-2011", metavar="CONTROLLER", help="parameter set (record-2011)"
     )
-    command.add_argument("--body", default="ranger", type=word("a body's name"), metavar="NAME", help="sound body (ranger)")
+    command.add_argument(
+        "--body", default="ranger", type=word("a body's name"), metavar="NAME", help="sound body (ranger)"
+    )
     command.add_argument("--work", metavar="DIR", help="folder of the walks (runs/twins/CONTROLLER)")
     command.add_argument("--out", metavar="FILE", help="file to make (default: the one in the package)")
     command.add_argument("--jobs", type=whole_number(1), default=2, metavar="N", help="walks at a time (2)")

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.command_line.files import replace_file
 from ranger_sim.tools.twins.causes import TWINS, Twin
 from ranger_sim.tools.twins.walking import Task, Walked, fingerprint, walk
 
@@ -91,6 +90,9 @@ def made(wanted: list[Task], folder: pathlib.Path) -> Iterator[tuple[Task, Walke
     for task in wanted:
         try:
             with np.load(path_of(folder, task)) as file:
-                yield task, Walked(file["leg"], file["full"].astype(float), file["link"].astype(float), bool(file["fell"]))
+                yield (
+                    task,
+                    Walked(file["leg"], file["full"].astype(float), file["link"].astype(float), bool(file["fell"])),
+                )
         except OSError as error:
             raise UserError(f"{folder}: the walk {task.name} is missing ({error}); start the command again") from None
