@@ -18,11 +18,12 @@ from typing import Any
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import ModelError, UserError, unknown
 from ranger_sim.plant.electrics.electrics import ElectricsParameters
-from ranger_sim.plant.electrics.motor_parameters import MotorParameters
+from ranger_sim.plant.electrics.motor_parameters import GATE_SCHEMES, MotorParameters
 from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
 
 FOLDER = pathlib.Path(__file__).parent / "bodies"
 MOTORS = ("hip", "outer_ankle", "inner_ankle")
+GATES = (*MOTORS, "steering")
 TEXTS = ("title", "description", "base")
 
 
@@ -52,6 +53,11 @@ MOTOR_KEYS = (
     ("constant_friction_Nm", "N m", (0.0, 10.0), "C_0 at the joint (robot.md P3)"),
     ("viscous_friction_Nms", "N m s/rad", (0.0, 10.0), "C_1 at the joint (robot.md P3)"),
 )
+# Of MotorParameters as well, for the steering's motor too.
+GATE_KEYS = (
+    ("gate_power_W", {"unit": "W", "limits": (0.0, 10.0)}, "of a board's MOSFET drive at 30 V, 100 kHz (appendix 3.7)"),
+    ("gate_scheme", {"unit": "", "allowed": GATE_SCHEMES}, "when that is drawn: chosen by us, see motor_parameters.py"),
+)
 # Of ElectricsParameters: the part of the feet's sensors that belongs to the feet.
 SENSOR_KEYS = (
     ("foot_rise_time_constant_s", "s", (1e-4, 1.0), "of the gap's closing; chosen by us: see foot_sensor.py"),
@@ -74,6 +80,10 @@ def keys() -> dict[str, Key]:
             key = f"{motor}_{name}"
             metadata = {"unit": unit, "limits": limits, "source": source}
             found[key] = Key(key, getattr(getattr(electrics, motor), name), metadata)
+    for motor in GATES:
+        for name, metadata, source in GATE_KEYS:
+            key = f"{motor}_{name}"
+            found[key] = Key(key, getattr(getattr(electrics, motor), name), {**metadata, "source": source})
     for name, unit, limits, source in SENSOR_KEYS:
         metadata = {"unit": unit, "limits": limits, "source": source}
         found[name] = Key(name, getattr(electrics, name), metadata)
@@ -99,6 +109,7 @@ class BodyFile:
         """Motors and sensors; battery and electronics are those of every robot."""
         whole = ElectricsParameters()
         changes: dict[str, Any] = {motor: self._motor(motor, getattr(whole, motor)) for motor in MOTORS}
+        changes["steering"] = dataclasses.replace(whole.steering, **self._gates("steering"))
         changes.update({name: self.values[name] for name, _, _, _ in SENSOR_KEYS})
         return dataclasses.replace(whole, **changes)
 
@@ -109,7 +120,11 @@ class BodyFile:
             gear=gear,
             rotor_inertia_kg_m2=self.values["motor_inertia_kg_m2"],
             **{name: self.values[f"{motor}_{name}"] for name, _, _, _ in MOTOR_KEYS},
+            **self._gates(motor),
         )
+
+    def _gates(self, motor: str) -> dict[str, Any]:
+        return {name: self.values[f"{motor}_{name}"] for name, _, _ in GATE_KEYS}
 
 
 def available() -> tuple[str, ...]:

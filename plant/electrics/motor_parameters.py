@@ -7,10 +7,11 @@ of docs/robot.md, "chosen by us, because ...". Angles and rates of a motor are t
 import dataclasses
 import math
 
-from ranger_sim.foundation.user_error import ModelError
+from ranger_sim.foundation.user_error import ModelError, unknown
 
 # Measured winding inductance against frequency [A 3.9]: 94 uH at 1 kHz ... 16 uH at 200 kHz.
 FAULHABER_INDUCTANCE = ((1e3, 94e-6), (20e3, 35e-6), (100e3, 20e-6), (200e3, 16e-6))
+GATE_SCHEMES = ("switching", "powered")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +36,12 @@ class MotorParameters:
     # short end of 47-106 us [P 5]. Chosen by us, because duty changes are steps and the first 50 us matter most.
     settling_frequency_hz: float = 100e3
     pwm_frequency_hz: float = 100e3  # [N 4.4]
-    gate_power_W: float = 0.3  # of the gate drive at 30 V and 100 kHz [A 3.7]
+    # Of a whole board's MOSFET drive at 30 V and 100 kHz; it goes with the voltage and with the frequency. [A 3.7]: a
+    # board "uses under 200 mW, not including the motor and MOSFETs; the MOSFET drive uses another 300 mW at 30 V and
+    # 100 kHz when active".
+    gate_power_W: float = 0.3
+    # When it is active: "switching", while a lead toggles with the PWM; "powered", as long as the bridge has power.
+    gate_scheme: str = "switching"
     diode_drop_V: float = 0.7  # of a bridge diode [A 3.9]
     watchdog_ns: int = 10_000_000  # [A 3.9; N 4.3]
     # Heat: winding to housing, housing to air. Chosen by us in the size of the catalogue values of a 26 mm motor
@@ -71,7 +77,7 @@ class MotorParameters:
         signed = ("air_C", "resistance_per_K", "torque_constant_per_K")
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if field.name == "inductance_table":
+            if field.name in ("inductance_table", "gate_scheme"):
                 continue
             if not math.isfinite(value):
                 raise ModelError(f"motor: {field.name} is {value!r}, it must be a finite number")
@@ -79,6 +85,8 @@ class MotorParameters:
                 raise ModelError(f"motor: {field.name} is {value!r}, it must be above 0")
             if field.name not in positive and field.name not in signed and value < 0.0:
                 raise ModelError(f"motor: {field.name} is {value!r}, it must not be negative")
+        if self.gate_scheme not in GATE_SCHEMES:
+            raise ModelError(f"motor: {unknown('gate_scheme', self.gate_scheme, GATE_SCHEMES)}")
         table = self.inductance_table
         if not table or any(f <= 0.0 or inductance < 0.0 for f, inductance in table):
             raise ModelError(f"motor: inductance_table {table!r} needs frequencies above 0 and inductances from 0 up")

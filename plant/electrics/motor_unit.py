@@ -23,10 +23,11 @@ rotor's inertia, which the body carries. tanh instead of sgn lets a stuck joint 
 moves it with epsilon atanh(T / F), that is 0.027 rad/s at half of the friction with epsilon = 0.05 rad/s.
 
 Losses of the PWM: a triangular ripple of V_b d (1 - d) / (L f) from peak to peak heats the loop by
-R (V_b d (1 - d) / (L f))^2 / 12, with the inductance at the PWM frequency. The gate drive takes 0.3 W at 30 V
-and 100 kHz for each lead that switches. The electronics' 5.15 W are measured at the router board, which feeds
-everything "except for the motors and motor drivers" (appendix 3.8), so gate and ripple losses come on top and
-are drawn from the battery here.
+R (V_b d (1 - d) / (L f))^2 / 12, with the inductance at the PWM frequency. The MOSFETs' drive takes
+gate_power_W V_b / 30 V f / 100 kHz for the board, while a lead switches or as long as the bridge has power
+(`gate_scheme`). The electronics' 5.15 W are measured at the router board, which feeds everything "except for the
+motors and motor drivers" (appendix 3.8), so the gates' power and ripple losses come on top and are drawn from the
+battery here.
 """
 
 import cython
@@ -71,7 +72,8 @@ class MotorUnit:
     decay: cython.double
     decay_s: cython.double
     decay_squared_s: cython.double
-    gate_W_per_V: cython.double
+    switching_gate_A: cython.double
+    powered_gate_A: cython.double
     ripple_per_ohm2: cython.double
     mu: cython.double
     C0: cython.double
@@ -133,7 +135,10 @@ class MotorUnit:
         self.inductance_H = p.inductance_H(p.settling_frequency_hz)
         # of EQUATIONS 10.6, without voltage, resistance and duty
         self.ripple_per_ohm2 = 1.0 / (12.0 * (p.inductance_H(p.pwm_frequency_hz) * p.pwm_frequency_hz) ** 2)
-        self.gate_W_per_V = p.gate_power_W / 30.0 * (p.pwm_frequency_hz / 100e3)
+        # what the MOSFETs' drive takes from the battery while a lead switches, and while the bridge has power
+        gate_A = p.gate_power_W / 30.0 * (p.pwm_frequency_hz / 100e3)
+        self.switching_gate_A = gate_A if p.gate_scheme == "switching" else 0.0
+        self.powered_gate_A = gate_A if p.gate_scheme == "powered" else 0.0
         self.diode_drop_V = p.diode_drop_V
         self.dead_time_fraction = p.dead_time_fraction
         self.mu = p.load_friction
@@ -284,11 +289,15 @@ class MotorUnit:
         if bridge_A == 0.0 and drive.switching_leads == 0 and drive.next_change_ns > t1:
             driving_V = duty * battery_V - back_emf_V
             if -contact_V <= driving_V <= contact_V:
-                # nothing drives a current through the contacts and no lead switches: only time passes
-                if self.current_A != 0.0 or self.battery_current_A != 0.0 or self.drive_Nm != 0.0:
+                # nothing drives a current through the contacts and no lead switches: the MOSFETs' drive at most
+                if self.current_A != 0.0 or self.drive_Nm != 0.0:
                     self.current_A = 0.0
-                    self.battery_current_A = 0.0
                     self.load(0.0)
+                self.battery_current_A = 0.0 if drive.is_open else self.powered_gate_A
+                if self.battery_current_A > 0.0:
+                    from_battery_J = self.battery_current_A * h * battery_V
+                    self.gate_J += from_battery_J
+                    self.drawn_J += from_battery_J
                 self.heat_s += h
                 if self.heat_s >= 0.008:
                     self._heat()
@@ -327,12 +336,14 @@ class MotorUnit:
             else:
                 # the dead time's drop is the battery's own voltage, switched against the current: it goes back
                 from_battery_As += duty * total_As - self.dead_time_fraction * size_As
+                ripple_As = 0.0
+                gate_As = self.powered_gate_A * h
                 if drive.switching_leads > 0:
                     ripple_As = battery_V * R * self.ripple_per_ohm2 * drive.ripple * h
-                    gate_As = drive.switching_leads * self.gate_W_per_V * h
+                    gate_As += self.switching_gate_A * h
                     self.ripple_J += ripple_As * battery_V
-                    self.gate_J += gate_As * battery_V
-                    from_battery_As += ripple_As + gate_As
+                self.gate_J += gate_As * battery_V
+                from_battery_As += ripple_As + gate_As
         else:
             self._step_in_pieces(t0, t1, back_emf_V, battery_V)
             bridge_A = self.bridge_current_A
@@ -465,12 +476,14 @@ class MotorUnit:
             else:
                 # the dead time's drop is the battery's own voltage, switched against the current: it goes back
                 from_battery_As += duty * signed_As - self.dead_time_fraction * unsigned_As
+                ripple_As = 0.0
+                gate_As = self.powered_gate_A * between_changes_s
                 if drive.switching_leads > 0:
                     ripple_As = battery_V * R * self.ripple_per_ohm2 * drive.ripple * between_changes_s
-                    gate_As = drive.switching_leads * self.gate_W_per_V * between_changes_s
+                    gate_As += self.switching_gate_A * between_changes_s
                     self.ripple_J += ripple_As * battery_V
-                    self.gate_J += gate_As * battery_V
-                    from_battery_As += ripple_As + gate_As
+                self.gate_J += gate_As * battery_V
+                from_battery_As += ripple_As + gate_As
             now = following
             if now == drive.next_change_ns:
                 drive.apply(now)

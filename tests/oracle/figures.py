@@ -61,8 +61,8 @@ def of_the_walk(walk, electronics_W):
     counted = len(walk.strikes) - SKIPPED
     xs, times = walk.strike_xs(), time[walk.strikes]
     lengths, durations = np.diff(xs)[SKIPPED - 1 :], np.diff(times)[SKIPPED - 1 :]
-    # a foot rolls on by its radius times its rate until it is seen: 0.2 m x 5 rad/s x 2 ms, and back at the step before
-    rolled = 0.2 * 5.0 * STEP_S
+    # a foot rolls on by its radius times its rate until it is seen: 0.2 m x 6 rad/s x 2 ms, and back at the step before
+    rolled = 0.2 * 6.0 * STEP_S
     walked = time[-1] - time[walk.release]
     double = np.array([in_double_stance(walk, at) for at in walk.strikes[SKIPPED:]])
     powers = {name: np.maximum(body[column][walk.release :], 0.0).mean() for name, column in MOTORS.items()}

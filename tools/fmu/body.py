@@ -106,6 +106,9 @@ def _inputs() -> list[Quantity]:
             found.append(Quantity(f"{motor}.low_side_{lead}", INPUT, TRUTH, "", what, True))
         what = "the board's watchdog line moves; 10 ms after it has stopped the bridge has no power"
         found.append(Quantity(f"{motor}.watchdog", INPUT, TRUTH, "", what, False))
+        what = "it moves so long after the communication point; below 0: the slot before it moved it"
+        limits = ((1 - STEP_NS) * 1e-9, (STEP_NS - 1) * 1e-9)
+        found.append(Quantity(f"{motor}.watchdog_delay_s", INPUT, REAL, "s", what, 0.0, limits))
     modes = "0 none, 194 rates, 207 angles and rates, as the robot's user interface asks for"
     found.append(Quantity("imu.mode", INPUT, INTEGER, "", f"packets that the inertial unit is to send: {modes}", 207))
     what = "a person holds the robot in its pose; false lets it go, for good"
@@ -274,7 +277,7 @@ class ExportedBody:
                 bridge.low_side(now, *sides)
             self.written[place] = wanted + sides
             if values[f"{motor}.watchdog"]:
-                bridge.watchdog_edge(now)
+                bridge.watchdog_edge(now + round(1e9 * values[f"{motor}.watchdog_delay_s"]))
         if values["imu.mode"] != self.imu_mode:
             self.imu_mode = values["imu.mode"]
             for byte in (SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD, self.imu_mode):

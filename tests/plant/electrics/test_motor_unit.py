@@ -317,14 +317,40 @@ def test_the_inductance_falls_with_frequency_as_measured():
     assert 20e-6 < HIP_MOTOR.winding_inductance_H(50e3) < 35e-6
 
 
-def test_the_gate_drive_takes_300_mW_at_30_volts_while_one_lead_switches():
-    unit = driven(MotorUnit("m"), 1)
-    run(unit, 8, battery=30.0)
-    assert unit.gate_J / 1e-3 == pytest.approx(0.3)
+def test_the_gate_drive_takes_300_mW_at_30_volts_while_a_lead_switches():
+    for mr2, mr6 in ((1, 0), (0, 300), (300, 200)):
+        unit = driven(MotorUnit("m"), mr2, mr6)
+        run(unit, 8, battery=30.0)
+        assert unit.gate_J / 1e-3 == pytest.approx(0.3)
     for mr2, mr6 in ((0, 0), (600, 600), (600, 0)):
         still = driven(MotorUnit("m"), mr2, mr6)
         run(still, 8, battery=30.0)
         assert still.gate_J == 0.0
+
+
+def test_a_gate_drive_that_goes_with_the_bridges_power_takes_it_at_rest_too():
+    gates = dataclasses.replace(HIP_MOTOR, gate_power_W=0.14, gate_scheme="powered")
+    resting, driving, unpowered = (
+        driven(MotorUnit("m", gates), 0),
+        driven(MotorUnit("m", gates), 1),
+        MotorUnit("m", gates),
+    )
+    for unit in (resting, driving):
+        run(unit, 8, battery=24.0)
+        assert unit.gate_J / 1e-3 == pytest.approx(0.14 * 24.0 / 30.0)
+    assert resting.battery_current_A == pytest.approx(0.14 / 30.0)
+    assert resting.drawn_J == pytest.approx(resting.gate_J)
+    run(unpowered, 8, battery=24.0, feed=False)
+    assert unpowered.gate_J == unpowered.battery_current_A == 0.0
+    # the watchdog, 10 ms later, takes the power away and the gates' with it
+    run(resting, 160, battery=24.0, start=8, feed=False)
+    assert resting.gate_J == pytest.approx(0.14 * 24.0 / 30.0 * (7 * STEP * 1e-9 + 10e-3))
+    assert resting.battery_current_A == 0.0
+
+
+def test_an_unknown_gate_scheme_is_refused():
+    with pytest.raises(UserError, match="unknown gate_scheme 'sometimes'.*switching, powered"):
+        MotorParameters(gate_scheme="sometimes")
 
 
 def test_alternating_leads_give_the_same_duty_and_move_the_switching_lead():

@@ -192,13 +192,14 @@ class Equations:
             lossy = p.contact_drop_V + (volts + 2.0 * p.diode_drop_V if is_open else p.dead_time_fraction * volts)
             charge, size, square = self.run(h, -emf if is_open else duty * volts - emf, lossy, R, inductance)
             turned += charge
+            active = leads > 0 if p.gate_scheme == "switching" else not is_open
             added = {
                 "winding_J": self.R * square,
                 "series_J": (R - self.R) * square,
                 "contact_J": p.contact_drop_V * size,
                 "diode_J": 2.0 * p.diode_drop_V * size if is_open else 0.0,
                 "ripple_J": R * (volts * abs(duty) * (1.0 - abs(duty)) / at_pwm) ** 2 / 12.0 * h if leads else 0.0,
-                "gate_J": leads * p.gate_power_W * (volts / 30.0) * (p.pwm_frequency_hz / 100e3) * h,
+                "gate_J": active * p.gate_power_W * (volts / 30.0) * (p.pwm_frequency_hz / 100e3) * h,
             }
             battery_As += (added["ripple_J"] + added["gate_J"]) / volts
             battery_As += -size if is_open else duty * charge - p.dead_time_fraction * size
@@ -219,6 +220,7 @@ MOTORS = {
     "mirrored ankle": (ANKLE_MOTOR, -1, 16.0),
     "steering": (STEERING_MOTOR, 1, 14.0),
     "dead time": (dataclasses.replace(DEAD, gate_power_W=0.5), -1, 8.0),
+    "gates with the bridge's power": (dataclasses.replace(ANKLE_MOTOR, gate_scheme="powered"), 1, 8.0),
 }
 
 

@@ -46,7 +46,7 @@ def test_every_number_of_the_bodys_table_is_a_parameter_with_its_unit_limits_and
 def test_the_inputs_start_as_a_bridge_does_at_power_up():
     body = body_of(SCENARIO)
     of_a_motor = {"match_2": 0, "match_6": 0, "period": 600, "delay_s": 0.0, "low_side_2": True, "low_side_6": True}
-    of_a_motor["watchdog"] = False
+    of_a_motor |= {"watchdog": False, "watchdog_delay_s": 0.0}
     motors = ("hip", "outer_ankle", "inner_ankle", "steering")
     inputs = {name: each.start for name, each in body.quantities.items() if each.causality == "input"}
     wanted = {f"{motor}.{name}": value for motor in motors for name, value in of_a_motor.items()}
@@ -79,11 +79,12 @@ def test_a_bridge_gets_only_what_has_changed():
     body._act(Plant)
     body.set("hip.low_side_6", False)
     body.set("hip.watchdog", True)
+    body.set("hip.watchdog_delay_s", -5e-6)
     body._act(Plant)
     assert reported == [
         ("write_pwm", 1_003_000, 7, 0, 600),
         ("low_side", 1_000_000, True, False),
-        ("watchdog_edge", 1_000_000),
+        ("watchdog_edge", 995_000),
     ]
     assert plant.imu.mode == 207
 
