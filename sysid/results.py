@@ -187,8 +187,8 @@ class TwinsEvidence:
     features with their distance from sound walks, in their deviations; smallest_visible: by cause the least size that
     would have been detected; cannot_be_seen: causes that these channels do not show; other_parameters: of the
     controller,
-    whose values in the recording are others; held_out: distance of held-out steps without and with the cause; note: why
-    there is no comparison, "" where there is one.
+    whose values in the recording are others; other_body: the body has other numbers now than the twins had; held_out:
+    distance of held-out steps without and with the cause; note: why there is no comparison, "" where there is one.
     """
 
     controller: str
@@ -209,6 +209,7 @@ class TwinsEvidence:
     smallest_visible: Mapping[str, float] = dataclasses.field(default_factory=dict)
     cannot_be_seen: tuple[str, ...] = ()
     other_parameters: tuple[str, ...] = ()
+    other_body: bool = False
     held_out: Interval | None = None
     note: str = ""
 

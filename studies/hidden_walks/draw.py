@@ -45,7 +45,9 @@ def scenario_of(hidden: Hidden, folder: pathlib.Path) -> Scenario:
     """The scenario with its files in the folder."""
     body = dict(body_files.load("ranger").values)
     gains = dict(controllers.load(hidden.controller).values)
-    kind, changed, tuned = hidden.kind, {}, {}
+    kind = hidden.kind
+    changed: dict[str, float] = {}
+    tuned: dict[str, float] = {}
     if hidden.loose:
         draw = generator(hidden.seed, "body of a hidden walk")
         for key, deviation in TOLERANCES.items():
@@ -83,7 +85,7 @@ def recorded(hidden: Hidden) -> Dataset:
         if hidden.kind is not None and hidden.kind.fault is not None:
             places, mode, key, factor = hidden.kind.fault
             for place in places:
-                robot.inject(place, mode, at=hidden.at, **{key: factor * hidden.size})
+                robot.inject(place, mode, hidden.at, **dict[str, Any]({key: factor * hidden.size}))
         stop = StopRule(steps=hidden.steps)
         while not robot.run(stop):
             pass

@@ -113,7 +113,12 @@ def of(
     later = rest_of(view, held) if held else None
     if holdout_part is not None:
         later = rest_of(view, walks, part=(part[1], 1.0))
-    return _evidence(controller, rate, verdict, changed, _held_out(view, verdict, later, spread)), verdict
+    return _evidence(controller, rate, verdict, changed, _held_out(view, verdict, later, spread), is_old(file)), verdict
+
+
+def is_old(file: TwinFile) -> bool:
+    """Whether the body of this version has other numbers than the twins had."""
+    return twin_file.of_body(file.made_of["body"]) != file.made_of["body_fingerprint"]
 
 
 def controller_of(datasets: Sequence[Dataset]) -> tuple[str, tuple[str, ...]]:
@@ -173,7 +178,12 @@ def _cause(fit: Fit) -> TwinCause:
 
 
 def _evidence(
-    controller: str, rate: str, verdict: Verdict, changed: Sequence[str], held: tuple[float, float] | None
+    controller: str,
+    rate: str,
+    verdict: Verdict,
+    changed: Sequence[str],
+    held: tuple[float, float] | None,
+    other_body: bool,
 ) -> TwinsEvidence:
     refused = held is not None and verdict.named is not None and held[1] >= held[0]
     return TwinsEvidence(
@@ -195,6 +205,7 @@ def _evidence(
         smallest_visible={f"{each.name}: {each.parameter}": size for each, size in verdict.visible},
         cannot_be_seen=tuple(f"{each.name}: {each.parameter}" for each in verdict.unseen),
         other_parameters=tuple(changed),
+        other_body=other_body,
         held_out=held,
         note="",
     )

@@ -71,8 +71,7 @@ class Space:
         )
         self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
         self.directions = view.directions
-        self.linear = np.array([self.of(each.linear) for each in view.directions])
-        self.square = np.array([self.of(each.square) for each in view.directions])
+        self.terms = [np.array([self.of(term) for term in each.terms]) for each in view.directions]
         self.steps = sum(mean.steps)
 
     @property
@@ -86,34 +85,39 @@ class Space:
 
     def moved(self, number: int, size: float) -> Array:
         """Where a cause of this size moves a sound walk."""
-        each = self.directions[number]
-        edge = each.high if size > 0.0 else -each.low
-        inside = min(abs(size), edge) * np.sign(size)
-        return (inside * self.linear[number] + inside**2 * self.square[number]) * (size / inside if inside else 1.0)
+        return np.asarray(self._powers(number, np.array([size]))[0] @ self.terms[number])
 
-    def profile(self, number: int, sizes: Array, value: Array | None = None) -> Array:
-        """Twice the log-likelihood of each size, against that of a sound walk."""
-        value = self.value if value is None else value
+    def _powers(self, number: int, sizes: Array) -> Array:
+        """(m, 3) what the terms are multiplied by: size, square and cube; beyond the sizes that were made a line."""
         each = self.directions[number]
         edge = np.where(sizes > 0.0, each.high, -each.low)
         inside = np.minimum(np.abs(sizes), edge) * np.sign(sizes)
         stretch = np.where(inside != 0.0, sizes / np.where(inside == 0.0, 1.0, inside), 1.0)
-        a, b = inside * stretch, inside**2 * stretch
-        line, bend = self.linear[number], self.square[number]
-        length = a**2 * (line @ line) + 2 * a * b * (line @ bend) + b**2 * (bend @ bend)
-        left = value @ value - 2 * a * (value @ line) - 2 * b * (value @ bend) + length
-        unsure = 1.0 + sizes**2 * self.steps / max(each.weight, 1e-30) + CURVATURE**2 * length / self.freedom
-        return np.asarray(value @ value - left / unsure - self.freedom * np.log(unsure))
+        return np.asarray(np.stack((inside, inside**2, inside**3), axis=1) * stretch[:, None])
 
-    def fit(self, number: int, value: Array | None = None) -> Fit:
+    def unsure(self, number: int, powers: Array) -> Array:
+        """(m,) variance of a walk with a cause over that of a sound walk: the direction's error and its curvature."""
+        terms = self.terms[number]
+        length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        error = np.einsum("mi,ij,mj->m", powers, self.directions[number].unsure, powers)
+        return np.asarray(1.0 + self.steps * error + CURVATURE**2 * length / self.freedom)
+
+    def profile(self, number: int, sizes: Array) -> Array:
+        """Twice the log-likelihood of each size, against that of a sound walk."""
+        powers, terms = self._powers(number, sizes), self.terms[number]
+        left = -2.0 * powers @ (terms @ self.value) + np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        whole = self.value @ self.value
+        unsure = self.unsure(number, powers)
+        return np.asarray(whole - (whole + left) / unsure - self.freedom * np.log(unsure))
+
+    def fit(self, number: int) -> Fit:
         """The likeliest size of a cause with its interval."""
         each = self.directions[number]
-        value = self.value if value is None else value
         sizes = np.concatenate([sign for sign in (
             np.linspace(FARTHEST * each.low, 0.0, GRID)[:-1] if each.low < 0.0 else np.empty(0),
             np.linspace(0.0, FARTHEST * each.high, GRID)[1:],
         ) if len(sign)])  # fmt: skip
-        gains = self.profile(number, sizes, value)
+        gains = self.profile(number, sizes)
         for _ in range(2):  # finer about the best
             best = int(np.argmax(gains))
             width = sizes[1] - sizes[0]
@@ -124,18 +128,26 @@ class Space:
                 & (finer > (0.0 if each.low >= 0.0 else -np.inf))
             ]
             sizes = np.unique(np.concatenate((sizes, finer)))
-            gains = self.profile(number, sizes, value)
+            gains = self.profile(number, sizes)
         best = int(np.argmax(gains))
         within = sizes[gains > gains[best] - HOLDS]
-        left = value - self.moved(number, float(sizes[best]))
-        unsure = 1.0 + sizes[best] ** 2 * self.steps / max(each.weight, 1e-30)
-        unsure += CURVATURE**2 * float(np.sum(self.moved(number, float(sizes[best])) ** 2)) / self.freedom
-        return Fit(each, float(sizes[best]), float(within.min()), float(within.max()), float(gains[best]),
-                   float(left @ left / unsure) / self.freedom)  # fmt: skip
+        size = float(sizes[best])
+        left = self.value - self.moved(number, size)
+        unsure = float(self.unsure(number, self._powers(number, np.array([size])))[0])
+        distance = float(left @ left) / unsure / self.freedom
+        return Fit(each, size, float(within.min()), float(within.max()), float(gains[best]), distance)
+
+    def is_known(self, number: int) -> bool:
+        """Whether a cause moves a walk by more than twice the error of its direction."""
+        each = self.directions[number]
+        powers = self._powers(number, np.array([each.high or each.low]))
+        length = float(np.sum((powers[0] @ self.terms[number]) ** 2))
+        error = self.steps * float(powers[0] @ each.unsure @ powers[0]) * self.freedom
+        return length > 4.0 * error
 
     def fits(self) -> list[Fit]:
         """All causes, the likeliest first."""
-        found = [self.fit(number) for number in range(len(self.directions))]
+        found = [self.fit(number) for number in range(len(self.directions)) if self.is_known(number)]
         return sorted(found, key=lambda each: -each.gain)
 
 
@@ -212,7 +224,8 @@ def _alike(space: Space, best: Fit) -> tuple[Direction, ...]:
     out = []
     for other, each in enumerate(space.directions):
         if each is not best.direction:
-            cosine = own @ space.linear[other] / (np.linalg.norm(own) * np.linalg.norm(space.linear[other]) + 1e-30)
+            line = space.terms[other][0]
+            cosine = own @ line / (np.linalg.norm(own) * np.linalg.norm(line) + 1e-30)
             if abs(cosine) > ALIKE:
                 out.append(each)
     return tuple(out)
@@ -222,14 +235,29 @@ def _visible(space: Space, limit: float) -> tuple[tuple[tuple[Direction, float],
     """The least size of each cause that would have passed the limit, and the causes that have none."""
     seen, unseen = [], []
     for number, each in enumerate(space.directions):
-        squared = float(space.linear[number] @ space.linear[number])
-        squared -= space.freedom * space.steps / max(each.weight, 1e-30)  # what the direction's own error adds
-        size = np.sqrt(limit / squared) if squared > 0.0 else np.inf
+        size = _least(space, number, limit)
         if size < FARTHEST * max(each.high, -each.low):
             seen.append((each, float(size)))
         else:
             unseen.append(each)
     return tuple(seen), tuple(unseen)
+
+
+def _least(space: Space, number: int, limit: float) -> float:
+    """The least size of a cause whose expected gain is the limit; infinite for a direction that is not known."""
+    each = space.directions[number]
+    if not space.is_known(number):
+        return np.inf
+    edge = each.high or -each.low
+    sizes = np.linspace(0.0, FARTHEST * edge, 400)[1:]
+    powers = space._powers(number, sizes if each.high else -sizes)
+    terms = space.terms[number]
+    length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+    length -= space.freedom * space.steps * np.einsum("mi,ij,mj->m", powers, each.unsure, powers)  # the error's own
+    unsure = space.unsure(number, powers)
+    gain = space.freedom + length - space.freedom / unsure - space.freedom * np.log(unsure)
+    above = np.flatnonzero(gain > limit)
+    return float(sizes[above[0]]) if len(above) else np.inf
 
 
 def _unusual(view: View, mean: Mean, weights: Array, names: Sequence[str]) -> tuple[tuple[str, float], ...]:

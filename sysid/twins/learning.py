@@ -14,6 +14,7 @@ from ranger_sim.sysid.twins.steps import INNER, OUTER
 
 FOLDS = 4  # of sound twins, for thresholds
 SHRUNK = 0.02  # of a correlation towards none
+RARE = 6.0  # deviations at which a sound step is cut
 LEAST = 1e-4  # of a feature's size: a scatter below it is a constant's
 SIDES = (OUTER, INNER)
 
@@ -56,14 +57,33 @@ def learned(twins: Sequence[Twinned], causes: Sequence[Cause], floors_m: Sequenc
         if (direction := _direction(view, each, [(twin, rests[id(twin)]) for twin in made[each.key]])) is not None
     ]
     view = dataclasses.replace(view, directions=tuple(directions))
+    loose = [(each, rests[id(each)]) for each in twins if each.loose]
     alarms = []
     for fold in range(FOLDS):
         kept = [(each, rests[id(each)]) for number, each in enumerate(sound) if number % FOLDS != fold]
         part = _scattered(kept, (legs[0], legs[1]), floors_m, few)
         part = dataclasses.replace(part, directions=view.directions)
-        alarms += [_alarm(part, each, rests[id(each)]) for number, each in enumerate(sound) if number % FOLDS == fold]
-    alarms += [_alarm(view, each, rests[id(each)]) for each in twins if each.loose]
+        part = _loosened(part, [pair for number, pair in enumerate(loose) if number % FOLDS != fold])
+        others = [pair for number, pair in enumerate(loose) if number % FOLDS == fold]
+        others += [(each, rests[id(each)]) for number, each in enumerate(sound) if number % FOLDS == fold]
+        alarms += [_alarm(part, *pair) for pair in others]
+    view = _loosened(view, loose)
     return dataclasses.replace(view, alarms=np.array([each for each in alarms if each is not None]))
+
+
+def _loosened(view: View, loose: Sequence[tuple[Twinned, Rest]]) -> View:
+    """The view with what bodies within tolerances show beyond the sum of their tolerances."""
+    vectors = []
+    middle: judgement.Space | None = None
+    for twin, rest in loose:
+        mean = mean_of(rest)
+        if mean is not None:
+            middle = judgement.Space(view, mean, np.eye(len(view.floors_m))[twin.floor])
+            vectors.append(middle.value)
+    if middle is None:
+        return view
+    rows = _above_noise(np.array(vectors)) @ middle.lower.T
+    return dataclasses.replace(view, between=np.vstack((view.between, rows)))
 
 
 def _map(sound: Sequence[Twinned], side: int, few: bool) -> LegMap:
@@ -97,6 +117,7 @@ def _scattered(
         for side in SIDES:
             rows = slice(side * p, (side + 1) * p)
             left = np.vstack([rest.left[rest.inside & (rest.leg == side)] for rest in here])
+            left = np.clip(left - np.median(left, 0), -RARE, RARE)  # one rare step would hide the others
             left = left - left.mean(0)
             deviation[floor, rows] = np.maximum(left.std(0), LEAST)
             z = left / deviation[floor, rows]
@@ -124,22 +145,24 @@ def _between(view: View, means: Sequence[tuple[int, Mean]]) -> Array:
         lowers[floor, mean.steps] = space
         white.append(space.value)
     z = np.array(white)
+    if len(z) < 12:
+        return np.zeros((0, z.shape[1]))
+    return np.asarray(_above_noise(z) @ next(iter(lowers.values())).lower.T)
+
+
+def _above_noise(z: Array) -> Array:
+    """(k, size) rows whose products are the covariance of (n, size) vectors beyond white noise of deviation 1."""
     n, size = z.shape
-    middle = next(iter(lowers.values()))
-    if n < 12:
-        return np.zeros((0, size))
     values, vectors = np.linalg.eigh(z.T @ z / n)
-    usual = float(np.median(values[values > 0.0])) if n > size else 1.0
-    edge = max(1.0, min(usual, 1.0)) * (1.0 + np.sqrt(size / n)) ** 2  # of the eigenvalues of white noise
-    above = values > edge
-    rest = max(float((np.trace(z.T @ z / n) - values[above].sum()) / max(size - above.sum(), 1)) - 1.0, 0.0)
+    above = values > (1.0 + np.sqrt(size / n)) ** 2  # the largest that white noise has
+    rest = max(float((values.sum() - values[above].sum()) / max(size - above.sum(), 1)) - 1.0, 0.0)
     rows = np.sqrt(values[above] - 1.0)[:, None] * vectors[:, above].T
-    rows = np.vstack((rows, np.sqrt(rest) * np.eye(size))) if rest > 0.0 else rows
-    return np.asarray(rows @ middle.lower.T)
+    return np.vstack((rows, np.sqrt(rest) * np.eye(size))) if rest > 0.0 else rows
 
 
 def _direction(view: View, cause: Cause, pairs: Sequence[tuple[Twinned, Rest]]) -> Direction | None:
-    """A line and a square through the vectors of a cause's twins, each weighed by its steps; None with too few."""
+    """A line, a square and a cube through the vectors of a cause's twins, each weighed by its steps; None with too
+    few."""
     sizes, vectors, counts = [], [], []
     for twin, rest in pairs:
         mean = mean_of(rest)
@@ -150,15 +173,16 @@ def _direction(view: View, cause: Cause, pairs: Sequence[tuple[Twinned, Rest]]) 
     if len(sizes) < 2:
         return None
     size, weight = np.array(sizes), np.array(counts, dtype=float)
-    basis = np.column_stack((size, size**2))
-    if len(np.unique(np.round(size, 9))) < 2:
-        basis = basis[:, :1]
-    solved = np.linalg.lstsq(
-        basis * np.sqrt(weight)[:, None], np.array(vectors) * np.sqrt(weight)[:, None], rcond=None
-    )[0]
-    square = solved[1] if len(solved) > 1 else np.zeros_like(solved[0])
-    return Direction(cause.cause, cause.at, cause.parameter, cause.form, solved[0], square, min(0.0, float(size.min())),
-                     max(0.0, float(size.max())), float(weight @ size**2), cause.tolerance)  # fmt: skip
+    reach = float(np.abs(size).max())
+    powers = min(3, max(1, len(np.unique(np.round(size / reach, 6))) - 1)) if len(sizes) > 2 else 1
+    basis = np.column_stack([(size / reach) ** (power + 1) for power in range(powers)]) * np.sqrt(weight)[:, None]
+    solved = np.linalg.lstsq(basis, np.array(vectors) * np.sqrt(weight)[:, None], rcond=None)[0]
+    scale = reach ** -np.arange(1.0, powers + 1.0)
+    terms, unsure = np.zeros((3, solved.shape[1])), np.zeros((3, 3))
+    terms[:powers] = solved * scale[:, None]
+    unsure[:powers, :powers] = np.linalg.inv(basis.T @ basis) * np.outer(scale, scale)
+    low, high = min(0.0, float(size.min())), max(0.0, float(size.max()))
+    return Direction(cause.cause, cause.at, cause.parameter, cause.form, low, high, cause.tolerance, terms, unsure)
 
 
 def _alarm(view: View, twin: Twinned, rest: Rest) -> tuple[float, float] | None:

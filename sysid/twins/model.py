@@ -18,19 +18,19 @@ FEWEST = 3  # steps of either leg
 
 @dataclasses.dataclass(frozen=True)
 class Direction:
-    """How a cause moves the vector: linear and square by its size, shape (2 p,) each; largest: size that was made,
-    either sign; weight: sum of sizes squared times steps; tolerance: deviation of the size among sound robots."""
+    """How a cause moves the vector. terms: (3, 2 p) of its size, the square and the cube; unsure: (3, 3) covariance of
+    these coefficients for a walk of one step; low, high: smallest and largest size that was made, which include 0;
+    tolerance: deviation of the size among sound robots."""
 
     cause: str
     at: str
     parameter: str
     form: str
-    linear: Array
-    square: Array
     low: float
     high: float
-    weight: float
     tolerance: float
+    terms: Array
+    unsure: Array
 
     @property
     def name(self) -> str:
@@ -111,6 +111,6 @@ def scatter(view: View, weights: Array, steps: Sequence[int], without: str = "")
         out[rows, rows] += view.correlation[side] * np.outer(deviation[rows], deviation[rows]) / steps[side]
     for each in view.directions:
         if each.tolerance and each.name != without:
-            step = each.linear * each.tolerance
+            step = each.terms[0] * each.tolerance
             out += np.outer(step, step)
     return np.asarray(out)

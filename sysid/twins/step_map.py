@@ -26,7 +26,7 @@ OUTSIDE = 6.0  # beyond which a step is not judged
 OF_FOOTHOLD = 3  # inputs, the last ones
 LEAST_INSIDE = 0.4  # of the steps
 RIDGE = 1e-3  # of the rows
-WILD = 6.0  # standard deviations at which a residual is cut: one rare step would hide the others
+WILD = 100.0  # deviations at which what is left is cut
 
 
 def starts(few: bool) -> tuple[str, ...]:
@@ -73,7 +73,7 @@ def learn(starts_: Array, footholds: Array | None, found: Array) -> LegMap:
     left = found - x @ weights
     deviation = 1.4826 * np.median(np.abs(left - np.median(left, 0)), 0)
     deviation = np.maximum(deviation, 0.3 * left.std(0)) + 1e-9
-    return LegMap(start, reach, foothold, weights, deviation)
+    return LegMap(start, reach, foothold, np.asarray(weights, dtype=np.float64), np.asarray(deviation))
 
 
 def _inputs(leg: LegMap, starts_: Array, footholds: Array | None) -> Array:

@@ -133,7 +133,7 @@ def of_dataset(dataset: Dataset) -> Steps | None:
     if hip is None or len(hip[0]) < 100:
         return None
     start, stop = float(hip[0][0]), float(hip[0][-1])
-    grid = start + CLOCK_S * np.arange(int((stop - start) / CLOCK_S + 1e-6) + 1)
+    grid = np.asarray(start + CLOCK_S * np.arange(int((stop - start) / CLOCK_S + 1e-6) + 1), dtype=np.float64)
     every_s = float(np.median(np.diff(hip[0])))
     columns = {name: on_clock(name, time_s, value, grid, every_s < FAST_S) for name, (time_s, value) in found.items()}
     return of_columns(columns, every_s)
@@ -165,7 +165,8 @@ def by_link(columns: Mapping[str, Array], every: int, phases: Sequence[int]) -> 
     out = {}
     for phase, (name, value) in zip(phases, sorted(columns.items()), strict=True):
         rows = np.arange(phase, len(value), every)
-        out[name] = on_clock(name, CLOCK_S * rows, value[rows], CLOCK_S * np.arange(len(value)), fast=False)
+        clock = np.asarray(CLOCK_S * np.arange(len(value)), dtype=np.float64)
+        out[name] = on_clock(name, clock[rows], value[rows], clock, fast=False)
     return out
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import DataError
+from ranger_sim.plant import body_files
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins.model import Direction, View
 from ranger_sim.sysid.twins.step_map import LegMap, outcomes
@@ -22,6 +23,7 @@ FULL, LINK, FEW = "full", "link", "few"  # the table's rate, the data link's, an
 MADE_OF = "made_of.json"
 SAME_TIME = (1980, 1, 1, 0, 0, 0)  # of every part of the file, so that its bytes say nothing but its numbers
 PARTS = ("floors_m", "footholds", "middle", "deviation", "correlation", "between", "alarms")
+OF_CAUSE = ("cause", "at", "parameter", "form", "low", "high", "tolerance")
 OF_LEG = ("start", "reach", "foothold", "weights", "deviation")
 
 
@@ -39,6 +41,12 @@ def fingerprint(values: Mapping[str, float]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def of_body(body: str) -> str:
+    """The fingerprint of a body of this version."""
+    values = body_files.load(body).values
+    return fingerprint({name: value for name, value in values.items() if not isinstance(value, str)})
+
+
 def written(file: TwinFile) -> bytes:
     """The file's bytes."""
     made = io.BytesIO()
@@ -49,13 +57,7 @@ def written(file: TwinFile) -> bytes:
                 buffer = io.BytesIO()
                 np.save(buffer, np.asarray(values, dtype="<f4"), allow_pickle=False)
                 _add(archive, f"{name}/{part}.npy", buffer.getvalue())
-            texts = [
-                {
-                    key: getattr(each, key)
-                    for key in ("cause", "at", "parameter", "form", "low", "high", "weight", "tolerance")
-                }
-                for each in view.directions
-            ]
+            texts = [{key: getattr(each, key) for key in OF_CAUSE} for each in view.directions]
             _add(archive, f"{name}/directions.json", json.dumps({"few": view.few, "directions": texts}).encode())
     return made.getvalue()
 
@@ -70,8 +72,8 @@ def _arrays(view: View) -> dict[str, Array]:
     found = {part: getattr(view, part) for part in PARTS}
     for number, leg in enumerate(view.legs):
         found |= {f"leg{number}_{part}": getattr(leg, part) for part in OF_LEG}
-    found["linear"] = np.array([each.linear for each in view.directions])
-    found["square"] = np.array([each.square for each in view.directions])
+    found["terms"] = np.array([each.terms for each in view.directions])
+    found["unsure"] = np.array([each.unsure for each in view.directions])
     return found
 
 
@@ -94,10 +96,9 @@ def _view(archive: zipfile.ZipFile, name: str) -> View:
         return np.load(io.BytesIO(archive.read(f"{name}/{part}.npy")), allow_pickle=False).astype(np.float64)
 
     legs = [LegMap(*(array(f"leg{number}_{part}") for part in OF_LEG)) for number in range(2)]
-    linear, square = array("linear"), array("square")
     directions = tuple(
-        Direction(linear=one, square=other, **each)
-        for each, one, other in zip(texts["directions"], linear, square, strict=True)
+        Direction(terms=terms, unsure=unsure, **each)
+        for each, terms, unsure in zip(texts["directions"], array("terms"), array("unsure"), strict=True)
     )
     parts = {part: array(part) for part in PARTS}
     view = View(texts["few"], (legs[0], legs[1]), directions=directions, **parts)

@@ -198,7 +198,7 @@ def test_the_file_has_the_same_bytes_each_time_and_reads_back(view, tmp_path):
     path.write_bytes(content)
     again = twin_file.read(path)
     assert again.made_of == file.made_of and len(again.views["few"].directions) == 2
-    assert again.views["few"].directions[0].linear == pytest.approx(view.directions[0].linear, rel=1e-6)
+    assert again.views["few"].directions[0].terms == pytest.approx(view.directions[0].terms, rel=1e-6)
     assert twin_file.written(again) == content
 
 

@@ -28,6 +28,8 @@ def lines(answer: dict[str, Any]) -> list[str]:
     if found["other_parameters"]:
         names = shortened(found["other_parameters"])
         out.append(f"twins: parameters with other values than {found['controller']} has: {names}")
+    if found["other_body"]:
+        out.append("twins: the body has other numbers than these twins had: `ranger-sim twins` makes new ones")
     if not found["detected"]:
         return out + visible(found)
     unusual = ", ".join(f"{name} {away:+.1f}" for name, away in found["unusual"][:3])

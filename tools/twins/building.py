@@ -32,6 +32,7 @@ def built(tasks: list[Task], folder: pathlib.Path) -> TwinFile:
         "version": ranger_sim.__version__,
         "controller": first.controller,
         "body": first.body,
+        "body_fingerprint": twin_file.of_body(first.body),
         "fingerprint": fingerprint(first.body, first.controller),
         "walks": len(walks),
         "steps": sum(len(walk.leg) for _, walk in walks),
@@ -52,11 +53,6 @@ def twins(walks: list[tuple[Task, Walked]], name: str) -> list[learning.Twinned]
                 learning.Twinned(floor, walk.leg[:count], features[:count], task.key, task.size, task.tolerances)
             )
     return found
-
-
-def is_current(file: TwinFile) -> bool:
-    """Whether body and controller of this version have the numbers that the twins had."""
-    return fingerprint(file.made_of["body"], file.made_of["controller"]) == file.made_of["fingerprint"]
 
 
 def default_path(controller: str) -> pathlib.Path:

@@ -132,7 +132,7 @@ TWINS: tuple[Twin, ...] = (
     Twin("geometry", "legs", "length_m", both(0.006, 0.012), of_body("leg_length_m"), 0.001),
     Twin("inertia", "body", "mass_kg", both(0.2, 0.4), of_body("total_mass_kg"), 0.02),
     Twin("spring_value", "hip_spring", "stiffness_Nm_per_rad", both(0.5, 1.1), of_body("hip_spring_Nm_per_rad"), 0.076),
-    Twin("spring_value", "cables", "stiffness_Nm_per_rad", both(1.5, 3.5), of_body("ankle_spring_Nm_per_rad"), 0.14),
+    Twin("spring_value", "cables", "stiffness_Nm_per_rad", both(0.8, 1.8), of_body("ankle_spring_Nm_per_rad"), 0.14),
     Twin("spring_value", "ankle_return", "stiffness_Nm_per_rad", both(0.03, 0.06),
          of_body("ankle_return_Nm_per_rad"), 0.0026),
     Twin("hip_spring_bend", "hip_spring", "cubic_Nm_per_rad3", both(3.0, 6.0),
@@ -146,7 +146,7 @@ TWINS: tuple[Twin, ...] = (
     Twin("sensor_scale", "hip_angle_rad", "change", both(0.01, 0.02),
          of_term("sensor_scale", "hip_absolute", "factor", 1.0)),
     Twin("sensor_scale", "gyro", "change", both(0.02, 0.04), of_term("sensor_scale", "gyro", "factor", 1.0), 0.001),
-    Twin("sensor_offset", "gyro", "offset_rad_s", both(0.008, 0.016), of_term("sensor_offset", "gyro", "value"),
+    Twin("sensor_offset", "gyro", "offset_rad_s", both(0.0015, 0.003), of_term("sensor_offset", "gyro", "value"),
          0.0005),
     Twin("sensor_lag", "gyro", "time_constant_s", (0.005, 0.01), of_term("sensor_lag", "gyro", "time_constant_s")),
     Twin("torque_constant_temperature", "hip_motor", "relative", both(0.05, 0.1),
@@ -160,16 +160,19 @@ TWINS: tuple[Twin, ...] = (
     Twin("sensor_scale", "hip_battery_current", "change", both(0.05, 0.1),
          of_term("sensor_scale", "hip_battery_current", "factor", 1.0), 0.005),
     Twin("firmware_parameter", "C_F_ST_F_ANG", "relative", both(0.12, 0.24), of_gains("C_F_ST_F_ANG")),
-    Twin("firmware_parameter", "C_HI_SH_H_ANG", "relative", both(0.12, 0.24), of_gains("C_HI_SH_H_ANG",
-         "C_H_EH_H_ANG")),
+    Twin("firmware_parameter", "C_H_PM_H_RATE", "relative", both(0.1, 0.2), of_gains("C_H_PM_H_RATE")),
     Twin("firmware_parameter", "C_F_PP_F_ANG", "relative", both(0.1, 0.2), of_gains("C_F_PP_F_ANG")),
-    Twin("firmware_parameter", "P_HI_SH_H_TANG", "change_rad", both(0.015, 0.03),
-         of_targets("P_HI_SH_H_TANG", "P_H_EH_H_TANG")),
+    Twin("firmware_parameter", "P_H_PM_H_TRATE", "change_rad_s", both(0.06, 0.12), of_targets("P_H_PM_H_TRATE")),
     Twin("firmware_parameter", "C_F_FU_F_ANG", "relative", both(0.15, 0.3), of_gains("C_F_FU_F_ANG", "C_F_FD_F_ANG")),
     *(
         Twin("clock_drift", f"{bus}_delay", "delay_s", (0.003, 0.006), of_faults("delay", "late_us", 1e6, f"CSR.{bus}"),
              seeds=0.6)
         for bus in ("can1", "can2", "can3", "can4")
+    ),
+    *(
+        Twin("pwm_ripple", f"{motor.partition('_')[0]}_motor", "power_W", (-0.06, 0.06, 0.12),
+             of_body(f"{motor}_gate_power_W"), 0.005)
+        for motor in ("hip", "outer_ankle", "inner_ankle")
     ),
 )  # fmt: skip
 BY_KEY = {twin.key: twin for twin in TWINS}

@@ -121,7 +121,7 @@ def walk(task: Task) -> Walked:
         robot = Ranger(scenario, "full")
     try:
         for place, mode, parameters in faults:
-            robot.inject(place, mode, at="step 1", **parameters)
+            robot.inject(place, mode, "step 1", **dict[str, Any](parameters))
         stop = StopRule(steps=task.steps)
         while not robot.run(stop):
             pass
@@ -138,7 +138,7 @@ def walked(columns: Mapping[str, Array], fell: bool, phases: list[int]) -> Walke
     for every in (1, LINK_ROWS):
         found = steps.of_columns(steps.by_link(columns, every, phases) if every > 1 else columns, every * steps.CLOCK_S)
         assert found is not None  # the emulator has every variable
-        both.append((found.leg, features.of(found).astype(np.float32)))
+        both.append((found.leg, features.of(found)))
     (leg, full), (_, link) = both
     last = len(leg) - (FALLING if fell else 0)
     return Walked(leg[FIRST:last], full[FIRST:last], link[FIRST : min(last, len(link))], fell)
