@@ -10,21 +10,22 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins.model import Direction, Mean, View, mean_of, scatter
 from ranger_sim.sysid.twins.step_map import Rest
 
-CURVATURE = 0.12  # of an effect's length: what a line and a square leave of it; chosen by leaving out
+CURVATURE = 0.18  # of an effect's length: what a line, a square and a cube leave of it; by leaving twins out
 GRID = 61  # sizes of either sign
 FARTHEST = 2.5  # times the largest size that was made
 TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
 ALIKE = 0.95  # cosine of directions above which they never are
 ALARM = 0.98  # quantile of sound walks
+SIZE_ERROR = 0.15  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
 HOLDS = 3.84  # of twice the log-likelihood: 95 %
 ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 6, 8  # steps: between onsets, before the first, after the last
-ONSET_PAYS = 14.0  # of twice the log-likelihood that a later begin must gain
+ONSET_PAYS, ONSET_LEAST_GAIN = 1.25, 20.0  # times the gain of all steps, and more, that a later begin must reach
 UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
 
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """One cause. gain: of twice the log-likelihood; left: distance with it, over its degrees of freedom."""
+    """One cause. gain: what it takes of the squared distance; left: distance with it, over its degrees of freedom."""
 
     direction: Direction
     size: float
@@ -65,23 +66,29 @@ class Space:
 
     def __init__(self, view: View, mean: Mean, weights: Array, without: str = "") -> None:
         self.there = np.isfinite(mean.value)
-        covariance = scatter(view, weights, mean.steps, without)[np.ix_(self.there, self.there)]
-        self.lower = np.linalg.cholesky(
-            covariance + 1e-9 * np.trace(covariance) / len(covariance) * np.eye(len(covariance))
-        )
+        self.lower = self._lower(scatter(view, weights, mean.steps, without))
+        nominal = self._lower(scatter(view, weights, mean.steps, nominal=True))
         self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
         self.directions = view.directions
         self.terms = [np.array([self.of(term) for term in each.terms]) for each in view.directions]
+        # products of the terms where tolerances count nothing: a direction's error goes with its whole length
+        whole = [np.array([self.of(term, nominal) for term in each.terms]) for each in view.directions]
+        self.lengths = [terms @ terms.T for terms in whole]
         self.steps = sum(mean.steps)
+
+    def _lower(self, covariance: Array) -> Array:
+        part = covariance[np.ix_(self.there, self.there)]
+        return np.asarray(np.linalg.cholesky(part + 1e-9 * np.trace(part) / len(part) * np.eye(len(part))))
 
     @property
     def freedom(self) -> int:
         """Number of features."""
         return len(self.value)
 
-    def of(self, vector: Array) -> Array:
-        """A vector of features in these coordinates."""
-        return np.asarray(linalg.solve_triangular(self.lower, vector[self.there], lower=True))
+    def of(self, vector: Array, lower: Array | None = None) -> Array:
+        """A vector of features in these coordinates, or in those of another covariance."""
+        lower = self.lower if lower is None else lower
+        return np.asarray(linalg.solve_triangular(lower, vector[self.there], lower=True))
 
     def moved(self, number: int, size: float) -> Array:
         """Where a cause of this size moves a sound walk."""
@@ -97,45 +104,38 @@ class Space:
 
     def unsure(self, number: int, powers: Array) -> Array:
         """(m,) variance of a walk with a cause over that of a sound walk: the direction's error and its curvature."""
-        terms = self.terms[number]
-        length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        length = np.einsum("mi,ij,mj->m", powers, self.lengths[number], powers)
         error = np.einsum("mi,ij,mj->m", powers, self.directions[number].unsure, powers)
         return np.asarray(1.0 + self.steps * error + CURVATURE**2 * length / self.freedom)
 
     def profile(self, number: int, sizes: Array) -> Array:
-        """Twice the log-likelihood of each size, against that of a sound walk."""
+        """What each size takes of the squared distance."""
         powers, terms = self._powers(number, sizes), self.terms[number]
-        left = -2.0 * powers @ (terms @ self.value) + np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
-        whole = self.value @ self.value
-        unsure = self.unsure(number, powers)
-        return np.asarray(whole - (whole + left) / unsure - self.freedom * np.log(unsure))
+        gained = 2.0 * powers @ (terms @ self.value) - np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        return np.asarray(gained)
 
     def fit(self, number: int) -> Fit:
-        """The likeliest size of a cause with its interval."""
+        """The best size of a cause with its interval, which carries the error of the direction."""
         each = self.directions[number]
-        sizes = np.concatenate([sign for sign in (
-            np.linspace(FARTHEST * each.low, 0.0, GRID)[:-1] if each.low < 0.0 else np.empty(0),
-            np.linspace(0.0, FARTHEST * each.high, GRID)[1:],
-        ) if len(sign)])  # fmt: skip
+        below = np.linspace(FARTHEST * each.low, 0.0, GRID)[:-1] if each.low < 0.0 else np.empty(0)
+        above = np.linspace(0.0, FARTHEST * each.high, GRID)[1:] if each.high > 0.0 else np.empty(0)
+        sizes = np.concatenate((below, above))
         gains = self.profile(number, sizes)
         for _ in range(2):  # finer about the best
             best = int(np.argmax(gains))
-            width = sizes[1] - sizes[0]
-            finer = sizes[best] + np.linspace(-1.0, 1.0, 41) * width
-            finer = finer[
-                (finer != 0.0)
-                & (finer > min(each.low, 0.0) * FARTHEST)
-                & (finer > (0.0 if each.low >= 0.0 else -np.inf))
-            ]
+            finer = sizes[best] + np.linspace(-1.0, 1.0, 41) * (sizes[1] - sizes[0])
+            finer = finer[(finer != 0.0) & (finer >= FARTHEST * each.low) & (finer <= FARTHEST * each.high)]
             sizes = np.unique(np.concatenate((sizes, finer)))
             gains = self.profile(number, sizes)
         best = int(np.argmax(gains))
-        within = sizes[gains > gains[best] - HOLDS]
-        size = float(sizes[best])
-        left = self.value - self.moved(number, size)
+        size, gain = float(sizes[best]), float(gains[best])
+        left = max(float(self.value @ self.value) - gain, 0.0) / self.freedom
+        within = sizes[gains > gain - HOLDS * max(1.0, left)]
+        reach = float(np.hypot(float(np.ptp(within)) / 2.0, SIZE_ERROR * abs(size)))
+        middle = 0.5 * (float(within.min()) + float(within.max()))
+        low, high = middle - reach, middle + reach
         unsure = float(self.unsure(number, self._powers(number, np.array([size])))[0])
-        distance = float(left @ left) / unsure / self.freedom
-        return Fit(each, size, float(within.min()), float(within.max()), float(gains[best]), distance)
+        return Fit(each, size, min(low, size), max(high, size), gain, left / unsure)
 
     def is_known(self, number: int) -> bool:
         """Whether a cause moves a walk by more than twice the error of its direction."""
@@ -165,19 +165,17 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
     floor_m, weights = view.floor(spread)
     space = Space(view, mean, weights)
     fits, since = space.fits(), 0
+    if not fits:
+        return None
+    pays = ONSET_PAYS * fits[0].gain + ONSET_LEAST_GAIN
     for onset in _onsets(found):
         part = mean_of(found, found.step >= onset)
         if part is None:
             continue
         later = Space(view, part, weights)
         tried = later.fits()
-        if tried[0].gain - ONSET_PAYS > fits[0].gain and tried[0].gain - ONSET_PAYS > (fits[0].gain if since else -1.0):
-            fits, since, space, mean = (
-                [dataclasses.replace(each, gain=each.gain - ONSET_PAYS) for each in tried],
-                onset,
-                later,
-                part,
-            )
+        if tried and tried[0].gain > pays:
+            fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
     gain_limit, distance_limit = limits_of(view)
     distance = float(space.value @ space.value) / space.freedom
     best = fits[0]
@@ -185,7 +183,8 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
     named = None
     if detected and best.gain > gain_limit and best.left < UNEXPLAINED * distance_limit:
         named = _sized(view, mean, weights, best)
-    ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE)
+    scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
+    ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE * scale)
     return Verdict(
         detected,
         named,
@@ -254,9 +253,7 @@ def _least(space: Space, number: int, limit: float) -> float:
     terms = space.terms[number]
     length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
     length -= space.freedom * space.steps * np.einsum("mi,ij,mj->m", powers, each.unsure, powers)  # the error's own
-    unsure = space.unsure(number, powers)
-    gain = space.freedom + length - space.freedom / unsure - space.freedom * np.log(unsure)
-    above = np.flatnonzero(gain > limit)
+    above = np.flatnonzero(length > limit)
     return float(sizes[above[0]]) if len(above) else np.inf
 
 

@@ -83,7 +83,7 @@ def _loosened(view: View, loose: Sequence[tuple[Twinned, Rest]]) -> View:
     if middle is None:
         return view
     rows = _above_noise(np.array(vectors)) @ middle.lower.T
-    return dataclasses.replace(view, between=np.vstack((view.between, rows)))
+    return dataclasses.replace(view, loose=rows)
 
 
 def _map(sound: Sequence[Twinned], side: int, few: bool) -> LegMap:
@@ -131,7 +131,7 @@ def _scattered(
         for floor in range(count)
     ]
     view = View(few, legs, np.array(floors_m, dtype=float), np.array(spreads), middle, deviation, products,
-                np.zeros((0, 2 * p)), (), np.zeros((0, 2)))  # fmt: skip
+                np.zeros((0, 2 * p)), np.zeros((0, 2 * p)), (), np.zeros((0, 2)))  # fmt: skip
     return dataclasses.replace(view, between=_between(view, means))
 
 

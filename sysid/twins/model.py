@@ -42,10 +42,10 @@ class Direction:
 class View:
     """Of one rate of the log. few: of the hip's and the leg's angle and the walk's state alone.
 
-    floors_m: (f,) roughness; footholds: (f,) what `step_map.roughness` gives there; middle: (f, 2 p); deviation: (f,
-    2 p)
-    of one step; correlation: (2, p, p) of a leg's steps; between: (k, 2 p), in which walks differ as a whole; steps: of
-    the twins; alarms: (a, 2) gain of the best cause and distance, each sound walk that had no part in the scatter.
+    floors_m: (f,) roughness; footholds: (f,) what `step_map.roughness` gives there; middle: (f, 2 p); deviation:
+    (f, 2 p) of one step; correlation: (2, p, p) of a leg's steps; between: (k, 2 p), in which walks differ as a whole;
+    loose: (k, 2 p), in which bodies within tolerances differ beyond the sum of these; alarms: (a, 2) gain of the best
+    cause and distance, of sound walks that had no part in the scatter.
     """
 
     few: bool
@@ -56,6 +56,7 @@ class View:
     deviation: Array
     correlation: Array
     between: Array
+    loose: Array
     directions: tuple[Direction, ...]
     alarms: Array
 
@@ -100,15 +101,18 @@ def trimmed(left: Array) -> Array:
     return np.asarray(ordered[cut : len(left) - cut].mean(0))
 
 
-def scatter(view: View, weights: Array, steps: Sequence[int], without: str = "") -> Array:
+def scatter(view: View, weights: Array, steps: Sequence[int], without: str = "", nominal: bool = False) -> Array:
     """Covariance (2 p, 2 p) of the vector of a sound walk with so many steps of either leg. without: the name of a
-    cause whose tolerance does not count."""
+    cause whose tolerance does not count; nominal: of robots without tolerances."""
     p = view.correlation.shape[1]
     deviation = np.sqrt(weights @ view.deviation**2)
     out = view.between.T @ view.between
     for side in (OUTER, INNER):
         rows = slice(side * p, (side + 1) * p)
         out[rows, rows] += view.correlation[side] * np.outer(deviation[rows], deviation[rows]) / steps[side]
+    if nominal:
+        return np.asarray(out)
+    out += view.loose.T @ view.loose
     for each in view.directions:
         if each.tolerance and each.name != without:
             step = each.terms[0] * each.tolerance
