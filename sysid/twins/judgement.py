@@ -18,7 +18,7 @@ ALIKE = 0.95  # cosine of directions above which they never are
 ALARM = 0.98  # quantile of sound walks
 SIZE_ERROR = 0.15  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
 HOLDS = 3.84  # of twice the log-likelihood: 95 %
-ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 6, 8  # steps: between onsets, before the first, after the last
+ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, before the first, after the last
 ONSET_PAYS, ONSET_LEAST_GAIN = 1.25, 20.0  # times the gain of all steps, and more, that a later begin must reach
 UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
 
@@ -174,7 +174,7 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
             continue
         later = Space(view, part, weights)
         tried = later.fits()
-        if tried and tried[0].gain > pays:
+        if tried and tried[0].gain > pays and _begins(view, found, onset, weights, tried[0]):
             fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
     gain_limit, distance_limit = limits_of(view)
     distance = float(space.value @ space.value) / space.freedom
@@ -199,6 +199,16 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
         sum(mean.steps),
         _unusual(view, mean, weights, names),
     )
+
+
+def _begins(view: View, found: Rest, onset: int, weights: Array, later: Fit) -> bool:
+    """Whether the steps before an onset are nearer to a sound walk than to one with the cause."""
+    before = mean_of(found, found.step < onset)
+    if before is None:
+        return False
+    space = Space(view, before, weights)
+    number = next(n for n, each in enumerate(view.directions) if each is later.direction)
+    return bool(space.profile(number, np.array([0.5 * later.size]))[0] < 0.0)
 
 
 def _onsets(found: Rest) -> range:
