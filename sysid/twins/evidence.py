@@ -250,6 +250,15 @@ def _nearer(one: Value, other: Value) -> Value:
     return min((other, one), key=lambda each: each.ci95[1] - each.ci95[0])
 
 
+def _balance(own: TwinCause) -> str:
+    """Letters of the equations in which a cause acts."""
+    kinds = ("gyro", "current", "angle")  # of sensors, where the catalogue distinguishes them
+    place = next((kind for kind in kinds if kind in own.at), "")
+    known = causes.CAUSES
+    each = known.get(own.name) or known.get(f"{own.name}@{place}") or known[f"{own.name}@gyro"]
+    return "".join(each.balances)
+
+
 def result_cause(found: TwinsEvidence) -> Cause:
     """The twins' cause as a diagnosis lists causes."""
     assert found.named is not None
@@ -261,7 +270,7 @@ def result_cause(found: TwinsEvidence) -> Cause:
         name=own.name,
         at=own.at,
         form=None,
-        balance="".join(causes.CAUSES[own.name].balances),
+        balance=_balance(own),
         parameters=dict(own.parameters),
         tied_with=tuple(
             dict.fromkeys(each.partition(" at ")[0] for each in found.ties if not each.startswith(f"{own.name} at"))

@@ -8,7 +8,8 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Channel, Dataset
-from ranger_sim.sysid.twins import features, judgement, learning, step_map, steps, twin_file
+from ranger_sim.sysid.results import TwinCause, TwinsEvidence, Value
+from ranger_sim.sysid.twins import evidence, features, judgement, learning, step_map, steps, twin_file
 from ranger_sim.sysid.twins.model import mean_of
 from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
 
@@ -207,3 +208,13 @@ def test_another_file_is_refused_in_one_line(tmp_path):
     path.write_bytes(b"not a file of twins")
     with pytest.raises(DataError, match=r"other\.npz: this is not a file of twins"):
         twin_file.read(path)
+
+
+def test_every_cause_of_the_file_that_ships_is_an_answer_of_the_catalogue():
+    file = twin_file.of_controller("record-2011")
+    assert set(file.views) == {"full", "link", "few"} and file.made_of["controller"] == "record-2011"
+    assert len(file.views["full"].directions) >= 40
+    for each in file.views["full"].directions:
+        named = TwinCause(each.cause, each.at, {each.parameter: Value(1.0, (0.5, 1.5))}, 99.0)
+        found = TwinsEvidence("record-2011", detected=True, named=named, likeliest=(named,))
+        assert evidence.result_cause(found).balance
