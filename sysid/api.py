@@ -8,16 +8,18 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import losses, model_file, pipeline
-from ranger_sim.sysid.dataset import Dataset
+from ranger_sim.sysid.dataset import Dataset, Table
 from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.fit import Parameter
 from ranger_sim.sysid.identification import run
 from ranger_sim.sysid.identification.motor import GEAR
 from ranger_sim.sysid.machine import Machine
-from ranger_sim.sysid.machines import machine_of
-from ranger_sim.sysid.preparation import parted, prepared
+from ranger_sim.sysid.machines import is_ours, machine_of
+from ranger_sim.sysid.preparation import Prepared, parted, prepared
 from ranger_sim.sysid.reading import open_recording
+from ranger_sim.sysid.regression import Regression
 from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
+from ranger_sim.sysid.twins import evidence
 
 File = str | pathlib.Path | Dataset
 
@@ -78,10 +80,8 @@ def diagnosis(
         raise UserError(f"--holdout-part {holdout_part:g}: allowed is what lies between 0 and 1")
     machine = machine_of(machine, gear)
     known = model_file.read(model, machine).effects if model is not None else []
-    data, held = (
-        [prepared(_dataset(each, mapping, time_unit), machine, accept_loss, repair) for each in _several(group)]
-        for group in (files, holdout)
-    )
+    read = [[_dataset(each, mapping, time_unit) for each in _several(group)] for group in (files, holdout)]
+    data, held = ([prepared(each, machine, accept_loss, repair) for each in group] for group in read)
     if not data:
         raise UserError("files: none is given, a diagnosis needs at least one recording")
     ready = [*data, *held]
@@ -92,10 +92,13 @@ def diagnosis(
     names = ", ".join(table.name for table in tables)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an overflow ends as a value that is not finite, see below
-            found = pipeline.diagnose(machine, tables, [each.table for each in held], seed, ready, known, progress)
+            found = pipeline.diagnose(machine, tables, _judging(machine, held), seed, ready, known, progress)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
+    if _is_walk(machine):
+        twins, _ = evidence.of(read[0], read[1], holdout_part)
+        found.result = evidence.combined(found.result, twins)
     if wrong := _not_finite(found.answer):
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")
     return found
@@ -133,6 +136,24 @@ def _several(files: File | Sequence[File]) -> Sequence[File]:
 
 def _dataset(file: File, mapping: Mapping[str, str] | None, time_unit: str | None) -> Dataset:
     return file if isinstance(file, Dataset) else open_recording(file, mapping, time_unit=time_unit)
+
+
+def _judging(machine: Machine, held: Sequence[Prepared]) -> list[Table]:
+    """The held-out recordings that the equations can judge: of a walk, too few steps are left to its twins."""
+    if not _is_walk(machine):
+        return [each.table for each in held]
+    found = []
+    for each in held:
+        try:
+            Regression([machine.prepare(each.table)])
+        except UserError:
+            continue
+        found.append(each.table)
+    return found
+
+
+def _is_walk(machine: Machine) -> bool:
+    return machine.name == "walk" and is_ours(machine)
 
 
 def _not_finite(value: Any, place: str = "") -> str:

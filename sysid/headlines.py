@@ -13,6 +13,7 @@ from ranger_sim.sysid.dataset import Array, Channel, Finding
 
 NOTE, WARNING = "note", "warning"
 FEWEST = 60  # samples
+PARTS = 4  # of a recording's channels: so many time bases may share them
 UNEVEN = 0.2  # of a step: rounding of stamps below it changes a rate by less than its own noise
 # A join: every smooth channel steps at one row, farther than anywhere else by this factor, and goes on smoothly.
 JOIN, USUAL_PERCENT = 8.0, 99.5
@@ -87,9 +88,11 @@ def _step(time_s: Array) -> float:
 
 def of_all(channels: dict[str, Channel]) -> Iterator[Finding]:
     """Recordings that were joined, or whose rows are mixed: what happens to all channels of one time base at a row."""
+    moving = sum(len(each.value) >= FEWEST and np.ptp(each.value) > 0.0 for each in channels.values())
     for group in _by_stamps(channels):
-        smooth = [channel for channel in group if _is_smooth(channel.value)]
-        yield from _joined(smooth)
+        if PARTS * len(group) >= moving:  # a few of a robot's variables restart together; a joint is in all channels
+            smooth = [channel for channel in group if _is_smooth(channel.value)]
+            yield from _joined(smooth)
         yield from _mixed(group)
 
 

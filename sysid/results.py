@@ -167,6 +167,56 @@ class WithoutForm:
 
 
 @dataclasses.dataclass(frozen=True)
+class TwinCause:
+    """A cause by the comparison with emulated walks. gain: twice the log-likelihood that it gains."""
+
+    name: str
+    at: str
+    parameters: Mapping[str, Value]
+    gain: float
+
+
+@dataclasses.dataclass(frozen=True)
+class TwinsEvidence:
+    """A walk compared with its twins, emulated walks of sound robots and of robots with one cause each.
+
+    controller: whose twins; rate: "full", "link" (50 Hz) or "few" (hip and leg angle alone); steps: that counted;
+    since_step:
+    the first step with the cause, 0 for all; distance: from sound walks, over its degrees of freedom; gain: of the
+    likeliest cause; limits: of gain and distance, which one sound walk in fifty exceeds; named: None where nothing was
+    detected, or what is left with the likeliest cause is not sound; refused_by_holdout: it does not explain held-out
+    steps; ties: causes that explain these steps as well; never_distinguished: whose direction is the same; unusual:
+    features with their distance from sound walks, in their deviations; smallest_visible: by cause the least size that
+    would have been detected; cannot_be_seen: causes that these channels do not show; other_parameters: of the
+    controller,
+    whose values in the recording are others; other_body: the body has other numbers now than the twins had; held_out:
+    distance of held-out steps without and with the cause; note: why there is no comparison, "" where there is one.
+    """
+
+    controller: str
+    rate: str = ""
+    steps: int = 0
+    floor_roughness_m: float = 0.0
+    detected: bool = False
+    distance: float = 0.0
+    gain: float = 0.0
+    limits: Interval = (0.0, 0.0)
+    named: TwinCause | None = None
+    refused_by_holdout: bool = False
+    since_step: int = 0
+    likeliest: tuple[TwinCause, ...] = ()
+    ties: tuple[str, ...] = ()
+    never_distinguished: tuple[str, ...] = ()
+    unusual: tuple[tuple[str, float], ...] = ()
+    smallest_visible: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    cannot_be_seen: tuple[str, ...] = ()
+    other_parameters: tuple[str, ...] = ()
+    other_body: bool = False
+    held_out: Interval | None = None
+    note: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
 class DiagnosisEvidence:
     """The numbers behind a diagnosis.
 
@@ -179,7 +229,7 @@ class DiagnosisEvidence:
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
     the machine's own parameters explain in these data; too_short_s, by equation whose noise is too slow for these
     recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than
-    what numerics move them by.
+    what numerics move them by. Only of a walk: twins, the comparison with emulated walks.
     """
 
     p_general: float
@@ -203,6 +253,7 @@ class DiagnosisEvidence:
     cannot_be_seen: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     too_short_s: Mapping[str, float] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     below_numerics: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    twins: TwinsEvidence | None = dataclasses.field(default=None, metadata=OPTIONAL)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -175,6 +175,13 @@ COMMANDS = (
         ("ranger-sim diagnose run1.csv --holdout run2.csv --experiment motor-bench --out found",),
     ),
     Command(
+        "twins",
+        "tools.twins.command",
+        "make the emulated walks that a walk's diagnosis compares with",
+        ("ranger-sim twins record-2011 --jobs 2",),
+        is_for_developers=True,
+    ),
+    Command(
         "fmu",
         "tools.fmu.command",
         "write the body as a unit for co-simulation (FMI 3.0)",

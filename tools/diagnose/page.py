@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 from ranger_sim.sysid import inspection, predicted_ties
 from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.naming import Named
-from ranger_sim.tools.diagnose import figures, words
+from ranger_sim.tools.diagnose import figures, twin_figure, twin_words, words
 from ranger_sim.tools.report.figures import library
 
 HERE = pathlib.Path(__file__).parent
@@ -48,6 +48,8 @@ def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = N
         headline=headline,
         told=words.told(found),
         errors=evidence.get("held_out_errors") or {},
+        twins=twin_words.lines(answer),
+        unusual=twin_figure.unusual(evidence.get("twins")),
         unseen=sorted((evidence.get("smallest_visible") or {}).items()),
         numerics=words.numerics(answer),
         causes=[cause_of(found, each, cause, sides) for each, cause in named(found)],
@@ -69,9 +71,10 @@ def breakable(identifier: str) -> Markup:
 
 
 def named(found: Diagnosis) -> list[tuple[Named, dict[str, Any]]]:
-    """The named effects with the answer's entry for each; empty when it abstains."""
-    causes = found.answer["causes"]
-    return list(zip(found.named, causes, strict=True)) if len(found.named) == len(causes) else []
+    """The effects that the equations name with the answer's entry for each; empty when it abstains."""
+    effects = {(each.effect.cause, each.effect.at): each for each in reversed(found.named)}
+    causes = [(effects.get((cause["name"], cause["at"])), cause) for cause in found.answer["causes"]]
+    return [(each, cause) for each, cause in causes if each is not None]
 
 
 def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[str, figures.Sides]) -> dict[str, Any]:

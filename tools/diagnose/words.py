@@ -17,6 +17,12 @@ def sentence(found: Diagnosis) -> str:
         return f"{name}: {doubted(answer)}."
     if not answer["detected"]:
         return f"{name}: {nothing(answer)}."
+    if answer["abstained"] and answer["subsystem"] == "gait":
+        likeliest = " or ".join(answer["evidence"]["suspects"])
+        return (
+            f"{name}: the gait is not that of a sound robot, and no cause of the catalogue explains it; the nearest: "
+            f"{likeliest}."
+        )
     if answer["abstained"]:
         suspects = answer["evidence"]["suspects"]
         also = f"; {', '.join(suspects)} would explain {answer['evidence']['explained']:.0%} of it" if suspects else ""
@@ -105,7 +111,9 @@ def learned(answer: dict[str, Any]) -> str:
 
 
 def doubts(answer: dict[str, Any]) -> list[dict[str, Any]]:
-    """The findings after which no cause is named."""
+    """The findings after which no cause is named; none of them where the gait has one all the same."""
+    if answer["causes"]:
+        return []
     return [each for each in answer["data_findings"] if each["kind"] in plausibility.FORBID]
 
 
@@ -138,6 +146,9 @@ def told(found: Diagnosis) -> str:
     if not answer["detected"]:
         text = nothing(answer)
         return f"{text[0].upper()}{text[1:]}."
+    if answer["abstained"] and answer["subsystem"] == "gait":
+        near = " or ".join(answer["evidence"]["suspects"])
+        return f"The gait is not that of a sound robot, and no cause of the catalogue explains it; the nearest: {near}."
     if answer["abstained"]:
         also = ""
         if answer["evidence"]["suspects"]:

@@ -24,7 +24,7 @@ from ranger_sim.sysid.machines import missing_members
 from ranger_sim.sysid.pipeline import Progress as Progressed
 from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
-from ranger_sim.tools.diagnose import words
+from ranger_sim.tools.diagnose import twin_words, words
 from ranger_sim.tools.recordings import datasets
 
 EXIT_CLEAN, EXIT_FOUND, EXIT_DOUBTFUL = 0, 1, 3  # 2 is a user's mistake
@@ -154,7 +154,7 @@ def _show(found: Diagnosis, console: Console) -> None:
             for name, value in each["parameters"].items()
         )
         console.print(f"known: {each['name']} at {each['at']}: {values}", highlight=False, soft_wrap=True)
-    for line in [*words.held_out(told), *words.numerics(told), *words.unseen(told)]:
+    for line in [*words.held_out(told), *words.numerics(told), *words.unseen(told), *twin_words.lines(told)]:
         console.print(line, highlight=False, soft_wrap=True)
     if not told["detected"]:
         return

@@ -8,7 +8,7 @@ import pytest
 from ranger_sim.tools import cli
 from ranger_sim.tools.commands import COMMANDS
 
-FOR_DEVELOPERS = ["bench"]
+FOR_DEVELOPERS = ["bench", "twins"]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,277 @@
+"""Which cause moves a walk away from its sound twins, how far, and since which step."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg
+
+from ranger_sim.sysid.dataset import Array
+from ranger_sim.sysid.twins.model import Direction, Mean, View, mean_of, scatter
+from ranger_sim.sysid.twins.step_map import Rest
+
+CURVATURE = 0.18  # of an effect's length: what a line, a square and a cube leave of it; by leaving twins out
+GRID = 61  # sizes of either sign
+FARTHEST = 2.5  # times the largest size that was made
+TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
+ALIKE = 0.95  # cosine of directions above which they never are
+ALARM = 0.98  # quantile of sound walks
+SIZE_ERROR = 0.15  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
+HOLDS = 3.84  # of twice the log-likelihood: 95 %
+ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, before the first, after the last
+ONSET_PAYS, ONSET_LEAST_GAIN = 1.25, 20.0  # times the gain of all steps, and more, that a later begin must reach
+UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """One cause. gain: what it takes of the squared distance; left: distance with it, over its degrees of freedom."""
+
+    direction: Direction
+    size: float
+    low: float
+    high: float
+    gain: float
+    left: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """The comparison of a walk with its twins.
+
+    detected; named: the best cause, None when nothing is detected or what is left is not sound; fits: all causes, the
+    best first; ties, alike: names that explain as well, and that these channels can never distinguish from it; since:
+    step from which on, 0 for all; distance: over its degrees of freedom; gain: of the best cause; limits: of both;
+    visible: (cause, least size, unit) for every cause; unseen: causes without a size; floor_m; steps that counted;
+    unusual: (feature, deviations) of the largest.
+    """
+
+    detected: bool
+    named: Fit | None
+    fits: tuple[Fit, ...]
+    ties: tuple[Direction, ...]
+    alike: tuple[Direction, ...]
+    since: int
+    distance: float
+    limits: tuple[float, float]
+    visible: tuple[tuple[Direction, float], ...]
+    unseen: tuple[Direction, ...]
+    floor_m: float
+    steps: int
+    unusual: tuple[tuple[str, float], ...]
+
+
+class Space:
+    """The vector of a walk in coordinates in which a sound walk is white noise of deviation 1."""
+
+    def __init__(self, view: View, mean: Mean, weights: Array, without: str = "") -> None:
+        self.there = np.isfinite(mean.value)
+        self.lower = self._lower(scatter(view, weights, mean.steps, without))
+        nominal = self._lower(scatter(view, weights, mean.steps, nominal=True))
+        self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
+        self.directions = view.directions
+        self.terms = [np.array([self.of(term) for term in each.terms]) for each in view.directions]
+        # products of the terms where tolerances count nothing: a direction's error goes with its whole length
+        whole = [np.array([self.of(term, nominal) for term in each.terms]) for each in view.directions]
+        self.lengths = [terms @ terms.T for terms in whole]
+        self.steps = sum(mean.steps)
+
+    def _lower(self, covariance: Array) -> Array:
+        part = covariance[np.ix_(self.there, self.there)]
+        return np.asarray(np.linalg.cholesky(part + 1e-9 * np.trace(part) / len(part) * np.eye(len(part))))
+
+    @property
+    def freedom(self) -> int:
+        """Number of features."""
+        return len(self.value)
+
+    def of(self, vector: Array, lower: Array | None = None) -> Array:
+        """A vector of features in these coordinates, or in those of another covariance."""
+        lower = self.lower if lower is None else lower
+        return np.asarray(linalg.solve_triangular(lower, vector[self.there], lower=True))
+
+    def moved(self, number: int, size: float) -> Array:
+        """Where a cause of this size moves a sound walk."""
+        return np.asarray(self._powers(number, np.array([size]))[0] @ self.terms[number])
+
+    def _powers(self, number: int, sizes: Array) -> Array:
+        """(m, 3) what the terms are multiplied by: size, square and cube; beyond the sizes that were made a line."""
+        each = self.directions[number]
+        edge = np.where(sizes > 0.0, each.high, -each.low)
+        inside = np.minimum(np.abs(sizes), edge) * np.sign(sizes)
+        stretch = np.where(inside != 0.0, sizes / np.where(inside == 0.0, 1.0, inside), 1.0)
+        return np.asarray(np.stack((inside, inside**2, inside**3), axis=1) * stretch[:, None])
+
+    def unsure(self, number: int, powers: Array) -> Array:
+        """(m,) variance of a walk with a cause over that of a sound walk: the direction's error and its curvature."""
+        length = np.einsum("mi,ij,mj->m", powers, self.lengths[number], powers)
+        error = np.einsum("mi,ij,mj->m", powers, self.directions[number].unsure, powers)
+        return np.asarray(1.0 + self.steps * error + CURVATURE**2 * length / self.freedom)
+
+    def profile(self, number: int, sizes: Array) -> Array:
+        """What each size takes of the squared distance."""
+        powers, terms = self._powers(number, sizes), self.terms[number]
+        gained = 2.0 * powers @ (terms @ self.value) - np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        return np.asarray(gained)
+
+    def fit(self, number: int) -> Fit:
+        """The best size of a cause with its interval, which carries the error of the direction."""
+        each = self.directions[number]
+        below = np.linspace(FARTHEST * each.low, 0.0, GRID)[:-1] if each.low < 0.0 else np.empty(0)
+        above = np.linspace(0.0, FARTHEST * each.high, GRID)[1:] if each.high > 0.0 else np.empty(0)
+        sizes = np.concatenate((below, above))
+        gains = self.profile(number, sizes)
+        for _ in range(2):  # finer about the best
+            best = int(np.argmax(gains))
+            finer = sizes[best] + np.linspace(-1.0, 1.0, 41) * (sizes[1] - sizes[0])
+            finer = finer[(finer != 0.0) & (finer >= FARTHEST * each.low) & (finer <= FARTHEST * each.high)]
+            sizes = np.unique(np.concatenate((sizes, finer)))
+            gains = self.profile(number, sizes)
+        best = int(np.argmax(gains))
+        size, gain = float(sizes[best]), float(gains[best])
+        left = max(float(self.value @ self.value) - gain, 0.0) / self.freedom
+        within = sizes[gains > gain - HOLDS * max(1.0, left)]
+        reach = float(np.hypot(float(np.ptp(within)) / 2.0, SIZE_ERROR * abs(size)))
+        middle = 0.5 * (float(within.min()) + float(within.max()))
+        low, high = middle - reach, middle + reach
+        unsure = float(self.unsure(number, self._powers(number, np.array([size])))[0])
+        return Fit(each, size, min(low, size), max(high, size), gain, left / unsure)
+
+    def is_known(self, number: int) -> bool:
+        """Whether a cause moves a walk by more than twice the error of its direction."""
+        each = self.directions[number]
+        powers = self._powers(number, np.array([each.high or each.low]))
+        length = float(np.sum((powers[0] @ self.terms[number]) ** 2))
+        error = self.steps * float(powers[0] @ each.unsure @ powers[0]) * self.freedom
+        return length > 4.0 * error
+
+    def fits(self) -> list[Fit]:
+        """All causes, the likeliest first."""
+        found = [self.fit(number) for number in range(len(self.directions)) if self.is_known(number)]
+        return sorted(found, key=lambda each: -each.gain)
+
+
+def limits_of(view: View) -> tuple[float, float]:
+    """Gain and distance that one sound walk in fifty exceeds."""
+    return float(np.quantile(view.alarms[:, 0], ALARM)), float(np.quantile(view.alarms[:, 1], ALARM))
+
+
+def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdict | None:
+    """The verdict about what the map leaves of a walk. names: of the features; spread: of the footholds' heights, m.
+    None for a walk with too few steps."""
+    mean = mean_of(found)
+    if mean is None:
+        return None
+    floor_m, weights = view.floor(spread)
+    space = Space(view, mean, weights)
+    fits, since = space.fits(), 0
+    if not fits:
+        return None
+    pays = ONSET_PAYS * fits[0].gain + ONSET_LEAST_GAIN
+    for onset in _onsets(found):
+        part = mean_of(found, found.step >= onset)
+        if part is None:
+            continue
+        later = Space(view, part, weights)
+        tried = later.fits()
+        if tried and tried[0].gain > pays and _begins(view, found, onset, weights, tried[0]):
+            fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
+    gain_limit, distance_limit = limits_of(view)
+    distance = float(space.value @ space.value) / space.freedom
+    best = fits[0]
+    detected = best.gain > gain_limit or distance > distance_limit
+    named = None
+    if detected and best.gain > gain_limit and best.left < UNEXPLAINED * distance_limit:
+        named = _sized(view, mean, weights, best)
+    scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
+    ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE * scale)
+    return Verdict(
+        detected,
+        named,
+        tuple(fits),
+        ties if named else (),
+        _alike(space, best) if named else (),
+        since,
+        distance,
+        (gain_limit, distance_limit),
+        *_visible(space, gain_limit),
+        floor_m,
+        sum(mean.steps),
+        _unusual(view, mean, weights, names),
+    )
+
+
+def _begins(view: View, found: Rest, onset: int, weights: Array, later: Fit) -> bool:
+    """Whether the steps before an onset are nearer to a sound walk than to one with the cause."""
+    before = mean_of(found, found.step < onset)
+    if before is None:
+        return False
+    space = Space(view, before, weights)
+    number = next(n for n, each in enumerate(view.directions) if each is later.direction)
+    return bool(space.profile(number, np.array([0.5 * later.size]))[0] < 0.0)
+
+
+def _onsets(found: Rest) -> range:
+    last = int(found.step[found.inside][-1]) if found.inside.any() else 0
+    return range(ONSET_AFTER, last - ONSET_LEAST, ONSET_EVERY)
+
+
+def _sized(view: View, mean: Mean, weights: Array, best: Fit) -> Fit:
+    """The cause's size and interval without its tolerance: it is the size that is asked for."""
+    if not best.direction.tolerance:
+        return best
+    space = Space(view, mean, weights, without=best.direction.name)
+    number = next(n for n, each in enumerate(view.directions) if each is best.direction)
+    sized = space.fit(number)
+    return dataclasses.replace(best, size=sized.size, low=sized.low, high=sized.high)
+
+
+def _alike(space: Space, best: Fit) -> tuple[Direction, ...]:
+    """Causes whose direction is the best one's in the present features."""
+    number = next(n for n, each in enumerate(space.directions) if each is best.direction)
+    own = space.moved(number, best.size)
+    out = []
+    for other, each in enumerate(space.directions):
+        if each is not best.direction:
+            line = space.terms[other][0]
+            cosine = own @ line / (np.linalg.norm(own) * np.linalg.norm(line) + 1e-30)
+            if abs(cosine) > ALIKE:
+                out.append(each)
+    return tuple(out)
+
+
+def _visible(space: Space, limit: float) -> tuple[tuple[tuple[Direction, float], ...], tuple[Direction, ...]]:
+    """The least size of each cause that would have passed the limit, and the causes that have none."""
+    seen, unseen = [], []
+    for number, each in enumerate(space.directions):
+        size = _least(space, number, limit)
+        if size < FARTHEST * max(each.high, -each.low):
+            seen.append((each, float(size)))
+        else:
+            unseen.append(each)
+    return tuple(seen), tuple(unseen)
+
+
+def _least(space: Space, number: int, limit: float) -> float:
+    """The least size of a cause whose expected gain is the limit; infinite for a direction that is not known."""
+    each = space.directions[number]
+    if not space.is_known(number):
+        return np.inf
+    edge = each.high or -each.low
+    sizes = np.linspace(0.0, FARTHEST * edge, 400)[1:]
+    powers = space._powers(number, sizes if each.high else -sizes)
+    terms = space.terms[number]
+    length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+    length -= space.freedom * space.steps * np.einsum("mi,ij,mj->m", powers, each.unsure, powers)  # the error's own
+    above = np.flatnonzero(length > limit)
+    return float(sizes[above[0]]) if len(above) else np.inf
+
+
+def _unusual(view: View, mean: Mean, weights: Array, names: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """Every feature's distance from sound walks in their deviations, the largest first."""
+    deviation = np.sqrt(np.diag(scatter(view, weights, mean.steps)))
+    away = (mean.value - weights @ view.middle) / deviation
+    legs = ("outer", "inner")
+    labels = [f"{name}, {leg} legs swing" for leg in legs for name in names]
+    order = np.argsort(-np.nan_to_num(np.abs(away)))
+    return tuple((labels[place], float(away[place])) for place in order if np.isfinite(away[place]))

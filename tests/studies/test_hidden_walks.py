@@ -1,0 +1,66 @@
+"""Hidden walks of the emulator put to the comparison with twins: a sample; `python -m studies.hidden_walks` has all."""
+
+import dataclasses
+
+import pytest
+
+from ranger_sim.sysid.results import TwinsEvidence
+from ranger_sim.sysid.twins import evidence
+from studies.hidden_walks import score
+from studies.hidden_walks.draw import Hidden, as_row, recorded, scenario_of
+from studies.hidden_walks.kinds import KINDS
+
+BY_NAME = {kind.name: kind for kind in KINDS}
+
+
+def hidden(name, size, **more):
+    return Hidden(BY_NAME[name], size, 71, 0.0, 0.8, **{"loose": False, **more})
+
+
+def test_at_least_thirty_kinds_are_hidden():
+    assert len(KINDS) >= 30 and len({kind.name for kind in KINDS}) == len(KINDS)
+
+
+def test_a_scenario_has_the_hidden_change_and_no_other(tmp_path):
+    scenario = scenario_of(hidden("slope", 0.005), tmp_path)
+    assert scenario.slope_rad == 0.005 and scenario.body == "ranger" and scenario.model_file is None
+    scenario_of(hidden("mass", 0.3), tmp_path)
+    assert "total_mass_kg = 10.21" in (tmp_path / "b.toml").read_text()
+
+
+def test_a_relative_change_multiplies(tmp_path):
+    scenario_of(hidden("stance gain", 0.25), tmp_path)
+    assert "C_F_ST_F_ANG = 5.0" in (tmp_path / "c.toml").read_text()
+
+
+def test_the_rates_count_what_was_detected_and_named():
+    one = score.case_of(hidden("mass", 0.3), 2.0, "level", "full", TwinsEvidence("record-2011"))
+    found = dataclasses.replace(one, detected=True, named="inertia at body", right=True, holds=True)
+    (rates,) = score.table([one, found], {("full", "level"): (0, 50)})
+    assert (rates["walks"], rates["detected"], rates["right"], rates["holds"]) == (2, 1, 1, 1)
+
+
+@pytest.mark.blind
+@pytest.mark.parametrize(
+    ("name", "size", "at"),
+    [
+        ("hip spring", -1.14, "step 1"),
+        ("outer ankle's friction", 0.1, "step 1"),
+        ("slope", 0.005, "step 1"),
+        ("outer cable slips", 0.05, "step 24"),
+    ],
+)
+def test_a_hidden_cause_is_named_first(name, size, at):
+    case = hidden(name, size, at=at)
+    found, _ = evidence.of([recorded(case)])
+    assert found.detected and found.named is not None
+    assert f"{found.named.name} at {found.named.at}" == case.kind.right
+    assert found.named.parameters[case.kind.parameter].value * size > 0.0
+
+
+@pytest.mark.blind
+def test_a_sound_walk_is_silent_at_every_rate():
+    dataset = recorded(Hidden(None, 0.0, 72, 0.0, 0.7, loose=False))
+    for row in score.ROWS:
+        found, _ = evidence.of([as_row(dataset, row)])
+        assert found.note == "" and not found.detected

@@ -1,0 +1,220 @@
+"""The comparison of a walk with its twins: steps, features, maps, the file, and known answers of the judgement."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.foundation.user_error import DataError
+from ranger_sim.sysid.dataset import Channel, Dataset
+from ranger_sim.sysid.results import TwinCause, TwinsEvidence, Value
+from ranger_sim.sysid.twins import evidence, features, judgement, learning, step_map, steps, twin_file
+from ranger_sim.sysid.twins.model import mean_of
+from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
+
+STEP_ROWS = 300
+
+
+def leg_machine(count):
+    """The state of the leg machine over `count` steps: 0, 1, 2, then 3, 4, 5."""
+    return np.concatenate([np.repeat(np.arange(3) + 3 * (number % 2), STEP_ROWS // 3) for number in range(count)])
+
+
+def swinging(count):
+    """Columns of a walk whose hip angle is positive at the end of every other step."""
+    state = leg_machine(count).astype(float)
+    hip = np.concatenate(
+        [np.linspace(-0.3, 0.3, STEP_ROWS) * (1 if number % 2 == 0 else -1) for number in range(count)]
+    )
+    return {"FSM_LEG": state, "MCH_ANGLE": hip, "MCH_MOTOR_CURRENT": np.full(len(hip), 2.0)}
+
+
+def test_steps_end_where_the_leg_machine_changes_its_leg():
+    cut = steps.of_columns(swinging(6))
+    assert cut.ends.tolist() == [300, 600, 900, 1200, 1500]
+    assert cut.leg.tolist() == [steps.OUTER, steps.INNER, steps.OUTER, steps.INNER]
+    assert steps.usual(cut).all()
+
+
+def test_columns_without_a_state_or_a_step_number_have_no_steps():
+    assert steps.of_columns({"MCH_ANGLE": np.zeros(100)}) is None
+
+
+def test_features_of_a_step_are_what_a_person_reads_off_its_curves():
+    found = features.of(steps.of_columns(swinging(4)))
+    column = {name: found[:, place] for place, name in enumerate(features.NAMES)}
+    assert column["step time"] == pytest.approx(0.6)
+    assert column["hip angle top"] == pytest.approx(0.3)
+    assert column["hip current mean"] == pytest.approx(2.0) and column["hip current square"] == pytest.approx(4.0)
+    assert column["leg state 1"].tolist() == pytest.approx([0.0, 0.2]) or column["leg state 1"][1] == pytest.approx(0.2)
+    assert np.isnan(column["gyro mean"]).all()  # a signal that the recording does not have
+
+
+def test_a_recording_with_other_stamps_per_channel_gives_the_same_steps():
+    columns = swinging(6)
+    channels = {}
+    for name, value in columns.items():
+        changed = np.flatnonzero(np.diff(value, prepend=np.nan) != 0.0)
+        kept = np.unique(np.append(changed, [0, 1, len(value) - 1]))
+        channels[name] = Channel(name, "", steps.CLOCK_S * kept, value[kept])
+    cut = steps.of_dataset(Dataset("walk", channels))
+    assert cut.ends.tolist() == steps.of_columns(columns).ends.tolist()
+
+
+def test_names_of_the_experiment_are_variables_of_the_table():
+    columns = swinging(6)
+    stamps = steps.CLOCK_S * np.arange(len(columns["MCH_ANGLE"]))
+    channels = {
+        new: Channel(new, "", stamps, columns[old])
+        for new, old in (("hip_angle_rad", "MCH_ANGLE"), ("walk_state", "FSM_LEG"))
+    }
+    assert steps.of_dataset(Dataset("walk", channels)).count == 4
+
+
+def test_a_link_of_50_hz_is_recognised_and_strikes_come_at_most_one_sample_late():
+    columns = swinging(8)
+    late = steps.by_link(columns, 10, [3, 0, 7])
+    cut = steps.of_columns(late, 0.02)
+    exact = steps.of_columns(columns)
+    assert cut.late_rows > exact.late_rows
+    assert np.all((cut.ends - exact.ends >= 0) & (cut.ends - exact.ends <= 10))
+
+
+# --- made-up walks of the few channels, whose map and directions are known ---------------------------------------
+
+SLOPES = generator(1, "slopes of made-up twins").normal(size=(len(FEW_START), len(FEW)))
+EFFECT = generator(2, "effect of a made-up cause").normal(size=(2, len(FEW)))
+OTHER = generator(3, "effect of another cause").normal(size=(2, len(FEW)))
+NOISE = 0.3
+
+
+def made_up(seed, moved=0.0, other=0.0, count=40, since=0):
+    """Steps whose outcomes are linear in the step before, plus noise and effects of this size from a step on."""
+    draw = generator(seed, "made-up walk")
+    found = np.full((count, len(features.NAMES)), np.nan)
+    leg = np.arange(count) % 2
+    starts, outcomes = step_map.columns(FEW_START), step_map.columns(FEW)
+    found[0] = draw.normal(size=found.shape[1])
+    for row in range(1, count):
+        made = 0.15 * found[row - 1, starts] @ SLOPES + NOISE * draw.normal(size=len(FEW))
+        if row >= since:
+            made += moved * EFFECT[leg[row]] + other * OTHER[leg[row]]
+        found[row] = draw.normal(size=found.shape[1])
+        found[row, outcomes] = made
+    return leg, found
+
+
+def made_up_view():
+    twins = [learning.Twinned(0, *made_up(100 + seed)) for seed in range(40)]
+    twins += [learning.Twinned(0, *made_up(200 + seed), loose=True) for seed in range(10)]
+    for place, size in enumerate((-0.4, -0.2, 0.2, 0.4) * 3):
+        twins.append(learning.Twinned(0, *made_up(300 + place, moved=size), key="one", size=size))
+        twins.append(learning.Twinned(0, *made_up(400 + place, other=size), key="two", size=size))
+    causes = [
+        learning.Cause("one", "geometry", "feet", "foot_height_m", "", 0.0),
+        learning.Cause("two", "inertia", "body", "mass_kg", "", 0.0),
+    ]
+    return learning.learned(twins, causes, [0.0], few=True)
+
+
+@pytest.fixture(scope="module")
+def view():
+    return made_up_view()
+
+
+def judged(view, leg, found):
+    rest = step_map.rest(view.legs, leg, found, few=True)
+    return judgement.judge(view, rest, FEW, float("nan"))
+
+
+def test_a_sound_walk_is_silent_and_lists_what_it_would_have_shown(view):
+    verdict = judged(view, *made_up(9001))
+    assert not verdict.detected and verdict.named is None
+    assert {each.cause for each, _ in verdict.visible} == {"geometry", "inertia"}
+    assert all(0.0 < size < 0.4 for _, size in verdict.visible)
+
+
+@pytest.mark.parametrize("size", [0.3, -0.3, 0.15])
+def test_a_cause_is_named_with_an_interval_that_holds(view, size):
+    verdict = judged(view, *made_up(9100, moved=size))
+    assert verdict.detected and verdict.named.direction.cause == "geometry" and verdict.ties == ()
+    assert verdict.named.low <= size <= verdict.named.high
+    assert verdict.named.high - verdict.named.low < 0.15
+
+
+def test_a_larger_effect_never_gains_less(view):
+    gains = [judged(view, *made_up(9200, moved=size)).fits[0].gain for size in (0.1, 0.2, 0.4, 0.6)]
+    assert gains == sorted(gains)
+
+
+def test_a_cause_that_begins_on_the_way_has_its_first_step(view):
+    verdict = judged(view, *made_up(9300, moved=0.5, since=22))
+    assert verdict.named.direction.cause == "geometry" and abs(verdict.since - 22) <= 2
+    assert verdict.named.low <= 0.5 <= verdict.named.high
+
+
+def test_an_effect_in_another_direction_is_detected_without_a_name(view):
+    leg, found = made_up(9400)
+    found[1:, step_map.columns(FEW)] += np.where(np.arange(len(FEW)) % 2, 2.0, -2.0)
+    verdict = judged(view, leg, found)
+    assert verdict.detected and verdict.named is None
+
+
+def test_a_missing_feature_leaves_the_others(view):
+    leg, found = made_up(9500, moved=0.4)
+    found[:, features.NAMES.index("leg state 5")] = np.nan
+    verdict = judged(view, leg, found)
+    assert verdict.named.direction.cause == "geometry"
+
+
+def test_a_walk_of_four_steps_has_no_verdict(view):
+    leg, found = made_up(9600, count=5)
+    assert judged(view, leg, found) is None
+
+
+def test_a_tolerance_of_sound_robots_hides_what_is_within_it(view):
+    loose = dataclasses.replace(
+        view, directions=tuple(dataclasses.replace(each, tolerance=0.3) for each in view.directions)
+    )
+    leg, found = made_up(9700, moved=0.3)
+    assert judged(loose, leg, found).fits[0].gain < 0.2 * judged(view, leg, found).fits[0].gain
+
+
+def test_the_trimmed_mean_is_not_moved_by_a_single_step():
+    left = np.zeros((20, 2))
+    left[3] = 100.0
+    rest = Rest(np.arange(40), np.arange(40) % 2, np.repeat(left, 2, axis=0), np.ones(40, dtype=bool))
+    assert mean_of(rest).value.tolist() == [0.0] * 4
+
+
+# --- the file --------------------------------------------------------------------------------------------------
+
+
+def test_the_file_has_the_same_bytes_each_time_and_reads_back(view, tmp_path):
+    file = twin_file.TwinFile({"few": view}, {"controller": "made-up", "parameters": {}})
+    content = twin_file.written(file)
+    assert content == twin_file.written(file)
+    path = tmp_path / "made-up.npz"
+    path.write_bytes(content)
+    again = twin_file.read(path)
+    assert again.made_of == file.made_of and len(again.views["few"].directions) == 2
+    assert again.views["few"].directions[0].terms == pytest.approx(view.directions[0].terms, rel=1e-6)
+    assert twin_file.written(again) == content
+
+
+def test_another_file_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "other.npz"
+    path.write_bytes(b"not a file of twins")
+    with pytest.raises(DataError, match=r"other\.npz: this is not a file of twins"):
+        twin_file.read(path)
+
+
+def test_every_cause_of_the_file_that_ships_is_an_answer_of_the_catalogue():
+    file = twin_file.of_controller("record-2011")
+    assert set(file.views) == {"full", "link", "few"} and file.made_of["controller"] == "record-2011"
+    assert len(file.views["full"].directions) >= 40
+    for each in file.views["full"].directions:
+        named = TwinCause(each.cause, each.at, {each.parameter: Value(1.0, (0.5, 1.5))}, 99.0)
+        found = TwinsEvidence("record-2011", detected=True, named=named, likeliest=(named,))
+        assert evidence.result_cause(found).balance
