@@ -18,7 +18,10 @@ PATIENCE_S = 120.0
 
 
 class Terminal:
-    """`ranger-sim WORDS`, or those of another module, in a session of its own whose terminal has so many columns. A context manager."""
+    """`ranger-sim WORDS`, or another module with its words, in a separate session whose terminal has so many columns.
+
+    A context manager.
+    """
 
     def __init__(self, *words: object, folder: pathlib.Path, columns: int = 80, module: str = "ranger_sim") -> None:
         self.shown = ""

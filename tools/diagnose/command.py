@@ -18,8 +18,8 @@ def register(commands: Any) -> None:
         description="Looks for a misfit between measured data and the equations of an experiment, names its cause or "
         "says that it cannot, and measures what the extended model gains on held-out data. Exit code 0: nothing was "
         "found; 1: something was; 2: a mistake, or data that contradict their own description; 3: no cause was found, "
-        "and an equation leaves far more than its channel's noise, the data are too short for their noise, or a parameter "
-        "comes out as no machine has it.",
+        "and an equation leaves far more than its channel's noise, the data are too short for their noise, or a "
+        "parameter comes out as no machine has it.",
     )
     command.add_argument("data", nargs="+", metavar="DATA", help="recordings: CSV, MF4, a run's folder, CAN logs")
     command.add_argument(

@@ -51,8 +51,8 @@ def nothing(answer: dict[str, Any]) -> str:
         )
     if evidence["impossible"]:
         return (
-            "no cause was found, and the equations fit only with values that no machine has: the model lacks something, "
-            "or a channel is not what its name says"
+            "no cause was found, and the equations fit only with values that no machine has: the model lacks "
+            "something, or a channel is not what its name says"
         )
     if evidence.get("noise_floor"):
         return "nothing that these data could show is missing from the equations"

@@ -27,7 +27,7 @@ FILES: dict[str, tuple[str, str]] = {
     "panel/firmware.toml": ("firmware.toml.j2", "panel"),
     "panel/panel.c": ("panel.c.j2", ""),
 }
-# pytest.ini: a separate file, so that a configuration in a folder above has no effect. launch.json: for Visual Studio Code
+# pytest.ini: a separate file, so that a configuration in a folder above has no effect.
 WRITTEN = {
     "pytest.ini": "[pytest]\naddopts = --strict-markers\n",
     ".gitignore": "build/\nruns/\n__pycache__/\n",
