@@ -10,7 +10,8 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins.model import Direction, Mean, View, mean_of, scatter
 from ranger_sim.sysid.twins.step_map import Rest
 
-CURVATURE = 0.18  # of an effect's length: what a line, a square and a cube leave of it; chosen by us, looking at five hidden causes
+# of an effect's length: what a line, a square and a cube leave of it. Chosen by us, looking at five hidden causes
+CURVATURE = 0.18
 GRID = 61  # sizes of either sign
 FARTHEST = 2.5  # times the largest size that was made
 TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
