@@ -86,7 +86,7 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 def tables() -> list[str]:
     """The three tables of the page."""
-    walk = json.loads(KEPT.read_text(encoding="utf-8"))
+    walk = json.loads(KEPT.read_text(encoding="utf-8"))["walk"]
     return [walk_table(walk), energy_table(walk), network_table(walk)]
 
 
