@@ -12,7 +12,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BEFORE = ROOT / "benchmarks" / "2026-11-22-walks.json"
-NOW = ROOT / "benchmarks" / "2026-11-22-walks-on-ranger.json"
+NOW = ROOT / "benchmarks" / "2026-11-27-walks-on-ranger.json"
 FIGURE = ROOT / "docs" / "record-walk.svg"
 STEPS = 1000
 ROBOT = (0.60, 0.35)  # step time s, step length m: robot.md P6

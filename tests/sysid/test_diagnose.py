@@ -15,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import KnownEffect
 from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
-from ranger_sim.sysid.machines import MACHINES
+from ranger_sim.sysid.machines import EXPERIMENTS
 from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.tools.cli import main
 
@@ -203,7 +203,7 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
         (["none.csv", "--experiment", "motor-bench"], "none.csv: there is no such file"),
         (
             ["data.csv", "--experiment", "moon"],
-            f"--experiment moon: unknown experiment 'moon' (available: {', '.join(MACHINES)}); a machine of yours",
+            f"--experiment moon: unknown experiment 'moon' (available: {', '.join(EXPERIMENTS)}); a machine of yours",
         ),
         (["data.csv", "--experiment", "nowhere:Cart"], "--experiment nowhere:Cart: No module named 'nowhere'"),
         (["data.csv", "--experiment", "json:dumps"], "--experiment json:dumps: it has no name, quantities"),
