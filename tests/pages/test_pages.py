@@ -18,7 +18,7 @@ from dev.readme import BLOCK, EXIT_CODE, FILE_NAME
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "how-to").glob("*.md"))]
-KINDS = {"sh", "text", "python", "toml", "c", "console"}
+KINDS = {"sh", "text", "python", "toml", "c", "console", "json"}
 
 
 @dataclasses.dataclass(frozen=True)
