@@ -14,6 +14,7 @@ from tests.blind.generator.strength import Scale
 BATCH = 80  # cases simulated side by side: memory, not speed, sets it
 STRENGTHS = (0.5, 1.0, 2.0, 4.0)
 WITH_ONE = ("single", "confusable", "outside")  # kinds with one effect, whose likeness to causes is told
+HOTTEST_C = 150.0  # of a housing: no small motor survives more; chosen by us
 AGAIN = 8  # trajectories that are tried for a case before it is given up
 # With its effect no machine turns so many times as fast as without: chosen by us. An effect that hides in the base
 # parameters along one trajectory (friction by direction, where all motion is in one) would need a size beyond all.
@@ -328,6 +329,8 @@ class Experiment:
 
 
 def runs_away(plain, *trajectories):
-    """True when a run is much faster than the one without effects, or is not a motion at all."""
+    """True when a run is much faster than the one without effects, is not a motion at all, or would burn the motor."""
     fastest = RUNAWAY * float(np.max(np.abs(plain.w)))
-    return any(not np.max(np.abs(each.w)) <= fastest for each in trajectories)
+    return any(
+        not (np.max(np.abs(each.w)) <= fastest and np.max(each.housing_C) <= HOTTEST_C) for each in trajectories
+    )
