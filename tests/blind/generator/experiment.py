@@ -331,6 +331,4 @@ class Experiment:
 def runs_away(plain, *trajectories):
     """True when a run is much faster than the one without effects, is not a motion at all, or would burn the motor."""
     fastest = RUNAWAY * float(np.max(np.abs(plain.w)))
-    return any(
-        not (np.max(np.abs(each.w)) <= fastest and np.max(each.housing_C) <= HOTTEST_C) for each in trajectories
-    )
+    return any(not (np.max(np.abs(each.w)) <= fastest and np.max(each.housing_C) <= HOTTEST_C) for each in trajectories)
