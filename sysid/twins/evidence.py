@@ -93,7 +93,7 @@ def of(
     controller, changed = controller_of(datasets)
     file = twin_file.of_controller(controller)
     if file is None or not walks:
-        why = f"no twins of {controller} come with this version" if file is None else (
+        why = f"no twins of {controller} are here: `ranger-sim twins {controller}` makes them" if file is None else (
             "these recordings do not show where steps end (FSM_LEG, walk_state or E_STEP_COUNT, and the hip's angle)"
         )  # fmt: skip
         return TwinsEvidence(controller, note=why), None

@@ -12,6 +12,7 @@ from ranger_sim.sysid.results import TwinCause, TwinsEvidence, Value
 from ranger_sim.sysid.twins import evidence, features, judgement, learning, step_map, steps, twin_file
 from ranger_sim.sysid.twins.model import mean_of
 from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
+from ranger_sim.tools.twins.causes import TWINS
 
 STEP_ROWS = 300
 
@@ -210,11 +211,15 @@ def test_another_file_is_refused_in_one_line(tmp_path):
         twin_file.read(path)
 
 
-def test_every_cause_of_the_file_that_ships_is_an_answer_of_the_catalogue():
-    file = twin_file.of_controller("record-2011")
-    assert set(file.views) == {"full", "link", "few"} and file.made_of["controller"] == "record-2011"
-    assert len(file.views["full"].directions) >= 40
-    for each in file.views["full"].directions:
+def test_every_cause_of_the_table_of_twins_is_an_answer_of_the_catalogue():
+    assert len(TWINS) >= 40
+    for each in TWINS:
         named = TwinCause(each.cause, each.at, {each.parameter: Value(1.0, (0.5, 1.5))}, 99.0)
         found = TwinsEvidence("record-2011", detected=True, named=named, likeliest=(named,))
         assert evidence.result_cause(found).balance
+
+
+def test_without_a_file_the_answer_says_how_to_make_it():
+    found, verdict = evidence.of([])
+    assert verdict is None and not found.detected
+    assert "record-2011" in twin_file.available() or "`ranger-sim twins record-2011` makes them" in found.note
