@@ -29,8 +29,11 @@ UNDEFINED_RUNTIMES = ("libubsan.so.1", "libubsan.so.2")
 UNDEFINED = re.compile(r"^(?P<file>[^\s:]+):(?P<line>\d+)(?::\d+)?: runtime error: (?P<text>.*)$", re.MULTILINE)
 ADDRESS = re.compile(r"ERROR: AddressSanitizer: (?P<what>[\w-]+) on .*?(?=^=====|\Z)", re.DOTALL | re.MULTILINE)
 ACCESS = re.compile(r"^(?P<access>READ|WRITE) of size (?P<size>\d+)", re.MULTILINE)
-# of the copy that was loaded: its name is the library's with eight characters behind it (library.py)
-FRAME = re.compile(r"^\s*#\d+ .*/(?P<name>[^/]+)-[^/-]{8}\.so\+0x(?P<offset>[0-9a-f]+)\)", re.MULTILINE)
+# of the copy that was loaded: its name is the library's with eight characters behind it (library.py); the kernel adds
+# that it is deleted
+FRAME = re.compile(
+    r"^\s*#\d+ .*/(?P<name>[^/]+)-[^/-]{8}\.so(?: \(deleted\))?\+0x(?P<offset>[0-9a-f]+)\)", re.MULTILINE
+)
 
 
 def is_ready() -> bool:
