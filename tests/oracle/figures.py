@@ -10,6 +10,7 @@ import numpy as np
 STEP_S = 0.002
 BIT_RATE = 3e6
 SKIPPED = 5
+RADIUS_M = 0.2  # of a foot's arc: appendix 2.4
 MOTORS = {"hip": "hip_W", "outer_ankle": "outer_W", "inner_ankle": "inner_W", "steering": "steering_W"}
 CAN_OF = {"MCH": "can1", "UI": "can2", "MCFO": "can3", "MCFI": "can4", "MCSI": "can4"}
 # Identifiers of the error frames and of "longest slot of all" (datatable/master/variables.csv).
@@ -36,14 +37,19 @@ class Walk:
         ankle = self.body["hip_x_m"] - self.leg_m * np.sin(self.body[f"leg_{leg}_rad"])
         return ankle + self.ankle_offset_m * np.sin(self.body[f"foot_{leg}_rad"])
 
+    def landed(self, at):
+        """The foot that stands since this sample."""
+        [leg] = [each for each in self.standing if self.standing[each][at] and not self.standing[each][at - 1]]
+        return leg
+
     def strike_xs(self):
         """Contact point of each strike: of the foot that did not stand before it."""
-        found = []
-        for at in self.strikes:
-            new = [leg for leg in self.standing if self.standing[leg][at] and not self.standing[leg][at - 1]]
-            assert len(new) == 1, f"at sample {at} not one foot alone came down"
-            found.append(self.contact_x(new[0])[at])
-        return np.array(found)
+        return np.array([self.contact_x(self.landed(at))[at] for at in self.strikes])
+
+    def rolled(self):
+        """How far a foot rolls at most from a strike to the sample that shows it: as it turns between two samples."""
+        feet = [self.body[f"foot_{self.landed(at)}_rad"][at - 1 : at + 2] for at in self.strikes]
+        return RADIUS_M * max(np.abs(np.diff(foot)).max() for foot in feet)
 
     def weight_N(self):
         """What the floor carries while the robot is held on one foot."""
@@ -61,8 +67,7 @@ def of_the_walk(walk, electronics_W):
     counted = len(walk.strikes) - SKIPPED
     xs, times = walk.strike_xs(), time[walk.strikes]
     lengths, durations = np.diff(xs)[SKIPPED - 1 :], np.diff(times)[SKIPPED - 1 :]
-    # a foot rolls on by its radius times its rate until it is seen: 0.2 m x 6 rad/s x 2 ms, and back at the step before
-    rolled = 0.2 * 6.0 * STEP_S
+    rolled = walk.rolled()  # until a foot is seen to stand, and back at the step before
     walked = time[-1] - time[walk.release]
     double = np.array([in_double_stance(walk, at) for at in walk.strikes[SKIPPED:]])
     powers = {name: np.maximum(body[column][walk.release :], 0.0).mean() for name, column in MOTORS.items()}

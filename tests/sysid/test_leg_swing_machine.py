@@ -60,13 +60,13 @@ def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, wit
     return Table(np.arange(SIZE) * STEP_S, columns, (slice(0, SIZE),), f"swing {seed}")
 
 
-def told(seed, **fault):
+def diagnosed(seed, **fault):
     return diagnose(LegSwing(), [swing(seed, **fault)]).answer
 
 
 def test_the_legs_parameters_are_found_and_a_sound_leg_raises_no_alarm():
     """Nine errors beyond 4.5 standard errors come in one of 16000 runs; a false alarm in one of a hundred at most."""
-    found = told(1)
+    found = diagnosed(1)
     for name, true in TRUE.items():
         value = found["evidence"]["parameters"][name]
         error = (value["ci95"][1] - value["ci95"][0]) / (2.0 * 1.96)
@@ -84,7 +84,7 @@ def test_the_legs_parameters_are_found_and_a_sound_leg_raises_no_alarm():
     ],
 )
 def test_what_is_wrong_is_named_with_its_size(fault, cause, coefficient):
-    found = told(2, **fault)
+    found = diagnosed(2, **fault)
     assert [each["name"] for each in found["causes"]] == [cause]
     first = next(iter(found["causes"][0]["parameters"].values()))
     assert first["value"] == pytest.approx(coefficient, rel=0.2)
@@ -92,13 +92,13 @@ def test_what_is_wrong_is_named_with_its_size(fault, cause, coefficient):
 
 @pytest.mark.parametrize("fault", [{"unknown": 0.1}, {"unknown": 0.2}, {"tight": 0.3}])
 def test_a_torque_or_a_friction_of_no_known_kind_is_detected_and_given_no_name(fault):
-    found = told(3, **fault)
+    found = diagnosed(3, **fault)
     assert found["detected"] and found["abstained"] and found["causes"] == []
     assert found["subsystem"] == "mechanical"
 
 
 def test_without_the_voltage_the_current_drives_and_a_sound_leg_raises_no_alarm():
-    assert not told(4, with_voltage=False)["detected"]
+    assert not diagnosed(4, with_voltage=False)["detected"]
 
 
 def test_recordings_that_say_nothing_are_reported_in_a_sentence():

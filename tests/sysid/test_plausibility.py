@@ -111,8 +111,8 @@ def test_a_voltage_that_is_late_is_detected_by_an_impossible_inductance_and_give
 def test_a_torque_with_its_sign_turned_round_contradicts_the_voltage(bench):
     """The winding says K = 0.25 N m/A and the load cell -0.25: friction and causes could hide it, and are not named."""
     found = diagnose(MotorBench(), [with_factors(bench, torque_Nm=-1.0)]).answer
-    (told,) = [each for each in found["data_findings"] if each["kind"] == "contradiction"]
-    assert told["channel"] == "torque_constant_Nm_per_A" and told["size"] == pytest.approx(-0.252, rel=0.1)
+    (finding,) = [each for each in found["data_findings"] if each["kind"] == "contradiction"]
+    assert finding["channel"] == "torque_constant_Nm_per_A" and finding["size"] == pytest.approx(-0.252, rel=0.1)
     assert found["detected"] and found["abstained"] and found["causes"] == []
 
 

@@ -47,7 +47,8 @@ def test_gravity_that_a_model_lacks_is_named_first_with_its_size(left_in):
 
 def test_gravity_takes_the_error_on_the_other_part_below_five_per_cent():
     _, error = diagnosed("joint4")
-    assert error["after"] < 0.03 and error["before"] > 5.0 * error["after"]  # 0.19 and 0.017 in the band of 2.6 Hz
+    assert error["before"] > 0.15 and error["after"] < 0.03  # 0.19 and 0.017 in the band of 2.6 Hz
+    assert error["before"] > 5.0 * error["after"]
     # nothing that a black box learns from the same part explains much more of the other one
     assert error["black_box"] > 0.8 * error["after"]
 

@@ -19,7 +19,7 @@ from ranger_sim.foundation import wallclock
 from tests.terminals import Terminal
 
 ROOT = pathlib.Path(__file__).parents[2]
-STRANGER = 65534  # nobody, on every Linux
+STRANGER = 65534  # the user without rights of every Linux
 LISTENS = "0A"  # of /proc/net/tcp
 ACCEPTS = 0x10000  # __SO_ACCEPTCON, of /proc/net/unix
 WAITS_S = 5.0  # of the stranger, for a byte; a robot that is behind its time polls rarely
