@@ -15,6 +15,7 @@ import ranger_sim
 from ranger_sim.can_bus.edge import logs
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import sanity
 from ranger_sim.sysid.api import diagnose
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.machines import machine_of
@@ -433,6 +434,50 @@ def test_nothing_is_concluded_from_spoilt_runs_of_the_positioning_bench(kind, re
     assert main(arguments) == 2
     error = " ".join(capsys.readouterr().err.split())
     assert reason.split(" .* ")[0] in error and "nothing is concluded" in error
+
+
+@needs_data
+@pytest.mark.parametrize(("first", "second"), [(8000, 1000), (10000, 20000), (6000, 0), (15000, 7777)])
+def test_runs_of_the_positioning_bench_are_joined_wherever_they_are_cut(first, second, positioning, written):
+    names, data = positioning
+    both = np.vstack([data[:first], data[second : second + 4000]])
+    text = "".join(f"{k / 1000:.3f},{a:.6f},{b:.6f},{c:.6f}\n" for k, (_, a, b, c) in enumerate(both.tolist()))
+    (joined,) = [each for each in read(written(f"{names}\n{text}")).findings if each.kind in ("jump", "step")]
+    assert joined.kind == "jump" and joined.start_s == pytest.approx((first - 1) / 1000)
+
+
+def broken_loose(gain, spike, constant):
+    """An arm that breaks loose in one row: stamps, its angle, and a controller that answers in the same row."""
+    t = 0.01 * np.arange(2000)
+    angle = 0.3 * np.sin(0.9 * t) + 2e-4 * np.sin(1e4 * t * t)
+    angle += 0.04 * (np.arange(2000) >= 700) * np.exp(-np.maximum(t - 7.0, 0.0))
+    voltage = 0.05 * np.sin(2.7 * t) - gain * angle + np.where(np.arange(2000) == 700, spike, 0.0)
+    voltage += np.where(np.arange(2000) >= 700, constant, 0.0)
+    return "t_s,arm_angle_rad,drive_V\n" + "".join(f"{a:.2f},{b:.6f},{c:.6f}\n" for a, b, c in zip(t, angle, voltage, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("gain", "spike", "constant", "kind"),
+    [
+        (0.0, -3.0, 0.0, "step"),  # the derivative's part of the controller, for one row
+        (60.0, 0.0, 0.0, "step"),  # the proportional part, which stays
+        (0.0, 0.0, -3.0, "jump"),  # the drive goes over to another course, and its steps are not the angle's
+    ],
+)
+def test_what_breaks_loose_in_one_row_is_a_finding_with_its_size_and_not_a_join(gain, spike, constant, kind, written):
+    measurement = read(written(broken_loose(gain, spike, constant)))
+    (found,) = [each for each in measurement.findings if each.kind in ("jump", "step")]
+    assert found.kind == kind and (found.start_s, found.end_s) == pytest.approx((6.99, 7.0))
+    assert len(sanity.doubts(measurement.findings)) == (kind == "jump")
+    if kind == "step":
+        assert found.channel == "arm_angle_rad" and found.size == pytest.approx(0.04, rel=0.1)
+
+
+def test_a_clock_that_steps_where_the_angle_jumps_is_a_join(written):
+    lines = broken_loose(0.0, -3.0, 0.0).splitlines()
+    late = [f"{float(line.partition(',')[0]) + 0.013:.3f},{line.partition(',')[2]}" for line in lines[701:]]
+    findings = read(written("\n".join([*lines[:701], *late, ""]))).findings
+    assert [each.kind for each in findings if each.kind in ("jump", "step")] == ["jump"]
 
 
 def prepared_run(written, names, data, **how):
