@@ -1,5 +1,9 @@
 """Stamps that are numbers, in whatever unit a file has them, as seconds."""
 
+import pathlib
+import shlex
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +25,23 @@ LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewe
 EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
 EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
+
+
+OR_A_RATE = "; or the rate of its samples is known, as 100 a second:"
+
+
+def with_rate(path: str | pathlib.Path) -> str:
+    """The command, as a line of an error, that reads a file without a time."""
+    return f"  ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
+
+
+def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> None:
+    """Record in a dataset that its stamps are made from a rate. unused: columns that may be times."""
+    text = f"the stamps are made from the number of the row, {1.0 / rate_hz:.6g} s apart (--rate {rate_hz:.10g}Hz)"
+    if unused:
+        text += f"; {', '.join(unused)} is a channel and not the time"
+    dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, 1.0 / rate_hz, "s", text, "note"))
+    dataset.layout |= {"time": "row number", "rate_hz": rate_hz}
 
 
 def seconds(

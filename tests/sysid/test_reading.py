@@ -4,6 +4,7 @@ import gzip
 import json
 import math
 import re
+import shlex
 import struct
 import zlib
 
@@ -478,6 +479,59 @@ def test_a_clock_that_steps_where_the_angle_jumps_is_a_join(written):
     late = [f"{float(line.partition(',')[0]) + 0.013:.3f},{line.partition(',')[2]}" for line in lines[701:]]
     findings = read(written("\n".join([*lines[:701], *late, ""]))).findings
     assert [each.kind for each in findings if each.kind in ("jump", "step")] == ["jump"]
+
+
+RATED = "a_V,b_A\n" + "".join(f"{k % 7},{k * k % 11}\n" for k in range(50))
+
+
+@pytest.mark.parametrize(("rate", "step_s"), [("100", 0.01), ("100Hz", 0.01), ("10ms", 0.01), ("2 kHz", 0.0005)])
+def test_a_table_without_a_time_gets_its_stamps_from_a_rate_and_the_ledger_says_so(rate, step_s, written, capsys):
+    path = written(RATED)
+    assert main(["read", str(path), "--rate", rate, "--json", "-"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["channels"]["a_V"]["end_s"] == pytest.approx(49 * step_s)
+    assert answer["ledger"]["stamps"].startswith("the stamps are made from the number of the row")
+
+
+def test_the_refusal_of_a_file_without_a_time_has_a_ready_command(written, tmp_path, capsys):
+    scipy.io.savemat(tmp_path / "no time.mat", {"u": np.arange(40.0) ** 2 % 11, "gain": 3.0})
+    for path in (written(RATED), tmp_path / "no time.mat"):
+        with pytest.raises(UserError, match="there is no time column") as refused:
+            read(path)
+        command = shlex.split(str(refused.value.args[-1]))
+        assert command[:2] == ["ranger-sim", "read"] and command[-2:] == ["--rate", "100Hz"]
+        assert main(command[1:]) == 0
+    capsys.readouterr()
+
+
+def test_rows_that_are_left_out_keep_their_place_at_a_rate(written):
+    lines = RATED.splitlines()
+    lines[11] = "torn"
+    assert read(written("\n".join([*lines, ""])), rate_hz=10.0)["a_V"].time_s[9:11] == pytest.approx([0.9, 1.1])
+
+
+def test_a_time_column_is_a_channel_where_a_rate_is_given(written):
+    measurement = read(written("t_s,a_V\n" + "".join(f"{0.5 * k},{k % 7}\n" for k in range(50))), rate_hz=10.0)
+    assert set(measurement.channels) == {"t_s", "a_V"} and measurement["a_V"].time_s[-1] == pytest.approx(4.9)
+    assert "t_s is a channel and not the time" in measurement.ledger()["stamps"]
+
+
+def test_a_rate_is_refused_where_stamps_are_given(written, tmp_path):
+    (tmp_path / "a.log").write_text("(1.000000) can0 123#01\n(2.000000) can0 123#02\n")
+    with pytest.raises(UserError, match="has stamps, as every file of its format does"):
+        read(tmp_path / "a.log", rate_hz=10.0)
+    with pytest.raises(UserError, match="the stamps are those of a column already"):
+        read(written(RATED), rate_hz=10.0, time_unit="s")
+
+
+def test_a_recipe_keeps_the_rate(written, tmp_path):
+    path, recipe = written(RATED), tmp_path / "lab.toml"
+    assert main(["read", str(path), "--rate", "20ms", "--write-recipe", str(recipe)]) == 0
+    assert 'rate = "50.0 Hz"' in recipe.read_text()
+    assert read(path, recipe=recipe)["b_A"].time_s[-1] == pytest.approx(0.98)
+    recipe.write_text('rate = "0 Hz"\n')
+    with pytest.raises(UserError, match="rate is '0 Hz'; a number above 0"):
+        read(path, recipe=recipe)
 
 
 def prepared_run(written, names, data, **how):

@@ -117,6 +117,8 @@ def _show_ledger(measurement: Measurement, console: Console) -> None:
     if ledger["lines"]:
         parts = ", ".join(f"{count} {kind}" for kind, count in ledger["lines"].items() if count)
         console.print(printable(f"lines: {sum(ledger['lines'].values())} = {parts}"), soft_wrap=True)
+    if ledger["stamps"]:
+        console.print(printable(f"stamps: {ledger['stamps']}"), soft_wrap=True)
     alike: dict[str, list[str]] = {}
     for name, account in ledger["channels"].items():
         if account["left_out"]:
