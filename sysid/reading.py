@@ -167,6 +167,7 @@ def open_recording(
     if rate_hz is not None and (time_unit or "time" in assume):
         raise DataError(f"--rate {rate_hz:g}Hz: the stamps are those of a column already (--time-unit, --assume time)")
     dataset = _read(path, mapping, databases, time_unit, rate_hz, each_frame, buses, of_table, progress)
+    dataset.clock_is_given |= time_unit is not None or rate_hz is not None
     if recipe is not None:
         recipe.check(dataset)
     dataset = _assumed(dataset, assume)

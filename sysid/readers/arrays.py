@@ -84,8 +84,7 @@ def channels(
         raise DataError(
             f"{dataset.name}: there is no time column among {some}; "
             + (f"--map {rising}=time says which it is (it rises all the time)" if rising else "--map NAME=t_s says it")
-            + time_column.OR_A_RATE,
-            time_column.with_rate(arrays.path),
+            + time_column.or_with_rate(arrays.path)
         )
     stamps = _stamps(dataset, arrays, times, mapping, time_unit)
     used: set[str] = set()
@@ -169,6 +168,7 @@ def _stamps(
         dataset.layout |= {"time": name} if not found else {}
         if name in dates:
             away = (dates[name] - first).astype(np.int64) * 1e-9
+            dataset.clock_is_given = True
             found[name] = np.where(np.isnat(dates[name]), np.nan, away)
             continue
         if value.dtype.kind == "m":

@@ -628,6 +628,7 @@ def _time(
         text += f", 0 is {np.datetime64(first_ns, 'ns')}"
     dataset.repairs.append(Repair("", "dates", len(time_ns), text))
     dataset.layout |= {"time": both, "time_unit": "dates" if with_date else "times of the day"}
+    dataset.clock_is_given = True
     if any(written[k].either_way for k in chosen):
         text = f"{both}: day and month may be either way round; --assume dates=day-first or month-first decides"
         dataset.findings.append(Finding("", "dates_either_way", 0.0, 0.0, 0.0, "", text))
@@ -670,8 +671,7 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
             f"--map {example} says which it is"
             + (" (it rises all the time)" if rising else "")
-            + time_column.OR_A_RATE,
-            time_column.with_rate(rows.path),
+            + time_column.or_with_rate(rows.path)
         )
     text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))

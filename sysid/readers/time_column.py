@@ -27,12 +27,9 @@ EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
 EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
 
 
-OR_A_RATE = "; or the rate of its samples is known, as 100 a second:"
-
-
-def with_rate(path: str | pathlib.Path) -> str:
-    """The command, as a line of an error, that reads a file without a time."""
-    return f"  ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
+def or_with_rate(path: str | pathlib.Path) -> str:
+    """The end of an error about a file without a time: the command that reads it."""
+    return f"; or its samples come at a known rate, as 100 a second: ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
 
 
 def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> None:

@@ -350,7 +350,7 @@ def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
 def test_what_is_not_a_table_is_reported_in_a_line(table, text, line):
     with pytest.raises(UserError, match=line) as error:
         table(text)
-    assert all(line.startswith("  ranger-sim read ") for line in str(error.value).splitlines()[1:])
+    assert "\n" not in str(error.value)
 
 
 GOOD = "t_s,angle_deg,current_mA\n" + "".join(f"{k * 0.004:.3f},{k % 90},{-k}\n" for k in range(40))
@@ -371,7 +371,7 @@ def test_a_mangled_table_is_read_or_refused_in_a_line(tmp_path, places):
     try:
         data = repairs.mend(read(path))
     except UserError as error:
-        assert all(line.startswith("  ranger-sim read ") for line in str(error).splitlines()[1:])
+        assert "\n" not in str(error)
         return
     for channel in data.channels.values():
         assert len(channel.time_s) == len(channel.value) > 0

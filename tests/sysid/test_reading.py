@@ -498,7 +498,8 @@ def test_the_refusal_of_a_file_without_a_time_has_a_ready_command(written, tmp_p
     for path in (written(RATED), tmp_path / "no time.mat"):
         with pytest.raises(UserError, match="there is no time column") as refused:
             read(path)
-        command = shlex.split(str(refused.value.args[-1]))
+        assert "\n" not in str(refused.value)
+        command = shlex.split(str(refused.value).rpartition("a second: ")[2])
         assert command[:2] == ["ranger-sim", "read"] and command[-2:] == ["--rate", "100Hz"]
         assert main(command[1:]) == 0
     capsys.readouterr()
@@ -532,6 +533,27 @@ def test_a_recipe_keeps_the_rate(written, tmp_path):
     recipe.write_text('rate = "0 Hz"\n')
     with pytest.raises(UserError, match="rate is '0 Hz'; a number above 0"):
         read(path, recipe=recipe)
+
+
+SLOW = "time,a_V\n" + "".join(f"{k},{(k * k % 11) / 7:.3f}\n" for k in range(100))
+
+
+def test_a_time_unit_that_is_given_is_not_argued_with(written, capsys):
+    path = written(SLOW)
+    with pytest.raises(UserError, match="nothing says the unit of the stamps"):
+        read(path)
+    assert main(["read", str(path), "--time-unit", "s"]) == 0
+    assert main(["read", str(path), "--rate", "1Hz"]) == 0
+    shown = capsys.readouterr().out
+    assert "probably" not in shown and "finding" not in shown and "note: a_V: 0 to 99 s: samples are 1 s" in shown
+
+
+def test_the_unit_in_a_columns_name_is_questioned_and_dates_are_not(written):
+    (found,) = [each for each in read(written(SLOW.replace("time,", "t_s,"))).findings if each.channel == "a_V"]
+    assert found.kind == "slow_samples" and "probably in ms" in found.text and found in sanity.doubts([found])
+    rows = "".join(f"2026-11-05 09:{k // 60:02d}:{k % 60:02d},{k % 7 / 7}\n" for k in range(100))
+    (found,) = [each for each in read(written("time,a_V\n" + rows)).findings if each.kind == "slow_samples"]
+    assert found.severity == sanity.NOTE and not sanity.doubts([found])
 
 
 def prepared_run(written, names, data, **how):
