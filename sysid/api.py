@@ -48,13 +48,24 @@ def diagnose(
     part of each file by time, above 0 and below 1. model: a model file to start from; its effects are not findings.
     gear: of the motor bench's gearbox (14). repair: channels that drive the machine and are repaired all the same.
     accept_loss: share of a channel's samples that may be lost, 0 to 1. mapping: {column of the files: channel};
-    time_unit: of a time column without one; rate_hz: of the samples of a file without a time. seed: of the bootstrap. progress: is called with (present step, finished
-    share).
+    time_unit: of a time column without one; rate_hz: of the samples of a file without a time. seed: of the
+    bootstrap. progress: is called with (present step, finished share).
 
     The same arguments give the same result. UserError for a mistake, and for data from which nothing can be concluded.
     """
     return diagnosis(
-        files, machine, holdout, holdout_part, model, gear, repair, accept_loss, mapping, time_unit, rate_hz, seed,
+        files,
+        machine,
+        holdout,
+        holdout_part,
+        model,
+        gear,
+        repair,
+        accept_loss,
+        mapping,
+        time_unit,
+        rate_hz,
+        seed,
         progress,
     ).result
 
@@ -137,9 +148,7 @@ def _several(files: File | Sequence[File]) -> Sequence[File]:
     return [files] if isinstance(files, str | pathlib.Path | Dataset) else files
 
 
-def _dataset(
-    file: File, mapping: Mapping[str, str] | None, time_unit: str | None, rate_hz: float | None
-) -> Dataset:
+def _dataset(file: File, mapping: Mapping[str, str] | None, time_unit: str | None, rate_hz: float | None) -> Dataset:
     return file if isinstance(file, Dataset) else open_recording(file, mapping, time_unit=time_unit, rate_hz=rate_hz)
 
 

@@ -19,8 +19,8 @@ from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import layout
 
-KEYS = {"format": str, "columns": list, "channels": dict, "time_unit": str, "rate": str, "dbc": list, "bus": list, "assume": dict,
-        "map": dict}  # fmt: skip
+KEYS = {"format": str, "columns": list, "channels": dict, "time_unit": str, "rate": str, "dbc": list,
+        "bus": list, "assume": dict, "map": dict}  # fmt: skip
 MOST_NAMED = 5
 NOT_OF_THE_NEXT = ("names",)  # a line number: preambles differ in length, the names are found by themselves
 

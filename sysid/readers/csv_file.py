@@ -50,8 +50,8 @@ def read(
     """The channels of a text table.
 
     mapping: {column in the file: name of the channel}; time_unit: of a time column whose name does not give it;
-    rate_hz: of the rows, in place of a time column; assumed: parts of the layout that are given (layout.KEYS). UserError for a file that is not a table with a time
-    column, or that can be read in two ways.
+    rate_hz: of the rows, in place of a time column; assumed: parts of the layout that are given (layout.KEYS).
+    UserError for a file that is not a table with a time column, or that can be read in two ways.
     """
     path = pathlib.Path(path)
     assumed = dict(assumed or {})

@@ -29,7 +29,8 @@ EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after
 
 def or_with_rate(path: str | pathlib.Path) -> str:
     """The end of an error about a file without a time: the command that reads it."""
-    return f"; or its samples come at a known rate, as 100 a second: ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
+    command = f"ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
+    return f"; or its samples come at a known rate, as 100 a second: {command}"
 
 
 def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> None:

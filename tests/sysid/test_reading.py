@@ -454,7 +454,8 @@ def broken_loose(gain, spike, constant):
     angle += 0.04 * (np.arange(2000) >= 700) * np.exp(-np.maximum(t - 7.0, 0.0))
     voltage = 0.05 * np.sin(2.7 * t) - gain * angle + np.where(np.arange(2000) == 700, spike, 0.0)
     voltage += np.where(np.arange(2000) >= 700, constant, 0.0)
-    return "t_s,arm_angle_rad,drive_V\n" + "".join(f"{a:.2f},{b:.6f},{c:.6f}\n" for a, b, c in zip(t, angle, voltage, strict=True))
+    rows = zip(t.tolist(), angle.tolist(), voltage.tolist(), strict=True)
+    return "t_s,arm_angle_rad,drive_V\n" + "".join(f"{a:.2f},{b:.6f},{c:.6f}\n" for a, b, c in rows)
 
 
 @pytest.mark.parametrize(
@@ -533,6 +534,13 @@ def test_a_recipe_keeps_the_rate(written, tmp_path):
     recipe.write_text('rate = "0 Hz"\n')
     with pytest.raises(UserError, match="rate is '0 Hz'; a number above 0"):
         read(path, recipe=recipe)
+
+
+def test_a_text_with_the_ending_of_a_measurement_file_is_judged_as_a_text(tmp_path):
+    (tmp_path / "a.dat").write_text("# by region\nRegion Austria Hungary\n1891-1900 a b\nsum of all\n")
+    with pytest.raises(UserError) as refused:
+        read(tmp_path / "a.dat")
+    assert "asammdf" not in str(refused.value)
 
 
 SLOW = "time,a_V\n" + "".join(f"{k},{(k * k % 11) / 7:.3f}\n" for k in range(100))
