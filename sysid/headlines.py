@@ -129,7 +129,7 @@ def _joined(smooth: list[Channel], group: list[Channel]) -> Iterator[Finding]:
     at_all = np.all([jumps[channel.name] > 0.0 for channel in positions], axis=0)
     places = np.flatnonzero(at_all & (np.sum([each > 0.0 for each in jumps.values()], axis=0) > 1))
     clock_is_even = np.percentile(np.abs(np.diff(time_s) - usual_s), USUAL_PERCENT) < CLOCK_STEP * usual_s
-    for place in places if len(places) <= MOST_JOINS else ():
+    for place in map(int, places if len(places) <= MOST_JOINS else ()):
         at, after = float(time_s[place]), float(time_s[place + 1])
         names = [name for name, sizes in jumps.items() if sizes[place] > 0.0]
         text = f"{', '.join(names[:3])} jump at one row ({at:.6g} s)"

@@ -93,8 +93,8 @@ class Walk:
     def is_masked(self, begin: float, end: float) -> bool:
         """True when a masked value lies between the samples by which the angles from begin to end are interpolated."""
         for (time_s, _), masked_s in zip((self.hip, self.lean), self.masked_s, strict=True):
-            first = time_s[max(0, np.searchsorted(time_s, begin, side="right") - 1)]
-            last = time_s[min(len(time_s) - 1, np.searchsorted(time_s, end))]
+            first = time_s[max(0, int(np.searchsorted(time_s, begin, side="right")) - 1)]
+            last = time_s[min(len(time_s) - 1, int(np.searchsorted(time_s, end)))]
             if ((masked_s > first) & (masked_s < last)).any():
                 return True
         return False

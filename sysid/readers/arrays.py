@@ -70,13 +70,13 @@ def channels(
         return
     times = {name: value for name, value in flat.items() if _is_time(name, value, mapping)}
     if rate_hz is not None:
-        lost = {name: len(value) for name, value in flat.items() if len(value) == 1}
-        kept = {name: value for name, value in flat.items() if name not in lost and value.dtype.kind in "fiub"}
+        single = {name: 1 for name, value in flat.items() if len(value) == 1}
+        kept = {name: value for name, value in flat.items() if name not in single and value.dtype.kind in "fiub"}
         time_column.of_rate(dataset, rate_hz, list(times))
         for name, value in kept.items():
             yield Column(name, arrays.units.get(name, ""), np.arange(len(value)) / rate_hz, value.astype(np.float64))
-        arrays.other += [name for name in flat if name not in kept and name not in lost]
-        _note(dataset, arrays, lost, [])
+        arrays.other += [name for name in flat if name not in kept and name not in single]
+        _note(dataset, arrays, single, [])
         return
     if not times and not arrays.own_times:
         some = ", ".join(flat)[:200] or "none with numbers"

@@ -81,7 +81,7 @@ def of(path: pathlib.Path) -> Format:
     if suffix not in TEXT_ENDINGS or not _is_table(first.decode("utf-8", errors="replace")):
         if suffix in log_kinds.ENDINGS:
             return Format(log_kinds.ENDINGS[suffix], holds_frames=True)
-        if suffix in MDF_ENDINGS and b"\0" in first:  # other programs' .dat are text
+        if suffix in MDF_ENDINGS and (suffix not in TEXT_ENDINGS or b"\0" in first):
             return MDF
         if suffix == ".mat":  # of version 4, which begins with numbers
             return Format("MATLAB")
