@@ -186,7 +186,11 @@ class Term:
         columns += [one for name, one in whole().columns(s).items() if name not in self.parameters]
         if self.column is _cosine:
             columns.append(np.sin(angle))
-        columns += [FRICTIONS[each](angle, rate) for each in others if each in FRICTIONS]
+        for name, form, speed in others:
+            if name == "stribeck":
+                columns.append(np.sign(rate) * np.exp(-((rate / speed) ** 2)))
+            elif (name, form) in FRICTIONS:
+                columns.append(FRICTIONS[name, form](angle, rate))
         counts = np.abs(rate) > 0.02 * np.quantile(np.abs(rate), 0.98)
         both = np.column_stack([*columns, values[whole.response]])
         plain = np.linalg.lstsq(both[counts, :-1], both[counts, -1], rcond=None)[0]
@@ -282,8 +286,12 @@ def row(term, share, fitted):
     named = " + ".join(each.name for each in result.causes) or ("abstains" if result.detected else "nothing")
     first = next(iter(result.causes), None)
     right = first is not None and first.name in term.names
-    others = {(each.name, each.form or "") for each in result.causes if each is not first}
-    left, unsure = term.left(share, value, sorted(others))
+    others = [
+        (each.name, each.form or "", each.parameters["speed"].value if "speed" in each.parameters else 0.0)
+        for each in result.causes
+        if each is not first
+    ]
+    left, unsure = term.left(share, value, others)
     interval = ""
     if right and term.coefficient in first.parameters:
         found = first.parameters[term.coefficient]
