@@ -180,10 +180,17 @@ class Balance(abc.ABC):
         found = [
             self._effect("viscous_friction", joint, ("size",), lambda s, _: [s["rate"]]),
             self._effect("coulomb_friction", joint, ("size",), lambda s, _: [s["direction"]]),
-            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square", forms=3),
+            self._effect(
+                "drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square", forms=3
+            ),
             self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] ** 3], form="cube", forms=3),
             self._effect(
-                "drag", joint, ("size",), lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))], form="root", forms=3
+                "drag",
+                joint,
+                ("size",),
+                lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))],
+                form="root",
+                forms=3,
             ),
             self._effect("stribeck", joint, ("excess",), slow, [{"speed": share * top} for share in SPEEDS]),
             self._effect("direction_friction", joint, ("size",), lambda s, _: [np.abs(s["rate"])]),

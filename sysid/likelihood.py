@@ -340,7 +340,7 @@ def _exchanged(
     out = list(named)
     for _ in range(PASSES if len(named) > 1 else 0):
         before = [each.effect for each in out]
-        for place, old in enumerate(list(out)):
+        for old in list(out):
             others = [each for each in out if each is not old]
             if len(others) == len(out) or not others:
                 continue

@@ -10,7 +10,7 @@ others, whose source and licence docs/diagnose-your-machine.md lists. What is mi
 "seen from" is the smallest share that theory allows: sqrt(threshold + ln n) standard errors of the term, by generalised
 least squares of the whole model under an autoregression of what it leaves; nothing of the diagnosis is used for it.
 
-What is left of a term in a recording is its value there less what was taken out, and not the share of a value: the value
+What is left of a term in a recording is its value there less what was taken out, and not the share of a value, which
 is an estimate itself. So "its size" is the mean of a plain and of a whitened fit to the diagnosed part, with the other
 frictions that were named in the model, less what was taken; its error has half of the difference of the two fits.
 """
@@ -181,7 +181,8 @@ class Term:
         whole = self.source.whole
         times, values = self.source.parts()[0]
         angle, rate, acceleration = moved(times, values, whole)
-        s = {"t": times, "angle": angle, "rate": rate, "acceleration": acceleration, "direction": np.sign(rate)} | values
+        s = {"t": times, "angle": angle, "rate": rate, "acceleration": acceleration, "direction": np.sign(rate)}
+        s |= values
         columns = [self.column(angle, rate)]
         columns += [one for name, one in whole().columns(s).items() if name not in self.parameters]
         if self.column is _cosine:
