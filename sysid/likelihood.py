@@ -379,7 +379,7 @@ def _exchanged(
             out[out.index(old)] = new
         if [each.effect for each in out] == before:
             break
-    return sorted(out, key=lambda each: -each.bic)
+    return out
 
 
 Scored = tuple[float, float, int, Trial]  # (score, chi-square, freedom, trial)
