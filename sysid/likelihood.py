@@ -265,7 +265,9 @@ def select(
             if not _surely_better(extended, other):
                 plainer.tied = [found.effect, *(each for each in plainer.tied if each is not found.effect)]
                 found, extended = plainer, other
-        if not _predicts(regression, extended) or not _apart(found.effect, base, fixed, named, refused, threshold):
+        if not _predicts(regression, extended) or not _seen_with_refused(
+            found.effect, base, fixed, named, refused, threshold
+        ):
             left_out.append(found.effect)
         elif judge is not None and not judge.accepts(named, found, regression, extended):
             refused.append(found)
@@ -311,7 +313,7 @@ def _surely_better(one: Regression, other: Regression) -> bool:
     return float(np.sum(by_block)) > max(naming.TIE, SURE * error)
 
 
-def _apart(
+def _seen_with_refused(
     effect: Effect,
     base: Regression,
     fixed: Sequence[Named],
