@@ -124,13 +124,20 @@ class Balance(abc.ABC):
         return lambda s, _: self.more(s)[cause]
 
     def _effect(
-        self, cause: str, at: str, names: tuple[str, ...], make: Made, shapes: Sequence[Shape] = ({},), form: str = ""
+        self,
+        cause: str,
+        at: str,
+        names: tuple[str, ...],
+        make: Made,
+        shapes: Sequence[Shape] = ({},),
+        form: str = "",
+        forms: int = 1,
     ) -> Effect:
         def columns(recording: Recording, shape: Shape, _: Values) -> Columns:
             return {self.response: np.column_stack(make(recording.signals, shape))}
 
         part = "sensor" if cause.startswith("sensor_") else "mechanical"
-        return Effect(cause, at, part, names, list(shapes), columns, form=form)
+        return Effect(cause, at, part, names, list(shapes), columns, form=form, forms=forms)
 
     def _lag(self) -> Effect:
         def columns(recording: Recording, _: Shape, values: Values) -> Columns:
@@ -173,10 +180,17 @@ class Balance(abc.ABC):
         found = [
             self._effect("viscous_friction", joint, ("size",), lambda s, _: [s["rate"]]),
             self._effect("coulomb_friction", joint, ("size",), lambda s, _: [s["direction"]]),
-            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square"),
-            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] ** 3], form="cube"),
             self._effect(
-                "drag", joint, ("size",), lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))], form="root"
+                "drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square", forms=3
+            ),
+            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] ** 3], form="cube", forms=3),
+            self._effect(
+                "drag",
+                joint,
+                ("size",),
+                lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))],
+                form="root",
+                forms=3,
             ),
             self._effect("stribeck", joint, ("excess",), slow, [{"speed": share * top} for share in SPEEDS]),
             self._effect("direction_friction", joint, ("size",), lambda s, _: [np.abs(s["rate"])]),
