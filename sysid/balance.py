@@ -86,8 +86,26 @@ class Balance(abc.ABC):
             sharper = np.tanh(SHARPER * np.arctanh(np.clip(s["direction"], -CLOSE, CLOSE)))
             columns["width of standstill@rate"] = sharper - s["direction"]
         unit = next(each.unit for each in self.quantities if each.name == self.response)
-        made = Equation(self.response, "M", "mechanical", unit, table[self.response], columns, valid)
+        made = Equation(
+            self.response, "M", "mechanical", unit, table[self.response], columns, valid, self._stand_ins(table, s)
+        )
         return Recording(table, s, {self.response: made})
+
+    def _stand_ins(self, table: Table, s: Signals) -> dict[str, Array]:
+        """Columns that a measured rate has part in, by the angle instead, whose noise is another.
+
+        A rate's noise, differentiated, is larger than the acceleration in it; against its own column an inertia would
+        come out near zero, and what it should explain would be left to other terms.
+        """
+        if not (self.angle and self.rate):
+            return {}
+        rate = signals.derivative(table, s["angle"], SLOPE_S / table.step_s)
+        other = dict(s) | {
+            "rate": rate,
+            "acceleration": signals.per_run(table, lambda part: np.gradient(part, table.step_s), rate),
+        }
+        there, instead = self.columns(s), self.columns(other)
+        return {name: column for name, column in instead.items() if not np.array_equal(column, there[name])}
 
     def _add_joint(self, table: Table, s: dict[str, Array]) -> None:
         width = SLOPE_S / table.step_s
