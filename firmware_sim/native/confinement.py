@@ -2,7 +2,7 @@
 
 `confine` is called in that process, before the program is loaded. It takes, as far as the kernel grants each:
 
-- user, network, IPC and host-name namespaces of its own, and no capabilities in any;
+- separate user, network, IPC and host-name namespaces, and no capabilities in any;
 - Landlock: it reads the interpreter, the system's libraries and the firmware's folder, and writes only where coverage
   and sanitizers keep their results;
 - limits of memory, of the size of a file, of descriptors and of core dumps;
@@ -145,7 +145,7 @@ def confine(needs: Needs, keep: Collection[int]) -> list[str]:
     _limit(needs, lacks)
     user, group = os.getuid(), os.getgid()
     if libc.unshare(CLONE_NEWUSER | CLONE_NEWNET | CLONE_NEWIPC | CLONE_NEWUTS) != 0:
-        lacks.append(f"no namespaces of its own: {os.strerror(ctypes.get_errno())}")
+        lacks.append(f"no separate namespaces: {os.strerror(ctypes.get_errno())}")
     else:
         _map_itself(user, group)
     libc.prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)

@@ -129,7 +129,7 @@ def test_where_user_namespaces_are_forbidden_the_rest_holds(tmp_path):
     with os.fdopen(reading, "rb") as pipe:
         lacks = json.loads(pipe.read())
     os.waitpid(process, 0)
-    assert lacks == ["no namespaces of its own: Operation not permitted", "refused"]
+    assert lacks == ["no separate namespaces: Operation not permitted", "refused"]
 
 
 def test_the_walks_own_process_never_loads_the_library(tmp_path):
