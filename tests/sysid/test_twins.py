@@ -182,6 +182,26 @@ def test_a_tolerance_of_sound_robots_hides_what_is_within_it(view):
     assert judged(loose, leg, found).fits[0].gain < 0.2 * judged(view, leg, found).fits[0].gain
 
 
+def inside_after(view, rows):
+    """Which of the 39 steps count when the states in which these steps start are 50 deviations away."""
+    leg, found = made_up(9400)
+    found[rows, features.NAMES.index(FEW_START[0])] += 50.0
+    return step_map.rest(view.legs, leg, found, few=True).inside
+
+
+def test_a_stray_step_outside_the_map_is_left_out(view):
+    assert inside_after(view, [20]).tolist() == [row != 20 for row in range(39)]
+
+
+def test_steps_count_that_stay_outside_the_map_from_some_step_on(view):
+    inside = inside_after(view, range(20, 40))
+    assert inside[:20].all() and inside[26:].all()  # the first ones have inside neighbours
+
+
+def test_a_walk_outside_the_map_from_its_begin_counts(view):
+    assert inside_after(view, range(40)).all()
+
+
 def test_the_trimmed_mean_is_not_moved_by_a_single_step():
     left = np.zeros((20, 2))
     left[3] = 100.0
