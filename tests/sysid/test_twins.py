@@ -73,6 +73,16 @@ def test_names_of_the_experiment_are_variables_of_the_table():
     assert steps.of_dataset(Dataset("walk", channels)).count == 4
 
 
+@pytest.mark.parametrize(("name", "sign"), [("outer_leg_abs_angle_gyro_rad", 1.0), ("UI_ROLL", -1.0)])
+def test_the_leg_angle_of_a_log_of_2015_has_the_sign_of_the_tables(name, sign):
+    columns = swinging(6)
+    stamps = steps.CLOCK_S * np.arange(len(columns["MCH_ANGLE"]))
+    angle = np.linspace(-0.2, 0.3, len(stamps))
+    made = {"hip_angle_rad": columns["MCH_ANGLE"], "walk_fsm_state": columns["FSM_LEG"], name: sign * angle}
+    cut = steps.of_dataset(Dataset("walk", {each: Channel(each, "", stamps, value) for each, value in made.items()}))
+    assert cut.signals["outer leg angle"].tolist() == pytest.approx(angle.tolist())
+
+
 def test_a_link_of_50_hz_is_recognised_and_strikes_come_at_most_one_sample_late():
     columns = swinging(8)
     late = steps.by_link(columns, 10, [3, 0, 7])
