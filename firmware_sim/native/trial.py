@@ -7,6 +7,7 @@ so the code proves nothing, and it can write to the pipe: nothing in the descrip
 
 import contextlib
 import dataclasses
+import importlib
 import json
 import mmap
 import os
@@ -64,6 +65,7 @@ def tried(
 
     record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet.
     """
+    importlib.import_module("cffi")  # a missing library is not the program's fault
     record = record_words()
     if not hasattr(os, "fork"):
         return Tried(None, _load_and_start(library, start, made, record, lambda reached: None))
