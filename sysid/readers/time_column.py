@@ -22,6 +22,7 @@ EARLIEST_DAY, LATER_THAN_LONG = 0.01, 10.0  # parts of a day begin long after mi
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
 LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
+CENTURIES = (18_000_101, 22_001_231)  # dates as numbers, 20261105, within which
 EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
 EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
@@ -40,6 +41,31 @@ def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> Non
         text += f"; {', '.join(unused)} is a channel and not the time"
     dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, 1.0 / rate_hz, "s", text, "note"))
     dataset.layout |= {"time": "row number", "rate_hz": rate_hz}
+
+
+def of_compact_dates(dataset: Dataset, name: str, stamps: Array) -> Array | None:
+    """Stamps (n,) in s since the first one of dates that are written as numbers, 20261105; None for other numbers.
+
+    They are dates where every number is a day of the calendar and more than one month is met: a counter is not.
+    """
+    good = stamps[np.isfinite(stamps)]
+    if len(good) < 2 or good.min() < CENTURIES[0] or good.max() > CENTURIES[1] or (good != np.floor(good)).any():
+        return None
+    number = good.astype(np.int64)
+    month = number // 100 % 100
+    if len(np.unique(number // 100)) < 2 or month.min() < 1 or month.max() > 12:
+        return None
+    months = (number // 10_000 - 1970).astype("M8[Y]").astype("M8[M]") + (month - 1)
+    days = months.astype("M8[D]") + (number % 100 - 1)
+    if (days.astype("M8[M]") != months).any() or (number % 100 < 1).any():
+        return None
+    time_s = np.full(len(stamps), np.nan)
+    time_s[np.isfinite(stamps)] = (days - days[0]).astype(np.int64) * DAY_S
+    text = f"{name}: dates such as {number[0]} are read as seconds"
+    dataset.repairs.append(Repair("", "dates", len(good), text))
+    dataset.layout |= {"time": name, "time_unit": "dates"}
+    dataset.clock_is_given = True
+    return time_s
 
 
 def seconds(

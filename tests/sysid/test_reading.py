@@ -556,6 +556,16 @@ def test_a_time_unit_that_is_given_is_not_argued_with(written, capsys):
     assert "probably" not in shown and "finding" not in shown and "note: a_V: 0 to 99 s: samples are 1 s" in shown
 
 
+def test_dates_as_numbers_are_days_of_the_calendar_and_a_counter_is_not(written):
+    week = np.datetime64("2024-02-24") + 7 * np.arange(60)
+    rows = "".join(f"{str(day).replace('-', '')},{0.1 * k:.1f}\n" for k, day in enumerate(week))
+    channel = open_recording(written("date,level_m\n" + rows))["level_m"]
+    assert channel.time_s.tolist() == [604_800.0 * k for k in range(60)]  # through a 29th of February
+    counter = "".join(f"{20_260_190 + k},{0.1 * k:.1f}\n" for k in range(60))  # has a 32nd of a month
+    with pytest.raises(UserError, match="nothing says the unit of the stamps"):
+        open_recording(written("t,level_m\n" + counter))
+
+
 def test_the_unit_in_a_columns_name_is_questioned_and_dates_are_not(written):
     (found,) = [each for each in read(written(SLOW.replace("time,", "t_s,"))).findings if each.channel == "a_V"]
     assert found.kind == "slow_samples" and "probably in ms" in found.text and found in sanity.doubts([found])
