@@ -134,7 +134,7 @@ def rest(legs: Sequence[LegMap], leg: np.ndarray, found: Array, few: bool, usabl
 
 
 def _another_gait(inside: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """Steps outside the map among others outside: a gait of its own, from some step on or all the time.
+    """Steps outside the map among others outside: another gait, from some step on or all the time.
     At the map's edge they still show what is wrong; a stray step is left out."""
     window = np.ones(2 * NEIGHBOURS + 1)
     outside, there = (
