@@ -111,6 +111,9 @@ class _Rows:
             rows: list[list[str]] = []
             plain = '"' not in "".join(lines)
             for place, line in enumerate(lines, number):
+                if line == text_file.CONTINUED:
+                    self._count("continued")
+                    continue
                 if place < layout.first_line:
                     self._above(place, line)
                     continue

@@ -186,7 +186,6 @@ def test_microseconds_since_a_controllers_start_are_not_a_date(written):
     ("text", "reason"),
     [
         (rows("{t:.3f},{v:.3f}\n").replace(".", ","), "may be decimals behind a comma, and then nothing says where"),
-        ('t_s,note,a_V\n0,"one\ntwo",1\n1,"one\ntwo",2\n', ":2: a quoted cell goes on in the next line"),
         (rows("step {k} {v:.3f}\n"), "has no names, and its column_1 holds words such as 'step'"),
         ('{"t": 0, "u": 1}\n', "this is a JSON file"),
     ],
@@ -554,6 +553,30 @@ def test_a_time_unit_that_is_given_is_not_argued_with(written, capsys):
     assert main(["read", str(path), "--rate", "1Hz"]) == 0
     shown = capsys.readouterr().out
     assert "probably" not in shown and "finding" not in shown and "note: a_V: 0 to 99 s: samples are 1 s" in shown
+
+
+@pytest.mark.parametrize("line", [0, 1, 150, 199])
+def test_a_quoted_cell_of_several_lines_is_one_cell_wherever_it_is(line, written):
+    remarks = ["ok"] * 200
+    remarks[line] = '"two, and\n""three"" \nlines"'
+    text = "t_s,remark,a_V\n" + "".join(f"{0.01 * k:.2f},{each},{k}\n" for k, each in enumerate(remarks))
+    measurement = read(written(text))
+    assert measurement["a_V"].value.tolist() == list(range(200))
+    assert measurement.ledger()["lines"] == {"names": 1, "rows": 200, "continued": 2}
+
+
+def test_a_name_of_two_lines_has_its_unit(written):
+    measurement = read(written('"Time\n(s)","Speed\n(km/h)"\n' + "".join(f"{0.01 * k:.2f},36\n" for k in range(50))))
+    assert measurement["Speed_m_per_s"].value.tolist() == pytest.approx([10.0] * 50)
+
+
+def test_a_quotation_mark_that_is_not_closed_is_a_character(written):
+    rows = [f"{0.01 * k:.2f},ok,{k}\n" for k in range(200)]
+    rows[100] = '1.00,5" pipe,100\n'  # not at the cell's begin
+    rows[120] = '1.20,"lost,120\n'
+    measurement = read(written("t_s,remark,a_V\n" + "".join(rows)))
+    assert measurement["a_V"].value.tolist() == [k for k in range(200) if k != 120]
+    assert measurement.ledger()["lines"]["left out: ragged"] == 1
 
 
 def test_dates_as_numbers_are_days_of_the_calendar_and_a_counter_is_not(written):
