@@ -258,13 +258,9 @@ def select(
             errors = [judge.square([*named, one], each) for one, each in zip(options, extensions, strict=True)]
             best = int(np.argmin(errors))
         found, extended = options[best], extensions[best]
-        simple = _simpler_one(found, ranked, threshold)
-        if simple is not None:
-            plainer = _named(simple, ranked, near, chance)
-            other = naming.refit(base, [*named, plainer], [*fixed, *named, plainer])
-            if not _surely_better(extended, other):
-                plainer.tied = [found.effect, *(each for each in plainer.tied if each is not found.effect)]
-                found, extended = plainer, other
+        in_doubt = _simpler_in_doubt(found, named, base, fixed, ranked, near, chance, threshold)
+        if in_doubt is not found:
+            found, extended = in_doubt, naming.refit(base, [*named, in_doubt], [*fixed, *named, in_doubt])
         if not _predicts(regression, extended) or not _seen_with_refused(
             found.effect, base, fixed, named, refused, threshold
         ):
@@ -291,9 +287,18 @@ def _simpler(one: Effect, than: Effect) -> bool:
     return other.number in simple.confusable or simple.number in other.confusable
 
 
-def _simpler_one(found: Named, ranked: Sequence["Scored"], threshold: float) -> "Scored | None":
-    """The best simpler cause that these data support as well."""
-    return next(
+def _simpler_in_doubt(
+    found: Named,
+    others: Sequence[Named],
+    base: Regression,
+    fixed: Sequence[Named],
+    ranked: Sequence["Scored"],
+    near: Sequence["Scored"],
+    chance: Array,
+    threshold: float,
+) -> Named:
+    """The cause itself, or the best simpler one that these data support as well, with it as a tie."""
+    simple = next(
         (
             each
             for each in ranked
@@ -301,6 +306,14 @@ def _simpler_one(found: Named, ranked: Sequence["Scored"], threshold: float) -> 
         ),
         None,
     )
+    if simple is None:
+        return found
+    plainer = _named(simple, ranked, near, chance)
+    with_each = [naming.refit(base, [*others, each], [*fixed, *others, each]) for each in (found, plainer)]
+    if _surely_better(*with_each):
+        return found
+    plainer.tied = [found.effect, *(each for each in plainer.tied if each is not found.effect)]
+    return plainer
 
 
 def _surely_better(one: Regression, other: Regression) -> bool:
@@ -344,7 +357,7 @@ def _exchanged(
         before = [each.effect for each in out]
         for old in list(out):
             others = [each for each in out if each is not old]
-            if len(others) == len(out) or not others:
+            if not others or len(others) == len(out):  # it is alone, or has been dropped
                 continue
             regression = naming.refit(base, others, [*fixed, *others])
             rest = [
@@ -363,13 +376,7 @@ def _exchanged(
             tied = [each for each in ranked if abs(each[0] - chosen[0]) < naming.TIE and naming.possible(each[3])]
             if chosen[3].effect is not old.effect and chosen[0] > own[0] + naming.TIE:
                 new = _named(chosen, ranked, tied, np.zeros(0))
-            simple = _simpler_one(new, ranked, threshold)
-            if simple is not None:
-                plainer = _named(simple, ranked, tied, np.zeros(0))
-                both = [naming.refit(base, [*others, each], [*fixed, *others, each]) for each in (new, plainer)]
-                if not _surely_better(*both):
-                    plainer.tied = [new.effect, *(each for each in plainer.tied if each is not new.effect)]
-                    new = plainer
+            new = _simpler_in_doubt(new, others, base, fixed, ranked, tied, np.zeros(0), threshold)
             new.p = old.p
             if new.effect is not old.effect and judge is not None:
                 squares = [

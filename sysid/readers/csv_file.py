@@ -713,10 +713,7 @@ def _counted(
             f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
             "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
         )
-    if unit is None and (of_dates := time_column.of_compact_dates(dataset, name, time_s)) is not None:
-        return of_dates
-    dataset.layout |= {"time": name}
-    time_s, _ = time_column.seconds(dataset, str(rows.path), name, time_s, column.whole_numbers(), unit)
     factor = f"{unit.factor:g} s" if unit is not None else "assumed"
-    dataset.layout |= {"time_unit": unit_text if said else time_unit or factor}
+    dataset.layout |= {"time": name, "time_unit": unit_text if said else time_unit or factor}
+    time_s, _ = time_column.seconds(dataset, str(rows.path), name, time_s, column.whole_numbers(), unit)
     return time_s

@@ -43,31 +43,6 @@ def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> Non
     dataset.layout |= {"time": "row number", "rate_hz": rate_hz}
 
 
-def of_compact_dates(dataset: Dataset, name: str, stamps: Array) -> Array | None:
-    """Stamps (n,) in s since the first one of dates that are written as numbers, 20261105; None for other numbers.
-
-    They are dates where every number is a day of the calendar and more than one month is met: a counter is not.
-    """
-    good = stamps[np.isfinite(stamps)]
-    if len(good) < 2 or good.min() < CENTURIES[0] or good.max() > CENTURIES[1] or (good != np.floor(good)).any():
-        return None
-    number = good.astype(np.int64)
-    month = number // 100 % 100
-    if len(np.unique(number // 100)) < 2 or month.min() < 1 or month.max() > 12:
-        return None
-    months = (number // 10_000 - 1970).astype("M8[Y]").astype("M8[M]") + (month - 1)
-    days = months.astype("M8[D]") + (number % 100 - 1)
-    if (days.astype("M8[M]") != months).any() or (number % 100 < 1).any():
-        return None
-    time_s = np.full(len(stamps), np.nan)
-    time_s[np.isfinite(stamps)] = (days - days[0]).astype(np.int64) * DAY_S
-    text = f"{name}: dates such as {number[0]} are read as seconds"
-    dataset.repairs.append(Repair("", "dates", len(good), text))
-    dataset.layout |= {"time": name, "time_unit": "dates"}
-    dataset.clock_is_given = True
-    return time_s
-
-
 def seconds(
     dataset: Dataset,
     path: str,
@@ -82,6 +57,8 @@ def seconds(
     calendar. unit: None where nothing gives it. UserError for a unit of something else, and for stamps whose unit
     does not follow from their size.
     """
+    if unit is None and (dates := _compact_dates(dataset, name, stamps)) is not None:
+        return dates
     unit = unit or _assumed(dataset, path, name, stamps)
     if unit.numerator != ("s",) or unit.denominator:
         raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
@@ -94,6 +71,31 @@ def seconds(
     if whole is not None and len(whole):
         return (whole - whole[0]) * unit.factor, int(whole[0]) * round(unit.factor * 1e9)
     return from_zero, round(columns.ends(time_s)[0] * 1e9)
+
+
+def _compact_dates(dataset: Dataset, name: str, stamps: Array) -> tuple[Array, int] | None:
+    """As `seconds`, of dates that are written as numbers, 20261105; None for other numbers.
+
+    They are dates where every number is a day of the calendar and more than one month is met: a counter is not.
+    """
+    good = stamps[np.isfinite(stamps)]
+    if len(good) < 2 or good.min() < CENTURIES[0] or good.max() > CENTURIES[1] or (good != np.floor(good)).any():
+        return None
+    number = good.astype(np.int64)
+    month, day = number // 100 % 100, number % 100
+    if len(np.unique(number // 100)) < 2 or month.min() < 1 or month.max() > 12 or day.min() < 1:
+        return None
+    months = (number // 10_000 - 1970).astype("M8[Y]").astype("M8[M]") + (month - 1)
+    days = months.astype("M8[D]") + (day - 1)
+    if (days.astype("M8[M]") != months).any():
+        return None
+    time_s = np.full(len(stamps), np.nan)
+    time_s[np.isfinite(stamps)] = (days - days[0]).astype(np.int64) * DAY_S
+    text = f"{name}: dates such as {number[0]} are read as seconds, 0 is {days[0]}"
+    dataset.repairs.append(Repair("", "dates", len(good), text))
+    dataset.layout |= {"time_unit": "dates"}
+    dataset.clock_is_given = True
+    return time_s, int(days[0].astype(np.int64)) * 86_400_000_000_000
 
 
 def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Unit:

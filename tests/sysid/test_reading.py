@@ -584,6 +584,10 @@ def test_dates_as_numbers_are_days_of_the_calendar_and_a_counter_is_not(written)
     rows = "".join(f"{str(day).replace('-', '')},{0.1 * k:.1f}\n" for k, day in enumerate(week))
     channel = open_recording(written("date,level_m\n" + rows))["level_m"]
     assert channel.time_s.tolist() == [604_800.0 * k for k in range(60)]  # through a 29th of February
+    number = [int(str(day).replace("-", "")) for day in week]
+    path = written(b"", "t.mat")
+    scipy.io.savemat(path, {"date": np.array(number, dtype=float), "level_m": 0.1 * np.arange(60)})
+    assert open_recording(path, {"date": "time"})["level_m"].time_s.tolist() == [604_800.0 * k for k in range(60)]
     counter = "".join(f"{20_260_190 + k},{0.1 * k:.1f}\n" for k in range(60))  # has a 32nd of a month
     with pytest.raises(UserError, match="nothing says the unit of the stamps"):
         open_recording(written("t,level_m\n" + counter))
