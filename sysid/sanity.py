@@ -65,6 +65,7 @@ KINDS = {
     "mixed": "rows of two recordings in turn",
     "quantised": "the steps of its values are most of the noise of its derivative",
     "stuck": "a value stays constant while other channels move",
+    "at_rest": "a value stays at 0 while the channels that move are small",
     "constant": "one value all the time",
     "saturation": "values cut off at a limit",
     "lag": "a channel comes later than a redundant one",
@@ -89,6 +90,7 @@ SPIKE_STEPS = 12.0  # of the usual second difference; noise reaches 6 in a milli
 WARMTHS = ("C", "K")  # units of temperatures
 STUCK_SAMPLES = 50  # a fifth of a second of a fast channel of the robot
 STUCK_RATIO = 8.0  # to the longest other stretch: a quantised channel at rest is constant as well
+SMALL_PART = 0.5  # of a channel's largest value: below it friction or a dead zone may hold what it drives
 MOVES_PART = 0.2  # of a channel's whole range, within a stretch: less is rest
 # Variance of values over half the mean square of neighbours' differences: 1 for white noise at rest, 2 for one with a
 # correlation of 0.5 from sample to sample; a sine of 10 samples a period has 2.6, slower ones have more.
@@ -474,11 +476,21 @@ def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Findi
         if other.name != channel.name and not _is_held(other.value) and not warm and _moves(other, begin, end):
             moving.append(other.name)
     if moving:
-        text = (
-            f"it stays at {channel.value[starts[longest]]:.6g} {channel.unit} for {end - begin:.4g} s "
-            f"while {', '.join(moving[:3])} move"
-        )
-        yield Finding(channel.name, "stuck", float(begin), float(end), float(end - begin), "s", text)
+        value = float(channel.value[starts[longest]])
+        stays = f"it stays at {value:.6g} {channel.unit}".rstrip() + f" for {end - begin:.4g} s while "
+        stays += f"{', '.join(moving[:3])} {'moves' if len(moving) == 1 else 'move'}"
+        where = (float(begin), float(end), float(end - begin), "s")
+        if value == 0.0 and all(_is_small(all_channels[name], begin, end) for name in moving):
+            text = f"{stays} little: friction or a dead zone may hold it"
+            yield Finding(channel.name, "at_rest", *where, text, NOTE)
+        else:
+            yield Finding(channel.name, "stuck", *where, stays)
+
+
+def _is_small(channel: Channel, begin: float, end: float) -> bool:
+    """True when within these stamps the channel is far below its largest value, of either sign."""
+    inside = channel.value[(channel.time_s > begin) & (channel.time_s < end)]
+    return bool(np.max(np.abs(inside)) < SMALL_PART * np.max(np.abs(channel.value)))
 
 
 def _moves(channel: Channel, begin: float, end: float) -> bool:

@@ -21,6 +21,7 @@ DAY_S = 86_400.0
 EARLIEST_DAY, LATER_THAN_LONG = 0.01, 10.0  # parts of a day begin long after midnight; an oscilloscope's stamps about 0
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
+SHORTEST_S = 2e-5  # faster recordings have the unit of their stamps
 LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
 CENTURIES = (18_000_101, 22_001_231)  # dates as numbers, 20261105, within which
 EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -119,15 +120,22 @@ def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Uni
             return units.Unit(("s",), (), factor)
     text = f"{name}: nothing says the unit of the stamps; seconds are assumed"
     if usual > SLOWEST_S:
-        smaller = next((unit for unit in ("ms", "us", "ns") if usual * units.ATOMS[unit][1] <= SLOWEST_S), "ns")
-        better = usual * units.ATOMS[smaller][1]
-        if usual > LONGEST_S or len(stamps) >= FEWEST:
+        steps_s = {unit: usual * units.ATOMS[unit][1] for unit in ("ms", "us", "ns")}
+
+        def slow(unit: str) -> bool:
+            return steps_s[unit] > SLOWEST_S
+
+        likely = {unit: step_s for unit, step_s in steps_s.items() if SHORTEST_S <= step_s <= LONGEST_S}
+        if likely and (usual > LONGEST_S or len(stamps) >= FEWEST):
+            others = ", ".join(f"in {unit} {step_s:g} s" for unit, step_s in likely.items())
             raise DataError(
-                f"{path}: {name}: nothing says the unit of the stamps; in seconds samples would be "
-                f"{usual:.6g} s apart, in {smaller} {better:g} s:",
-                f"  ranger-sim read {path} --time-unit {smaller}",
-                f"  ranger-sim read {path} --time-unit s",
+                f"{path}: {name}: nothing says the unit of the stamps; "
+                f"in seconds samples would be {usual:.6g} s apart, {others}:",
+                *(f"  ranger-sim read {path} --time-unit {unit}" for unit in (*sorted(likely, key=slow), "s")),
             )
-        text += f", which are {usual:.6g} s apart; --time-unit {smaller} would make them {better:g} s"
+        text += f", which are {usual:.6g} s apart"
+        if likely:
+            first = min(likely, key=slow)
+            text += f"; --time-unit {first} would make them {steps_s[first]:g} s"
     dataset.findings.append(Finding("", "unit_assumed", *ends, 1.0, "s", text))
     return units.Unit(("s",))

@@ -231,7 +231,7 @@ def test_stamps_that_are_not_read_are_named(table):
     ):
         table("time,a_V\nhalf past nine,1\nten,2\n")
     with pytest.raises(
-        UserError, match=r"samples would be 10000 s apart, in us 0.01 s:\n.*--time-unit us\n.*--time-unit s"
+        UserError, match=r"samples would be 10000 s apart, in ms 10 s, in us 0.01 s:\n.*unit us\n.*unit ms\n.*unit s"
     ):
         table("timestamp,a\n8123456,1\n8133456,2\n")
     assert "--time-unit ms would make them 0.002 s" in table("timestamp,a\n0,1\n2,2\n").findings[0].text

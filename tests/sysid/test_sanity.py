@@ -267,6 +267,20 @@ def test_an_angle_at_rest_is_not_stuck_because_a_temperature_moves():
     assert stuck(Channel("current_A", "A", time_s, np.sin(40.0 * time_s))) == ["motor_angle_rad"]
 
 
+@pytest.mark.parametrize(("top", "kinds"), [(0.3, ["at_rest"]), (1.0, ["stuck"])])
+def test_a_speed_of_zero_is_rest_while_the_command_is_small_and_a_fault_while_it_is_large(top, kinds):
+    time_s = np.arange(1000) * 0.01
+    within = (time_s > 3.0) & (time_s < 7.0)
+    command = np.where(within, top * np.sin(4.0 * np.pi * (time_s - 3.0) / 4.0), np.sin(2.0 * time_s))
+    speed = np.where(within, 0.0, np.round(np.sin(2.0 * time_s - 0.3), 3))
+    values = {"command": command, "speed": speed}
+    data = Dataset("wheel", {name: Channel(name, "", time_s, value) for name, value in values.items()})
+    found = [each for each in sanity.inspect(data) if each.kind in ("stuck", "at_rest")]
+    assert [(each.channel, each.kind) for each in found] == [("speed", kind) for kind in kinds]
+    assert [each.severity for each in found] == ["note" if kinds == ["at_rest"] else "warning"]
+    assert "it stays at 0 for 3.98 s while command moves" in found[0].text
+
+
 def bench_at_first_at_rest(**changes):
     """A motor that rests for half a second of five and then turns to and fro; torque by a noisy load cell."""
     time_s = np.arange(2500) * 0.002
