@@ -27,7 +27,7 @@ from ranger_sim.sysid import (
 )
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
-from ranger_sim.sysid.machine import Effect, Machine, Recording
+from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
@@ -294,8 +294,9 @@ def unclipped(machine: Machine, recording: Recording) -> Recording:
     table = recording.table
     rows = np.zeros(len(table), dtype=bool)
     most = MOST_CLIPPED_SIMULATED if recording.entries else MOST_CLIPPED
+    inputs = inputs_of(machine)
     for each in machine.quantities:
-        if each.is_input or each.name not in table:
+        if each.name in inputs or each.name not in table:
             continue
         cut = signals.clipped(table, table[each.name])
         share = float(np.mean(cut))

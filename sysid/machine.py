@@ -28,7 +28,7 @@ class Quantity:
     """A channel that the machine knows. `needed`: without it there is no diagnosis.
 
     drives: True for an input of the machine, whose values are repaired only on request; when not set, a voltage is an
-    input, and so is anything named command, target, reference or setpoint.
+    input, and so is anything named command, target, reference or setpoint, but for the outputs of a simulated machine.
     """
 
     name: str
@@ -43,6 +43,12 @@ class Quantity:
         if self.drives is not None:
             return self.drives
         return self.unit == "V" or any(word in DRIVING for word in self.name.lower().split("_"))
+
+
+def inputs_of(machine: "Machine") -> set[str]:
+    """Names of the channels that drive the machine: not those of its outputs, unless their quantity says so."""
+    outputs = {each.channel for each in getattr(machine, "outputs", ())}
+    return {each.name for each in machine.quantities if each.is_input and (each.drives or each.name not in outputs)}
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import losses, repairs, sanity
 from ranger_sim.sysid.channels import named_by, named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Repair, Table
-from ranger_sim.sysid.machine import Machine
+from ranger_sim.sysid.machine import Machine, inputs_of
 from ranger_sim.sysid.machines import is_ours
 
 LEAST_ROWS = 50  # below, filters are longer than the data; useful data have some hundreds
@@ -68,7 +68,7 @@ def prepared(
     dataset.repairs = [each for each in dataset.repairs if each.channel in ("", *names)]
     findings = sanity.inspect(dataset)
     sanity.stop_if_fatal(dataset.name, findings)
-    inputs = {each.name for each in machine.quantities if each.is_input} - set(asked)
+    inputs = inputs_of(machine) - set(asked)
     sanity.stop_if_input_is_clipped(dataset.name, findings, inputs)
     mended = repairs.mend(dataset, findings, inputs)
     losses.stop_if_too_many(mended, names, accepted)

@@ -81,10 +81,11 @@ def channels(
     if not times and not arrays.own_times:
         some = ", ".join(flat)[:200] or "none with numbers"
         rising = next((name for name, value in flat.items() if len(value) > 2 and _rises(value)), "")
+        once = {name: float(each[0]) for name, each in flat.items() if len(each) == 1 and each.dtype.kind in "fiu"}
         raise DataError(
             f"{dataset.name}: there is no time column among {some}; "
             + (f"--map {rising}=time says which it is (it rises all the time)" if rising else "--map NAME=t_s says it")
-            + time_column.or_with_rate(arrays.path)
+            + time_column.or_with_rate(arrays.path, once)
         )
     stamps = _stamps(dataset, arrays, times, mapping, time_unit)
     used: set[str] = set()

@@ -674,10 +674,21 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
             f"--map {example} says which it is"
             + (" (it rises all the time)" if rising else "")
-            + time_column.or_with_rate(rows.path)
+            + time_column.or_with_rate(rows.path, _single(names, table))
         )
     text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))
+    return found
+
+
+def _single(names: Sequence[str], table: list[_Column]) -> dict[str, float]:
+    """By name, the number of each column that has one only, however often."""
+    found = {}
+    for name, column in zip(names, table, strict=True):
+        value = column.value()
+        value = value[np.isfinite(value)]
+        if len(value) and np.ptp(value) == 0.0:
+            found[name] = float(value[0])
     return found
 
 

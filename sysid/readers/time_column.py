@@ -2,7 +2,7 @@
 
 import pathlib
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,15 +24,27 @@ SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a sm
 SHORTEST_S = 2e-5  # faster recordings have the unit of their stamps
 LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
 CENTURIES = (18_000_101, 22_001_231)  # dates as numbers, 20261105, within which
+STEP, RATE = ("time", "s"), ("rate", "Hz")
+SAMPLING = {  # usual names of a sample time or rate, without _
+    **dict.fromkeys(("ts", "dt", "deltat", "sampletime", "samplingtime", "samplingperiod", "sampleperiod"), STEP),
+    **dict.fromkeys(("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency"), RATE),
+}
 EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
 EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
 
 
-def or_with_rate(path: str | pathlib.Path) -> str:
-    """The end of an error about a file without a time: the command that reads it."""
-    command = f"ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
-    return f"; or its samples come at a known rate, as 100 a second: {command}"
+def or_with_rate(path: str | pathlib.Path, single: Mapping[str, float]) -> str:
+    """The end of an error about a file without a time: the command that reads it.
+
+    single: numbers that the file has once, by name; one of them may be the sample time or the rate.
+    """
+    read = f"ranger-sim read {shlex.quote(str(path))}"
+    for name, value in single.items():
+        what = SAMPLING.get(name.lower().replace("_", ""))
+        if what is not None and 0.0 < value < np.inf:
+            return f"; or {name}, {value:g}, is the sample {what[0]}: {read} --rate {value:g}{what[1]}"
+    return f"; or its samples come at a known rate, as 100 a second: {read} --rate 100Hz"
 
 
 def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> None:

@@ -9,7 +9,8 @@ import pytest
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import api
 from ranger_sim.sysid.channels import named_by
-from ranger_sim.sysid.machine import Quantity
+from ranger_sim.sysid.free_simulation import Output
+from ranger_sim.sysid.machine import Quantity, inputs_of
 from ranger_sim.sysid.reading import open_recording
 
 ROWS = 60
@@ -80,3 +81,14 @@ def test_the_machine_of_the_page_finds_the_channels_that_it_names(tmp_path):
     np.savetxt(path, table, delimiter=",", header="time_s,voltage_V,speed_rad_s", comments="")
     found = api.diagnose(path, written["Disc"]())
     assert not found.causes
+
+
+def test_an_output_in_volts_is_not_an_input_of_the_machine():
+    machine = type("Tank", (), {})()
+    machine.quantities = (
+        Quantity("pump_V", "V", ""),
+        Quantity("level_V", "V", ""),
+        Quantity("sense_V", "V", "", drives=True),
+    )
+    machine.outputs = (Output("level_V", "M", "level", "V"), Output("sense_V", "M", "level", "V"))
+    assert inputs_of(machine) == {"pump_V", "sense_V"}

@@ -699,3 +699,15 @@ def test_topics_of_a_flight_log_are_channels_by_their_own_stamps(tmp_path):
     path.write_bytes(b"".join(parts)[:-5])
     (finding,) = read(path).matters
     assert finding.kind == "cut_off" and f"begins at byte {len(b''.join(parts[:-1]))}" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "rate"),
+    [("Ts", ["4", "", ""], "4s"), ("dt", ["0.01"] * 3, "0.01s"), ("fs", ["200", "", ""], "200Hz")],
+)
+def test_a_file_without_a_time_that_has_its_sample_time_in_a_column_is_read_by_it(tmp_path, name, cells, rate):
+    path = tmp_path / "tanks.csv"
+    rows = [f"{3 - row}.5,{row * row - 2}.25,{cell}" for row, cell in enumerate(cells)]
+    path.write_text("\n".join([f"u,y,{name}", *rows]) + "\n", encoding="utf-8")
+    with pytest.raises(UserError, match=rf"or {name}, .* is the sample \w+: ranger-sim read .*tanks.csv --rate {rate}"):
+        read(path)
