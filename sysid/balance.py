@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import signals
+from ranger_sim.sysid import signals, units
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 
@@ -34,6 +34,7 @@ SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
 PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
 LIMITS = (0.5, 0.7, 0.85)  # of the largest input: where it may saturate
 ZONES = (0.02, 0.05, 0.1, 0.2)  # of the largest input: where nothing may come of it
+RADIAN = units.Unit(("rad",))
 SLOPE_S = 0.002  # Gaussian of a rate that is not measured
 
 Shape = Mapping[str, float]
@@ -184,8 +185,10 @@ class Balance(abc.ABC):
     def _of_joint(self, recordings: Sequence[Recording]) -> list[Effect]:
         top = max(_top(each.signals["rate"]) for each in recordings)
         reach = max(float(np.ptp(each.signals["angle"])) for each in recordings)
-        turns = next((each.unit == "rad" for each in self.quantities if each.name == self.angle), True)
-        cycle = 2.0 * np.pi if turns else max(reach, 1e-9)
+        angle_unit = next((units.unit_of(each.unit) for each in self.quantities if each.name == self.angle), RADIAN)
+        turns = angle_unit is not None and angle_unit.same_kind(RADIAN)
+        rad = angle_unit.factor if angle_unit is not None else 1.0  # of one unit of the angle
+        cycle = 2.0 * np.pi / rad if turns else max(reach, 1e-9)
 
         def waves(s: Signals, p: Shape) -> list[Array]:
             angle = 2.0 * np.pi * p["periods"] * s["angle"] / cycle
@@ -219,7 +222,10 @@ class Balance(abc.ABC):
         if turns:
             found.append(
                 self._effect(
-                    "gravity", joint, ("cosine", "sine"), lambda s, _: [np.cos(s["angle"]), np.sin(s["angle"])]
+                    "gravity",
+                    joint,
+                    ("cosine", "sine"),
+                    lambda s, _: [np.cos(rad * s["angle"]), np.sin(rad * s["angle"])],
                 )
             )
         return found

@@ -66,6 +66,25 @@ def test_a_joint_has_its_frictions_and_its_sensors_as_candidates():
     }  # fmt: skip
 
 
+def test_gravity_and_a_turn_are_the_same_for_a_joint_in_degrees():
+    class InDegrees(Joint):
+        quantities = (Quantity("angle_rad", "deg", "of the joint"), *Joint.quantities[1:])
+
+    def columns(machine, angle):
+        values = {"angle_rad": angle, "rate_rad_per_s": np.gradient(angle, 0.01), "current_A": np.cos(time_s)}
+        recording = machine.prepare(Table(time_s, values, (slice(0, 500),)))
+        effects = {
+            each.cause: each for each in machine.effects([recording]) if each.cause in ("gravity", "once_per_turn")
+        }
+        return {cause: each.columns(recording, each.shapes[0], {})["current_A"] for cause, each in effects.items()}
+
+    time_s = 0.01 * np.arange(500)
+    radians, degrees = columns(Joint(), np.sin(2.0 * time_s)), columns(InDegrees(), np.degrees(np.sin(2.0 * time_s)))
+    assert set(degrees) == {"gravity", "once_per_turn"}
+    for cause, expected in radians.items():
+        assert degrees[cause] == pytest.approx(expected, abs=1e-12)
+
+
 def test_a_column_without_a_parameter_is_a_mistake():
     class Wrong(ThrustStand):
         def columns(self, s):
