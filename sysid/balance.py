@@ -170,6 +170,24 @@ class Balance(abc.ABC):
 
         return Effect("sensor_lag", self.response, "sensor", ("lag_s",), [{}], columns)
 
+    def _load_friction(self, joint: str) -> Effect:
+        """Friction in proportion to the load: to inertia, gravity and what else of the machine is not a friction.
+
+        It is of a fit with gravity and friction, whether or not the machine has them; a load that is measured would
+        explain the response by itself.
+        """
+
+        def columns(recording: Recording, _: Shape, __: Values) -> Columns:
+            s, equation = recording.signals, recording.equations[self.response]
+            columns = [s["rate"], s["direction"], np.ones_like(s["t"]), np.cos(s["angle"]), np.sin(s["angle"])]
+            columns += equation.columns.values()
+            both, valid = np.column_stack(columns), equation.valid
+            size = np.linalg.lstsq(both[valid], equation.response[valid], rcond=None)[0]
+            loads = [k for k, each in enumerate(columns) if np.ptp(each) > 0.0 and np.any(each * s["direction"] < 0.0)]
+            return {self.response: (s["direction"] * np.abs(both[:, loads] @ size[loads]))[:, None]}
+
+        return Effect("load_friction", joint, "mechanical", ("share",), [{}], columns)
+
     def _of_input(self, name: str, top: float) -> list[Effect]:
         def saturated(s: Signals, p: Shape) -> list[Array]:
             return [-np.sign(s[name]) * np.maximum(np.abs(s[name]) - p["limit"], 0.0)]
@@ -215,6 +233,7 @@ class Balance(abc.ABC):
             ),
             self._effect("stribeck", joint, ("excess",), slow, [{"speed": share * top} for share in SPEEDS]),
             self._effect("direction_friction", joint, ("size",), lambda s, _: [np.abs(s["rate"])]),
+            self._load_friction(joint),
             self._effect("friction_drift", joint, ("per_s",), lambda s, _: [s["direction"] * s["t"]]),
             self._effect("spring", joint, ("size",), lambda s, _: [s["angle"]]),
             self._effect("once_per_turn", joint, ("cosine", "sine"), waves, [{"periods": n} for n in PERIODS]),

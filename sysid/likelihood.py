@@ -28,6 +28,10 @@ BLOCKS = 8  # of the cross-validation within the training data
 SURE = 2.33  # standard errors over the blocks by which a further effect must exceed a simpler one: 1 % on one side
 PASSES = 3  # over the causes, each held against all others
 WORSE = 1.05  # times the held-out square: an exchange may not make it worse
+ALIKE, MOST_ALIKE = (
+    0.1,
+    4,
+)  # of the best score, and how many: causes between which other data choose; the first is found alone
 HIDDEN = 1e-4  # of a candidate's square: when the others explain all but this, an equation does not show it
 FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
 
@@ -230,6 +234,7 @@ def select(
     left_out: list[Effect] = []
     refused: list[Named] = []
     thresholds: list[float] = []
+    met: list[set[str]] = []  # names of the causes after each addition
     tried: list[Trial] = []
     scores = np.empty((0, SURROGATES))
     while True:
@@ -251,11 +256,16 @@ def select(
                 named, refused, base, regression, thresholds, [(each[3].effect, each[0]) for each in ranked]
             )
         near = [each for each in ranked if abs(chosen[0] - each[0]) < naming.TIE and naming.possible(each[3])]
-        options = [_named(each, ranked, near, chance) for each in near if each is chosen or judge is not None]
+        within = max(naming.TIE, ALIKE * chosen[0])
+        alike = [each for each in ranked if chosen[0] - each[0] < within and naming.possible(each[3])][:MOST_ALIKE]
+        options = [_named(each, ranked, near, chance) for each in alike]
         extensions = [naming.refit(base, [*named, each], [*fixed, *named, each]) for each in options]
         best = 0
-        if judge is not None and len(options) > 1:
-            errors = [judge.square([*named, one], each) for one, each in zip(options, extensions, strict=True)]
+        if len(options) > 1:
+            errors = [
+                judge.square([*named, one], each) if judge is not None else _error_of_blocks(each)
+                for one, each in zip(options, extensions, strict=True)
+            ]
             best = int(np.argmin(errors))
         found, extended = options[best], extensions[best]
         in_doubt = _simpler_in_doubt(found, named, base, fixed, ranked, near, chance, threshold)
@@ -268,8 +278,14 @@ def select(
         elif judge is not None and not judge.accepts(named, found, regression, extended):
             refused.append(found)
         else:
-            named = _exchanged([*named, found], effects, base, fixed, refused, threshold, judge)
-            regression, tried = naming.refit(base, named, [*fixed, *named]), []
+            exchanged = _exchanged([*named, found], effects, base, fixed, refused, threshold, judge)
+            together = {each.effect.name for each in exchanged}
+            if together in met:  # the exchange has undone it
+                left_out.append(found.effect)
+            else:
+                met.append(together)
+                named = exchanged
+                regression, tried = naming.refit(base, named, [*fixed, *named]), []
         rest = [
             each
             for each in rest
@@ -431,22 +447,25 @@ def ranking(tried: Sequence[Trial], size: int) -> list[Scored]:
 
 def _predicts(without: Regression, extended: Regression) -> bool:
     """True when the extended model predicts blocks of the training data better that neither model was fitted to."""
-    errors = np.zeros(2)
-    for number, regression in enumerate((without, extended)):
-        rows = {name: np.flatnonzero(without.good[name]) for name in without.equations}
-        block = {name: each * BLOCKS // len(without.good[name]) for name, each in rows.items()}
-        z, x, y = _unwhitened(regression)
-        place = np.concatenate([block[name] for name in without.equations])
-        for each in range(BLOCKS):
-            fitted, held = place != each, place == each
-            if not np.any(held):
-                continue
-            scale = np.linalg.norm(z[fitted], axis=0)
-            scale = np.where(scale > 0.0, scale, 1.0)
-            zs, xs = z[fitted] / scale, x[fitted] / scale
-            found = np.linalg.lstsq(zs.T @ xs, zs.T @ y[fitted], rcond=1e-10)[0]
-            errors[number] += np.sum((y[held] - (x[held] / scale) @ found) ** 2)
-    return bool(errors[1] < errors[0])
+    return _error_of_blocks(extended) < _error_of_blocks(without)
+
+
+def _error_of_blocks(regression: Regression) -> float:
+    """Sum of squares of what a model leaves in blocks of the training data that it was not fitted to."""
+    rows = {name: np.flatnonzero(regression.good[name]) for name in regression.equations}
+    place = np.concatenate([each * BLOCKS // len(regression.good[name]) for name, each in rows.items()])
+    z, x, y = _unwhitened(regression)
+    error = 0.0
+    for each in range(BLOCKS):
+        fitted, held = place != each, place == each
+        if not np.any(held):
+            continue
+        scale = np.linalg.norm(z[fitted], axis=0)
+        scale = np.where(scale > 0.0, scale, 1.0)
+        zs, xs = z[fitted] / scale, x[fitted] / scale
+        found = np.linalg.lstsq(zs.T @ xs, zs.T @ y[fitted], rcond=1e-10)[0]
+        error += float(np.sum((y[held] - (x[held] / scale) @ found) ** 2))
+    return error
 
 
 def _unwhitened(regression: Regression) -> tuple[Array, Array, Array]:

@@ -160,8 +160,10 @@ class Term:
             s = {"t": times, "angle": angle, "rate": rate, "acceleration": acceleration, "direction": np.sign(rate)}
             s |= values
             columns = [one for name, one in whole().columns(s).items() if name not in self.parameters]
-            if self.column is _cosine:  # of a weight at an unknown angle the other part is small
-                columns.append(np.sin(angle))
+            if (
+                self.column in OTHER and len(self.parameters) > 1
+            ):  # of a weight at an unknown angle the other part is small
+                columns.append(OTHER[self.column](angle, rate))
             counts = np.abs(rate) > 0.02 * np.quantile(np.abs(rate), 0.98)
             blocks.append((np.column_stack([self.column(angle, rate), *columns]), values[whole.response], counts))
         matrix, response, counts = (np.concatenate(each) for each in zip(*blocks, strict=True))
@@ -185,8 +187,8 @@ class Term:
         s |= values
         columns = [self.column(angle, rate)]
         columns += [one for name, one in whole().columns(s).items() if name not in self.parameters]
-        if self.column is _cosine:
-            columns.append(np.sin(angle))
+        if self.column in OTHER and len(self.parameters) > 1:
+            columns.append(OTHER[self.column](angle, rate))
         for name, form, speed in others:
             if name == "stribeck":
                 columns.append(np.sign(rate) * np.exp(-((rate / speed) ** 2)))
@@ -226,9 +228,9 @@ class Term:
 
 def _joint(number):
     columns = {"angle_rad": "angle_rad", "rate_rad_per_s": "rate_rad_per_s", "current_A": "current_A"}
-    return Source(
-        (f"ur10e_joint{number}_a.csv", f"ur10e_joint{number}_b.csv"), HeavyJoint if number == 4 else Joint, columns
-    )
+    folder = "" if number in (1, 4) else "public/"
+    files = tuple(f"{folder}ur10e_joint{number}_{part}.csv" for part in "ab")
+    return Source(files, Joint if number in (1, 6) else HeavyJoint, columns)
 
 
 def _cosine(angle, rate):
@@ -237,6 +239,9 @@ def _cosine(angle, rate):
 
 def _sine(angle, rate):
     return np.sin(angle)
+
+
+OTHER = {_cosine: _sine, _sine: _cosine}
 
 
 def _rate(angle, rate):
@@ -270,6 +275,16 @@ TERMS = (
     Term("joint 4, viscous friction", _joint(4), ("viscous_As_per_rad",), _rate, *VISCOUS),
     Term("joint 1, Coulomb friction", _joint(1), ("coulomb_A",), _sign, *COULOMB),
     Term("joint 1, viscous friction", _joint(1), ("viscous_As_per_rad",), _rate, *VISCOUS),
+    Term("joint 2, gravity", _joint(2), ("cosine_A", "sine_A"), _cosine, ("gravity", "once_per_turn"), "cosine"),
+    Term("joint 3, gravity", _joint(3), ("sine_A", "cosine_A"), _sine, ("gravity", "once_per_turn"), "sine"),
+    *(
+        Term(f"joint {number}, {title} friction", _joint(number), (parameter,), column, *names)
+        for number in (2, 3, 5, 6)
+        for title, parameter, column, names in (
+            ("Coulomb", "coulomb_A", _sign, COULOMB),
+            ("viscous", "viscous_As_per_rad", _rate, VISCOUS),
+        )
+    ),
     Term("EMPS, Coulomb friction", EMPS, ("coulomb_V",), _sign, *COULOMB),
     Term("EMPS, viscous friction", EMPS, ("viscous_Vs_per_m",), _rate, *VISCOUS),
     Term("pendulum by hand, gravity", BY_HAND, ("weight_Nm",), _sine, ("gravity",), "sine"),

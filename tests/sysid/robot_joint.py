@@ -29,8 +29,8 @@ class Joint(Balance):
 class HeavyJoint(Joint):
     parameters = (
         *Joint.parameters,
-        Known("cosine_A", "A", 0.0, -10.0, 10.0, "gravity"),
-        Known("sine_A", "A", 0.0, -10.0, 10.0, "gravity"),
+        Known("cosine_A", "A", 0.0, -50.0, 50.0, "gravity"),
+        Known("sine_A", "A", 0.0, -50.0, 50.0, "gravity"),
     )
 
     def columns(self, s):

@@ -9,7 +9,7 @@ from ranger_sim.sysid.balance import Balance
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Known, Quantity
 from ranger_sim.sysid.pipeline import diagnose
-from tests.sysid.robot_joint import Joint
+from tests.sysid.robot_joint import HeavyJoint, Joint
 
 
 class ThrustStand(Balance):
@@ -62,8 +62,27 @@ def test_a_joint_has_its_frictions_and_its_sensors_as_candidates():
     causes = {each.cause for each in joint.effects([joint.prepare(table)])}
     assert causes == {
         "sensor_offset", "sensor_drift", "sensor_lag", "viscous_friction", "coulomb_friction", "drag", "stribeck",
-        "direction_friction", "friction_drift", "spring", "once_per_turn", "gravity",
+        "direction_friction", "load_friction", "friction_drift", "spring", "once_per_turn", "gravity",
     }  # fmt: skip
+
+
+def test_a_friction_that_grows_with_the_load_is_not_taken_for_a_lag():
+    """A weight of 4 A on a joint, with 6 % of the load as friction: the arm of a robot, whose lag was -39 ms."""
+    draw = generator(7, "loaded joint")
+    t = 0.01 * np.arange(6000)
+    angle = 1.2 * np.sin(0.9 * t) + 0.3 * np.sin(3.1 * t + 1.0)
+    rate = 1.08 * np.cos(0.9 * t) + 0.93 * np.cos(3.1 * t + 1.0)
+    acceleration = -0.972 * np.sin(0.9 * t) - 2.883 * np.sin(3.1 * t + 1.0)
+    load = 0.4 * acceleration + 4.0 * np.cos(angle)
+    current = load + 1.0 * rate + (0.6 + 0.06 * np.abs(load)) * np.sign(rate) + 0.03 * draw.normal(size=len(t))
+    values = {"angle_rad": angle, "rate_rad_per_s": rate, "current_A": current}
+    parts = [
+        Table(t[part], {name: each[part] for name, each in values.items()}, (slice(0, 3000),), f"rows {part}")
+        for part in (slice(0, 3000), slice(3000, 6000))
+    ]
+    first = diagnose(HeavyJoint(), parts[:1], parts[1:]).result.causes[0]
+    low, high = first.parameters["share"].ci95
+    assert first.name == "load_friction" and low < 0.06 < high
 
 
 def test_gravity_and_a_turn_are_the_same_for_a_joint_in_degrees():

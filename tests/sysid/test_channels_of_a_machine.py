@@ -67,11 +67,16 @@ def test_channels_without_a_unit_and_channels_of_no_quantity_stay_as_they_are(tm
     assert not made.repairs
 
 
-def test_the_machine_of_the_page_finds_the_channels_that_it_names(tmp_path):
+def _written(name):
+    """A class of the page, as a reader would type it."""
     page = pathlib.Path(__file__).parents[2] / "docs" / "diagnose-your-machine.md"
-    block = re.search(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    written = {}
-    exec(block[1], written)  # noqa: S102 - the page's own example, as a reader would type it
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    made = {}
+    exec(next(each for each in blocks if f"class {name}(" in each), made)  # noqa: S102 - the page's own example
+    return made[name]
+
+
+def test_the_disc_of_the_page_finds_the_channels_that_it_names(tmp_path):
     time_s = 0.01 * np.arange(2000)
     voltage, speed = np.sign(np.sin(1.3 * time_s)), np.zeros(2000)
     for row in range(1999):  # 5 rad/s^2/V and 1/s, solved exactly while the voltage is held
@@ -79,7 +84,7 @@ def test_the_machine_of_the_page_finds_the_channels_that_it_names(tmp_path):
     path = tmp_path / "disc.csv"
     table = np.column_stack((time_s, voltage, speed + 0.01 * np.sin(0.1 * np.arange(2000) ** 2)))
     np.savetxt(path, table, delimiter=",", header="time_s,voltage_V,speed_rad_s", comments="")
-    found = api.diagnose(path, written["Disc"]())
+    found = api.diagnose(path, _written("Disc")())
     assert not found.causes
 
 
@@ -92,3 +97,18 @@ def test_an_output_in_volts_is_not_an_input_of_the_machine():
     )
     machine.outputs = (Output("level_V", "M", "level", "V"), Output("sense_V", "M", "level", "V"))
     assert inputs_of(machine) == {"pump_V", "sense_V"}
+
+
+def test_the_joint_of_the_page_finds_the_gravity_that_it_lacks(tmp_path):
+    time_s = 0.01 * np.arange(3000)
+    angle = np.sin(1.7 * time_s) + 0.4 * np.sin(4.3 * time_s + 1.0)
+    rate = 1.7 * np.cos(1.7 * time_s) + 1.72 * np.cos(4.3 * time_s + 1.0)
+    acceleration = -(1.7**2) * np.sin(1.7 * time_s) - 4.3 * 1.72 * np.sin(4.3 * time_s + 1.0)
+    current = 0.2 * acceleration + 1.1 * rate + 0.4 * np.sign(rate) + 0.6 * np.sin(angle)
+    current += 0.02 * np.sin(0.1 * np.arange(3000) ** 2)  # as good as noise
+    path = tmp_path / "joint.csv"
+    table = np.column_stack((time_s, angle, rate, current))
+    np.savetxt(path, table, delimiter=",", header="time_s,angle_rad,rate_rad_s,current_A", comments="")
+    first = api.diagnose(path, _written("Joint")()).causes[0]
+    low, high = first.parameters["sine"].ci95
+    assert first.name == "gravity" and low < 0.6 < high

@@ -1,6 +1,7 @@
 """Hidden effects in three machines that a user wrote; all of them by `python -m tests.sysid.hidden_effects`."""
 
 import pathlib
+import re
 
 import numpy as np
 import pytest
@@ -49,9 +50,11 @@ def test_the_generators_share_nothing_with_the_diagnosis_and_repeat():
 
 def test_the_page_s_machine_of_twenty_lines_has_its_candidates_without_a_port_or_a_term():
     """A disc with drag, which the page's machine does not have; dead zone and lag are other candidates."""
-    _, _, after = PAGE.read_text().partition("```python\n")
     made = {}
-    exec(after.partition("```")[0], made)
+    exec(
+        next(block for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL) if "Disc" in block),
+        made,
+    )
     draw = generator(5, "disc")
     fine_s = np.arange(1500 * 8 + 1) / 800.0
     volts = sum(2.0 * np.sin(f * fine_s + draw.uniform(0.0, 6.28)) for f in (0.7, 1.9, 4.3))
