@@ -192,6 +192,8 @@ class Term:
         for name, form, speed in others:
             if name == "stribeck":
                 columns.append(np.sign(rate) * np.exp(-((rate / speed) ** 2)))
+            elif name == "load_friction":
+                columns.append(np.sign(rate) * np.abs(_load(s, values[whole.response])))
             elif (name, form) in FRICTIONS:
                 columns.append(FRICTIONS[name, form](angle, rate))
         counts = np.abs(rate) > 0.02 * np.quantile(np.abs(rate), 0.98)
@@ -231,6 +233,15 @@ def _joint(number):
     folder = "" if number in (1, 4) else "public/"
     files = tuple(f"{folder}ur10e_joint{number}_{part}.csv" for part in "ab")
     return Source(files, Joint if number in (1, 6) else HeavyJoint, columns)
+
+
+def _load(s, response):
+    """What inertia and gravity take of the response, by a plain fit of them with two frictions and a constant."""
+    loads = np.column_stack([s["acceleration"], np.cos(s["angle"]), np.sin(s["angle"])])
+    others = np.column_stack([s["rate"], np.sign(s["rate"]), np.ones_like(s["rate"])])
+    counts = np.abs(s["rate"]) > 0.02 * np.quantile(np.abs(s["rate"]), 0.98)
+    size = np.linalg.lstsq(np.column_stack([loads, others])[counts], response[counts], rcond=None)[0]
+    return loads @ size[:3]
 
 
 def _cosine(angle, rate):
@@ -318,8 +329,12 @@ def row(term, share, fitted):
     shown = f"{errors.before:.2%}, {errors.after:.2%}, {errors.black_box or 0.0:.2%}" if errors else ""
     if share == 0.0:
         verdict = "named" if right else "not named"
+    elif right:
+        verdict = "first"
+    elif any(each.name in term.names for each in result.causes):
+        verdict = "later"
     else:
-        verdict = "first" if right else ("missed" if share > seen else "too small")
+        verdict = "missed" if share > seen else "too small"
     cells = (
         term.title,
         f"{share:.0%}",
