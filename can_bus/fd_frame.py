@@ -48,14 +48,13 @@ from ranger_sim.can_bus.frame import (
 )
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 
-# The part of the flags of an FD frame that a request may have, and the part of these on the wire.
-FD_SENDABLE: Final = 0x76F  # length code, single shot, extended, FD, BRS, ESI; no remote frames
-FD_RECEIVERS_SEE: Final = 0x74F
+FD_SENDABLE: Final = 0x76F  # flags that a request may have: length code, single shot, extended, FD, BRS, ESI
 
 # Positions in a frame that the LPC2194 has no codes for; of the 32 codes these are free (`frame.FIELD_*`).
+FIELD_RES: Final = 1
+FIELD_STUFF_COUNT: Final = 16
 FIELD_BRS: Final = 20
 FIELD_ESI: Final = 21
-FIELD_STUFF_COUNT: Final = 29
 
 LONGEST: Final = 64  # data bytes
 LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)  # by data length code
@@ -191,10 +190,15 @@ def phases(
     return (whole - slow) << PHASE_SHIFT | slow
 
 
+def padded(data: bytes) -> bytes:
+    """Data bytes filled up with zeros to the next length that a CAN FD frame has."""
+    return data.ljust(LENGTHS[length_code(len(data))], b"\0")
+
+
 def fd_wire(identifier: int, flags: int, data: bytes, iso: bool = True) -> tuple[list[int], list[int]]:
     """The bits of a frame on the wire, from start of frame to the end of EOF, as sent; and their FIELD_*.
 
-    A stuff bit belongs to the field of the bit before it, the first fixed one to the CRC field.
+    A dynamic stuff bit belongs to the field of the bit before it, a fixed one to that of the bit after it.
     """
     parts: list[tuple[int, int, int]] = [(FIELD_START, 1, 0)]
     if flags & FLAG_EXTENDED:
@@ -215,10 +219,10 @@ def fd_wire(identifier: int, flags: int, data: bytes, iso: bool = True) -> tuple
             (FIELD_ID_20_18, 3, identifier),
             (FIELD_SRTR, 1, 0),
             (FIELD_IDE, 1, 0),
-            (FIELD_R1, 1, 1),  # FDF
+            (FIELD_R0, 1, 1),  # FDF, in the place of r0; in an extended frame of r1
         ]
     parts += [
-        (FIELD_R0, 1, 0),  # res
+        (FIELD_RES, 1, 0),
         (FIELD_BRS, 1, int(bool(flags & FLAG_BRS))),
         (FIELD_ESI, 1, int(bool(flags & FLAG_ESI))),
         (FIELD_DLC, 4, flags & LENGTH_CODE),
@@ -249,7 +253,7 @@ def fd_wire(identifier: int, flags: int, data: bytes, iso: bool = True) -> tuple
     for place, (field, bit) in enumerate(tail):
         if place % FIXED_STUFF_EVERY == 0:
             bits.append(1 - bits[-1])
-            fields.append(tail[max(place - 1, 0)][0])
+            fields.append(field)
         bits.append(bit)
         fields.append(field)
     bits += [RECESSIVE] * TAIL_BITS

@@ -22,6 +22,9 @@ class FdFrame:
     extended: bool = False
     brs: bool = False
     esi: bool = False
+    single_shot: bool = False
+    buffer: int = 0
+    remote: bool = False  # never; the oracle of the classic bus asks for it
 
 
 def number(value, count):
