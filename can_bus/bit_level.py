@@ -142,9 +142,7 @@ class BitLevel:
 
     def add_node(self, node) -> None:
         """Add a node."""
-        machine = MediumAccess(node)
-        if self.is_timed:
-            machine.set_timing(self.timing)
+        machine = MediumAccess(node, self.timing)
         self.machines.append(machine)
         machine.place(self.bit, self.bit)
 
@@ -497,18 +495,18 @@ class BitLevel:
         level = 1 - edges[0][1] if edges else self.level
         start = since
         while True:
-            sampled = start + machine.nominal_sample
+            sampled = start + self.timing.sample
             while edges and edges[0][0] <= sampled:
                 tick, level = edges.pop(0)
                 if level == DOMINANT and tick > start:
                     start = tick
-                    sampled = start + machine.nominal_sample
+                    sampled = start + self.timing.sample
             if sampled >= self.bit:
                 break
             if machine.sample(level, start) & MET_JOIN:
-                machine.next_start = max(start + machine.nominal, self.bit)
+                machine.next_start = max(start + self.timing.nominal, self.bit)
                 return MET_JOIN
-            start += machine.nominal
+            start += self.timing.nominal
         if start >= self.bit:
             machine.next_start = start
         else:

@@ -188,8 +188,6 @@ class Bus:
     bit_ticks: cython.longlong
     intermission: cython.longlong
     timing: BitTiming
-    classic_nodes: cython.longlong
-    iso: cython.bint
     fd_data: bytes
 
     def __init__(
@@ -212,8 +210,6 @@ class Bus:
         self.tick_rate = self.timing.rate
         self.bit_ticks = self.timing.nominal
         self.intermission = INTERMISSION_BITS * self.bit_ticks
-        self.iso = iso
-        self.classic_nodes = 0  # of a CAN FD bus
         self.fd_data = None  # of the request that is being made
         self.nodes = []
         self.node_count = 0
@@ -264,6 +260,20 @@ class Bus:
         """The data bit rate of a CAN FD bus, bit/s; 0 of a classic one."""
         return self.tick_rate // self.timing.data if self.timing.is_fd else 0
 
+    @property
+    def iso(self) -> bool:
+        """How CAN FD frames are coded; see the class."""
+        return bool(self.buffers.iso)
+
+    def _refuses_fd(self) -> bool:
+        """Whether a classic node on a CAN FD bus will disturb FD frames."""
+        return any(node.fdf == FDF_REFUSED for node in self.nodes)
+
+    def check_classic(self, what) -> None:
+        """Raise UserError, naming `what`, on a CAN FD bus."""
+        if self.timing.is_fd:
+            raise BusError(f"bus {self.name}: {what} exist on classic buses only, and this is a CAN FD bus")
+
     def set_classic(self, node, classic=True) -> None:
         """Let a node of a CAN FD bus know classic frames only (or FD frames again).
 
@@ -272,7 +282,6 @@ class Bus:
         if not self.timing.is_fd:
             raise BusError(f"bus {self.name}: all nodes of a classic bus are classic")
         controller: Node = self.nodes[node]
-        self.classic_nodes += int(classic) - (controller.fdf == FDF_REFUSED)
         controller.fdf = FDF_REFUSED if classic else FDF_KNOWN
 
     @property
@@ -315,10 +324,10 @@ class Bus:
 
     # ---- time
 
-    @cython.cfunc
+    @cython.ccall
     @cython.exceptval(check=False)
-    @cython.cdivision(True)
-    def _aligned(self, bit: cython.longlong) -> cython.longlong:
+    @cython.cdivision(True)  # bits are not negative
+    def aligned(self, bit: cython.longlong) -> cython.longlong:
         """The first tick not before `bit` that is whole nominal bits after the tick at which the bus is free."""
         rest: cython.longlong = bit - self.free_bit
         if rest <= 0:
@@ -431,7 +440,7 @@ class Bus:
             start = second * SECOND_NS + (first * SECOND_NS + self.tick_rate - 1) // self.tick_rate
             first += second * self.tick_rate
         if self.bit_ticks > 1:
-            first = self._aligned(first)
+            first = self.aligned(first)
             start = self.edge_ns(first)
         if first < self.hindered_until:
             first = self._hindered(node, buffer, time, flags, first)
@@ -604,7 +613,9 @@ class Bus:
         self._aim()
 
     def tamper(self, tampering) -> None:
-        """Let faults affect frames from now on (`tampering.Tampering`); None: no longer."""
+        """Let faults affect frames from now on (`tampering.Tampering`); None: no longer. UserError on a CAN FD bus."""
+        if tampering is not None:
+            self.check_classic("faults of frames")
         self.tampering = tampering
         self.bit_level.tampering = tampering
         self._aim()
@@ -637,6 +648,8 @@ class Bus:
             elif self.next_change > until or not self._change(until):
                 if self.strike_bit < self.next_bit:
                     self._begin_bits(self._strike_start())
+                elif self.bit_ticks > 1:
+                    self._attempt_timed(self.next_bit)
                 else:
                     self._attempt(self.next_bit)
             if self.buffers.first < 0 and self.next_change == NEVER and self.strike_bit == NEVER and not self.disturbed:
@@ -664,7 +677,7 @@ class Bus:
             self.next_time = self.free_time
         else:
             if self.bit_ticks > 1 and first < NEVER:
-                first = self._aligned(first)
+                first = self.aligned(first)
             self.next_bit = first
             self.next_time = self.edge_ns(first) if first < NEVER else NEVER
         if self.disturbed:
@@ -779,7 +792,7 @@ class Bus:
 
     def _set_going(self, node: Node, time) -> None:
         """A node off the bus waits for its recessive sequences from `time` (ns) on."""
-        node.start_joining(self._aligned(self.bit_of(time) + 1))
+        node.start_joining(self.aligned(self.bit_of(time) + 1))
         self.joining += 1
         if self.disturbed and self.bit_level.join(node, node.join_from) & MET_JOIN:
             self._join(node, self.bit_level.bit)
@@ -826,13 +839,9 @@ class Bus:
         asked: cython.longlong
         bits: cython.longlong
         rate: cython.longlong = self.tick_rate
-        data: object = None
-        special: cython.bint = False
         sender: Node
         node: Node
         slots: cython.p_longlong = self.buffers.slots
-        if self.bit_ticks > 1:
-            self._show_error_states()
         if self.buffers.waiting_count > 1:
             row = self._arbitrate(k)
             if row < 0:  # another node sends the same arbitration field
@@ -846,17 +855,9 @@ class Bus:
             hi = slots[row + HIGH]
         else:
             _, _, asked, _, identifier, flags, lo, hi = slots[row : row + ROW]
-        if self.bit_ticks > 1:
-            bits = self._ticks_of(row)
-            if flags & FLAG_FD:
-                data = self.buffers.payloads[row]
-                special = self.classic_nodes > 0
-        else:
-            bits = measure(identifier, flags, lo, hi) & MEASURED_BITS
+        bits = measure(identifier, flags, lo, hi) & MEASURED_BITS
         end = k + bits
-        if (merged or special or self.next_strike < end + self.intermission) and self._is_disturbed(
-            k, row, end, merged
-        ):
+        if (merged or self.next_strike < end + INTERMISSION_BITS) and self._is_disturbed(k, row, end, merged):
             self._begin_bits(k)
             return k
         if self.rivals > 0:
@@ -871,7 +872,7 @@ class Bus:
         rest -= done * rate
         done += self.second_ns
         received = done - self.bit_ns - (rest < self.bit_rest)
-        self.free_bit = end + self.intermission
+        self.free_bit = end + INTERMISSION_BITS
         self.free_time = done + self.intermission_ns + (rest + self.intermission_rest >= rate)
         self.load.take(k, self.free_bit)
         self.counters.frames += 1
@@ -894,15 +895,82 @@ class Bus:
             if node.mode == OPERATING and not (merged and node.sending_end == end):
                 if node.receive_errors > 0:
                     node.count_reception()
+                    self._confine(node, self.edge_ns(end - ACK_DELIMITER_FROM_END), 0)  # behind the ACK slot
+                if node.listening:
+                    node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
+                    node.received += 1
+                    any_received = True
+            node = node.following
+        if not any_received:
+            self.counters.lost += 1
+        if not flags & FLAG_EXTENDED:
+            self.counters.note_answer(identifier, done - asked)
+        self.log.add(received, identifier, flags, lo, hi, row >> NODE_SHIFT)
+        if self.log.times is not None:
+            self._note_times(k, asked, done, row, flags)
+        return self.free_bit
+
+    # ---- one frame on a CAN FD bus
+
+    @cython.cfunc
+    def _attempt_timed(self, k: cython.longlong) -> cython.longlong:
+        """`_attempt` on a CAN FD bus, for frames of both kinds."""
+        row: cython.longlong
+        end: cython.longlong
+        flags: cython.longlong
+        identifier: cython.longlong
+        lo: cython.longlong
+        hi: cython.longlong
+        merged: cython.bint = False
+        any_received: cython.bint = False
+        sender: Node
+        node: Node
+        slots: cython.p_longlong = self.buffers.slots
+        self._show_error_states()
+        row = self._arbitrate(k)
+        if row < 0:
+            row = -row
+            merged = True
+        end = k + self._ticks_of(row)
+        identifier = slots[row + IDENTIFIER]
+        flags = slots[row + FLAGS] & RECEIVERS_SEE
+        lo = slots[row + LOW]
+        hi = slots[row + HIGH]
+        data = self.buffers.payloads[row] if flags & FLAG_FD else None
+        special: cython.bint = data is not None and self._refuses_fd()
+        plain: cython.bint = not merged and not special and self.next_strike >= end + self.intermission
+        if not plain and self._is_disturbed(k, row, end, merged):
+            self._begin_bits(k)
+            return k
+        if self.rivals > 0:
+            self._contend(k, row)
+            self.rivals = 0
+        done = self.edge_ns(end)
+        received = self.edge_ns(end - self.bit_ticks)
+        self.free_bit = end + self.intermission
+        self.free_time = self.edge_ns(self.free_bit)
+        self.load.take(k, self.free_bit)
+        self.counters.frames += 1
+        self._note_result(received)
+        asked = slots[row + ASKED]
+        self.buffers.remove(row)
+        slots[row + FREE_AT] = done
+        sender = self.nodes[row >> NODE_SHIFT]
+        buffer = row >> BUFFER_SHIFT & BUFFER_MASK
+        if not sender.ends.write(buffer, done, TX_SENT):
+            sender.inbox.put(done, sender.order, CAN_TX_DONE, sender.controller, buffer, TX_SENT, 0, 0, 0)
+        sender.sent += 1
+        if sender.transmit_errors > 0 or sender.passive:
+            self._after_success(sender, end, done)
+        node = sender.following
+        while node is not sender:
+            if node.mode == OPERATING and not (merged and node.sending_end == end):
+                if node.receive_errors > 0:
+                    node.count_reception()
                     # behind the ACK slot
                     self._confine(node, self.edge_ns(end - ACK_DELIMITER_FROM_END * self.bit_ticks), 0)
                 if node.listening:
-                    if data is None:
-                        node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
-                    else:
-                        node.inbox.push(
-                            received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0, data
-                        )
+                    node.inbox.push(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0, data)
                     node.received += 1
                     any_received = True
             node = node.following
@@ -1080,7 +1148,7 @@ class Bus:
         """
         if self.strike_bit < end + self.intermission or self.disturbance.frames_left > 0:
             return True
-        if self.classic_nodes > 0 and self.buffers.rows[best + FLAGS] & FLAG_FD:
+        if self.buffers.rows[best + FLAGS] & FLAG_FD and self._refuses_fd():
             return True
         if self.tampering is not None and self.tampering.reaches(self, best, k):
             return True

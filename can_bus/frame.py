@@ -337,7 +337,7 @@ def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cyth
 
 
 def data_length(flags: int) -> int:
-    """Data bytes that a frame with these flags carries, 0 ... 8."""
+    """Data bytes that a classic frame with these flags carries, 0 ... 8 (CAN FD: `fd_frame.fd_data_length`)."""
     return 0 if flags & FLAG_REMOTE else min(flags & LENGTH_CODE, 8)
 
 

@@ -28,6 +28,7 @@ from typing import Final
 
 import cython
 
+from ranger_sim.can_bus.bit_timing import BitTiming
 from ranger_sim.can_bus.fd_frame import (
     CRC17_BITS,
     CRC17_POLYNOMIAL,
@@ -129,6 +130,8 @@ FLAG_BITS: Final = 6  # of an error or overload flag
 DELIMITER_BITS: Final = 8  # recessive, after the last flag
 TOLERATED_BITS: Final = 8  # rule (f)
 
+CLASSIC = BitTiming("a classic bus", 1)
+
 
 @cython.final
 @cython.cclass
@@ -144,11 +147,10 @@ class MediumAccess:
     rate where it differs from the bus's (0: it does not); then `own_bit` counts its own bits, and `own_rest` is the
     part of the next one that has passed.
 
-    On a CAN FD bus: `fd`: its frame is an FD frame. `payload`: the data of it. `fixed_left`: bits to the next fixed
-    stuff bit, -1 outside the CRC field. `stuffed`: stuff bits so far. `short_register`, `long_register`: CRC-17 and
-    CRC-21. `count_wrong`: the stuff count was. `fast`: it is at the data rate. Ticks: `bit_start` of its present bit,
-    `sample_at` its sample point (NEVER once sampled), `next_start` the start of the next one (NEVER until sampled);
-    `nominal`, `nominal_sample`, `data`, `data_sample` of its bits.
+    On a CAN FD bus: `payload`: the data of an FD frame. `fixed_left`: bits to the next fixed stuff bit, -1 outside the
+    CRC field. `stuffed`: stuff bits so far, -1 once the stuff count was wrong. `short_register`, `long_register`:
+    CRC-17 and CRC-21. `fast`: it is at the data rate. Ticks: `bit_start` of its present bit, `sample_at` its sample
+    point (NEVER once sampled), `next_start` the start of the next one (NEVER until sampled); `timing`: its bits.
     """
 
     node: Node
@@ -185,30 +187,22 @@ class MediumAccess:
     own_bit: cython.longlong
     own_rest: cython.longlong
     # CAN FD
-    fd: cython.bint
     fast: cython.bint
-    count_wrong: cython.bint
     payload: bytearray
     fixed_left: cython.longlong
     stuffed: cython.longlong
     short_register: cython.longlong
     long_register: cython.longlong
-    ticks: cython.longlong
+    timing: BitTiming
     bit_start: cython.longlong
     sample_at: cython.longlong
     next_start: cython.longlong
-    nominal: cython.longlong
-    nominal_sample: cython.longlong
-    data: cython.longlong
-    data_sample: cython.longlong
 
-    def __init__(self, node) -> None:
+    def __init__(self, node, timing=CLASSIC) -> None:
         self.node = node
-        self.fd = False
+        self.timing = timing
         self.fast = False
         self.payload = bytearray()
-        self.ticks = 1
-        self.nominal = self.nominal_sample = self.data = self.data_sample = 1
         self.bit_start = 0
         self.sample_at = NEVER
         self.next_start = NEVER
@@ -246,7 +240,6 @@ class MediumAccess:
         self.lo = 0
         self.hi = 0
         self.unheeded = False
-        self.fd = False
         self.fast = False
         self.fixed_left = -1
         if self.node.fdf == FDF_KNOWN:
@@ -258,17 +251,8 @@ class MediumAccess:
         one: cython.longlong = 1 if self.node.iso else 0
         self.payload = bytearray()
         self.stuffed = 0
-        self.count_wrong = False
         self.short_register = one << (CRC17_BITS - 1)
         self.long_register = one << (CRC21_BITS - 1)
-
-    def set_timing(self, timing) -> None:
-        """Take the bits of a CAN FD bus."""
-        self.ticks = timing.nominal
-        self.nominal = timing.nominal
-        self.nominal_sample = timing.sample
-        self.data = timing.data
-        self.data_sample = timing.data_sample
 
     @cython.ccall
     def place(self, bit: cython.longlong, free_bit: cython.longlong) -> cython.void:
@@ -289,10 +273,12 @@ class MediumAccess:
             self.state = MAC_IDLE
             if node.suspend_bit > bit:
                 self.state = MAC_SUSPENDED
-                self.count = SUSPEND_BITS - (node.suspend_bit - bit) // self.ticks
+                self.count = SUSPEND_BITS - (node.suspend_bit - bit) // self.timing.nominal
         elif node.mode == JOINING:
             self.state = MAC_JOINING
-            self.count = max(bit - max(free_bit - node.sequence, node.join_from), 0) // self.ticks % SEQUENCE_BITS
+            self.count = (
+                max(bit - max(free_bit - node.sequence, node.join_from), 0) // self.timing.nominal % SEQUENCE_BITS
+            )
         else:
             self.state = MAC_AWAY
             self.next_start = NEVER
@@ -379,7 +365,7 @@ class MediumAccess:
             met = self._sample_delimiter(level)
         else:
             met = self._sample_intermission(level, bit)
-        if self.ticks > 1:
+        if self.timing.is_fd:
             self.position += 1
         else:
             self.position = bit + 1 - self.begun
@@ -390,7 +376,7 @@ class MediumAccess:
     def begin_bit(self, tick: cython.longlong) -> cython.void:
         """On a CAN FD bus: its bit begins at `tick`, or again there, by hard synchronisation to an edge."""
         self.bit_start = tick
-        self.sample_at = tick + (self.data_sample if self.fast else self.nominal_sample)
+        self.sample_at = tick + (self.timing.data_sample if self.fast else self.timing.sample)
         self.next_start = NEVER
 
     @cython.cfunc
@@ -398,7 +384,8 @@ class MediumAccess:
         """On a CAN FD bus: `sample` at `tick`; the rate after the sample point is that of the state it leads to."""
         self.met = self.sample(level, self.bit_start)
         self.sample_at = NEVER
-        self.next_start = tick + (self.data - self.data_sample if self.fast else self.nominal - self.nominal_sample)
+        timing: BitTiming = self.timing
+        self.next_start = tick + (timing.data - timing.data_sample if self.fast else timing.nominal - timing.sample)
         return self.met
 
     @cython.cfunc
@@ -488,7 +475,7 @@ class MediumAccess:
         if self.node.fdf != FDF_IGNORED and self._is_refused(level):
             return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
         self._take(level)
-        if self.fd and self.left == 0:
+        if self.flags & FLAG_FD and self.left == 0:
             if self.field == FIELD_DATA or (self.field == FIELD_DLC and not self.flags & LENGTH_CODE):
                 self.stuff_run = 0  # a fixed stuff bit follows, in the place of a dynamic one
         return 0
@@ -542,7 +529,7 @@ class MediumAccess:
             self.field = FIELD_RTR
         elif field == FIELD_RTR:
             self.field = FIELD_R1
-        elif self.fd and field != FIELD_CRC and field < FIELD_CRC_DELIMITER:
+        elif self.flags & FLAG_FD and field != FIELD_CRC and field < FIELD_CRC_DELIMITER:
             self._next_fd_field()
         elif field == FIELD_IDE or field == FIELD_R1:
             self.field = FIELD_R0
@@ -558,10 +545,10 @@ class MediumAccess:
             self.left = CRC_BITS
         elif field == FIELD_CRC:
             self.field = FIELD_CRC_DELIMITER
-            if self.fd:
+            if self.flags & FLAG_FD:
                 self.fixed_left = -1
                 self.register = self.long_register if self._has_long_crc() else self.short_register
-                if self.count_wrong:
+                if self.stuffed < 0:
                     self.register = 1
         elif field == FIELD_CRC_DELIMITER:
             self.field = FIELD_ACK_SLOT
@@ -619,8 +606,8 @@ class MediumAccess:
             self.flags |= FLAG_ESI if level else 0
         elif field == FIELD_STUFF_COUNT:
             self.count = self.count << 1 | level
-            if self.left == 0:
-                self.count_wrong = self.count != STUFF_COUNT_CODES[self.stuffed & 7]
+            if self.left == 0 and self.count != STUFF_COUNT_CODES[self.stuffed & 7]:
+                self.stuffed = -1
 
     @cython.cfunc
     def _take(self, level: cython.longlong) -> cython.void:
@@ -636,7 +623,7 @@ class MediumAccess:
         if self.fixed_left > 0:
             self.fixed_left -= 1
             self.stuff_run = 0  # no dynamic stuff bits
-        if self.fd and field != FIELD_DLC:
+        if self.flags & FLAG_FD and field != FIELD_DLC:
             self._take_fd(level)
         elif field == FIELD_DATA:
             place = (self.count & 24) + 7 - (self.count & 7)  # bytes little-endian, their bits not
@@ -647,7 +634,6 @@ class MediumAccess:
             self.count += 1
         elif field == FIELD_R1 or (field == FIELD_R0 and not self.flags & FLAG_EXTENDED):
             if level and self.node.fdf == FDF_KNOWN:
-                self.fd = True
                 self.flags = (self.flags | FLAG_FD) & ~FLAG_REMOTE  # RRS may have either level
         elif field == FIELD_CRC or field == FIELD_START or field == FIELD_R0:
             return

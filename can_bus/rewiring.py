@@ -59,6 +59,7 @@ def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
     UserError for a rate that is too close, or too far off.
     """
     controller = bus.nodes[node]
+    bus.check_classic("nodes at a wrong bit rate")
     if rate:
         check_rate(bus, rate, f"bus {bus.name}, {controller.name}")
     takes_part = controller.mode in (OPERATING, JOINING)
@@ -81,7 +82,8 @@ class Cut:
         self.far: Any = None
 
     def part(self, time: int) -> Any:
-        """Cut at `time` (ns); returns `far`."""
+        """Cut at `time` (ns); returns `far`. UserError on a CAN FD bus."""
+        self.bus.check_classic("cut wires")
         bus, controller = self.bus, self.bus.nodes[self.node]
         self.far = far = Bus(f"{bus.name} behind the cut", bus.bitrate, log_capacity=0)
         far.add_node(controller.name, controller.inbox, controller.controller, controller.order)

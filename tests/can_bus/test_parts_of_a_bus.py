@@ -770,7 +770,8 @@ def test_a_recording_of_an_error_frame_begins_at_its_frame_and_names_its_sender(
         (-1, FLAG_EXTENDED, "identifier -1 does not fit in 29 bits"),
         (1, 15 | FLAG_REMOTE | FLAG_SINGLE_SHOT, ""),
         (1, 8 | 0x80, "flags 0x88 of identifier 0x1 cannot be sent"),
-        (1, 8 | 0x100, "flags 0x108 of identifier 0x1 cannot be sent"),
+        (1, 8 | 0x100, "identifier 0x1: this bus is classic CAN, without a data bit rate"),
+        (1, 8 | 0x800, "flags 0x808 of identifier 0x1 cannot be sent"),
     ],
 )
 def test_identifiers_and_flags_have_limits(identifier, flags, words):
