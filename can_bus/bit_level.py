@@ -172,7 +172,7 @@ class BitLevel:
         self.at_rest = quiet or self.is_timed  # nodes out of step may all be idle a little earlier
         self.away = False
         for machine in self.machines:
-            if machine.may_start() and not self._is_elsewhere(machine):
+            if machine.may_start():  # on a CAN FD bus also in a bit that has begun: an edge may begin it anew
                 self.open = True
             if not machine.is_at_rest():
                 self.at_rest = False
@@ -387,6 +387,8 @@ class BitLevel:
             if machine.bit_start < self.bit and self._may_synchronise(machine):
                 if machine.met == 0 or machine.sample_at < NEVER:
                     machine.begin_bit(self.bit)
+                    if machine.state == MAC_INTERMISSION:
+                        machine.offered = self._offer(machine)
 
     @cython.cfunc
     @cython.exceptval(check=False)

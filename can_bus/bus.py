@@ -439,9 +439,6 @@ class Bus:
             first = (time - second * SECOND_NS) * self.tick_rate // SECOND_NS + 1
             start = second * SECOND_NS + (first * SECOND_NS + self.tick_rate - 1) // self.tick_rate
             first += second * self.tick_rate
-        if self.bit_ticks > 1:
-            first = self.aligned(first)
-            start = self.edge_ns(first)
         if first < self.hindered_until:
             first = self._hindered(node, buffer, time, flags, first)
             if first < 0:
@@ -460,6 +457,9 @@ class Bus:
             slots[row : row + ROW] = (NEVER, first, time, self.buffers.first, identifier, flags, lo, hi)
         self.buffers.first = row
         self.buffers.waiting_count += 1
+        if self.bit_ticks > 1 and first < NEVER:
+            first = self.aligned(first)
+            start = self.edge_ns(first)
         if first < self.next_bit:
             self.next_bit = first
         if start < self.next_time:
