@@ -15,6 +15,19 @@ Unit = float | Callable[[float], float]  # how many of the base unit, or how a n
 SLOPES: dict[str, Unit] = {**ANGLES, "%": lambda percent: math.atan(percent / 100.0)}
 TIMES = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
+
+def _per(unit_s: float) -> Unit:
+    """How a time of this unit between two becomes their rate in Hz."""
+    return lambda time: 1.0 / (time * unit_s) if time else math.inf
+
+
+RATES_HZ: dict[str, Unit] = {  # as a frequency, or as the time from one to the next
+    "Hz": 1.0,
+    "kHz": 1e3,
+    "MHz": 1e6,
+    **{unit: _per(size) for unit, size in TIMES.items()},
+}
+
 Duration = str | float  # "20 ms", or a number of seconds
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

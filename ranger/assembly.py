@@ -36,7 +36,9 @@ class Parts(NamedTuple):
     started: dict[str, list[Message]]
 
 
-def factory_of(scenario: Scenario, emulated: Emulated, in_c: ProgramsInC, images: dict[str, Image]) -> BoardFactory:
+def factory_of(
+    scenario: Scenario, emulated: Emulated, in_c: ProgramsInC, images: dict[str, Image], profile: Profile | None
+) -> BoardFactory:
     """The factory of a robot's boards. UserError for a board with two programs, or one in C that does not start."""
     for name, image in images.items():
         if name in in_c.firmware:
@@ -46,7 +48,14 @@ def factory_of(scenario: Scenario, emulated: Emulated, in_c: ProgramsInC, images
         **{name: OfImage(image) for name, image in images.items()},
     }
     factory = BoardFactory(scenario.seed, scenario.start_uptime_ms * 1_000_000, emulated, programs)
-    in_c.try_each(factory.first_board)
+
+    def tried_board(name: str, record: Any) -> Any:
+        board = factory.first_board(name, record)
+        if profile is not None:
+            bus_schedule.apply(board, profile.schedules())
+        return board
+
+    in_c.try_each(tried_board)
     return factory
 
 
@@ -65,7 +74,8 @@ def parts_of(scenario: Scenario, body: body_files.BodyFile, factory: BoardFactor
     if profile is not None:
         rates |= {name: bus.bit_rate for name, bus in profile.buses.items() if name in rates}
         for board in boards.values():
-            bus_schedule.apply(board, profile.schedules())
+            if not board.out_of_process:  # else where its program is
+                bus_schedule.apply(board, profile.schedules())
     return Parts(plant, boards, rates, started)
 
 

@@ -69,6 +69,10 @@ class InC:
     programs: ProgramsInC
 
     def board(self, name: str, crystal: Any, power_up_ns: int, record: Any) -> Any:
+        if self.programs.elsewhere:
+            from ranger_sim.ranger.firmware.robot_stand_in import RobotStandIn
+
+            return RobotStandIn(name, crystal, self.programs.trials[name].description)
         from ranger_sim.ranger.firmware.robot_native_board import RobotNativeBoard  # only here: it loads cffi
 
         with self.programs.printing(name):
@@ -79,7 +83,8 @@ class InC:
         return board
 
     def waits_for_slots(self, board: Any) -> bool:
-        return bool(board.scheduler.names_transmitters)  # else its handlers may send
+        found = board if self.programs.elsewhere else board.scheduler
+        return bool(found.names_transmitters)  # else its handlers may send
 
 
 @dataclasses.dataclass(frozen=True)

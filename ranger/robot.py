@@ -63,7 +63,8 @@ class Ranger(Machine):
     process, or `in_process`: faster, but a crash of one of them ends this process. images: boards that run a
     firmware image, by file. board_deadline_s: how long a board's own process may leave a request unanswered; 0: for
     ever (debuggers). printed: takes what programs in C print; without it they print on standard output. mode: where
-    the boards run, instead of what `in_process` and `board_deadline_s` choose.
+    the boards run, instead of what `board_deadline_s` chooses. require_confined: UserError where the kernel does not
+    grant every confinement of a program in C.
     """
 
     end_word, end_name = "the robot fell", "a fall"
@@ -80,6 +81,7 @@ class Ranger(Machine):
         board_deadline_s: float = DEADLINE_S,
         printed: Printed | None = None,
         mode: InProcess | None = None,
+        require_confined: bool = False,
     ) -> None:
         self.scenario = scenario if scenario is not None else Scenario()
         self.profile = profile
@@ -88,11 +90,15 @@ class Ranger(Machine):
         # the programs of the boards
         self.controller = controllers.load(self.scenario.controller)
         self.quirks = program(self.controller.program).switches(quirks if quirks is not None else Quirks())
-        self.programs_in_c = ProgramsInC(native_boards.built(firmware if firmware is not None else {}), printed)
+        self.programs_in_c = ProgramsInC(
+            native_boards.built(firmware if firmware is not None else {}), printed, elsewhere=not in_process
+        )
         self.firmware = self.programs_in_c.firmware
         self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})
         emulated = Emulated(self.quirks, self.controller)
-        self.factory = factory_of(self.scenario, emulated, self.programs_in_c, self.images)
+        self.factory = factory_of(self.scenario, emulated, self.programs_in_c, self.images, profile)
+        if require_confined:
+            self.programs_in_c.require_confined()
 
         # body, boards, buses; then the wires and the recorders
         self.body = body_files.load(self.scenario.body)
@@ -112,6 +118,11 @@ class Ranger(Machine):
     def new_board(self, name: str, power_up_ns: int, record: Any = None) -> Any:
         """A new, unwired board with its own crystal, powered up at `power_up_ns` (board_programs.py)."""
         return self.factory.board(name, power_up_ns, record)
+
+    def confined_board(self, name: str, record: Any) -> Any:
+        """In the process of a board with a program in C: the board, whose program is loaded now."""
+        self.programs_in_c.load_here()
+        return self.factory.first_board(name, record)
 
     def waits_for_slots(self, board: Any) -> bool:
         return self.factory.program(board.name).waits_for_slots(board)

@@ -36,6 +36,7 @@ def diagnose(
     accept_loss: float = losses.ACCEPTED,
     mapping: Mapping[str, str] | None = None,
     time_unit: str | None = None,
+    rate_hz: float | None = None,
     seed: int = 0,
     progress: pipeline.Progress = lambda what, share: None,
 ) -> DiagnosisResult:
@@ -47,13 +48,25 @@ def diagnose(
     part of each file by time, above 0 and below 1. model: a model file to start from; its effects are not findings.
     gear: of the motor bench's gearbox (14). repair: channels that drive the machine and are repaired all the same.
     accept_loss: share of a channel's samples that may be lost, 0 to 1. mapping: {column of the files: channel};
-    time_unit: of a time column without one. seed: of the bootstrap. progress: is called with (present step, finished
-    share).
+    time_unit: of a time column without one; rate_hz: of the samples of a file without a time. seed: of the
+    bootstrap. progress: is called with (present step, finished share).
 
     The same arguments give the same result. UserError for a mistake, and for data from which nothing can be concluded.
     """
     return diagnosis(
-        files, machine, holdout, holdout_part, model, gear, repair, accept_loss, mapping, time_unit, seed, progress
+        files,
+        machine,
+        holdout,
+        holdout_part,
+        model,
+        gear,
+        repair,
+        accept_loss,
+        mapping,
+        time_unit,
+        rate_hz,
+        seed,
+        progress,
     ).result
 
 
@@ -68,6 +81,7 @@ def diagnosis(
     accept_loss: float = losses.ACCEPTED,
     mapping: Mapping[str, str] | None = None,
     time_unit: str | None = None,
+    rate_hz: float | None = None,
     seed: int = 0,
     progress: pipeline.Progress = lambda what, share: None,
 ) -> Diagnosis:
@@ -80,7 +94,7 @@ def diagnosis(
         raise UserError(f"--holdout-part {holdout_part:g}: allowed is what lies between 0 and 1")
     machine = machine_of(machine, gear)
     known = model_file.read(model, machine).effects if model is not None else []
-    read = [[_dataset(each, mapping, time_unit) for each in _several(group)] for group in (files, holdout)]
+    read = [[_dataset(each, mapping, time_unit, rate_hz) for each in _several(group)] for group in (files, holdout)]
     data, held = ([prepared(each, machine, accept_loss, repair) for each in group] for group in read)
     if not data:
         raise UserError("files: none is given, a diagnosis needs at least one recording")
@@ -134,8 +148,8 @@ def _several(files: File | Sequence[File]) -> Sequence[File]:
     return [files] if isinstance(files, str | pathlib.Path | Dataset) else files
 
 
-def _dataset(file: File, mapping: Mapping[str, str] | None, time_unit: str | None) -> Dataset:
-    return file if isinstance(file, Dataset) else open_recording(file, mapping, time_unit=time_unit)
+def _dataset(file: File, mapping: Mapping[str, str] | None, time_unit: str | None, rate_hz: float | None) -> Dataset:
+    return file if isinstance(file, Dataset) else open_recording(file, mapping, time_unit=time_unit, rate_hz=rate_hz)
 
 
 def _judging(machine: Machine, held: Sequence[Prepared]) -> list[Table]:

@@ -86,8 +86,26 @@ class Balance(abc.ABC):
             sharper = np.tanh(SHARPER * np.arctanh(np.clip(s["direction"], -CLOSE, CLOSE)))
             columns["width of standstill@rate"] = sharper - s["direction"]
         unit = next(each.unit for each in self.quantities if each.name == self.response)
-        made = Equation(self.response, "M", "mechanical", unit, table[self.response], columns, valid)
+        made = Equation(
+            self.response, "M", "mechanical", unit, table[self.response], columns, valid, self._stand_ins(table, s)
+        )
         return Recording(table, s, {self.response: made})
+
+    def _stand_ins(self, table: Table, s: Signals) -> dict[str, Array]:
+        """Columns that a measured rate has part in, by the angle instead, whose noise is another.
+
+        A rate's noise, differentiated, is larger than the acceleration in it; against its own column an inertia would
+        come out near zero, and what it should explain would be left to other terms.
+        """
+        if not (self.angle and self.rate):
+            return {}
+        rate = signals.derivative(table, s["angle"], SLOPE_S / table.step_s)
+        other = dict(s) | {
+            "rate": rate,
+            "acceleration": signals.per_run(table, lambda part: np.gradient(part, table.step_s), rate),
+        }
+        there, instead = self.columns(s), self.columns(other)
+        return {name: column for name, column in instead.items() if not np.array_equal(column, there[name])}
 
     def _add_joint(self, table: Table, s: dict[str, Array]) -> None:
         width = SLOPE_S / table.step_s
@@ -124,13 +142,20 @@ class Balance(abc.ABC):
         return lambda s, _: self.more(s)[cause]
 
     def _effect(
-        self, cause: str, at: str, names: tuple[str, ...], make: Made, shapes: Sequence[Shape] = ({},), form: str = ""
+        self,
+        cause: str,
+        at: str,
+        names: tuple[str, ...],
+        make: Made,
+        shapes: Sequence[Shape] = ({},),
+        form: str = "",
+        forms: int = 1,
     ) -> Effect:
         def columns(recording: Recording, shape: Shape, _: Values) -> Columns:
             return {self.response: np.column_stack(make(recording.signals, shape))}
 
         part = "sensor" if cause.startswith("sensor_") else "mechanical"
-        return Effect(cause, at, part, names, list(shapes), columns, form=form)
+        return Effect(cause, at, part, names, list(shapes), columns, form=form, forms=forms)
 
     def _lag(self) -> Effect:
         def columns(recording: Recording, _: Shape, values: Values) -> Columns:
@@ -173,10 +198,17 @@ class Balance(abc.ABC):
         found = [
             self._effect("viscous_friction", joint, ("size",), lambda s, _: [s["rate"]]),
             self._effect("coulomb_friction", joint, ("size",), lambda s, _: [s["direction"]]),
-            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square"),
-            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] ** 3], form="cube"),
             self._effect(
-                "drag", joint, ("size",), lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))], form="root"
+                "drag", joint, ("size",), lambda s, _: [s["rate"] * np.abs(s["rate"])], form="square", forms=3
+            ),
+            self._effect("drag", joint, ("size",), lambda s, _: [s["rate"] ** 3], form="cube", forms=3),
+            self._effect(
+                "drag",
+                joint,
+                ("size",),
+                lambda s, _: [s["direction"] * np.sqrt(np.abs(s["rate"]))],
+                form="root",
+                forms=3,
             ),
             self._effect("stribeck", joint, ("excess",), slow, [{"speed": share * top} for share in SPEEDS]),
             self._effect("direction_friction", joint, ("size",), lambda s, _: [np.abs(s["rate"])]),

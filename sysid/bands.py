@@ -20,6 +20,7 @@ MOST_ROWS = 6000  # of all recordings; a wider band says nothing more of causes,
 FEWEST_ROWS = 150  # of all recordings: below it a band has too few rows for candidates and noise
 WORSE = 1.1  # times the plain fit's error on held-out blocks
 BLOCKS = 5
+AGREE = 0.9  # correlation of a measured column with what moves as it does: below it the column is mostly noise
 OCTAVES = 3
 GAUSSIAN = 0.1325  # of the rows' frequency over the width in samples: -3 dB of a Gaussian
 OVER = 2.4  # kept rows' frequency over the band's edge
@@ -42,7 +43,7 @@ class Band:
 
 def choose(recordings: Sequence[Recording]) -> list[Band]:
     """The widest band in which a whitened fit predicts blocks that it was not fitted to about as well as a plain one,
-    and the two octaves below it.
+    and the two octaves below it. A band in which a measured column is mostly noise does not count.
 
     Only the full one for a simulator's errors, which are white by construction; the narrowest where none is good.
     """
@@ -59,7 +60,7 @@ def choose(recordings: Sequence[Recording]) -> list[Band]:
     fitting = [each for each in tried if rows * _kept(each, rate_hz) <= MOST_ROWS] or tried[-1:]
     for band in fitting:
         regression = plain([band.of(recording) for recording in recordings])
-        if all(_ratio(part) <= WORSE for part in regression.parts.values()):
+        if all(_ratio(part) <= WORSE and _agrees(part) for part in regression.parts.values()):
             first = fitting.index(band)
             return fitting[first : first + OCTAVES]
     return fitting[-1:]
@@ -96,6 +97,16 @@ def _ratio(part: Part) -> float:
         for number, (a, b, c) in enumerate(((z, x, y), (white_z, white_x, white_y))):
             errors[number] += np.sum((y[held] - x[held] @ fitted(a[used], b[used], c[used])) ** 2)
     return float(np.sqrt(errors[1] / max(errors[0], 1e-300)))
+
+
+def _agrees(part: Part) -> bool:
+    """True where no column of an equation is mostly the noise of its own measurement, by its stand-in."""
+    good = part.valid & ~part.starts
+    for measured, other in zip(part.measured[good].T, part.stand_in[good].T, strict=True):
+        lengths = float(np.linalg.norm(measured) * np.linalg.norm(other))
+        if lengths > 0.0 and float(measured @ other) < AGREE * lengths:
+            return False
+    return True
 
 
 def _same_run(part: Part) -> np.ndarray:

@@ -113,10 +113,16 @@ def diagnose(
         others = [other for other in found.named if other is not each]
         base = naming.refit(found.base, others, [*skews, *others]) if others else found.base
         each.shape, known_to[each.effect.name] = intervals.profile(each, base)
-    if found.named:
-        extended = naming.refit(found.base, found.named, [*skews, *found.named])
-    _widen(extended)
-    _add_numerics(extended, found.named, floor)
+    while True:  # a cause whose interval has 0 in it is not named
+        if found.named:
+            extended = naming.refit(found.base, found.named, [*skews, *found.named])
+        _widen(extended)
+        _add_numerics(extended, found.named, floor)
+        weakest = min(found.named, key=lambda each: _sure(extended, each), default=None)
+        if weakest is None or _sure(extended, weakest) > Z95:
+            break
+        found.named.remove(weakest)
+        extended = found.base
     after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
@@ -246,10 +252,10 @@ def _decided(
             except (UserError, np.linalg.LinAlgError):  # a rival with which the simulator runs away is none
                 scores.append(math.inf)
                 continue
-            free = len(option.effect.coefficients) + (len(option.effect.shapes) > 1)
+            free = len(option.effect.coefficients) + (option.effect.choices > 1)
             scores.append(
                 sum(machine.surprise(one) for one in simulated)  # type: ignore[attr-defined]
-                + free * math.log(base.size) + 2.0 * math.log(len(option.effect.shapes))
+                + free * math.log(base.size) + 2.0 * math.log(option.effect.choices)
             )  # fmt: skip
         order = sorted(range(len(options)), key=lambda number: scores[number])
         best, least = options[order[0]], scores[order[0]]
@@ -398,6 +404,13 @@ def _widen(regression: Regression) -> None:
     regression.covariance = regression.covariance * np.outer(wider, wider)
 
 
+def _sure(regression: Regression, each: Named) -> float:
+    """Standard errors that the surest coefficient of a cause is away from 0."""
+    numbers = [regression.names.index(name) for name in each.coefficients]
+    errors = np.sqrt(np.maximum(np.diag(regression.covariance)[numbers], 1e-300))
+    return float(np.max(np.abs([regression.values[name] for name in each.coefficients]) / errors))
+
+
 def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping[str, tuple[float, ...]]) -> None:
     """Widen the covariance by what numerics move each coefficient by, as a further error at 95 %."""
     for each in named:
@@ -439,7 +452,7 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
         sizes: list[tuple[float, dict[str, float], Mapping[str, float]]] = []
         for trial in naming.trials([effect], regression):
             inverse = np.linalg.pinv(trial.gram, rcond=1e-9, hermitian=True)
-            shapes = len(effect.shapes)
+            shapes = effect.choices
             free = len(inverse) + (shapes > 1)
             needed = threshold + free * math.log(regression.size) + 2.0 * math.log(shapes)
             errors = np.sqrt(np.maximum(np.diag(inverse), 0.0) * needed * trial.inflation)

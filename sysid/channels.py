@@ -5,9 +5,12 @@ by hand otherwise (`--map old=new`).
 """
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 
 from ranger_sim.foundation.user_error import DataError, unknown
-from ranger_sim.sysid.dataset import Dataset, Repair
+from ranger_sim.sysid import units
+from ranger_sim.sysid.dataset import Channel, Dataset, Repair
+from ranger_sim.sysid.machine import Quantity
 
 WRITTEN_SAMPLES = 3  # the robot's log has a first and a last sample of what no board ever wrote
 
@@ -172,15 +175,60 @@ def named_for(dataset: Dataset, name: str) -> Dataset:
             repairs.append(Repair(expected.name, "renamed", 0, f"{channel.name} is called {expected.name}"))
         found[expected.name] = dataclasses.replace(channel, name=expected.name, unit=expected.unit, value=value)
         renamed[channel.name] = expected.name
-    found |= {key: channel for key, channel in dataset.channels.items() if key not in renamed}
+    return _renamed(dataset, found, renamed, repairs)
+
+
+def named_by(dataset: Dataset, quantities: Sequence[Quantity]) -> Dataset:
+    """The dataset with its channels called, and in the units, as a user's machine has them; others keep their names.
+
+    A file's channel is in SI and has its unit in its name: "speed [rpm]" is speed_rad_per_s. A quantity "speed_rpm",
+    "speed_rad_s", or "speed" in rad/s is that channel. DataError for a channel in another kind of unit.
+    """
+    found: dict[str, Channel] = {}
+    repairs: list[Repair] = []
+    renamed: dict[str, str] = {}
+    for wanted in quantities:
+        unit = units.unit_of(wanted.unit) if wanted.unit else None
+        channel = dataset.channels.get(wanted.name) or _alike(dataset, wanted.name, unit)
+        if channel is None:
+            continue
+        made, text = dataclasses.replace(channel, name=wanted.name), f"{channel.name} is called {wanted.name}"
+        there = units.unit_of(channel.unit) if channel.unit else None
+        if unit is not None and there is not None:
+            if not unit.same_kind(there):
+                text = f"{channel.name} is in {channel.unit}, {wanted.name} of the machine in {wanted.unit}"
+                raise DataError(f"{dataset.name}: {text}")
+            if not unit.is_si:
+                value, resolution = (channel.value - unit.offset) / unit.factor, channel.resolution / unit.factor
+                made = dataclasses.replace(made, value=value, resolution=resolution, unit=wanted.unit)
+                text += f", in {wanted.unit}"
+        if made.name != channel.name or made.unit != channel.unit:
+            repairs.append(Repair(wanted.name, "renamed", 0, text))
+        found[wanted.name] = made
+        renamed[channel.name] = wanted.name
+    return _renamed(dataset, found, renamed, repairs)
+
+
+def _alike(dataset: Dataset, name: str, unit: units.Unit | None) -> Channel | None:
+    """The channel that has this name but for the unit at its end; unit: of a name without one."""
+    stem, of_name = units.split(name)
+    unit = of_name or unit
+    return dataset.channels.get(units.si_name(stem, unit)) if unit is not None else None
+
+
+def _renamed(
+    dataset: Dataset, found: dict[str, Channel], renamed: Mapping[str, str], repairs: Sequence[Repair]
+) -> Dataset:
+    """The dataset with the `found` channels in place of others. renamed: {in the dataset: in `found`}."""
+    channels = found | {key: channel for key, channel in dataset.channels.items() if key not in renamed}
     findings = [
         dataclasses.replace(each, channel=renamed.get(each.channel, each.channel))
         for each in dataset.findings
         # a state is a number, whatever a file calls its unit
-        if not (each.kind == "unknown_unit" and each.channel in renamed and not wanted[renamed[each.channel]].unit)
+        if not (each.kind == "unknown_unit" and each.channel in renamed and not found[renamed[each.channel]].unit)
     ]
     before = [dataclasses.replace(each, channel=renamed.get(each.channel, each.channel)) for each in dataset.repairs]
-    return dataclasses.replace(dataset, channels=found, findings=findings, repairs=[*before, *repairs])
+    return dataclasses.replace(dataset, channels=channels, findings=findings, repairs=[*before, *repairs])
 
 
 def _is_there(dataset: Dataset, source: str, name: str) -> bool:

@@ -185,7 +185,8 @@ class Dataset:
 
     rows, losses: lines or frames of the file, and those left out of which nothing says whose samples they were.
     lines: what became of every line of a text file: {"rows", "names", "comments" ...: number}.
-    layout: how the file was read: its format, and what `--assume` takes.
+    layout: how the file was read: its format, and what `--assume` takes. clock_is_given: the user says the unit of the
+    stamps, or they are dates, so that their size shows no other one.
     """
 
     name: str
@@ -196,6 +197,7 @@ class Dataset:
     losses: list[Loss] = dataclasses.field(default_factory=list)
     lines: dict[str, int] = dataclasses.field(default_factory=dict)
     layout: dict[str, Any] = dataclasses.field(default_factory=dict)
+    clock_is_given: bool = False
 
     def __post_init__(self) -> None:
         self.name = printable(self.name)  # a file's name may have bytes that are not UTF-8

@@ -22,6 +22,9 @@ SMOOTH = 0.2  # largest usual step of a smooth channel to its range
 LINES_PART, FEWEST_STEPS, DIGITS, SHARP = 0.8, 3, 2.5, 10.0
 POSITIONS = ("rad", "m")
 MOST_JOINS = 3
+CLOCK_STEP = 0.5  # of the usual step of an even clock
+NEAR, LEAD = 20, 3  # rows on either side; by which a reference is ahead
+STAYS, FOLLOWS = 0.5, 0.5  # part of a jump that is left a row later; correlation of steps
 MOST_HELD = 200
 MIXED = 3.0  # neighbours are so many times as far from each other as next neighbours
 
@@ -92,7 +95,7 @@ def of_all(channels: dict[str, Channel]) -> Iterator[Finding]:
     for group in _by_stamps(channels):
         if PARTS * len(group) >= moving:  # a few of a robot's variables restart together; a joint is in all channels
             smooth = [channel for channel in group if _is_smooth(channel.value)]
-            yield from _joined(smooth)
+            yield from _joined(smooth, group)
         yield from _mixed(group)
 
 
@@ -112,23 +115,70 @@ def _is_smooth(value: Array) -> bool:
     return bool(np.percentile(steps, USUAL_PERCENT) < SMOOTH * np.ptp(value)) and bool(np.mean(steps == 0.0) < 0.5)
 
 
-def _joined(smooth: list[Channel]) -> Iterator[Finding]:
-    """Rows at which every position jumps, and another channel with it: what is driven may step, a position does not."""
-    jumping = {}
-    for channel in smooth:
-        steps = np.abs(np.diff(channel.value))
-        steps[np.diff(channel.time_s) > 3.0 * _step(channel.time_s)] = 0.0  # across a gap it may have moved
-        jumping[channel.name] = steps > JOIN * max(float(np.percentile(steps, USUAL_PERCENT)), 2.0 * channel.resolution)
-    positions = [channel.name for channel in smooth if channel.unit in POSITIONS]
-    if not positions or len(smooth) < 2:
+def _joined(smooth: list[Channel], group: list[Channel]) -> Iterator[Finding]:
+    """Rows at which every position jumps, and another channel with it: joined recordings, or a fast movement.
+
+    Something that breaks loose may move in one row, and a controller answers in the same row. A join has evidence of
+    its own: the clock steps there, or channels that do not follow the position go over to another course and stay.
+    """
+    if len(smooth) < 2 or not (positions := [channel for channel in smooth if channel.unit in POSITIONS]):
         return
-    at_all = np.all([jumping[name] for name in positions], axis=0)
-    places = np.flatnonzero(at_all & (np.sum(list(jumping.values()), axis=0) > 1))
-    for place in places if len(places) <= MOST_JOINS else ():
-        at, after = float(smooth[0].time_s[place]), float(smooth[0].time_s[place + 1])
-        names = [name for name, jumps in jumping.items() if jumps[place]]
-        text = f"{', '.join(names[:3])} jump at one row ({at:.6g} s): two recordings were joined there"
-        yield Finding("", "jump", at, after, float(len(names)), "channels", text)
+    time_s = smooth[0].time_s
+    usual_s = _step(time_s)
+    jumps = {channel.name: _jumps(channel) for channel in smooth}
+    at_all = np.all([jumps[channel.name] > 0.0 for channel in positions], axis=0)
+    places = np.flatnonzero(at_all & (np.sum([each > 0.0 for each in jumps.values()], axis=0) > 1))
+    clock_is_even = np.percentile(np.abs(np.diff(time_s) - usual_s), USUAL_PERCENT) < CLOCK_STEP * usual_s
+    for place in map(int, places if len(places) <= MOST_JOINS else ()):
+        at, after = float(time_s[place]), float(time_s[place + 1])
+        names = [name for name, sizes in jumps.items() if sizes[place] > 0.0]
+        text = f"{', '.join(names[:3])} jump at one row ({at:.6g} s)"
+        staying = [channel for channel in group if _stays(channel, place)]
+        clock_steps = clock_is_even and abs(after - at - usual_s) > CLOCK_STEP * usual_s
+        others = [each for each in staying if each is not positions[0] and not _follows(each, positions[0], place)]
+        if clock_steps or (others and all(each in staying for each in positions)):
+            text += ": two recordings were joined there"
+            yield Finding("", "jump", at, after, float(len(names)), "channels", text)
+            continue
+        for channel in positions:
+            size = float(jumps[channel.name][place])
+            text = (
+                f"it jumps by {size:.4g} {channel.unit} at one row, and {', '.join(names[1:3])} with it: a fast "
+                "movement; nothing else says that two recordings were joined there"
+            )
+            yield Finding(channel.name, "step", at, after, size, channel.unit, text)
+
+
+def _jumps(channel: Channel) -> Array:
+    """Sizes (n - 1,) of the steps from row to row that are far larger than usual; 0 elsewhere."""
+    steps = np.abs(np.diff(channel.value))
+    steps[np.diff(channel.time_s) > 3.0 * _step(channel.time_s)] = 0.0  # across a gap it may have moved
+    usual = max(float(np.percentile(steps, USUAL_PERCENT)), 2.0 * channel.resolution)
+    return np.where(steps > JOIN * usual, steps, 0.0)
+
+
+def _stays(channel: Channel, place: int) -> bool:
+    """True when the channel steps farther than anywhere near, and does not go back in the row behind."""
+    value = channel.value[max(0, place - NEAR) : place + NEAR + 2]
+    here = min(place, NEAR)
+    size = abs(float(value[here + 1] - value[here]))
+    near = np.delete(np.abs(np.diff(value)), here)
+    before, after = value[max(0, here - 1) : here + 1], value[here + 1 : here + 3]
+    stays = float(np.abs(after[:, None] - before[None, :]).min()) > STAYS * size
+    return stays and size > JOIN * max(float(near.max(initial=0.0)), 2.0 * channel.resolution)
+
+
+def _follows(channel: Channel, position: Channel, place: int) -> bool:
+    """True for a channel whose steps are those of the position, as a controller's are: it jumps because that jumps.
+
+    What the position follows some rows later, as a reference, does not follow it.
+    """
+    one, two = (np.delete(np.diff(each.value), place) for each in (channel, position))
+    if not one.any() or not two.any():
+        return False
+    same_row = abs(float(np.corrcoef(one, two)[0, 1]))
+    later = abs(float(np.corrcoef(one[:-LEAD], two[LEAD:])[0, 1]))
+    return same_row > FOLLOWS and later <= same_row
 
 
 def _mixed(group: list[Channel]) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ranger_sim.sysid import naming, noise
+from ranger_sim.sysid import causes, naming, noise
 from ranger_sim.sysid.bands import fitted, least_squares, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Effect, Recording
@@ -25,6 +25,9 @@ LEVEL = 0.02  # chance that the best of all candidates exceeds its threshold on 
 MOST = 5  # causes
 LEAST = 6.0  # score that a cause must have whatever the surrogates say: that of a tie
 BLOCKS = 8  # of the cross-validation within the training data
+SURE = 2.33  # standard errors over the blocks by which a further effect must exceed a simpler one: 1 % on one side
+PASSES = 3  # over the causes, each held against all others
+WORSE = 1.05  # times the held-out square: an exchange may not make it worse
 HIDDEN = 1e-4  # of a candidate's square: when the others explain all but this, an equation does not show it
 FEWEST_FREE = 5  # rows per column, at least, in the fit with all candidates
 
@@ -204,7 +207,7 @@ def by_chance(tried: Sequence[Trial], regression: Regression, drawn: Array) -> A
         product = straight[number] - trial.shadow.T @ together
         inverse = np.linalg.pinv(trial.gram, rcond=1e-9, hermitian=True)
         chi2 = np.einsum("km,kl,lm->m", product, inverse, product) / trial.inflation
-        found[number] = score(chi2, len(inverse), len(trial.effect.shapes), regression.size)
+        found[number] = score(chi2, len(inverse), trial.effect.choices, regression.size)
     return found
 
 
@@ -255,13 +258,18 @@ def select(
             errors = [judge.square([*named, one], each) for one, each in zip(options, extensions, strict=True)]
             best = int(np.argmin(errors))
         found, extended = options[best], extensions[best]
-        if not _predicts(regression, extended):
+        in_doubt = _simpler_in_doubt(found, named, base, fixed, ranked, near, chance, threshold)
+        if in_doubt is not found:
+            found, extended = in_doubt, naming.refit(base, [*named, in_doubt], [*fixed, *named, in_doubt])
+        if not _predicts(regression, extended) or not _seen_with_refused(
+            found.effect, base, fixed, named, refused, threshold
+        ):
             left_out.append(found.effect)
         elif judge is not None and not judge.accepts(named, found, regression, extended):
             refused.append(found)
         else:
-            named.append(found)
-            regression, tried = extended, []
+            named = _exchanged([*named, found], effects, base, fixed, refused, threshold, judge)
+            regression, tried = naming.refit(base, named, [*fixed, *named]), []
         rest = [
             each
             for each in rest
@@ -269,6 +277,118 @@ def select(
             and all(each is not other.effect for other in refused)
             and not any(other.effect.excludes(each) for other in named)
         ]
+
+
+def _simpler(one: Effect, than: Effect) -> bool:
+    """True for a wrong value of a number of the model (`shift`), where the other is a further effect like it."""
+    simple, other = (causes.CAUSES.get(each.cause) for each in (one, than))
+    if simple is None or other is None or not simple.shift or other.shift or one.at != than.at:
+        return False
+    return other.number in simple.confusable or simple.number in other.confusable
+
+
+def _simpler_in_doubt(
+    found: Named,
+    others: Sequence[Named],
+    base: Regression,
+    fixed: Sequence[Named],
+    ranked: Sequence["Scored"],
+    near: Sequence["Scored"],
+    chance: Array,
+    threshold: float,
+) -> Named:
+    """The cause itself, or the best simpler one that these data support as well, with it as a tie."""
+    simple = next(
+        (
+            each
+            for each in ranked
+            if each[0] > threshold and naming.possible(each[3]) and _simpler(each[3].effect, found.effect)
+        ),
+        None,
+    )
+    if simple is None:
+        return found
+    plainer = _named(simple, ranked, near, chance)
+    with_each = [naming.refit(base, [*others, each], [*fixed, *others, each]) for each in (found, plainer)]
+    if _surely_better(*with_each):
+        return found
+    plainer.tied = [found.effect, *(each for each in plainer.tied if each is not found.effect)]
+    return plainer
+
+
+def _surely_better(one: Regression, other: Regression) -> bool:
+    """True when one model is better than another all over the recording, and not by a few stretches (Vuong 1989)."""
+    gained = other.residual**2 - one.residual**2
+    by_block = np.zeros(BLOCKS)
+    for rows in one.rows.values():
+        by_block += [float(np.sum(each)) for each in np.array_split(gained[rows], BLOCKS)]
+    error = math.sqrt(BLOCKS / (BLOCKS - 1.0) * float(np.sum((by_block - np.mean(by_block)) ** 2)))
+    return float(np.sum(by_block)) > max(naming.TIE, SURE * error)
+
+
+def _seen_with_refused(
+    effect: Effect,
+    base: Regression,
+    fixed: Sequence[Named],
+    named: Sequence[Named],
+    refused: Sequence[Named],
+    threshold: float,
+) -> bool:
+    """False for an effect that is seen only where the refused ones, which these data show better, are left out."""
+    if not refused:
+        return True
+    without = [*named, *(each for each in refused if all(not each.effect.excludes(one.effect) for one in named))]
+    ranked = ranking(naming.trials([effect], naming.refit(base, without, [*fixed, *without])), base.size)
+    return bool(ranked) and ranked[0][0] > threshold
+
+
+def _exchanged(
+    named: list[Named],
+    effects: Sequence[Effect],
+    base: Regression,
+    fixed: Sequence[Named],
+    refused: Sequence[Named],
+    threshold: float,
+    judge: Judge | None,
+) -> list[Named]:
+    """The causes, each held once more against all others with the rest in the model: the first was chosen alone."""
+    out = list(named)
+    for _ in range(PASSES if len(named) > 1 else 0):
+        before = [each.effect for each in out]
+        for old in list(out):
+            others = [each for each in out if each is not old]
+            if not others or len(others) == len(out):  # it is alone, or has been dropped
+                continue
+            regression = naming.refit(base, others, [*fixed, *others])
+            rest = [
+                each
+                for each in effects
+                if not any(one.effect.excludes(each) for one in others)
+                and all(each is not one.effect for one in refused)
+            ]
+            ranked = ranking(naming.trials(rest, regression), base.size)
+            own = next((each for each in ranked if each[3].effect is old.effect), None)
+            chosen = next((each for each in ranked if naming.possible(each[3])), None)
+            if own is None or chosen is None or own[0] <= threshold:  # the others explain it
+                out = others
+                continue
+            new = dataclasses.replace(old, chi2=own[1], freedom=own[2], bic=own[0], shape=own[3].shape)
+            tied = [each for each in ranked if abs(each[0] - chosen[0]) < naming.TIE and naming.possible(each[3])]
+            if chosen[3].effect is not old.effect and chosen[0] > own[0] + naming.TIE:
+                new = _named(chosen, ranked, tied, np.zeros(0))
+            new = _simpler_in_doubt(new, others, base, fixed, ranked, tied, np.zeros(0), threshold)
+            new.p = old.p
+            if new.effect is not old.effect and judge is not None:
+                squares = [
+                    judge.square(each, naming.refit(base, each, [*fixed, *each]))
+                    for each in ([*others, new], [*others, old])
+                ]
+                if squares[0] > WORSE * squares[1]:
+                    continue
+            out[out.index(old)] = new
+        if [each.effect for each in out] == before:
+            break
+    return out
 
 
 Scored = tuple[float, float, int, Trial]  # (score, chi-square, freedom, trial)
@@ -303,7 +423,7 @@ def ranking(tried: Sequence[Trial], size: int) -> list[Scored]:
         if not freedom:
             continue
         chi2 /= trial.inflation
-        found = (float(score(chi2, freedom, len(trial.effect.shapes), size)), chi2, freedom, trial)
+        found = (float(score(chi2, freedom, trial.effect.choices, size)), chi2, freedom, trial)
         if id(trial.effect) not in best or found[0] > best[id(trial.effect)][0]:
             best[id(trial.effect)] = found
     return sorted(best.values(), key=lambda each: -each[0])

@@ -141,11 +141,17 @@ class Effect:
     admissible: Callable[[Mapping[str, float]], bool] = lambda found: True
     meaning: str = ""
     form: str = ""  # of several forms of one cause at one place: only one of them is named, the others may be its ties
+    forms: int = 1  # of this cause at this place, of which the best is taken: it counts as a shape on a grid does
     scale: str | None = None  # a shape, above 0, that may also lie between the grid's values: it is refined
     free: tuple[str, ...] = ()  # coefficients that another run does not share, as the state before it
     phase_is_free: bool = (
         False  # pairs of coefficients, cosine and sine, of an angle whose zero another run does not share
     )
+
+    @property
+    def choices(self) -> int:
+        """Shapes and forms of which the best is taken."""
+        return len(self.shapes) * self.forms
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import losses, repairs, sanity
-from ranger_sim.sysid.channels import named_for
+from ranger_sim.sysid.channels import named_by, named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Repair, Table
 from ranger_sim.sysid.machine import Machine
 from ranger_sim.sysid.machines import is_ours
@@ -51,8 +51,7 @@ def prepared(
     same. UserError for data that are not what they say, or of which too much is lost.
     """
     ours = is_ours(machine)
-    if ours:
-        dataset = named_for(dataset, machine.name)
+    dataset = named_for(dataset, machine.name) if ours else named_by(dataset, machine.quantities)
     missing = [each.name for each in machine.quantities if each.needed and each.name not in dataset]
     names = [each.name for each in machine.quantities if each.name in dataset]
     if missing or not names:

@@ -56,8 +56,12 @@ class Measurement:
         return EXIT_FINDINGS if self.matters else EXIT_READ
 
     def ledger(self) -> dict[str, Any]:
-        """What became of every line and every sample: {"lines": {kind: number}, "channels": {channel: account}}."""
-        return {"lines": dict(self.dataset.lines), "channels": self.dataset.ledger()}
+        """What became of every line and sample, and where the stamps are from.
+
+        {"lines": {kind: number}, "stamps": text, "" where the file has them, "channels": {channel: account}}.
+        """
+        made = next((each.text for each in self.dataset.findings if each.kind == "time_of_rate"), "")
+        return {"lines": dict(self.dataset.lines), "stamps": made, "channels": self.dataset.ledger()}
 
     def mended(self) -> Dataset:
         """The dataset with all proposals carried out."""
@@ -136,6 +140,7 @@ def open_recording(
     mapping: Mapping[str, str] | None = None,
     databases: Sequence[Path] = (),
     time_unit: str | None = None,
+    rate_hz: float | None = None,
     each_frame: Callable[[frames.Frame], None] | None = None,
     buses: Collection[str] = (),
     assume: Mapping[str, str] | None = None,
@@ -145,7 +150,8 @@ def open_recording(
     """The channels of a file or folder, in SI.
 
     mapping: {name in the file: name of the channel}. databases: DBC files, for frames, of these `buses`; an MDF file is
-    read as frames when there are some. time_unit: of stamps whose column does not give it. assume: parts of a text
+    read as frames when there are some. time_unit: of stamps whose column does not give it. rate_hz: of the samples: the
+    stamps are made from the number of the row. assume: parts of a text
     table's layout, and what is known of the channels (readers.layout.KEYS). recipe: of `ranger-sim read
     --write-recipe`, in place of these. each_frame is called with every frame. UserError for all that is wrong.
     """
@@ -155,10 +161,13 @@ def open_recording(
         recipe = recipe if isinstance(recipe, Recipe) else Recipe.load(recipe)
         mapping = {**recipe.mapping, **mapping}
         assume = {**recipe.assume, **assume}
-        time_unit = time_unit or recipe.time_unit
+        time_unit, rate_hz = time_unit or recipe.time_unit, rate_hz or recipe.rate_hz
         databases, buses = databases or recipe.databases, buses or recipe.buses
     of_table = {key: value for key, value in assume.items() if key not in layout.OF_ANY_FORMAT}
-    dataset = _read(path, mapping, databases, time_unit, each_frame, buses, of_table, progress)
+    if rate_hz is not None and (time_unit or "time" in assume):
+        raise DataError(f"--rate {rate_hz:g}Hz: the stamps are those of a column already (--time-unit, --assume time)")
+    dataset = _read(path, mapping, databases, time_unit, rate_hz, each_frame, buses, of_table, progress)
+    dataset.clock_is_given |= time_unit is not None or rate_hz is not None
     if recipe is not None:
         recipe.check(dataset)
     dataset = _assumed(dataset, assume)
@@ -186,12 +195,15 @@ def _read(
     mapping: Mapping[str, str],
     databases: Sequence[Path],
     time_unit: str | None,
+    rate_hz: float | None,
     each_frame: Callable[[frames.Frame], None] | None,
     buses: Collection[str],
     assume: Mapping[str, str],
     progress: Progress,
 ) -> Dataset:
     known = formats.of(path)
+    if rate_hz is not None and known.has_stamps:
+        raise DataError(f"--rate {rate_hz:g}Hz: {path} has stamps, as every file of its format does ({known.name})")
     if known.holds_frames or (databases and known.may_hold_frames):
         if not databases:
             raise DataError(f"{path}: a recording of CAN frames needs a DBC file (--dbc FILE)")
@@ -202,7 +214,7 @@ def _read(
             raise DataError(f"--bus {' '.join(buses)}: {path} is not a recording of CAN frames, or --dbc is missing")
         if assume and known.name != formats.TEXT_TABLE:
             raise DataError(f"--assume {next(iter(assume))}=...: {path} is not a text table, but {known.name}")
-        dataset = formats.read(path, known, mapping, time_unit, assume, _robot_units(), progress)
+        dataset = formats.read(path, known, mapping, time_unit, rate_hz, assume, _robot_units(), progress)
     dataset.layout = {"format": known.name, **dataset.layout}
     return dataset
 

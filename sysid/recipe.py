@@ -14,13 +14,13 @@ import pathlib
 import re
 from typing import Any
 
-from ranger_sim.foundation import toml_file
+from ranger_sim.foundation import quantities, toml_file
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import layout
 
-KEYS = {"format": str, "columns": list, "channels": dict, "time_unit": str, "dbc": list, "bus": list, "assume": dict,
-        "map": dict}  # fmt: skip
+KEYS = {"format": str, "columns": list, "channels": dict, "time_unit": str, "rate": str, "dbc": list,
+        "bus": list, "assume": dict, "map": dict}  # fmt: skip
 MOST_NAMED = 5
 NOT_OF_THE_NEXT = ("names",)  # a line number: preambles differ in length, the names are found by themselves
 
@@ -29,7 +29,8 @@ NOT_OF_THE_NEXT = ("names",)  # a line number: preambles differ in length, the n
 class Recipe:
     """How a file was read. columns: the file's names of a text table; channels: {name: unit} of the result.
 
-    assume: as `--assume`; databases: DBC files; name: of the recipe's file, for messages.
+    assume: as `--assume`; rate_hz: of the samples, None where the file has stamps; databases: DBC files; name: of the
+    recipe's file, for messages.
     """
 
     format: str
@@ -38,6 +39,7 @@ class Recipe:
     assume: dict[str, str] = dataclasses.field(default_factory=dict)
     mapping: dict[str, str] = dataclasses.field(default_factory=dict)
     time_unit: str | None = None
+    rate_hz: float | None = None
     databases: tuple[str, ...] = ()
     buses: tuple[str, ...] = ()
     name: str = "recipe"
@@ -53,6 +55,7 @@ class Recipe:
             {key: str(how[key]) for key in layout.KEYS if key in how and key not in NOT_OF_THE_NEXT and key != "time"},
             dict(how.get("map", {})),
             time_unit,
+            how.get("rate_hz"),
             tuple(how.get("dbc", ())),
             tuple(how.get("bus", ())),
         )
@@ -76,6 +79,7 @@ class Recipe:
             assume,
             {key: str(value) for key, value in table.get("map", {}).items()},
             table.get("time_unit"),
+            _rate_hz(path, table["rate"]) if "rate" in table else None,
             tuple(table.get("dbc", ())),
             tuple(table.get("bus", ())),
             str(path),
@@ -90,6 +94,7 @@ class Recipe:
         for key, value in (
             ("columns", list(self.columns)),
             ("time_unit", self.time_unit),
+            ("rate", f"{self.rate_hz!r} Hz" if self.rate_hz else None),
             ("dbc", list(self.databases)),
             ("bus", list(self.buses)),
         ):
@@ -118,6 +123,14 @@ class Recipe:
             ][:MOST_NAMED]
         if differences:
             raise DataError(f"{dataset.name}: it does not fit {self.name}: {'; '.join(differences)}")
+
+
+def _rate_hz(path: pathlib.Path, text: str) -> float:
+    rate_hz = quantities.in_base_units(text, quantities.RATES_HZ)
+    if rate_hz is None or not 0.0 < rate_hz < float("inf"):
+        units = ", ".join(quantities.RATES_HZ)
+        raise DataError(f"{path}: rate is {text!r}; a number above 0 with one of the units {units} is expected")
+    return rate_hz
 
 
 def _difference(what: str, wanted: list[str], there: list[str]) -> list[str]:

@@ -60,7 +60,8 @@ KINDS = {
     "spike": "single values far from both neighbours",
     "held": "it keeps each value for several rows",
     "resampled": "it goes in straight lines between fewer samples",
-    "jump": "all channels jump at one row",
+    "jump": "all channels jump at one row, and stay: two recordings were joined",
+    "step": "a position jumps at one row, as in a fast movement",
     "mixed": "rows of two recordings in turn",
     "quantised": "the steps of its values are most of the noise of its derivative",
     "stuck": "a value stays constant while other channels move",
@@ -173,7 +174,7 @@ def _inspected(dataset: Dataset) -> list[Finding]:
         found.append(Finding("", "empty", 0.0, 0.0, 0.0, "", "there is no channel", FATAL))
     sound: dict[str, Channel] = {}
     for channel in dataset.channels.values():
-        found += _stamps(channel)
+        found += _stamps(channel, dataset.clock_is_given)
         found += headlines.of_stamps(channel)
         tidy = _tidied(channel)
         found += _not_finite(channel)
@@ -266,7 +267,7 @@ def stop_if_input_is_clipped(name: str, findings: list[Finding], inputs: Collect
 
 def doubts(findings: list[Finding]) -> list[Finding]:
     """Findings that forbid naming a cause with confidence: the data are not as described."""
-    return [each for each in findings if each.kind in DOUBTED]
+    return [each for each in findings if each.kind in DOUBTED and each.severity != NOTE]
 
 
 def as_json(finding: Finding) -> dict[str, object]:
@@ -284,7 +285,7 @@ def _tidied(channel: Channel) -> Channel:
 # --- stamps -------------------------------------------------------------------------------------------------
 
 
-def _stamps(channel: Channel) -> Iterator[Finding]:
+def _stamps(channel: Channel, clock_is_given: bool) -> Iterator[Finding]:
     name, time_s = channel.name, channel.time_s
     count = len(time_s)
     if count == 0:
@@ -328,8 +329,11 @@ def _stamps(channel: Channel) -> Iterator[Finding]:
     yield from _gaps(name, finite, steps, usual)
     states = np.all(channel.value == np.round(channel.value))  # numbers of states are written when they change
     if usual > LONGEST_STEP_S and len(finite) >= FEWEST and not states:
-        text = f"samples are {usual:.4g} s apart: the stamps are probably in ms, or readings were taken one by one"
-        yield Finding(name, "slow_samples", float(finite[0]), float(finite[-1]), usual, "s", text)
+        text = f"samples are {usual:.4g} s apart"
+        severity = NOTE if clock_is_given else WARNING
+        if not clock_is_given:
+            text += ": the stamps are probably in ms, or readings were taken one by one (--time-unit s: they are in s)"
+        yield Finding(name, "slow_samples", float(finite[0]), float(finite[-1]), usual, "s", text, severity)
 
 
 def _gaps(name: str, time_s: Array, steps: Array, usual: float) -> Iterator[Finding]:

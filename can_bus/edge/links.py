@@ -88,12 +88,14 @@ class Link:
         None when none arrives in time, or when the link is closed meanwhile. LinkError when it was closed before, or
         when the other side is gone.
         """
+        was_closed = self.closed  # read without the lock: others may hold it while they close the link
         with self.changed:
-            if self.closed:
+            if was_closed:
                 self._check()
             if not self.arrived:
                 end = FOR_EVER if timeout is None else wallclock.monotonic_s() + max(timeout, 0.0)
-                self._wait(lambda: bool(self.arrived), timeout)
+                if not self.closed:
+                    self._wait(lambda: bool(self.arrived), timeout)
                 if self.closed:
                     self.changed.wait(max(min(end - wallclock.monotonic_s(), RUN_OUT_S), 0.0))
                     return None

@@ -1,6 +1,7 @@
 """The compiled firmware as a separate library for every board: loading, and the checks that precede it.
 
-Every board gets a copy of the file, so that two boards from one source share no variable.
+Every board gets a copy of the file, so that two boards from one source share no variable; a process that runs one
+program needs none.
 """
 
 import atexit
@@ -64,6 +65,7 @@ void fw_end_counts(void);
 SIZED = ("fw_task", "fw_step", "fw_schedule", "fw_interrupt")  # in the order of fw_sizes
 ENTRY_POINTS = "firmware_start() and one of firmware_schedule() and firmware_main()"
 
+runs_one_program = False  # this process is that of one board: nothing else is loaded here
 WATCHED: list[Any] = []  # libraries that stay loaded: their code handles signals of this process, or counts
 
 ffi: Any = cffi.FFI()
@@ -81,7 +83,7 @@ class Library:
         self.path = path
         if not path.is_file():
             raise FirmwareError(f"{path}: there is no such firmware library; `ranger-sim firmware build` makes one")
-        self.code = _loaded_copy(path)
+        self.code = _loaded(path) if runs_one_program else _loaded_copy(path)
         sanitizers.lead_findings()
         path = shown if shown is not None else path
         for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch", "fw_turns"):
@@ -169,6 +171,14 @@ def _setting(variables: dict[str, str]) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def _loaded(path: pathlib.Path) -> Any:
+    """The file itself, loaded: debuggers and sanitizers find it under its name."""
+    try:
+        return ffi.dlopen(str(path), ffi.RTLD_NOW | ffi.RTLD_LOCAL)
+    except OSError as error:
+        raise FirmwareError(f"{path}: cannot be loaded as a library: {error}") from None
 
 
 def _loaded_copy(path: pathlib.Path) -> Any:

@@ -29,11 +29,10 @@ UNDEFINED_RUNTIMES = ("libubsan.so.1", "libubsan.so.2")
 UNDEFINED = re.compile(r"^(?P<file>[^\s:]+):(?P<line>\d+)(?::\d+)?: runtime error: (?P<text>.*)$", re.MULTILINE)
 ADDRESS = re.compile(r"ERROR: AddressSanitizer: (?P<what>[\w-]+) on .*?(?=^=====|\Z)", re.DOTALL | re.MULTILINE)
 ACCESS = re.compile(r"^(?P<access>READ|WRITE) of size (?P<size>\d+)", re.MULTILINE)
-# of the copy that was loaded: its name is the library's with eight characters behind it (library.py); the kernel adds
+# of the library, or of the copy that was loaded: its name has eight characters behind it (library.py); the kernel adds
 # that it is deleted
-FRAME = re.compile(
-    r"^\s*#\d+ .*/(?P<name>[^/]+)-[^/-]{8}\.so(?: \(deleted\))?\+0x(?P<offset>[0-9a-f]+)\)", re.MULTILINE
-)
+FRAME = re.compile(r"^\s*#\d+ .*/(?P<name>[^/]+)\.so(?: \(deleted\))?\+0x(?P<offset>[0-9a-f]+)\)", re.MULTILINE)
+COPY = re.compile(r"-[^/-]{8}$")
 
 
 def is_ready() -> bool:
@@ -137,7 +136,7 @@ def _address(text: str, what: str, programs: list[Program]) -> Finding:
         what = f"{what}: {access['access'].lower()} of {access['size']} bytes"
     for frame in FRAME.finditer(text):
         for program in programs:
-            if program.library.stem == frame["name"] and program.library.is_file():
+            if program.library.stem in (frame["name"], COPY.sub("", frame["name"])) and program.library.is_file():
                 (line_text,) = lines_of(program.library, program.folder, [int(frame["offset"], 16)])
                 function, at, place = line_text.partition("() at ")
                 file, _, line = place.rpartition(":")

@@ -1,9 +1,14 @@
-"""A program in C is first loaded and started in a separate process, so that a failure ends only that process.
+"""A program in C is first loaded and started in a separate, confined process, so that a failure ends only that process.
 
-The process reports its progress over a pipe; the program chooses its exit code, so the code proves nothing.
+The process reports over a pipe: what its confinement lacks, in a line, before it loads the program; its progress, a
+letter each; and after the last one a description of the program as JSON, in a line. The program chooses its exit code,
+so the code proves nothing, and it can write to the pipe: nothing in the description is taken for granted.
 """
 
 import contextlib
+import dataclasses
+import importlib
+import json
 import mmap
 import os
 import pathlib
@@ -12,14 +17,14 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native import confinement, crash, sanitizers
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import FirmwareError, UserError
 
 PATIENCE_S = 10.0  # of the clock: to load and to start takes milliseconds; chosen by us
 LONGEST_TEXT = 32768  # less than a pipe holds
+LONGEST_DESCRIPTION = 1 << 20  # bytes; one of a large schedule has some 20,000. Chosen by us
 LOADED, STARTED, REFUSED = b"L", b"S", b"R"  # reports of the process: its progress; after the last one the reason
-THROUGH = (LOADED + STARTED, STARTED)
 IN_TRIAL = "RANGER_SIM_TRIAL"  # in the environment of that process: runtime.c prints nothing there
 
 
@@ -28,36 +33,61 @@ def record_words() -> memoryview:
     return memoryview(mmap.mmap(-1, 8 * crash.RECORD)).cast("q")
 
 
+@dataclasses.dataclass(frozen=True)
+class Tried:
+    """A program that loads and starts. lacks: what the confinement of its process lacks, None: it had no process.
+
+    description: what `start` returned there.
+    """
+
+    lacks: tuple[str, ...] | None
+    description: Any
+
+
+def needs_of(library: pathlib.Path, sources: pathlib.Path, counts: pathlib.Path | None = None) -> confinement.Needs:
+    """What the process of a program needs: it reads its folder, and writes findings and counts of coverage."""
+    findings = sanitizers.place_of_findings()
+    write = [each for each in (findings, counts) if each is not None]
+    if counts is not None:
+        counts.mkdir(parents=True, exist_ok=True)
+    return confinement.Needs((library.parent, sources), tuple(write), large_memory=findings is not None)
+
+
 def tried(
     what: str,
     library: pathlib.Path,
     sources: pathlib.Path,
-    start: Callable[[Any], None] = lambda record: None,
+    start: Callable[[Any], Any] = lambda record: None,
     made: pathlib.Path | None = None,
-) -> None:
+) -> Tried:
     """Load a library in a forked process, then call `start(record)` there. UserError, which begins with `what`, when
     the program ends that process or does not return in time; a UserError of `start` is raised here as well.
 
     record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet.
     """
+    importlib.import_module("cffi")  # a missing library is not the program's fault
     record = record_words()
     if not hasattr(os, "fork"):
-        _load_and_start(library, start, made, record, lambda reached: None)
-        return
+        return Tried(None, _load_and_start(library, start, made, record, lambda reached: None))
+    needs = needs_of(made or library, sources)
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # other threads: nothing in the child needs them
         process = os.fork()
     if process == 0:
         os.close(reading)
-        _be_the_trial(lambda reached: _load_and_start(library, start, made, record, reached), writing)
+        _be_the_trial(lambda reached: _load_and_start(library, start, made, record, reached), writing, needs)
     os.close(writing)
     output = _all_of(reading)
     os.close(reading)
-    code = _end_of(process, is_over=output in THROUGH)
-    if output in THROUGH:
-        return
-    reached, _, mistake = output.partition(REFUSED)
+    code = _end_of(process, is_over=_is_through(output))
+    lacks, _, progress = output.partition(b"\n")
+    if _is_through(output):
+        try:
+            return Tried(tuple(json.loads(lacks)), json.loads(progress[len(LOADED + STARTED) :]))
+        except (ValueError, TypeError, RecursionError):
+            raise FirmwareError(f"{what}: its program writes over the reports of its start") from None
+    reached, _, mistake = progress.partition(REFUSED)
     if mistake:
         raise FirmwareError(*mistake.decode(errors="replace").split("\n"))
     how = crash.describe(library, sources, record.tolist()) or (
@@ -73,26 +103,31 @@ def tried(
 
 def _load_and_start(
     library: pathlib.Path,
-    start: Callable[[Any], None],
+    start: Callable[[Any], Any],
     made: pathlib.Path | None,
     record: Any,
     reached: Callable[[bytes], object],
-) -> None:
+) -> Any:
     from ranger_sim.firmware_sim.native.library import Library  # only here: it loads cffi
 
     Library(made or library, library).leave_record_in(record)
     reached(LOADED)
-    start(record)
-    reached(STARTED)
+    return start(record)
+
+
+def _is_through(output: bytes) -> bool:
+    """Whether these are all the reports of a program that has started."""
+    progress = output.partition(b"\n")[2]
+    return progress.startswith(LOADED + STARTED) and progress.endswith(b"\n")
 
 
 def _all_of(pipe: int) -> bytes:
     """Bytes from a pipe until the program is done, the pipe ends, or PATIENCE_S are over."""
     output = b""
     until_s = wallclock.monotonic_s() + PATIENCE_S
-    while output not in THROUGH and descriptors.wait([pipe], [], until_s - wallclock.monotonic_s())[0]:
+    while not _is_through(output) and descriptors.wait([pipe], [], until_s - wallclock.monotonic_s())[0]:
         part = os.read(pipe, LONGEST_TEXT)
-        if not part:
+        if not part or len(output) > LONGEST_DESCRIPTION:
             break
         output += part
     return output
@@ -112,14 +147,21 @@ def _end_of(process: int, is_over: bool) -> int | None:
     return None
 
 
-def _be_the_trial(work: Callable[[Callable[[bytes], object]], None], writing: int) -> None:
+def _be_the_trial(work: Callable[[Callable[[bytes], object]], Any], writing: int, needs: confinement.Needs) -> None:
     """Run the trial in the forked process, which exits here."""
+    from ranger_sim.firmware_sim.native import library
+
     os.environ[IN_TRIAL] = "1"
+    library.runs_one_program = True
     try:
-        work(lambda reached: os.write(writing, reached))
+        os.write(writing, json.dumps(confinement.confine(needs, [writing])).encode() + b"\n")
+        description = work(lambda reached: os.write(writing, reached))
+        report = STARTED + json.dumps(description).encode() + b"\n"
+        while report:
+            report = report[os.write(writing, report) :]
     except UserError as mistake:
         os.write(writing, REFUSED + str(mistake).encode()[:LONGEST_TEXT])
-    except BaseException:  # noqa: BLE001  (the caller comes across it again, and reports it)
-        os.write(writing, STARTED)
+    except BaseException as error:  # noqa: BLE001  (the program may have damaged anything here)
+        os.write(writing, REFUSED + f"{type(error).__name__}: {error}".encode()[:LONGEST_TEXT])
     finally:
         os._exit(1)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.harness.outside import bus_schedule
 
 Message = tuple[Any, ...]
@@ -14,7 +15,11 @@ def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> 
     record: memory in which a program in C leaves its position when it ends this process.
     What its program puts out while it starts waits in its outbox (`first_outputs`).
     """
-    board = robot.new_board(name, power_up_ns, record)
+    return connected(robot, name, robot.new_board(name, power_up_ns, record))
+
+
+def connected(robot: Any, name: str, board: Any) -> Any:
+    """The new board `name`, at the sensors of `robot`, with the schedules of its profile."""
     if robot.profile is not None:
         bus_schedule.apply(board, robot.profile.schedules())
     loop, plant = robot.loop, robot.plant
@@ -23,6 +28,14 @@ def fresh_board(robot: Any, name: str, power_up_ns: int, record: Any = None) -> 
             channel = robot.wiring.number(name, analog.input)
             board.analog.follow(channel, loop.step_times, plant.analog_start, plant.analog_end, analog.voltage)
     return board
+
+
+def take_edges(robot: Any, name: str, board: Any) -> None:
+    """Let a board take the edges of its encoders as messages, also where its program does not capture the pins."""
+    for wire in robot.wiring.encoders:
+        if wire.board == name:
+            pins = (robot.wiring.number(name, wire.pin_a), robot.wiring.number(name, wire.pin_b))
+            board.connect_edges(EdgeBuffer(1), *pins)
 
 
 def first_outputs(board: Any) -> list[Message]:

@@ -4,8 +4,10 @@ One block per board, written by its board process, the plant process and the sup
 plant process, with the sensors' values for all boards. places.py has the place of every word.
 """
 
+import contextlib
 import mmap
 import os
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
@@ -54,6 +56,10 @@ class Block:
         self.ask_descriptor = os.eventfd(0, os.EFD_CLOEXEC)
         self.answer_descriptor = os.eventfd(0, os.EFD_CLOEXEC)
 
+    def is_forked(self, wanted: bool) -> None:
+        """Whether processes that this one forks from now on have its memory."""
+        self.memory.madvise(mmap.MADV_DOFORK if wanted else mmap.MADV_DONTFORK)
+
     def close(self) -> None:
         """Close this process's ends of the bells; none of them may be rung or waited for after this."""
         for descriptor in (self.ask_descriptor, self.answer_descriptor):
@@ -90,6 +96,19 @@ class Block:
         padded = memoryview(data + bytes(-len(data) % 8)).cast("q")
         self.words[FAULT_TEXT + 1 : FAULT_TEXT + 1 + len(padded)] = padded
         self.words[FAULT_TEXT] = len(data)
+
+
+@contextlib.contextmanager
+def alone(block: Block, blocks: Iterable[Block]) -> Iterator[None]:
+    """Within it, a forked process has the memory of `block` and none of the others."""
+    others = [each for each in blocks if each is not block]
+    for each in others:
+        each.is_forked(False)
+    try:
+        yield
+    finally:
+        for each in others:
+            each.is_forked(True)
 
 
 def words_shown(board: Any) -> int:

@@ -7,9 +7,10 @@ from typing import Any
 
 from ranger_sim.can_bus.edge.peers import reasons_text
 from ranger_sim.firmware_sim.gdb.server import GdbServer
-from ranger_sim.firmware_sim.native import coverage
+from ranger_sim.firmware_sim.native import confinement, coverage
+from ranger_sim.firmware_sim.native.trial import needs_of
 from ranger_sim.foundation import wallclock
-from ranger_sim.harness.firmware.fresh_board import first_outputs, fresh_board, pass_on
+from ranger_sim.harness.firmware.fresh_board import connected, first_outputs, fresh_board, pass_on, take_edges
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
 from ranger_sim.harness.processes.channel import Bell
@@ -61,7 +62,21 @@ def serve(
     if robot.printed is not None and name in robot.firmware:
         robot.printed.lead(name)
     sent = []
+    from_ns = 0
     crash_record = block.words[places.CRASH : places.CRASH + places.CRASH_WORDS]
+    is_elsewhere = name in robot.firmware and board.out_of_process  # its program has not been loaded
+    if is_elsewhere:
+        firmware = robot.firmware[name]
+        from ranger_sim.firmware_sim.native import library  # only here: it loads cffi
+
+        library.runs_one_program = True
+        needs = needs_of(firmware.library, firmware.folder, firmware.counts)
+        lacks = confinement.confine(needs, [block.ask_descriptor, block.answer_descriptor])
+        sys.stderr = sys.__stderr__  # what Python reports here is the board's output as well
+        if set(lacks) - set(robot.programs_in_c.lacks(name) or ()):
+            block.leave_fault(f"it cannot be confined as its trial was: {confinement.describe(lacks)}")
+            return FAILED
+        robot.programs_in_c.load_here()
     if fresh:
         bell = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)
         turns = block.words[places.ASKED]
@@ -72,6 +87,11 @@ def serve(
         record = crash_record if name in robot.firmware else None
         board = fresh_board(robot, name, block.words[places.POWER_UP], record)
         sent = first_outputs(board)
+    elif is_elsewhere:
+        board = connected(robot, name, robot.confined_board(name, crash_record))
+        sent, from_ns = first_outputs(board), robot.start_ns
+    if is_elsewhere:
+        take_edges(robot, name, board)
     if name in robot.firmware:
         board.leave_record_in(crash_record)
         if board.counts is not None:
@@ -87,7 +107,7 @@ def serve(
     audience = Audience(words, doubles, robot.loop.step_times, plant.analog_start, plant.analog_end, board.words, wires)
     try:
         endpoint = Endpoint(board, block, stage, audience, place, in_slots)  # gives the board another outbox
-        pass_on(sent, board.outbox, 0)
+        pass_on(sent, board.outbox, from_ns)
         if server is not None:
             hold = Hold(block, stage)
             server.ends, server.on_wait = hold.ends, hold.on_wait

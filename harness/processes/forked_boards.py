@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, systems
 from ranger_sim.harness.processes import board_process, kernel, places
-from ranger_sim.harness.processes.block import Block, new_stage, words_shown
+from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
 from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import DEADLINE_S, Settings
@@ -48,7 +48,10 @@ class ForkedBoards:
         place = {name: number for number, name in enumerate(robot.boards)}
         self.blocks = {name: Block(name, place[name], words_shown(robot.boards[name])) for name in names}
         self.ended = False
-        self.children = {name: fork(self._board(name, stage)) for name in names}
+        self.children = {}
+        for name in names:
+            with alone(self.blocks[name], self.blocks.values()):
+                self.children[name] = fork(self._board(name, stage))
         self.numbers = tuple(self.children.values())  # of the processes, also of those that have ended
         self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
         in_c = frozenset(robot.firmware)

@@ -23,7 +23,7 @@ from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
-from ranger_sim.harness.processes.block import Block, new_stage, words_shown
+from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
 from ranger_sim.harness.processes.guard import is_awaited
 from ranger_sim.harness.processes.lateness import figures
@@ -168,7 +168,8 @@ class Supervisor:
         block.words[places.FAULT_TEXT] = 0
         block.words[places.CRASH] = 0
         block.words[places.HELD] = 0
-        self.fork(name, body)
+        with alone(block, self.blocks.values()):
+            self.fork(name, body)
 
     def close_servers(self) -> None:
         """Close the endpoints in a process that does not use them."""

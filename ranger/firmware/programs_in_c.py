@@ -10,8 +10,10 @@ import tempfile
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ranger_sim.firmware_sim.native import coverage, crash
-from ranger_sim.firmware_sim.native.trial import tried
+from ranger_sim.firmware_sim.native import confinement, coverage, crash
+from ranger_sim.firmware_sim.native.stand_in import description
+from ranger_sim.firmware_sim.native.trial import Tried, tried
+from ranger_sim.foundation.user_error import FirmwareError
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.printed import Printed
 
@@ -19,11 +21,14 @@ from ranger_sim.harness.firmware.printed import Printed
 class ProgramsInC:
     """`firmware`: by board; those compiled for coverage have a folder for their counts.
 
-    printed: takes what they print; without it they print on standard output.
+    printed: takes what they print; without it they print on standard output. elsewhere: they run in other processes,
+    and none of them is loaded in this one.
     """
 
-    def __init__(self, firmware: dict[str, Firmware], printed: Printed | None) -> None:
+    def __init__(self, firmware: dict[str, Firmware], printed: Printed | None, elsewhere: bool = False) -> None:
         self.printed = printed
+        self.elsewhere = elsewhere
+        self.trials: dict[str, Tried] = {}  # by board
         self.folder: tempfile.TemporaryDirectory[str] | None = None  # of the counts, where none was chosen
         self.are_watched = False
         if any(each.coverage and each.counts is None for each in firmware.values()):
@@ -42,13 +47,33 @@ class ProgramsInC:
         """
         for name, firmware in self.firmware.items():
 
-            def start(record: Any, name: str = name) -> None:
-                new_board(name, record).counters()
+            def start(record: Any, name: str = name) -> Any:
+                self.load_here()
+                board = new_board(name, record)
+                board.counters()
+                return description(board)
 
             with self.printing(name):
-                tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+                self.trials[name] = tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
             if self.printed is not None:
                 self.printed.drop(name)  # its program will print that again
+
+    def load_here(self) -> None:
+        """In the process of one program, whose output is the board's already: it is loaded here from now on."""
+        self.elsewhere, self.printed = False, None
+
+    def lacks(self, board: str) -> tuple[str, ...] | None:
+        """What the confinement of a board's process lacks; None: its program runs in this process, or unconfined."""
+        return self.trials[board].lacks if self.elsewhere and not confinement.unavailable() else None
+
+    def require_confined(self) -> None:
+        """UserError for a program that is not confined in every way."""
+        for name in self.firmware:
+            confined = confinement.describe(self.lacks(name))
+            if confined != "yes":
+                why = confinement.unavailable() or "its program runs in the run's own process"
+                reason = f"{confined} ({why})" if self.lacks(name) is None else confined
+                raise FirmwareError(f"{name}: every program in C is to be confined (--require-confined): {reason}")
 
     def printing(self, board: str) -> contextlib.AbstractContextManager[None]:
         """Within it, output of programs in C in this process counts as output of `board`."""

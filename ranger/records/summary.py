@@ -7,6 +7,7 @@ from typing import Any
 from ranger_sim import loading
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.datatable.generated import errors as error_table
+from ranger_sim.firmware_sim.native import confinement
 from ranger_sim.harness.outside.machine import Elsewhere
 from ranger_sim.harness.records.vital_signs import alive, can
 
@@ -166,6 +167,7 @@ def firmware(robot: Any, board: str) -> dict:
         "name": made.manifest.name,
         "folder": str(made.folder),
         "own_process": bool(robot.loop.board(board).out_of_process),
+        "confined": confinement.describe(robot.programs_in_c.lacks(board)),
         "lost_s": death["time_s"] if death is not None else None,
         "why": cause_of(death) if death is not None else None,
         "findings": [dataclasses.asdict(each) for each in found_in(robot, board)],

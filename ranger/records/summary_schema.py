@@ -180,6 +180,7 @@ FIGURES = (
     Figure("firmware.{board}.name", TEXT, "", "of the program in C that this board ran"),
     Figure("firmware.{board}.folder", TEXT, "", "where its sources are, as asked for"),
     Figure("firmware.{board}.own_process", FLAG, "", "it had a separate process, which it could end alone"),
+    Figure("firmware.{board}.confined", TEXT, "", "how that process was confined: yes, partly (what lacks), no"),
     Figure("firmware.{board}.lost_s", REAL, "s", "when its process was gone, since power-up", "it was not"),
     Figure(
         "firmware.{board}.why",

@@ -78,23 +78,40 @@ class Stride:
 
 @dataclasses.dataclass(frozen=True)
 class Walk:
-    """A walk's signals, all (n,) with their own stamps: hip angle, outer leg's lean, state. `ended`: why it fell."""
+    """A walk's signals, all (n,) with their own stamps: hip angle, outer leg's lean, state.
+
+    ended: why it fell. masked_s: stamps (m,) of values of the hip and of the lean that are left out because they are
+    cut off: nothing is interpolated there.
+    """
 
     hip: tuple[Array, Array]
     lean: tuple[Array, Array]
     state: tuple[Array, Array]
     ended: str = ""
+    masked_s: tuple[Array, Array] = (np.empty(0), np.empty(0))
+
+    def is_masked(self, begin: float, end: float) -> bool:
+        """True when a masked value lies between the samples by which the angles from begin to end are interpolated."""
+        for (time_s, _), masked_s in zip((self.hip, self.lean), self.masked_s, strict=True):
+            first = time_s[max(0, int(np.searchsorted(time_s, begin, side="right")) - 1)]
+            last = time_s[min(len(time_s) - 1, int(np.searchsorted(time_s, end)))]
+            if ((masked_s > first) & (masked_s < last)).any():
+                return True
+        return False
 
     def strides(self) -> list[Stride]:
-        """Every whole stride, without those that a state out of order interrupts."""
+        """Every whole stride, without those that a state out of order interrupts, and those with masked values."""
         times, states = self.state
         changes = np.flatnonzero(np.diff(states)) + 1
         order = [int(each) for each in states[changes]]
         found: list[Stride] = []
+        number = 0
         for i in range(len(changes) - len(ORDER) + 1):
             if tuple(order[i : i + len(ORDER)]) == ORDER:
                 stamps = tuple(float(each) for each in times[changes[i : i + len(ORDER)]])
-                found.append(self._stride(len(found) + 1, stamps))
+                number += 1
+                if not self.is_masked(stamps[0], stamps[-1]):
+                    found.append(self._stride(number, stamps))
         return found
 
     def _stride(self, number: int, changes_s: tuple[float, ...]) -> Stride:
@@ -130,6 +147,7 @@ def of_dataset(dataset: Dataset) -> Walk:
         (hip.time_s[sound[0]], hip.value[sound[0]]),
         (lean.time_s[sound[1]], lean.value[sound[1]]),
         (states.time_s, states.value),
+        masked_s=(hip.masked_s, lean.masked_s),
     )
 
 

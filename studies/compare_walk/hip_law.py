@@ -92,8 +92,10 @@ def pushes(walk: Walk) -> list[tuple[float, float, int]]:
 
 
 def has_gap(walk: Walk, begin: float, end: float) -> bool:
-    """Whether stamps of the angles are missing in the push or in the window about it."""
+    """Whether stamps of the angles are missing, or values masked, in the push or in the window about it."""
     reach = 0.5 * WINDOW * STEP_S
+    if walk.is_masked(begin - reach, end + reach):
+        return True
     for time_s, _ in (walk.hip, walk.lean):
         inside = time_s[(time_s > begin - reach) & (time_s < end + reach)]
         if len(inside) < 2 or np.diff(inside).max() > LONGEST_GAP_S:

@@ -34,8 +34,7 @@ def main() -> int:
     with threadpool_limits(1):
         alarms = {}
         for floor in options.floors:
-            for row in options.rows:
-                found = score.sound(row, floor, options.seed, options.sound)
+            for row, found in score.sound(options.rows, floor, options.seed, options.sound).items():
                 raised = [each for each in found if each.detected]
                 alarms[row, floor] = len(raised), len(found)
                 names = [f"{each.named.name} at {each.named.at}" if each.named else "no name" for each in raised]

@@ -44,9 +44,10 @@ def visible(row: str, floor: str, seed: int) -> dict[str, float]:
     return dict(found.smallest_visible)
 
 
-def sound(row: str, floor: str, seed: int, count: int) -> list[TwinsEvidence]:
-    """Answers about sound walks: other seeds, batteries, bodies within tolerance."""
-    return [evidence.of([as_row(recorded(each), row)])[0] for each in drawn_sound(floor, seed, count)]
+def sound(rows: Sequence[str], floor: str, seed: int, count: int) -> dict[str, list[TwinsEvidence]]:
+    """Answers by row about sound walks: other seeds, batteries, bodies within tolerance."""
+    walks = [recorded(each) for each in drawn_sound(floor, seed, count)]
+    return {row: [evidence.of([as_row(each, row)])[0] for each in walks] for row in rows}
 
 
 def drawn_sound(floor: str, seed: int, count: int) -> list[Hidden]:

@@ -73,7 +73,10 @@ class Predictor:
             error = C @ PC + output_noise[at]
             K = np.linalg.solve(error, (A @ PC + both_noise[at]).transpose(0, 2, 1)).transpose(0, 2, 1)
             self.covariance[at], self.gain[at], self.spread[at] = P, K, error
-            P = A @ P @ A.transpose(0, 2, 1) + state_noise[at] - K @ error @ K.transpose(0, 2, 1)
+            # Joseph's form: a sum of squares, which stays positive where the sensors' noise is next to nothing
+            inner, K_turned, shared = A - K @ C, K.transpose(0, 2, 1), both_noise[at] @ K.transpose(0, 2, 1)
+            P = inner @ P @ inner.transpose(0, 2, 1) + K @ output_noise[at] @ K_turned
+            P += state_noise[at] - shared - shared.transpose(0, 2, 1)
             P[:] = 0.5 * (P + P.transpose(0, 2, 1))
             self.ends[: len(at)] = P
         self.spread = np.asarray(np.linalg.cholesky(self.spread), dtype=float)

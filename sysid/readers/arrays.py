@@ -49,10 +49,17 @@ class Arrays:
             self.units[name] = unit
 
 
-def channels(dataset: Dataset, arrays: Arrays, mapping: Mapping[str, str], time_unit: str | None) -> Iterator[Column]:
+def channels(
+    dataset: Dataset,
+    arrays: Arrays,
+    mapping: Mapping[str, str],
+    time_unit: str | None,
+    rate_hz: float | None = None,
+) -> Iterator[Column]:
     """Each array at the stamps of the time that it has in its group, or of the only one of its length.
 
-    What has none is a finding. UserError for a file without a time.
+    What has none is a finding. rate_hz: of the samples of all arrays, where no time counts. UserError for a file
+    without a time.
     """
     flat = _flattened(arrays)
     columns.check_mapping(dataset, mapping, list(flat))
@@ -62,12 +69,22 @@ def channels(dataset: Dataset, arrays: Arrays, mapping: Mapping[str, str], time_
         _note(dataset, arrays, {}, [])
         return
     times = {name: value for name, value in flat.items() if _is_time(name, value, mapping)}
+    if rate_hz is not None:
+        single = {name: 1 for name, value in flat.items() if len(value) == 1}
+        kept = {name: value for name, value in flat.items() if name not in single and value.dtype.kind in "fiub"}
+        time_column.of_rate(dataset, rate_hz, list(times))
+        for name, value in kept.items():
+            yield Column(name, arrays.units.get(name, ""), np.arange(len(value)) / rate_hz, value.astype(np.float64))
+        arrays.other += [name for name in flat if name not in kept and name not in single]
+        _note(dataset, arrays, single, [])
+        return
     if not times and not arrays.own_times:
         some = ", ".join(flat)[:200] or "none with numbers"
         rising = next((name for name, value in flat.items() if len(value) > 2 and _rises(value)), "")
         raise DataError(
             f"{dataset.name}: there is no time column among {some}; "
             + (f"--map {rising}=time says which it is (it rises all the time)" if rising else "--map NAME=t_s says it")
+            + time_column.or_with_rate(arrays.path)
         )
     stamps = _stamps(dataset, arrays, times, mapping, time_unit)
     used: set[str] = set()
@@ -151,6 +168,7 @@ def _stamps(
         dataset.layout |= {"time": name} if not found else {}
         if name in dates:
             away = (dates[name] - first).astype(np.int64) * 1e-9
+            dataset.clock_is_given = True
             found[name] = np.where(np.isnat(dates[name]), np.nan, away)
             continue
         if value.dtype.kind == "m":

@@ -24,13 +24,18 @@ KINDS = {  # and the module that reads them
     "HDF5": "h5py",
     "TDMS": "nptdms",
 }
+OF_ARRAYS = ("MATLAB", "Parquet", "HDF5", "TDMS")  # which may have no time among them
 HDF5_INSIDE = b"MATLAB 7.3"  # a .mat file of this version is an HDF5 file
 ULOG_HEADER, ULOG_HEAD = 16, 3  # bytes of the file's header, and of a message's: its length, two bytes, and its type
 MOST_CELLS = 1000  # of an array of MATLAB's cells
 
 
 def read(
-    path: pathlib.Path, kind: str, mapping: Mapping[str, str] | None = None, time_unit: str | None = None
+    path: pathlib.Path,
+    kind: str,
+    mapping: Mapping[str, str] | None = None,
+    time_unit: str | None = None,
+    rate_hz: float | None = None,
 ) -> Dataset:
     """The channels of a file of one of KINDS. UserError for a file that its library cannot read, or without a time."""
     with path.open("rb") as file:
@@ -41,7 +46,7 @@ def read(
     dataset = Dataset(path.name, {})
     mapping = dict(mapping or {})
     try:
-        found = list(_columns(dataset, library, path, kind, mapping, time_unit))
+        found = list(_columns(dataset, library, path, kind, mapping, time_unit, rate_hz))
     except UserError:
         raise
     except Exception as error:  # a broken file raises many kinds of exceptions in a library
@@ -62,7 +67,13 @@ def read(
 
 
 def _columns(
-    dataset: Dataset, library: Any, path: pathlib.Path, kind: str, mapping: Mapping[str, str], time_unit: str | None
+    dataset: Dataset,
+    library: Any,
+    path: pathlib.Path,
+    kind: str,
+    mapping: Mapping[str, str],
+    time_unit: str | None,
+    rate_hz: float | None,
 ) -> Iterator[Column]:
     if kind == "ULog":
         return _ulog(dataset, library, path)
@@ -77,7 +88,7 @@ def _columns(
         hdf5.read(found, library, path, MOST_BYTES // 8)
     else:
         tdms.read(dataset, found, library, path, MOST_BYTES // 8)
-    return arrays.channels(dataset, found, mapping, time_unit)
+    return arrays.channels(dataset, found, mapping, time_unit, rate_hz)
 
 
 def _matlab(found: Arrays, library: Any, path: pathlib.Path) -> None:

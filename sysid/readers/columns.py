@@ -80,12 +80,11 @@ def add(
         raise DataError(f"{dataset.name}: two columns would be called {named.name}; --map gives one another name")
     unit = named.unit
     if named.unknown:
-        text = f"{column}: its unit {named.unknown[:40]!r} is not known (--map {column}=NAME_UNIT says it)"
+        text = f"its unit {named.unknown[:40]!r} is not known (--map {column}=NAME_UNIT says it)"
         dataset.findings.append(Finding(named.name, "unknown_unit", *ends(time_s), 0.0, "", text))
     elif unit is None:
-        dataset.findings.append(
-            Finding(named.name, "no_unit", *ends(time_s), 0.0, "", f"{column}: nothing says its unit", "note")
-        )
+        text = "nothing says its unit" if column == named.name else f"{column}: nothing says its unit"
+        dataset.findings.append(Finding(named.name, "no_unit", *ends(time_s), 0.0, "", text, "note"))
     elif not unit.is_si:
         value = value * unit.factor + unit.offset
         offset = f" {unit.offset:+g}" if unit.offset else ""

@@ -43,14 +43,15 @@ def read(
     path: str | pathlib.Path,
     mapping: Mapping[str, str] | None = None,
     time_unit: str | None = None,
+    rate_hz: float | None = None,
     assumed: Mapping[str, str] | None = None,
     progress: Progress = no_progress,
 ) -> Dataset:
     """The channels of a text table.
 
     mapping: {column in the file: name of the channel}; time_unit: of a time column whose name does not give it;
-    assumed: parts of the layout that are given (layout.KEYS). UserError for a file that is not a table with a time
-    column, or that can be read in two ways.
+    rate_hz: of the rows, in place of a time column; assumed: parts of the layout that are given (layout.KEYS).
+    UserError for a file that is not a table with a time column, or that can be read in two ways.
     """
     path = pathlib.Path(path)
     assumed = dict(assumed or {})
@@ -64,7 +65,7 @@ def read(
         marks = _marks(path, rows, progress, every=True)  # numbers that the first lines did not have
         table = _parsed(rows, marks, assumed, progress)
     _note_layout(dataset, layout, marks, rows, assumed)
-    return _channels(dataset, rows, table, dict(mapping or {}), time_unit, assumed)
+    return _channels(dataset, rows, table, dict(mapping or {}), time_unit, rate_hz, assumed)
 
 
 # --- rows ---------------------------------------------------------------------------------------------------
@@ -110,6 +111,9 @@ class _Rows:
             rows: list[list[str]] = []
             plain = '"' not in "".join(lines)
             for place, line in enumerate(lines, number):
+                if line == text_file.CONTINUED:
+                    self._count("continued")
+                    continue
                 if place < layout.first_line:
                     self._above(place, line)
                     continue
@@ -156,6 +160,11 @@ class _Rows:
             else:
                 self._count("footer")
         self._count("rows", self.kept)
+
+    def numbers(self) -> Array:
+        """The number of each row (n,) from 0, with those that are left out counted: each of them was a sample."""
+        left_out = np.searchsorted(np.array(self.ragged), self.places)
+        return np.arange(len(self.places), dtype=np.float64) + left_out
 
     def _leave_out_cut_off(self, places: list[int], rows: list[list[str]]) -> None:
         """Take out a last row without a line end whose last number has fewer decimals than all above it have."""
@@ -449,6 +458,7 @@ def _channels(
     table: list[_Column],
     mapping: dict[str, str],
     time_unit: str | None,
+    rate_hz: float | None,
     assumed: Mapping[str, str],
 ) -> Dataset:
     names = list(rows.layout.names)
@@ -458,7 +468,11 @@ def _channels(
     if not rows.layout.names_line and not any(rows.layout.above.names):
         _refuse_words(rows, table)
     lost = _left_out(dataset, rows)
-    time_columns, time_s = _time(dataset, rows, table, mapping, time_unit, assumed)
+    if rate_hz is not None:
+        time_column.of_rate(dataset, rate_hz, [each for each in names if layouts.is_time_name(mapping.get(each, each))])
+        time_columns, time_s = set[int](), rows.numbers() / rate_hz
+    else:
+        time_columns, time_s = _time(dataset, rows, table, mapping, time_unit, assumed)
     stamped = np.isfinite(time_s)
     if not stamped.all():
         places = [int(each) for each in rows.places[~stamped][:NAMED_LINES]]
@@ -585,7 +599,7 @@ def _time(
         text = f"no column has stamps: they are those of the rate above the table, {step_s:.6g} s apart"
         dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, step_s, "s", text, "note"))
         dataset.layout |= {"time": "rate", "time_unit": "s"}
-        return set(candidates), step_s * np.arange(rows.kept, dtype=np.float64)
+        return set(candidates), step_s * rows.numbers()
     month_first = {"month-first": True, "day-first": False}.get(assumed.get("dates", ""))
     candidates = candidates or _unnamed_time(dataset, rows, table, called)
     for k in candidates:
@@ -617,6 +631,7 @@ def _time(
         text += f", 0 is {np.datetime64(first_ns, 'ns')}"
     dataset.repairs.append(Repair("", "dates", len(time_ns), text))
     dataset.layout |= {"time": both, "time_unit": "dates" if with_date else "times of the day"}
+    dataset.clock_is_given = True
     if any(written[k].either_way for k in chosen):
         text = f"{both}: day and month may be either way round; --assume dates=day-first or month-first decides"
         dataset.findings.append(Finding("", "dates_either_way", 0.0, 0.0, 0.0, "", text))
@@ -657,7 +672,9 @@ def _unnamed_time(dataset: Dataset, rows: _Rows, table: list[_Column], called: S
         example = f"{names[rising[0]]}=time" if rising else "NAME=t_s"
         raise DataError(
             f"{dataset.name}: there is no time column (t_s, time_ms, timestamp_us ...) among {', '.join(names)[:200]}; "
-            f"--map {example} says which it is" + (" (it rises all the time)" if rising else "")
+            f"--map {example} says which it is"
+            + (" (it rises all the time)" if rising else "")
+            + time_column.or_with_rate(rows.path)
         )
     text = f"{names[found[0]]}: taken for the time, the only column that can be; --assume time=NAME chooses another"
     dataset.findings.append(Finding("", "time_assumed", 0.0, 0.0, 0.0, "", text))
@@ -696,8 +713,7 @@ def _counted(
             f"{dataset.name}: {name}: stamps such as {first[:40]!r} are not read (numbers, 2026-11-05 09:30:00.000, "
             "05.11.2026 09:30:00,000, 11/05/2026 09:30:00 PM, 09:30:00.000)"
         )
-    dataset.layout |= {"time": name}
-    time_s, _ = time_column.seconds(dataset, str(rows.path), name, time_s, column.whole_numbers(), unit)
     factor = f"{unit.factor:g} s" if unit is not None else "assumed"
-    dataset.layout |= {"time_unit": unit_text if said else time_unit or factor}
+    dataset.layout |= {"time": name, "time_unit": unit_text if said else time_unit or factor}
+    time_s, _ = time_column.seconds(dataset, str(rows.path), name, time_s, column.whole_numbers(), unit)
     return time_s

@@ -22,6 +22,11 @@ class Format:
     holds_frames: bool = False
     may_hold_frames: bool = False
 
+    @property
+    def has_stamps(self) -> bool:
+        """True when every file of this format has stamps."""
+        return self.name not in (TEXT_TABLE, *binary.OF_ARRAYS)
+
 
 FOLDER = Format("folder of a run")
 MDF = Format("MDF", may_hold_frames=True)
@@ -76,7 +81,7 @@ def of(path: pathlib.Path) -> Format:
     if suffix not in TEXT_ENDINGS or not _is_table(first.decode("utf-8", errors="replace")):
         if suffix in log_kinds.ENDINGS:
             return Format(log_kinds.ENDINGS[suffix], holds_frames=True)
-        if suffix in MDF_ENDINGS:
+        if suffix in MDF_ENDINGS and (suffix not in TEXT_ENDINGS or b"\0" in first):
             return MDF
         if suffix == ".mat":  # of version 4, which begins with numbers
             return Format("MATLAB")
@@ -98,19 +103,21 @@ def read(
     known: Format,
     mapping: Mapping[str, str] | None = None,
     time_unit: str | None = None,
+    rate_hz: float | None = None,
     assumed: Mapping[str, str] | None = None,
     variable_units: Mapping[str, str] | None = None,
     progress: Progress = no_progress,
 ) -> Dataset:
-    """The channels of a file without frames. variable_units: of a robot's log."""
+    """The channels of a file without frames. rate_hz: of one that may have no stamps; variable_units: of a robot's
+    log."""
     if known is FOLDER:
         return run_folder.read(path, mapping)
     if known is MDF:
         return measurement.read(path, mapping)
     if known.name in binary.KINDS:
-        return binary.read(path, known.name, mapping, time_unit)
+        return binary.read(path, known.name, mapping, time_unit, rate_hz)
     if known is LVM:
         return lvm.read(path, mapping)
     if known is ROBODAQ:
         return robodaq.read(path, mapping, variable_units)
-    return csv_file.read(path, mapping, time_unit, assumed, progress)
+    return csv_file.read(path, mapping, time_unit, rate_hz, assumed, progress)

@@ -144,7 +144,7 @@ def _bare(line: str) -> str:
 
 def is_blank(line: str) -> bool:
     """True for a line without anything but separators."""
-    return not line.strip(' \t\r,;|"')
+    return not line.strip(' \t\r\f,;|"')
 
 
 @dataclasses.dataclass
@@ -305,7 +305,6 @@ def _names(
         found.append((3.0 * named + full + known - 2.0 * are_units, place, cells))
     _refuse_second_table(path, attempt, [each for each in found if each[0] >= 3.0], run)
     if not found:
-        _refuse_long_cells(path, head)
         words = [(place, cells) for place, cells in attempt.rows if place < run and is_words(cells)]
         if words and len(words[-1][1]) > 1 and words[-1][0] == max(p for p, _ in attempt.rows if p < run):
             place, cells = words[-1]
@@ -334,13 +333,6 @@ def _names(
         (c for p, c in reversed(attempt.rows) if p < line and len(c) in (count, count - 1) and is_words(c)), []
     )
     return line + 1, line, _unique(path, line, cells, group)
-
-
-def _refuse_long_cells(path: pathlib.Path, head: list[tuple[int, str]]) -> None:
-    """UserError for a quoted cell that goes on in the next line."""
-    place = next((place for place, text in head if text.count('"') % 2), 0)
-    if place:
-        raise DataError(f"{path}:{place}: a quoted cell goes on in the next line: tables have one line for each row")
 
 
 def _counts_rows(attempt: _Attempt) -> bool:

@@ -6,6 +6,8 @@ Compressed files, files with bytes of value 0, and lines longer than LONGEST_LIN
 import codecs
 import dataclasses
 import pathlib
+import re
+from collections import deque
 from collections.abc import Iterator
 
 from ranger_sim.foundation.user_error import DataError
@@ -14,6 +16,10 @@ LONGEST_LINE = 1_000_000  # bytes; 3,000 columns of 20 digits have 60,000
 LARGEST_BYTES = 20_000_000_000
 CHUNK_BYTES = 1 << 20
 CHUNK_LINES = 20_000
+CONTINUED = "\f"  # in place of a line that is part of a quoted cell of the line above
+LONGEST_CELL = 50  # further lines; a quotation mark that is not closed within them is a character like others
+OPENING = re.compile(r'(?:^|[,;\t|]) *"')
+CONTENT = re.compile(r'(?:[^"]|"")*"(?!")')  # of a quoted cell, with the mark at its end
 COMPRESSED = {
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "a zip archive (an .xlsx is one as well)",
@@ -93,12 +99,15 @@ def _surveyed(path: pathlib.Path, file, size: int, encoding: str) -> Survey:  # 
 
 
 def chunks(path: pathlib.Path, encoding: str, most: int = CHUNK_LINES) -> Iterator[tuple[int, list[str]]]:
-    """(number of the first line, from 1; lines without their ends) of the file. UserError for a wrong encoding."""
+    """(number of the first line, from 1; lines without their ends) of the file. UserError for a wrong encoding.
+
+    A row whose quoted cell goes on in further lines is one line, with CONTINUED in place of each of these.
+    """
     number, lines = 1, []
     try:
         with path.open(encoding=encoding, newline=None) as file:
-            for line in file:
-                lines.append(line.rstrip("\n"))
+            for line in _whole_rows(each.rstrip("\n") for each in file):
+                lines.append(line)
                 if len(lines) == most:
                     yield number, lines
                     number, lines = number + most, []
@@ -108,3 +117,31 @@ def chunks(path: pathlib.Path, encoding: str, most: int = CHUNK_LINES) -> Iterat
         raise DataError(f"{path}: the table cannot be read ({error.strerror or error})") from None
     if lines:
         yield number, lines
+
+
+def _whole_rows(lines: Iterator[str]) -> Iterator[str]:
+    ahead: deque[str] = deque()
+    while (line := ahead.popleft() if ahead else next(lines, None)) is not None:
+        count, is_open = 0, '"' in line and _is_open(line, False)
+        while is_open and count < LONGEST_CELL:
+            if count == len(ahead):
+                following = next(lines, None)
+                if following is None:
+                    break
+                ahead.append(following)
+            is_open = _is_open(ahead[count], True)
+            count += 1
+        if is_open:  # to the end
+            count = 0
+        yield " ".join([line, *(ahead.popleft() for _ in range(count))])
+        yield from [CONTINUED] * count
+
+
+def _is_open(line: str, is_open: bool) -> bool:
+    """Whether a quoted cell is open at the end of a line. is_open: whether one is at its begin."""
+    at = 0
+    while True:
+        found = CONTENT.match(line, at) if is_open else OPENING.search(line, at)
+        if found is None:
+            return is_open
+        at, is_open = found.end(), not is_open

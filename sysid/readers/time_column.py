@@ -1,5 +1,9 @@
 """Stamps that are numbers, in whatever unit a file has them, as seconds."""
 
+import pathlib
+import shlex
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,9 +22,25 @@ EARLIEST_DAY, LATER_THAN_LONG = 0.01, 10.0  # parts of a day begin long after mi
 FASTEST_S = 2e-5  # a smaller step is not a machine's, but may be a spreadsheet's part of a day
 SLOWEST_S = 0.5  # as sanity.LONGEST_STEP_S: beyond it the unit is probably a smaller one
 LONGEST_S, FEWEST = 60.0, 30  # readings that a person takes one by one are fewer, and not farther apart
+CENTURIES = (18_000_101, 22_001_231)  # dates as numbers, 20261105, within which
 EPOCHS = {"seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH_YEARS_S = (631_152_000.0, 4_102_444_800.0)  # 1990 to 2100
 EPOCH_STEP_S = 2.0  # a controller's count of us since its start is a date after ten minutes, with steps of many s
+
+
+def or_with_rate(path: str | pathlib.Path) -> str:
+    """The end of an error about a file without a time: the command that reads it."""
+    command = f"ranger-sim read {shlex.quote(str(path))} --rate 100Hz"
+    return f"; or its samples come at a known rate, as 100 a second: {command}"
+
+
+def of_rate(dataset: Dataset, rate_hz: float, unused: Sequence[str] = ()) -> None:
+    """Record in a dataset that its stamps are made from a rate. unused: columns that may be times."""
+    text = f"the stamps are made from the number of the row, {1.0 / rate_hz:.6g} s apart (--rate {rate_hz:.10g}Hz)"
+    if unused:
+        text += f"; {', '.join(unused)} is a channel and not the time"
+    dataset.findings.append(Finding("", "time_of_rate", 0.0, 0.0, 1.0 / rate_hz, "s", text, "note"))
+    dataset.layout |= {"time": "row number", "rate_hz": rate_hz}
 
 
 def seconds(
@@ -37,6 +57,8 @@ def seconds(
     calendar. unit: None where nothing gives it. UserError for a unit of something else, and for stamps whose unit
     does not follow from their size.
     """
+    if unit is None and (dates := _compact_dates(dataset, name, stamps)) is not None:
+        return dates
     unit = unit or _assumed(dataset, path, name, stamps)
     if unit.numerator != ("s",) or unit.denominator:
         raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")
@@ -49,6 +71,31 @@ def seconds(
     if whole is not None and len(whole):
         return (whole - whole[0]) * unit.factor, int(whole[0]) * round(unit.factor * 1e9)
     return from_zero, round(columns.ends(time_s)[0] * 1e9)
+
+
+def _compact_dates(dataset: Dataset, name: str, stamps: Array) -> tuple[Array, int] | None:
+    """As `seconds`, of dates that are written as numbers, 20261105; None for other numbers.
+
+    They are dates where every number is a day of the calendar and more than one month is met: a counter is not.
+    """
+    good = stamps[np.isfinite(stamps)]
+    if len(good) < 2 or good.min() < CENTURIES[0] or good.max() > CENTURIES[1] or (good != np.floor(good)).any():
+        return None
+    number = good.astype(np.int64)
+    month, day = number // 100 % 100, number % 100
+    if len(np.unique(number // 100)) < 2 or month.min() < 1 or month.max() > 12 or day.min() < 1:
+        return None
+    months = (number // 10_000 - 1970).astype("M8[Y]").astype("M8[M]") + (month - 1)
+    days = months.astype("M8[D]") + (day - 1)
+    if (days.astype("M8[M]") != months).any():
+        return None
+    time_s = np.full(len(stamps), np.nan)
+    time_s[np.isfinite(stamps)] = (days - days[0]).astype(np.int64) * DAY_S
+    text = f"{name}: dates such as {number[0]} are read as seconds, 0 is {days[0]}"
+    dataset.repairs.append(Repair("", "dates", len(good), text))
+    dataset.layout |= {"time_unit": "dates"}
+    dataset.clock_is_given = True
+    return time_s, int(days[0].astype(np.int64)) * 86_400_000_000_000
 
 
 def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Unit:

@@ -24,7 +24,8 @@ SQUARES = 6  # of the first start values
 REACH = 4.0  # standard deviations of a start beyond which the map is held
 OUTSIDE = 6.0  # beyond which a step is not judged
 OF_FOOTHOLD = 3  # inputs, the last ones
-LEAST_INSIDE = 0.4  # of the steps
+NEIGHBOURS = 5  # steps on either side of one outside the map, of which
+STRAY = 0.5  # at most so many are outside as well when it is left out: more are another gait
 RIDGE = 1e-3  # of the rows
 WILD = 100.0  # deviations at which what is left is cut
 
@@ -129,6 +130,14 @@ def rest(legs: Sequence[LegMap], leg: np.ndarray, found: Array, few: bool, usabl
     if usable is not None:
         inside &= usable[1:] & usable[:-1]
         counted &= usable[1:] & usable[:-1]
-    if inside.sum() < LEAST_INSIDE * counted.sum():  # another gait: at the map's edge it still shows what is wrong
-        inside = counted
-    return Rest(np.arange(1, len(leg)), leg[1:], left, inside)
+    return Rest(np.arange(1, len(leg)), leg[1:], left, inside | _another_gait(inside, counted))
+
+
+def _another_gait(inside: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """Steps outside the map among others outside: another gait, from some step on or all the time.
+    At the map's edge they still show what is wrong; a stray step is left out."""
+    window = np.ones(2 * NEIGHBOURS + 1)
+    outside, there = (
+        np.convolve(np.pad(rows.astype(float), NEIGHBOURS), window, "valid") for rows in (counted & ~inside, counted)
+    )
+    return np.asarray(counted & (outside > STRAY * there))

@@ -149,13 +149,14 @@ def _channel(dataset: Dataset, variable: str) -> tuple[Array, Array] | None:
     if variable in dataset:
         channel = dataset[variable]
         return channel.time_s, channel.value * in_table_units(variable, channel.unit)
-    also = {"E_LO_ANGLE": "outer_leg_angle_rad", "FSM_LEG": "walk_state"}.get(variable, "")
+    wanted = {"E_LO_ANGLE": "outer_leg_angle_rad"}.get(variable, "")
     for each in EXPERIMENTS["walk"].channels:
-        for other in each.also:
-            if other.removeprefix("-") == variable or each.name == also:
-                if each.name in dataset:
-                    sign = -1.0 if other == f"-{variable}" else 1.0
-                    return dataset[each.name].time_s, sign * dataset[each.name].value
+        signs = {other.removeprefix("-"): -1.0 if other.startswith("-") else 1.0 for other in each.also}
+        if variable in signs or each.name == wanted:
+            to_name = signs.get(variable, 1.0)  # the variable's sign against the experiment's name
+            for name, sign in ((each.name, 1.0), *signs.items()):
+                if name in dataset:
+                    return dataset[name].time_s, to_name * sign * dataset[name].value
     return None
 
 

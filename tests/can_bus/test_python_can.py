@@ -486,6 +486,33 @@ def test_a_notifier_that_is_stopped_after_its_bus_is_shut_down_ends_without_an_e
         assert not notifier._readers[0].is_alive() and notifier.exception is None
 
 
+@pytest.mark.parametrize("attached", [False, True], ids=["private", "attached"])
+def test_a_recv_that_waits_for_the_lock_when_its_bus_is_shut_down_returns_none(bus, monkeypatch, attached):
+    monkeypatch.setattr(links, "RUN_OUT_S", 0.0)
+    with hosted("can1") as (name, _):
+        one = bus(f"{name}/can1", private=False) if attached else bus()
+        link, lock = one._link, one._link.changed
+        waits, may_have_it = threading.Event(), threading.Event()
+
+        class Contended:
+            def __enter__(self):
+                link.changed = lock
+                waits.set()
+                assert may_have_it.wait(60)
+                return lock.__enter__()
+
+            def __exit__(self, *raised):
+                return lock.__exit__(*raised)
+
+        link.changed = Contended()
+        thread, found = in_thread(lambda: one.recv(1.0))
+        assert waits.wait(60)
+        one.shutdown()
+        may_have_it.set()
+        thread.join(60)
+        assert found == [None]
+
+
 def test_what_arrived_is_not_read_after_the_shutdown(bus):
     a, b = bus(speed="max"), bus()
     a.send(message(1))

@@ -177,8 +177,11 @@ def test_a_program_in_c_is_reported_with_its_end_and_the_lines_that_ran():
     )
     written = []
     board = Made(out_of_process=False, write_counts=lambda: written.append(1))
-    whole = Made(firmware={"MCH": made, "MCFO": made}, deaths=[], loop=Made(board=lambda name: board))
+    programs = Made(lacks=lambda name: ("a",) if board.out_of_process else None)
+    loop = Made(board=lambda name: board)
+    whole = Made(firmware={"MCH": made, "MCFO": made}, deaths=[], loop=loop, programs_in_c=programs)
     reported = summary.firmware(whole, "MCH")
+    assert reported["confined"] == "no"
     assert (reported["name"], reported["folder"], reported["own_process"], reported["lost_s"], reported["why"]) == (
         "p",
         "f",
@@ -199,6 +202,7 @@ def test_a_program_in_c_is_reported_with_its_end_and_the_lines_that_ran():
         whole.deaths = [{"board": "MCFO", "time_s": 1.0, "why": "x"}, {"board": "MCH", "time_s": 2.0, "why": why}]
         reported = summary.firmware(whole, "MCH")
         assert (reported["own_process"], reported["lost_s"], reported["why"]) == (True, 2.0, why or None)
+        assert reported["confined"] == "partly (a)"
         assert reported["coverage"]["whole"] is whole_count
     assert written == [1]
     made.coverage = False

@@ -16,6 +16,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files, terms
 from ranger_sim.plant.mechanics.parameters import BodyParameters
 from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.sysid import dataset
 from studies.compare_walk import command, emulate, figure, gait, hip_law, naming, work
 from studies.compare_walk.candidates import BY_NAME, CANDIDATES
 
@@ -73,6 +74,21 @@ def test_a_stride_that_flight_breaks_off_is_none():
     states = np.where((times > first[2] + 0.05) & (times < first[2] + 0.1), 5, states)
     strides = gait.Walk(walk.hip, walk.lean, (times, states)).strides()
     assert [each.changes_s[0] > first[2] for each in strides] == [False, True]
+
+
+def test_nothing_is_interpolated_over_masked_values_of_a_walk():
+    walk = walk_by_hand(4)
+    second = walk.strides()[1].changes_s
+    clipped = (walk.hip[0] > second[1]) & (walk.hip[0] < second[1] + 0.03)
+    hip = dataset.Channel("hip_angle_rad", "rad", *walk.hip).without(clipped, dataset.CLIPPED)
+    lean = dataset.Channel("outer_leg_angle_rad", "rad", *walk.lean)
+    state = dataset.Channel("walk_state", "", walk.state[0], walk.state[1].astype(float))
+    masked = gait.of_dataset(dataset.Dataset("walk", {each.name: each for each in (hip, lean, state)}))
+    assert [each.number for each in masked.strides()] == [1, 3, 4]
+    assert [each.number for each in gait.steady(masked.strides())] == [3, 4]
+    begin = second[1]
+    assert hip_law.has_gap(masked, begin - 0.05, begin + 0.1) and not hip_law.has_gap(masked, begin - 0.5, begin - 0.2)
+    assert not hip_law.has_gap(walk, begin - 0.05, begin + 0.1)
 
 
 def test_steady_strides_are_the_longest_run_of_one_gait():

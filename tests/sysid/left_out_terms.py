@@ -9,6 +9,10 @@ others, whose source and licence docs/diagnose-your-machine.md lists. What is mi
 
 "seen from" is the smallest share that theory allows: sqrt(threshold + ln n) standard errors of the term, by generalised
 least squares of the whole model under an autoregression of what it leaves; nothing of the diagnosis is used for it.
+
+What is left of a term in a recording is its value there less what was taken out, and not the share of a value, which
+is an estimate itself. So "its size" is the mean of a plain and of a whitened fit to the diagnosed part, with the other
+frictions that were named in the model, less what was taken; its error has half of the difference of the two fits.
 """
 
 import argparse
@@ -172,6 +176,36 @@ class Term:
         covariance = np.linalg.inv(white[counts, :-1].T @ white[counts, :-1]) * deviation**2
         return float(value[0]), float(np.sqrt(covariance[0, 0])), int(np.sum(counts))
 
+    def left(self, share, value, others=()):
+        """(what is left of the term in the part that is diagnosed, its standard error); others: causes in the model."""
+        whole = self.source.whole
+        times, values = self.source.parts()[0]
+        angle, rate, acceleration = moved(times, values, whole)
+        s = {"t": times, "angle": angle, "rate": rate, "acceleration": acceleration, "direction": np.sign(rate)}
+        s |= values
+        columns = [self.column(angle, rate)]
+        columns += [one for name, one in whole().columns(s).items() if name not in self.parameters]
+        if self.column is _cosine:
+            columns.append(np.sin(angle))
+        for name, form, speed in others:
+            if name == "stribeck":
+                columns.append(np.sign(rate) * np.exp(-((rate / speed) ** 2)))
+            elif (name, form) in FRICTIONS:
+                columns.append(FRICTIONS[name, form](angle, rate))
+        counts = np.abs(rate) > 0.02 * np.quantile(np.abs(rate), 0.98)
+        both = np.column_stack([*columns, values[whole.response]])
+        plain = np.linalg.lstsq(both[counts, :-1], both[counts, -1], rcond=None)[0]
+        rest = np.where(counts, both[:, -1] - both[:, :-1] @ plain, 0.0)
+        past = np.column_stack([np.roll(rest, lag) for lag in range(1, ORDER + 1)])[ORDER:]
+        memory = np.linalg.lstsq(past, rest[ORDER:], rcond=None)[0]
+        white = lfilter(np.concatenate(([1.0], -memory)), [1.0], both, axis=0)
+        unbroken = np.convolve(counts, np.ones(ORDER + 1))[: len(counts)] > ORDER + 0.5
+        x, y = white[unbroken, :-1], white[unbroken, -1]
+        whitened = np.linalg.lstsq(x, y, rcond=None)[0]
+        error = np.sqrt(np.linalg.inv(x.T @ x)[0, 0]) * np.std(y - x @ whitened)
+        there = 0.5 * (plain[0] + whitened[0])
+        return float(there - (1.0 - share) * value), float(np.hypot(error, 0.5 * (plain[0] - whitened[0])))
+
     def tables(self, share, value):
         """Both parts with this share of the term left in them."""
         whole = self.source.whole
@@ -213,6 +247,13 @@ def _sign(angle, rate):
     return np.sign(rate)
 
 
+FRICTIONS = {  # of other causes that may be named: (cause, form)
+    ("drag", "square"): lambda angle, rate: rate * np.abs(rate),
+    ("drag", "cube"): lambda angle, rate: rate**3,
+    ("drag", "root"): lambda angle, rate: np.sign(rate) * np.sqrt(np.abs(rate)),
+    ("direction_friction", ""): lambda angle, rate: np.abs(rate),
+    ("spring", ""): lambda angle, rate: angle,
+}
 EMPS = Source(
     ("emps_run1.csv", "emps_run2_pulses.csv"),
     Carriage,
@@ -246,11 +287,18 @@ def row(term, share, fitted):
     named = " + ".join(each.name for each in result.causes) or ("abstains" if result.detected else "nothing")
     first = next(iter(result.causes), None)
     right = first is not None and first.name in term.names
+    others = [
+        (each.name, each.form or "", each.parameters["speed"].value if "speed" in each.parameters else 0.0)
+        for each in result.causes
+        if each is not first
+    ]
+    left, unsure = term.left(share, value, others)
     interval = ""
     if right and term.coefficient in first.parameters:
         found = first.parameters[term.coefficient]
         low, high = found.ci95
-        interval = f"{found.value:.4g} ({low:.4g} to {high:.4g})" + ("" if low <= share * value <= high else " **not**")
+        holds = abs(found.value - left) <= np.hypot(0.5 * (high - low), 1.96 * unsure)
+        interval = f"{found.value:.4g} ({low:.4g} to {high:.4g})" + ("" if holds else " **not**")
     errors = next(iter((result.evidence.held_out_errors or {}).values()), None)
     shown = f"{errors.before:.2%}, {errors.after:.2%}, {errors.black_box or 0.0:.2%}" if errors else ""
     if share == 0.0:
@@ -260,7 +308,7 @@ def row(term, share, fitted):
     cells = (
         term.title,
         f"{share:.0%}",
-        f"{share * value:.4g}",
+        f"{left:.3g} ± {unsure:.2g}",
         f"{seen:.1%}",
         verdict,
         named,

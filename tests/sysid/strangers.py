@@ -711,7 +711,7 @@ def judged(stranger: Stranger, folder: pathlib.Path) -> tuple[str, str]:
     """(verdict, reason); the verdict is MISSING where a library is not installed."""
     try:
         path = stranger.write(folder)
-    except ImportError as error:
+    except (ImportError, NotImplementedError) as error:  # python-can's for a library that lacks what it needs
         return MISSING, str(error)
     how = dict(stranger.how)
     if "databases" in how:

@@ -79,3 +79,24 @@ def test_a_recording_without_a_channel_is_a_mistake_that_names_it():
     bare = Table(0.01 * np.arange(100), {"thrust_N": np.ones(100)}, (slice(0, 100),), "bare")
     with pytest.raises(UserError, match=r"bare: thrust-stand needs command_rad_per_s \(available: thrust_N\)"):
         ThrustStand().prepare(bare)
+
+
+def test_an_inertia_is_found_where_the_rates_noise_exceeds_the_acceleration():
+    """0.2 A s^2/rad on 40 s at 500 Hz; differences of the rate have twice the size of the acceleration in noise."""
+    draw = generator(3, "noisy rate")
+    t = 0.002 * np.arange(20_000)
+    angle, rate, acceleration = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
+    for size, turn, phase in ((1.0, 2.1, 0.3), (0.4, 5.3, 1.1), (0.1, 11.7, 2.0)):
+        angle += size * np.sin(turn * t + phase)
+        rate += size * turn * np.cos(turn * t + phase)
+        acceleration -= size * turn**2 * np.sin(turn * t + phase)
+    current = 0.2 * acceleration + 0.7 * rate + 0.4 * np.sign(rate) + 0.05 * draw.normal(size=len(t))
+    columns = {
+        "angle_rad": angle + 2e-5 * draw.normal(size=len(t)),
+        "rate_rad_per_s": rate + 0.1 * draw.normal(size=len(t)),
+        "current_A": current,
+    }
+    noise = np.gradient(columns["rate_rad_per_s"], 0.002) - acceleration
+    assert np.std(noise) > 2.0 * np.std(acceleration)
+    found = diagnose(Joint(), [Table(t, columns, (slice(0, len(t)),), "noisy")]).result
+    assert found.evidence.parameters["inertia_As2_per_rad"].value == pytest.approx(0.2, rel=0.05)

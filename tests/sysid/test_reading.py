@@ -4,6 +4,7 @@ import gzip
 import json
 import math
 import re
+import shlex
 import struct
 import zlib
 
@@ -15,6 +16,7 @@ import ranger_sim
 from ranger_sim.can_bus.edge import logs
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid import sanity
 from ranger_sim.sysid.api import diagnose
 from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.machines import machine_of
@@ -184,7 +186,6 @@ def test_microseconds_since_a_controllers_start_are_not_a_date(written):
     ("text", "reason"),
     [
         (rows("{t:.3f},{v:.3f}\n").replace(".", ","), "may be decimals behind a comma, and then nothing says where"),
-        ('t_s,note,a_V\n0,"one\ntwo",1\n1,"one\ntwo",2\n', ":2: a quoted cell goes on in the next line"),
         (rows("step {k} {v:.3f}\n"), "has no names, and its column_1 holds words such as 'step'"),
         ('{"t": 0, "u": 1}\n', "this is a JSON file"),
     ],
@@ -433,6 +434,171 @@ def test_nothing_is_concluded_from_spoilt_runs_of_the_positioning_bench(kind, re
     assert main(arguments) == 2
     error = " ".join(capsys.readouterr().err.split())
     assert reason.split(" .* ")[0] in error and "nothing is concluded" in error
+
+
+@needs_data
+@pytest.mark.parametrize(("first", "second"), [(8000, 1000), (10000, 20000), (6000, 0), (15000, 7777)])
+def test_runs_of_the_positioning_bench_are_joined_wherever_they_are_cut(first, second, positioning, written):
+    names, data = positioning
+    both = np.vstack([data[:first], data[second : second + 4000]])
+    text = "".join(f"{k / 1000:.3f},{a:.6f},{b:.6f},{c:.6f}\n" for k, (_, a, b, c) in enumerate(both.tolist()))
+    (joined,) = [each for each in read(written(f"{names}\n{text}")).findings if each.kind in ("jump", "step")]
+    assert joined.kind == "jump" and joined.start_s == pytest.approx((first - 1) / 1000)
+
+
+def broken_loose(gain, spike, constant):
+    """An arm that breaks loose in one row: stamps, its angle, and a controller that answers in the same row."""
+    t = 0.01 * np.arange(2000)
+    angle = 0.3 * np.sin(0.9 * t) + 2e-4 * np.sin(1e4 * t * t)
+    angle += 0.04 * (np.arange(2000) >= 700) * np.exp(-np.maximum(t - 7.0, 0.0))
+    voltage = 0.05 * np.sin(2.7 * t) - gain * angle + np.where(np.arange(2000) == 700, spike, 0.0)
+    voltage += np.where(np.arange(2000) >= 700, constant, 0.0)
+    rows = zip(t.tolist(), angle.tolist(), voltage.tolist(), strict=True)
+    return "t_s,arm_angle_rad,drive_V\n" + "".join(f"{a:.2f},{b:.6f},{c:.6f}\n" for a, b, c in rows)
+
+
+@pytest.mark.parametrize(
+    ("gain", "spike", "constant", "kind"),
+    [
+        (0.0, -3.0, 0.0, "step"),  # the derivative's part of the controller, for one row
+        (60.0, 0.0, 0.0, "step"),  # the proportional part, which stays
+        (0.0, 0.0, -3.0, "jump"),  # the drive goes over to another course, and its steps are not the angle's
+    ],
+)
+def test_what_breaks_loose_in_one_row_is_a_finding_with_its_size_and_not_a_join(gain, spike, constant, kind, written):
+    measurement = read(written(broken_loose(gain, spike, constant)))
+    (found,) = [each for each in measurement.findings if each.kind in ("jump", "step")]
+    assert found.kind == kind and (found.start_s, found.end_s) == pytest.approx((6.99, 7.0))
+    assert len(sanity.doubts(measurement.findings)) == (kind == "jump")
+    if kind == "step":
+        assert found.channel == "arm_angle_rad" and found.size == pytest.approx(0.04, rel=0.1)
+
+
+def test_a_clock_that_steps_where_the_angle_jumps_is_a_join(written):
+    lines = broken_loose(0.0, -3.0, 0.0).splitlines()
+    late = [f"{float(line.partition(',')[0]) + 0.013:.3f},{line.partition(',')[2]}" for line in lines[701:]]
+    findings = read(written("\n".join([*lines[:701], *late, ""]))).findings
+    assert [each.kind for each in findings if each.kind in ("jump", "step")] == ["jump"]
+
+
+RATED = "a_V,b_A\n" + "".join(f"{k % 7},{k * k % 11}\n" for k in range(50))
+
+
+@pytest.mark.parametrize(("rate", "step_s"), [("100", 0.01), ("100Hz", 0.01), ("10ms", 0.01), ("2 kHz", 0.0005)])
+def test_a_table_without_a_time_gets_its_stamps_from_a_rate_and_the_ledger_says_so(rate, step_s, written, capsys):
+    path = written(RATED)
+    assert main(["read", str(path), "--rate", rate, "--json", "-"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["channels"]["a_V"]["end_s"] == pytest.approx(49 * step_s)
+    assert answer["ledger"]["stamps"].startswith("the stamps are made from the number of the row")
+
+
+def test_the_refusal_of_a_file_without_a_time_has_a_ready_command(written, tmp_path, capsys):
+    scipy.io.savemat(tmp_path / "no time.mat", {"u": np.arange(40.0) ** 2 % 11, "gain": 3.0})
+    for path in (written(RATED), tmp_path / "no time.mat"):
+        with pytest.raises(UserError, match="there is no time column") as refused:
+            read(path)
+        assert "\n" not in str(refused.value)
+        command = shlex.split(str(refused.value).rpartition("a second: ")[2])
+        assert command[:2] == ["ranger-sim", "read"] and command[-2:] == ["--rate", "100Hz"]
+        assert main(command[1:]) == 0
+    capsys.readouterr()
+
+
+def test_rows_that_are_left_out_keep_their_place_at_a_rate(written):
+    lines = RATED.splitlines()
+    lines[11] = "torn"
+    assert read(written("\n".join([*lines, ""])), rate_hz=10.0)["a_V"].time_s[9:11] == pytest.approx([0.9, 1.1])
+
+
+def test_a_time_column_is_a_channel_where_a_rate_is_given(written):
+    measurement = read(written("t_s,a_V\n" + "".join(f"{0.5 * k},{k % 7}\n" for k in range(50))), rate_hz=10.0)
+    assert set(measurement.channels) == {"t_s", "a_V"} and measurement["a_V"].time_s[-1] == pytest.approx(4.9)
+    assert "t_s is a channel and not the time" in measurement.ledger()["stamps"]
+
+
+def test_a_rate_is_refused_where_stamps_are_given(written, tmp_path):
+    (tmp_path / "a.log").write_text("(1.000000) can0 123#01\n(2.000000) can0 123#02\n")
+    with pytest.raises(UserError, match="has stamps, as every file of its format does"):
+        read(tmp_path / "a.log", rate_hz=10.0)
+    with pytest.raises(UserError, match="the stamps are those of a column already"):
+        read(written(RATED), rate_hz=10.0, time_unit="s")
+
+
+def test_a_recipe_keeps_the_rate(written, tmp_path):
+    path, recipe = written(RATED), tmp_path / "lab.toml"
+    assert main(["read", str(path), "--rate", "20ms", "--write-recipe", str(recipe)]) == 0
+    assert 'rate = "50.0 Hz"' in recipe.read_text()
+    assert read(path, recipe=recipe)["b_A"].time_s[-1] == pytest.approx(0.98)
+    recipe.write_text('rate = "0 Hz"\n')
+    with pytest.raises(UserError, match="rate is '0 Hz'; a number above 0"):
+        read(path, recipe=recipe)
+
+
+def test_a_text_with_the_ending_of_a_measurement_file_is_judged_as_a_text(tmp_path):
+    (tmp_path / "a.dat").write_text("# by region\nRegion Austria Hungary\n1891-1900 a b\nsum of all\n")
+    with pytest.raises(UserError) as refused:
+        read(tmp_path / "a.dat")
+    assert "asammdf" not in str(refused.value)
+
+
+SLOW = "time,a_V\n" + "".join(f"{k},{(k * k % 11) / 7:.3f}\n" for k in range(100))
+
+
+def test_a_time_unit_that_is_given_is_not_argued_with(written, capsys):
+    path = written(SLOW)
+    with pytest.raises(UserError, match="nothing says the unit of the stamps"):
+        read(path)
+    assert main(["read", str(path), "--time-unit", "s"]) == 0
+    assert main(["read", str(path), "--rate", "1Hz"]) == 0
+    shown = capsys.readouterr().out
+    assert "probably" not in shown and "finding" not in shown and "note: a_V: 0 to 99 s: samples are 1 s" in shown
+
+
+@pytest.mark.parametrize("line", [0, 1, 150, 199])
+def test_a_quoted_cell_of_several_lines_is_one_cell_wherever_it_is(line, written):
+    remarks = ["ok"] * 200
+    remarks[line] = '"two, and\n""three"" \nlines"'
+    text = "t_s,remark,a_V\n" + "".join(f"{0.01 * k:.2f},{each},{k}\n" for k, each in enumerate(remarks))
+    measurement = read(written(text))
+    assert measurement["a_V"].value.tolist() == list(range(200))
+    assert measurement.ledger()["lines"] == {"names": 1, "rows": 200, "continued": 2}
+
+
+def test_a_name_of_two_lines_has_its_unit(written):
+    measurement = read(written('"Time\n(s)","Speed\n(km/h)"\n' + "".join(f"{0.01 * k:.2f},36\n" for k in range(50))))
+    assert measurement["Speed_m_per_s"].value.tolist() == pytest.approx([10.0] * 50)
+
+
+def test_a_quotation_mark_that_is_not_closed_is_a_character(written):
+    rows = [f"{0.01 * k:.2f},ok,{k}\n" for k in range(200)]
+    rows[100] = '1.00,5" pipe,100\n'  # not at the cell's begin
+    rows[120] = '1.20,"lost,120\n'
+    measurement = read(written("t_s,remark,a_V\n" + "".join(rows)))
+    assert measurement["a_V"].value.tolist() == [k for k in range(200) if k != 120]
+    assert measurement.ledger()["lines"]["left out: ragged"] == 1
+
+
+def test_dates_as_numbers_are_days_of_the_calendar_and_a_counter_is_not(written):
+    week = np.datetime64("2024-02-24") + 7 * np.arange(60)
+    rows = "".join(f"{str(day).replace('-', '')},{0.1 * k:.1f}\n" for k, day in enumerate(week))
+    channel = open_recording(written("date,level_m\n" + rows))["level_m"]
+    assert channel.time_s.tolist() == [604_800.0 * k for k in range(60)]  # through a 29th of February
+    number = [int(str(day).replace("-", "")) for day in week]
+    path = written(b"", "t.mat")
+    scipy.io.savemat(path, {"date": np.array(number, dtype=float), "level_m": 0.1 * np.arange(60)})
+    assert open_recording(path, {"date": "time"})["level_m"].time_s.tolist() == [604_800.0 * k for k in range(60)]
+    counter = "".join(f"{20_260_190 + k},{0.1 * k:.1f}\n" for k in range(60))  # has a 32nd of a month
+    with pytest.raises(UserError, match="nothing says the unit of the stamps"):
+        open_recording(written("t,level_m\n" + counter))
+
+
+def test_the_unit_in_a_columns_name_is_questioned_and_dates_are_not(written):
+    (found,) = [each for each in read(written(SLOW.replace("time,", "t_s,"))).findings if each.channel == "a_V"]
+    assert found.kind == "slow_samples" and "probably in ms" in found.text and found in sanity.doubts([found])
+    rows = "".join(f"2026-11-05 09:{k // 60:02d}:{k % 60:02d},{k % 7 / 7}\n" for k in range(100))
+    (found,) = [each for each in read(written("time,a_V\n" + rows)).findings if each.kind == "slow_samples"]
+    assert found.severity == sanity.NOTE and not sanity.doubts([found])
 
 
 def prepared_run(written, names, data, **how):

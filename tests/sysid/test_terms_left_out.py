@@ -73,6 +73,32 @@ def test_a_term_too_small_for_these_data_has_its_smallest_visible_size_printed()
     assert answer["evidence"]["smallest_visible"]["gravity at angle_rad"]["cosine"] > 0.02 * abs(GRAVITY_A)
 
 
+def left_out(title, share):
+    """(causes by name, what is left of the term, its error) of a term left out."""
+    term = next(each for each in TERMS if each.title == title)
+    value, _, _ = term.fitted()
+    causes = term.diagnosed(share, value).causes
+    others = [(each.name, each.form or "", 0.0) for each in causes[1:]]
+    return causes, *term.left(share, value, others)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.2, 0.5, 1.0])
+@pytest.mark.parametrize("friction", ["viscous", "Coulomb"])
+def test_a_missing_friction_is_named_rather_than_a_curve_that_resembles_it(friction, share):
+    causes, left, error = left_out(f"joint 4, {friction} friction", share)
+    low, high = causes[0].parameters["size"].ci95
+    assert causes[0].name == f"{friction.lower()}_friction"
+    assert low - 1.96 * error < left < high + 1.96 * error
+
+
+@pytest.mark.parametrize("friction", ["viscous", "Coulomb"])
+def test_a_missing_friction_and_the_curve_of_joint_1_are_named_together(friction):
+    causes, left, error = left_out(f"joint 1, {friction} friction", 1.0)
+    low, high = causes[0].parameters["size"].ci95
+    assert [each.name for each in causes] == [f"{friction.lower()}_friction", "drag"]
+    assert low - 1.96 * error < left < high + 1.96 * error
+
+
 BY_HAND = next(each for each in TERMS if each.title == "pendulum by hand, gravity")
 
 

@@ -73,6 +73,16 @@ def test_names_of_the_experiment_are_variables_of_the_table():
     assert steps.of_dataset(Dataset("walk", channels)).count == 4
 
 
+@pytest.mark.parametrize(("name", "sign"), [("outer_leg_abs_angle_gyro_rad", 1.0), ("UI_ROLL", -1.0)])
+def test_the_leg_angle_of_a_log_of_2015_has_the_sign_of_the_tables(name, sign):
+    columns = swinging(6)
+    stamps = steps.CLOCK_S * np.arange(len(columns["MCH_ANGLE"]))
+    angle = np.linspace(-0.2, 0.3, len(stamps))
+    made = {"hip_angle_rad": columns["MCH_ANGLE"], "walk_fsm_state": columns["FSM_LEG"], name: sign * angle}
+    cut = steps.of_dataset(Dataset("walk", {each: Channel(each, "", stamps, value) for each, value in made.items()}))
+    assert cut.signals["outer leg angle"].tolist() == pytest.approx(angle.tolist())
+
+
 def test_a_link_of_50_hz_is_recognised_and_strikes_come_at_most_one_sample_late():
     columns = swinging(8)
     late = steps.by_link(columns, 10, [3, 0, 7])
@@ -180,6 +190,26 @@ def test_a_tolerance_of_sound_robots_hides_what_is_within_it(view):
     )
     leg, found = made_up(9700, moved=0.3)
     assert judged(loose, leg, found).fits[0].gain < 0.2 * judged(view, leg, found).fits[0].gain
+
+
+def inside_after(view, rows):
+    """Which of the 39 steps count when the states in which these steps start are 50 deviations away."""
+    leg, found = made_up(9400)
+    found[rows, features.NAMES.index(FEW_START[0])] += 50.0
+    return step_map.rest(view.legs, leg, found, few=True).inside
+
+
+def test_a_stray_step_outside_the_map_is_left_out(view):
+    assert inside_after(view, [20]).tolist() == [row != 20 for row in range(39)]
+
+
+def test_steps_count_that_stay_outside_the_map_from_some_step_on(view):
+    inside = inside_after(view, range(20, 40))
+    assert inside[:20].all() and inside[26:].all()  # the first ones have inside neighbours
+
+
+def test_a_walk_outside_the_map_from_its_begin_counts(view):
+    assert inside_after(view, range(40)).all()
 
 
 def test_the_trimmed_mean_is_not_moved_by_a_single_step():

@@ -105,7 +105,7 @@ def test_with_a_fault_too(hip, place, mode, parameters):
 
 def test_its_schedule_is_the_python_boards_line_by_line(hip):
     with (
-        contextlib.closing(Ranger(firmware={"MCH": hip})) as robot,
+        contextlib.closing(Ranger(firmware={"MCH": hip}, in_process=True)) as robot,
         contextlib.closing(Ranger()) as other,
     ):
         tables = [

@@ -16,6 +16,7 @@ from ranger_sim.foundation.quantities import (
     ENERGIES_WH,
     LENGTHS,
     NUMBER,
+    RATES_HZ,
     SHARES,
     SLOPES,
     TIMES,
@@ -24,7 +25,7 @@ from ranger_sim.foundation.quantities import (
 )
 
 __all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "SLOPES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
-__all__ += ["Unit", "duration_text", "figure", "length_text", "number", "quantity", "whole_number", "word"]
+__all__ += ["RATES_HZ", "Unit", "duration_text", "figure", "length_text", "number", "quantity", "whole_number", "word"]
 
 # Text of this form is a value, not an option: so `--time -1s` reaches its check (`-1` alone would by default).
 NEGATIVE_VALUE = re.compile(r"-(\.?\d|inf|nan)", re.IGNORECASE)

@@ -53,7 +53,12 @@ COVERAGE = Option(
     "lcov.info in --out",
     of_run=False,
 )
-OPTIONS = (FIRMWARE, SANITIZE, COVERAGE)
+REQUIRE_CONFINED = Option(
+    "--require-confined",
+    "run firmware in C only where its process can be confined in every way (exit code 2 otherwise)",
+    of_run=False,
+)
+OPTIONS = (FIRMWARE, SANITIZE, COVERAGE, REQUIRE_CONFINED)
 TARGETS = ("host", "lpc2194")
 EXIT_FOUND = 1
 
@@ -141,6 +146,11 @@ def programs_in(folders: list[str]) -> list[sanitizers.Program]:
         for folder in dict.fromkeys(folders)
         for library in (pathlib.Path(folder) / "build").glob("*-sanitize*.so")
     ]
+
+
+def confined_lines(summary: dict) -> list[str]:
+    """How each program in C was confined, and what that lacks."""
+    return [f"{board}: {each['name']}: confined: {each['confined']}" for board, each in summary["firmware"].items()]
 
 
 def coverage_lines(summary: dict) -> list[str]:

@@ -15,6 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import sanity
 from ranger_sim.sysid.dataset import Array, Channel, Finding
 from ranger_sim.sysid.reading import Measurement
+from ranger_sim.tools.read.findings import lines_of
 from ranger_sim.tools.report.figures import OUTER, Figure, finished, library
 
 HERE = pathlib.Path(__file__).parent
@@ -37,8 +38,7 @@ def page(found: list[Measurement]) -> str:
     recordings = [
         {
             "name": each.dataset.name,
-            "findings": each.findings,
-            "proposals": each.proposals,
+            "findings": lines_of(each),
             "lines": each.ledger()["lines"],
             "figures": [_figure(channel, each) for channel in list(each.channels.values())[:MOST_CHANNELS]],
             "more": max(0, len(each.channels) - MOST_CHANNELS),

@@ -17,6 +17,7 @@ from ranger_sim.sysid.reading import Measurement, inspected
 from ranger_sim.sysid.recipe import Recipe
 from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file
+from ranger_sim.tools.read.findings import called, lines_of
 from ranger_sim.tools.recordings import datasets
 
 EXIT_REFUSED = 2
@@ -92,24 +93,8 @@ def show(measurement: Measurement, console: Console) -> None:
     if len(answer["channels"]) > MOST_CHANNELS:
         console.print(f"and {len(answer['channels']) - MOST_CHANNELS} more channels (--json has all)")
     _show_ledger(measurement, console)
-    of_channels: dict[tuple[str, str], list[str]] = {}  # what all channels of a time base have is one line
-    for each in sorted(measurement.findings, key=lambda finding: finding.severity == sanity.NOTE):
-        place = f"{each.start_s:.6g} to {each.end_s:.6g} s: " if each.end_s > each.start_s else ""
-        mark = "note" if each.severity == sanity.NOTE else "finding"
-        of_channels.setdefault((mark, place + each.text), []).append(each.channel)
-    for repair in measurement.proposals:
-        residual = "" if repair.residual is None else f", residual {repair.residual:.3g} {repair.unit}".rstrip()
-        share = f", {measurement.share_of(repair):.2%} of its samples" if repair.count else ""
-        option = f" ({repair.option})" if repair.option else ""
-        of_channels.setdefault(("proposal", repair.text + residual + share + option), []).append(repair.channel)
-    for (mark, text), names in of_channels.items():
-        console.print(printable(f"{mark}: {_named(names, ': ')}{text}"), soft_wrap=True)
-
-
-def _named(names: list[str], behind: str) -> str:
-    """Channels by name, the first of them where there are many; empty for the recording as a whole."""
-    called = ", ".join(name for name in names[:3] if name)
-    return called + (f" and {len(names) - 3} more" if len(names) > 3 else "") + (behind if called else "")
+    for mark, text in lines_of(measurement):
+        console.print(printable(f"{mark}: {text}"), soft_wrap=True)
 
 
 def _show_ledger(measurement: Measurement, console: Console) -> None:
@@ -117,6 +102,8 @@ def _show_ledger(measurement: Measurement, console: Console) -> None:
     if ledger["lines"]:
         parts = ", ".join(f"{count} {kind}" for kind, count in ledger["lines"].items() if count)
         console.print(printable(f"lines: {sum(ledger['lines'].values())} = {parts}"), soft_wrap=True)
+    if ledger["stamps"]:
+        console.print(printable(f"stamps: {ledger['stamps']}"), soft_wrap=True)
     alike: dict[str, list[str]] = {}
     for name, account in ledger["channels"].items():
         if account["left_out"]:
@@ -126,7 +113,7 @@ def _show_ledger(measurement: Measurement, console: Console) -> None:
             )
             alike.setdefault(f"{account['read']} read, {account['kept']} kept, left out: {reasons}", []).append(name)
     for text, names in alike.items():
-        console.print(printable(f"samples of {_named(names, '') or 'no channel'}: {text}"), soft_wrap=True)
+        console.print(printable(f"samples of {called(names) or 'no channel'}: {text}"), soft_wrap=True)
 
 
 def plot(found: list[Measurement], path: pathlib.Path) -> None:

@@ -9,7 +9,7 @@ from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import columns, layout
 from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 from ranger_sim.sysid.reading import open_recording
-from ranger_sim.tools.command_line.units import SHARES, quantity
+from ranger_sim.tools.command_line.units import RATES_HZ, SHARES, quantity
 
 __all__ = ["add_accept_loss", "add_options", "how_of", "open_recording", "open_with"]
 
@@ -30,6 +30,13 @@ def add_options(command: Any) -> None:
         "--bus", action="append", default=[], metavar="NAME", help="read the frames of this bus only (repeatable)"
     )
     command.add_argument("--time-unit", metavar="ms", help="of a time column whose name does not say it")
+    command.add_argument(
+        "--rate",
+        type=quantity(RATES_HZ, "Hz", above=0.0),
+        metavar="100Hz",
+        help="of the samples, or the time between two (10ms): the stamps are made from the number of the row, for a "
+        "file without a time",
+    )
     command.add_argument(
         "--assume",
         action="append",
@@ -65,6 +72,7 @@ def how_of(options: Any) -> dict[str, Any]:
         "mapping": columns.mapping_of(options.map),
         "databases": options.dbc,
         "time_unit": options.time_unit,
+        "rate_hz": options.rate,
         "buses": options.bus,
         "assume": layout.assumptions(options.assume),
         "recipe": options.recipe,

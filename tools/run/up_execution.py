@@ -17,6 +17,7 @@ from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.processes import places
 from ranger_sim.harness.processes.hardware import HardwareInTheLoop
 from ranger_sim.harness.processes.lateness import figures
+from ranger_sim.harness.processes.modes import InProcess
 from ranger_sim.harness.processes.outside import move_bus
 from ranger_sim.harness.processes.plant_process import PlantRun, sent_away
 from ranger_sim.harness.processes.supervisor import Supervisor
@@ -77,7 +78,7 @@ class Execution:
         images = images_of(options)
         with (
             walk.printed_by(firmware, console) as self.printed,
-            # in_process: the supervisor gives every board its process
+            # mode: the supervisor gives every board its process
             contextlib.closing(
                 Ranger(
                     plan.scenario,
@@ -85,9 +86,10 @@ class Execution:
                     plan.quirks,
                     plan.profile,
                     firmware,
-                    in_process=True,
                     images=images,
                     printed=self.printed,
+                    mode=InProcess(),
+                    require_confined=options.require_confined,
                 )
             ) as robot,
         ):

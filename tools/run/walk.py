@@ -31,7 +31,13 @@ from ranger_sim.tools.command_line import interrupts, libraries, streams, termin
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.command_line.units import duration_text, figure, length_text
 from ranger_sim.tools.firmware import gdb_options
-from ranger_sim.tools.firmware.command import coverage_lines, folders_of, run_sanitized, wants_another_process
+from ranger_sim.tools.firmware.command import (
+    confined_lines,
+    coverage_lines,
+    folders_of,
+    run_sanitized,
+    wants_another_process,
+)
 from ranger_sim.tools.firmware.images import images_of
 from ranger_sim.tools.run import serial_options, unexpected
 from ranger_sim.tools.run.folder import LCOV, REPORT, SUMMARY, RunFolder
@@ -118,7 +124,16 @@ def run_scenario(scenario: Scenario, stop: StopRule, options: argparse.Namespace
         printed_by(firmware, console) as printed,
         contextlib.closing(
             Ranger(
-                scenario, log, quirks, profile, firmware, options.in_process, images, options.board_deadline, printed
+                scenario,
+                log,
+                quirks,
+                profile,
+                firmware,
+                options.in_process,
+                images,
+                options.board_deadline,
+                printed,
+                require_confined=options.require_confined,
             )
         ) as robot,
     ):
@@ -383,7 +398,7 @@ def print_summary(summary: dict, floor_friction: float, console: Console) -> Non
     console.print(energy_text(summary), highlight=False, soft_wrap=True)
     for fault in summary["faults"]:
         console.print(faults.fault_text(fault), highlight=False, soft_wrap=True)
-    for line in coverage_lines(summary):
+    for line in (*confined_lines(summary), *coverage_lines(summary)):
         console.print(line, highlight=False, soft_wrap=True)
     for line in [*unexpected.lines(summary, floor_friction), *usual_lines(summary["errors"], summary["time_s"])]:
         console.print(line, highlight=False, soft_wrap=True)

@@ -1,0 +1,82 @@
+"""A user's machine has its channels by its own names and in its own units, whatever the file calls them."""
+
+import pathlib
+import re
+
+import numpy as np
+import pytest
+
+from ranger_sim.foundation.user_error import DataError
+from ranger_sim.sysid import api
+from ranger_sim.sysid.channels import named_by
+from ranger_sim.sysid.machine import Quantity
+from ranger_sim.sysid.reading import open_recording
+
+ROWS = 60
+
+
+def _recording(tmp_path, header, values, **how):
+    time_s = 0.01 * np.arange(ROWS)
+    path = tmp_path / "run.csv"
+    np.savetxt(path, np.column_stack((time_s, values)), delimiter=",", header=f"time_s,{header}", comments="")
+    return open_recording(path, **how)
+
+
+@pytest.mark.parametrize("header", ["speed_rad_s", "speed (rad/s)", "speed_rad_per_s", "speed [rad*s^-1]"])
+@pytest.mark.parametrize("name", ["speed_rad_s", "speed", "speed_rad_per_s"])
+def test_a_speed_is_found_by_either_spelling_of_its_unit(tmp_path, header, name):
+    made = named_by(_recording(tmp_path, header, np.arange(ROWS)), [Quantity(name, "rad/s", "")])
+    assert made[name].value.tolist() == list(range(ROWS))
+    assert list(made.channels) == [name]
+
+
+def test_a_name_given_on_the_command_line_is_the_machines(tmp_path):
+    made = _recording(tmp_path, "n [rpm]", np.full(ROWS, 60.0), mapping={"n [rpm]": "speed_rad_s"})
+    made = named_by(made, [Quantity("speed_rad_s", "rad/s", "")])
+    assert made["speed_rad_s"].value == pytest.approx(2.0 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "factor"),
+    [("angle_rad", "deg", 180.0 / np.pi), ("angle_deg", "deg", 1.0), ("angle [rev]", "deg", 360.0)],
+)
+def test_a_machine_in_degrees_has_degrees(tmp_path, header, unit, factor):
+    made = named_by(_recording(tmp_path, header, np.arange(ROWS)), [Quantity("angle_deg", unit, "")])
+    assert made["angle_deg"].value == pytest.approx(factor * np.arange(ROWS))
+    assert made["angle_deg"].unit == "deg"
+    assert made.repairs[-1].text.endswith("is called angle_deg, in deg")
+
+
+def test_kelvin_and_celsius_differ_by_their_zero(tmp_path):
+    recording = _recording(tmp_path, "plate_C", np.full(ROWS, 20.0) + np.arange(ROWS))
+    made = named_by(recording, [Quantity("plate_K", "K", "")])
+    assert made["plate_K"].value[0] == pytest.approx(293.15)
+
+
+def test_a_channel_in_another_kind_of_unit_is_refused_by_both_names(tmp_path):
+    recording = _recording(tmp_path, "torque_Nm", np.arange(ROWS), mapping={"torque_Nm": "current"})
+    with pytest.raises(DataError, match=r"current.* is in N m, current of the machine in A"):
+        named_by(recording, [Quantity("current", "A", "")])
+
+
+def test_channels_without_a_unit_and_channels_of_no_quantity_stay_as_they_are(tmp_path):
+    recording = _recording(tmp_path, "load,spare_V", np.column_stack((np.arange(ROWS), np.arange(ROWS))))
+    made = named_by(recording, [Quantity("load", "N m", "")])
+    assert set(made.channels) == {"load", "spare_V"}
+    assert not made.repairs
+
+
+def test_the_machine_of_the_page_finds_the_channels_that_it_names(tmp_path):
+    page = pathlib.Path(__file__).parents[2] / "docs" / "diagnose-your-machine.md"
+    block = re.search(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    written = {}
+    exec(block[1], written)  # noqa: S102 - the page's own example, as a reader would type it
+    time_s = 0.01 * np.arange(2000)
+    voltage, speed = np.sign(np.sin(1.3 * time_s)), np.zeros(2000)
+    for row in range(1999):  # 5 rad/s^2/V and 1/s, solved exactly while the voltage is held
+        speed[row + 1] = 5.0 * voltage[row] + (speed[row] - 5.0 * voltage[row]) * np.exp(-0.01)
+    path = tmp_path / "disc.csv"
+    table = np.column_stack((time_s, voltage, speed + 0.01 * np.sin(0.1 * np.arange(2000) ** 2)))
+    np.savetxt(path, table, delimiter=",", header="time_s,voltage_V,speed_rad_s", comments="")
+    found = api.diagnose(path, written["Disc"]())
+    assert not found.causes
