@@ -792,7 +792,8 @@ class Bus:
 
     def _set_going(self, node: Node, time) -> None:
         """A node off the bus waits for its recessive sequences from `time` (ns) on."""
-        node.start_joining(self.aligned(self.bit_of(time) + 1))
+        first: cython.longlong = self.bit_of(time) + 1
+        node.start_joining(first + (self.free_bit - first) % self.bit_ticks)  # as the nominal bits around it
         self.joining += 1
         if self.disturbed and self.bit_level.join(node, node.join_from) & MET_JOIN:
             self._join(node, self.bit_level.bit)

@@ -3,11 +3,12 @@
 Nodes behave as those of `bit_oracle`; here are what CAN FD adds to them, and bits of two lengths. A node's bit has a
 start and a sample point; with the level it samples there it decides how long the rest of the bit is. Where nodes are
 out of step, after an error in a data phase, an edge from recessive to dominant begins the bit of every node that is
-outside of a frame, and nodes that are all idle are in step again.
+outside of a frame, and nodes that are all idle are in step again. A node that integrates counts its recessive bits from
+every such edge on.
 """
 
 from . import bit_oracle, fd_oracle
-from .bit_oracle import DOMINANT, FRAME, IDLE, INTERMISSION, RECESSIVE, SUSPEND, crc15
+from .bit_oracle import DOMINANT, FRAME, IDLE, INTEGRATING, INTERMISSION, RECESSIVE, SUSPEND, crc15
 
 
 class Reception:
@@ -170,7 +171,7 @@ class Node(bit_oracle.Node):
 
     @property
     def at_rest(self):
-        return self.state in (IDLE, SUSPEND, bit_oracle.OFF, bit_oracle.BUS_OFF)
+        return self.state in (IDLE, SUSPEND, INTEGRATING, bit_oracle.OFF, bit_oracle.BUS_OFF)
 
     @property
     def away(self):
@@ -187,6 +188,7 @@ class Bus:
         self.nodes, self.nominal, self.data = nodes, nominal, data
         self.windows = []
         self.tick = 0
+        self.joining = []  # [(first tick, node)]: programs have asked, and the node has had no bit since
         self.level = RECESSIVE
         self.on_sample = lambda node, end: None
 
@@ -194,9 +196,12 @@ class Bus:
         """Up to the first bit that begins at or after `until`; `before` is called with the tick of every such start."""
         while True:
             starts = [node.next_start for node in self.nodes if node.next_start is not None]
+            if not starts and self.joining:  # alone: the bits of an idle bus
+                starts = [self.tick + -(-(self.joining[0][0] - self.tick) // self.nominal[0]) * self.nominal[0]]
             if not starts or min(starts) >= until:
                 return
             self.tick = min(starts)
+            self.begin_joining()
             if all(node.at_rest for node in self.nodes):
                 for node in self.nodes:
                     if not node.away:
@@ -204,6 +209,18 @@ class Bus:
             before(self.tick)
             self.start()
             self.sample_all()
+
+    def begin_joining(self):
+        """A node's first bit begins with a nominal one of another node that is on the bus, if there is one."""
+        others = [node for node in self.nodes if not node.away]
+        if others and not any(node.next_start == self.tick and not node.fast for node in others):
+            return
+        for entry in [entry for entry in self.joining if entry[0] <= self.tick]:
+            self.joining.remove(entry)
+            node = entry[1]
+            if node.state in (bit_oracle.OFF, bit_oracle.BUS_OFF):
+                node.join()
+                node.next_start = self.tick
 
     def start(self):
         began = False
@@ -220,9 +237,12 @@ class Bus:
         level = min(node.on_wire for node in self.nodes)
         if level < self.level:
             for node in self.nodes:
-                outside = node.state in (IDLE, SUSPEND) or (node.state == INTERMISSION and node.count == 2)
-                if outside and node.start < self.tick:
+                outside = node.state in (IDLE, SUSPEND, INTEGRATING)
+                outside |= node.state == INTERMISSION and node.count == 2
+                if outside and node.start < self.tick and not node.away:
                     self.begin_bit(node)
+                    if node.state == INTEGRATING:
+                        node.recessive = 0
         self.level = level
 
     def decide(self, node):

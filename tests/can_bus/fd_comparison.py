@@ -4,12 +4,14 @@
 how many differ.
 """
 
+import collections
 import dataclasses
 import sys
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.fd_frame import LENGTHS, PHASE_MASK, PHASE_SHIFT, fd_wire, length_code, phases
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
+from ranger_sim.can_bus.node import OPERATING, RESET
 from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_STATUS,
@@ -33,7 +35,11 @@ BITRATE = 500_000
 # data rates and what they make of a bus: ticks per second, ticks of a nominal and of a data bit, with sample points
 RATES = {2_000_000: (40_000_000, (80, 64), (20, 16)), 5_000_000: (100_000_000, (200, 160), (20, 16))}
 BITS = 3000  # nominal ones, of a scenario
-KINDS = ("clean", "equal", "passive", "errors", "equal-errors", "errors-passive", "noise", "off", "classic", "non-iso")
+RECOVERY_BITS = 3 * 128 * 11  # of one with a way back from bus-off on a busy bus
+KINDS = (
+    "clean", "equal", "passive", "errors", "equal-errors", "errors-passive", "noise", "off", "classic", "non-iso",
+    "resets", "recovery",
+)  # fmt: skip
 
 
 def random_fd_frame(rng):
@@ -93,7 +99,8 @@ def compare_fd_frames(count):
 @dataclasses.dataclass(frozen=True)
 class Scenario:
     """`requests`: (time in ns, node, frame of either kind). `counters`: (transmit errors, receive errors) of each node
-    at the start. `inverted`: times in ns from which every node samples inverted for a nominal bit. `classic`: nodes."""
+    at the start. `inverted`: times in ns from which every node samples inverted for a nominal bit. `classic`: nodes.
+    `modes`: (time in ns, node, RESET or OPERATING), what programs ask for."""
 
     nodes: int
     data_bitrate: int
@@ -102,10 +109,12 @@ class Scenario:
     inverted: tuple
     classic: tuple
     iso: bool
+    bits: int = BITS
+    modes: tuple = ()
 
     @property
     def end_ns(self):
-        return BITS * 10**9 // BITRATE
+        return self.bits * 10**9 // BITRATE
 
 
 def random_scenario(rng, kind):
@@ -143,6 +152,23 @@ def random_scenario(rng, kind):
     if kind == "off":
         counters = [(rng.choice((0, 240, 248, 250, 255)), rng.choice((0, 0, 127))) for _ in range(count)]
         inverted = [rng.number(2 * bit_ns, last) for _ in range(rng.number(2, 12))]
+    modes = []
+    bits = RECOVERY_BITS if kind == "recovery" else BITS
+    if kind == "recovery":  # one node goes bus-off at its next error, and its program lets it return
+        counters = [(250 if node == 0 else 0, 0) for node in range(count)]
+        inverted = [rng.number(20 * bit_ns, last) for _ in range(rng.number(1, 3))]
+        modes = [(rng.number(900, 1500) * bit_ns + rng.number(0, bit_ns), 0, OPERATING)]
+    if kind == "resets":  # before the first frame: ours completes a plain one that is under way
+        for node in range(count):
+            if rng.chance(0.7):
+                modes.append((0, node, RESET))
+                modes.append((rng.number(2, 1500 * bit_ns), node, OPERATING))
+    if modes:
+        for _ in range(rng.number(5, 40)):
+            node = rng.number(0, count - 1)
+            frame = dataclasses.replace(random_fd_frame(rng), buffer=rng.number(1, 3))
+            requests.append((rng.number(2, (bits - 400) * bit_ns), node, frame))
+        requests.sort(key=lambda each: each[:2])
     return Scenario(
         count,
         rng.choice(tuple(RATES)),
@@ -151,6 +177,8 @@ def random_scenario(rng, kind):
         tuple(sorted(set(inverted))),
         classic,
         kind != "non-iso",
+        bits,
+        tuple(sorted(modes)),
     )
 
 
@@ -184,8 +212,12 @@ def run_on_our_bus(scenario, steps=None):
         bus.advance(until)
         now = until
 
-    for time, node, frame in scenario.requests:
+    for time, node, frame in sorted(scenario.modes + scenario.requests, key=lambda each: each[0]):
         advance(time)
+        if isinstance(frame, int):
+            bus.set_mode(node, frame, time)
+            accepted.append((time, node, frame))
+            continue
         if isinstance(frame, oracle.FdFrame):
             done = bus.request_fd(node, frame.buffer, time, frame.identifier, fd_flags_of(frame), frame.data)
         else:
@@ -230,17 +262,27 @@ def on_the_oracle(scenario, accepted):
         node.tec, node.rec = transmit_errors, receive_errors
         node.passive = max(transmit_errors, receive_errors) >= 128
         counters[node.name] = [(-1, transmit_errors, receive_errors)]
-    for time, number, frame in accepted:
-        nodes[number].waiting.append((time // step + 1, frame))
     wire = fd_bus_oracle.Bus(nodes, nominal, data)
+    for time, number, frame in accepted:
+        if frame == RESET:
+            nodes[number].leave()
+            nodes[number].next_start = None
+        elif frame == OPERATING:
+            wire.joining.append((time // step + 1, nodes[number]))
+    requests = collections.deque(each for each in accepted if not isinstance(each[2], int))
     wire.windows = [(time // step, time // step + nominal[0]) for time in scenario.inverted]
 
     def note(node, end):
         if node.tec < 256 and end * step < scenario.end_ns:
             counters[node.name].append((end * step, node.tec, node.rec))
 
+    def ask(tick):
+        while requests and requests[0][0] // step < tick:
+            time, number, frame = requests.popleft()
+            nodes[number].waiting.append((time // step + 1, frame))
+
     wire.on_sample = note
-    wire.run(scenario.end_ns // step)
+    wire.run(scenario.end_ns // step, ask)
     outcome = Outcome([], [], [])
     for node in nodes:
         seen = []

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from ranger_sim.can_bus.bit_timing import BitTiming
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.node import PASSIVE_LIMIT, RESET
+from ranger_sim.can_bus.node import BUS_OFF, OPERATING, PASSIVE_LIMIT, RESET
 from ranger_sim.can_bus.rewiring import Cut, set_rate_of
 from ranger_sim.can_bus.tampering import Loss, tampering_of
 from ranger_sim.foundation.events import (
@@ -191,6 +191,43 @@ def test_one_lone_node_gets_no_acknowledgement(fd):
     assert fd.bus.nodes[0].transmit_errors == 128 and not fd.of(0, "done")
 
 
+# ---- nodes that leave and join
+
+
+@pytest.mark.parametrize("disturbed", [False, True])
+def test_a_node_that_joins_in_a_data_phase_does_not_take_it_for_an_idle_bus(fd, disturbed):
+    """The bytes 0x77 have an edge each fourth data bit, which is one nominal bit: samples at the nominal rate are all
+    recessive. The node counts from each edge on, so it joins with the intermission and receives what follows: the next
+    frame, or the same one again where an inverted bit has made the bus pass bit by bit."""
+    fd.bus.set_mode(2, RESET, 0)
+    fd.send(0, 0x100, FAST | 15, b"\x77" * 64, time=100)
+    fd.bus.advance(100)
+    if disturbed:
+        fd.bus.inject_error_at(150 * BIT_NS)
+    fd.bus.set_mode(2, OPERATING, 40 * BIT_NS)
+    fd.send(1, 0x101, FAST | 15, b"\x77" * 64, time=100_000)
+    fd.bus.advance(10**7)
+    assert [message[1] for message in fd.of(2, "rx")] == ([0x100, 0x101] if disturbed else [0x101])
+    assert [message[1] for message in fd.of(1, "rx")] == [0x100]
+    assert fd.bus.nodes[2].receive_errors == 0
+
+
+def test_a_node_comes_back_from_bus_off_after_128_sequences_on_an_idle_bus(fd):
+    fd.bus.nodes[0].transmit_errors = 250
+    fd.bus.nodes[0].passive = True
+    fd.bus.inject_errors(1)
+    fd.send(0, 0x100, FAST | 8, bytes(8))
+    fd.bus.advance(10**6)
+    assert fd.bus.nodes[0].mode == BUS_OFF
+    asked = 10**6 // BIT_NS * BIT_NS + BIT_NS // 2
+    fd.bus.set_mode(0, OPERATING, asked)
+    fd.bus.advance(10**7)
+    [joined] = [time for time, transmit_errors, _ in fd.of(0, "status") if transmit_errors == 0]
+    recovery = 128 * 11 * BIT_NS
+    assert asked + recovery < joined <= asked + BIT_NS + recovery
+    assert fd.bus.nodes[0].mode == OPERATING and fd.bus.nodes[0].transmit_errors == 0
+
+
 # ---- misuse
 
 
@@ -265,6 +302,9 @@ def test_the_scenarios_hold_what_they_are_for():
     clean = [each for outcome in outcomes("clean") for seen in outcome.seen for each in seen]
     assert sum(len(each) > 2 and bool(each[3] & FLAG_BRS) for each in clean) > 3 * SEEDS
     assert sum(len(each) > 2 and len(each[4]) > 16 for each in clean) > SEEDS
+    back = [scenario.modes[0][0] for scenario in (comparison.scenario_of("recovery", seed) for seed in range(SEEDS))]
+    later = [outcome.seen[0][-1:] for outcome in outcomes("recovery")]
+    assert sum(bool(seen) and seen[0][0] > time for seen, time in zip(later, back, strict=True)) > SEEDS // 2
     for kind, counter in (("equal", 1), ("classic", 2)):
         passive = [max(each[counter] for node in outcome.counters for each in node) for outcome in outcomes(kind)]
         assert sum(peak >= PASSIVE_LIMIT for peak in passive) > SEEDS // 5, kind
