@@ -63,20 +63,20 @@ if TYPE_CHECKING:
 class BitLevel:
     """The medium access of all nodes (`machines`, by node number) and the bus between them.
 
-        `bit`: the next one to pass; `first_bit`: the start of this stretch. `quiet`: number of recessive bits passed last;
-        `levels`: of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been
-        recessive for long enough; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
-        `received_bit`: the bit after which a listening node had a frame, `sent_bit`: after which a transmitter was done.
-        `in_error`: an error frame is under way, which began in the frame of `error_begun`; `counted`: the bus has counted
-        it. `tampering`: what faults do to frames (`tampering.py`), or None. `bitrate`: of the bus.
+    `bit`: the next one to pass; `first_bit`: the start of this stretch. `quiet`: number of recessive bits passed last;
+    `levels`: of the bits passed since the last open one. `at_rest`: no node is in a frame, and the bus has been
+    recessive for long enough; `away`: some are in reset or bus-off. `aborting`: rows whose frame shall not be repeated.
+    `received_bit`: the bit after which a listening node had a frame, `sent_bit`: after which a transmitter was done.
+    `in_error`: an error frame is under way, which began in the frame of `error_begun`; `counted`: the bus has counted
+    it. `tampering`: what faults do to frames (`tampering.py`), or None. `bitrate`: of the bus.
 
-        A CAN FD bus (`is_timed`) has bits of two lengths, and after an error in a data phase its nodes are no longer in
-        step: each has its own start of bit and sample point, in ticks (`timing`). `bit` is then the tick at which the next
-        bits of some nodes begin; a sample point at the start of another node's bit comes first. `level`: on the bus, since
-        the last edge; `quiet_from`: the tick since which it is recessive; `levels`: edges (tick, level) since the last open
-        bit; `inverted_until`: the end of an inversion. A node that is idle, joins, or is in the last bit of intermission
-        synchronises to an edge from recessive to dominant: its bit begins there, and one that joins counts its recessive bits
-    anew. No node does so within a frame.
+    A CAN FD bus (`is_timed`) has bits of two lengths, and after an error in a data phase its nodes are no longer in
+    step: each has its own start of bit and sample point, in ticks (`timing`). `bit` is then the tick at which the next
+    bits of some nodes begin; a sample point at the start of another node's bit comes first. `level`: on the bus, since
+    the last edge; `quiet_from`: the tick since which it is recessive; `levels`: edges (tick, level) since the last open
+    bit; `inverted_until`: the end of an inversion. A node that is idle, joins, or is in the last bit of intermission
+    synchronises to an edge from recessive to dominant: its bit begins there, and one that joins counts its recessive
+    bits anew. No node does so within a frame.
     """
 
     machines: list
