@@ -266,6 +266,19 @@ def _bits_of(value: int, count: int) -> list[int]:
     return [value >> position & 1 for position in range(count - 1, -1, -1)]
 
 
+def fd_worst_case_phases(flags: int, iso: bool = True) -> tuple[int, int]:
+    """(nominal bits, data bits) of a frame with these flags, each with the most stuff bits it can have; see `phases`.
+
+    No frame lasts longer, because a data bit is not longer than a nominal one.
+    """
+    whole = fd_worst_case_bits(flags, iso)
+    if not flags & FLAG_BRS:
+        return whole, 0
+    slow = EXTENDED_UP_TO_BRS if flags & FLAG_EXTENDED else BASE_UP_TO_BRS
+    slow += (slow - 2) // (STUFF_AFTER - 1) + TAIL_BITS - 1
+    return slow, whole - slow
+
+
 def fd_worst_case_bits(flags: int, iso: bool = True) -> int:
     """The most bits, nominal and data together, that a frame with these flags has on the wire; see `phases`."""
     bits = (EXTENDED_UP_TO_BRS if flags & FLAG_EXTENDED else BASE_UP_TO_BRS) + ESI_AND_CODE
