@@ -23,6 +23,7 @@ from ranger_sim.datatable.model import (
     LIMITS,
     LONGEST_NAME,
     MAIN_BRAIN,
+    PROCESSORS,
     ROLES,
     ROUTER,
     TYPES,
@@ -248,6 +249,10 @@ def board_of(
     occasional_row = None
     if occasional:
         occasional_row = reader.take_whole("occasional_row", 0, max(0, len(rows) - 1))
+    processor = reader.take("processor", str, "")
+    clock_hz = reader.take_whole("clock_hz", 0, 10**10, 0)
+    if firmware and processor:
+        _check_processor(processor, clock_hz, report)
     board = Board(
         name=name,
         number=reader.take_whole("number", 0, 63),
@@ -257,8 +262,8 @@ def board_of(
         buses=buses,
         controller=controller,
         ribbon=ribbon,
-        processor=reader.take("processor", str, ""),
-        clock_hz=reader.take_whole("clock_hz", 0, 10**10, 0),
+        processor=processor,
+        clock_hz=clock_hz,
         sends_itself=reader.take_names("sends_itself", []),
         slot_us=slot_us,
         every=every,
@@ -268,6 +273,18 @@ def board_of(
     )
     reader.finish()
     return board
+
+
+def _check_processor(processor: str, clock_hz: int, report: Callable[[str, str], None]) -> None:
+    """Report a processor without a model, and a clock above its highest one."""
+    if processor not in PROCESSORS:
+        report(
+            "processor",
+            f"no model of {shown(processor)} (available: {', '.join(PROCESSORS)}); without the key the board has the "
+            "LPC2194's devices at any clock_hz",
+        )
+    elif clock_hz > PROCESSORS[processor]:
+        report("clock_hz", f"is {clock_hz}, above the {PROCESSORS[processor]} Hz of an {processor}")
 
 
 def line_of_table(text: str, name: str) -> int:

@@ -21,6 +21,9 @@ LIMITS = {
 COMPUTER = "PC"  # the board that publishes parameters
 ROUTER, MAIN_BRAIN = "router", "main brain"
 ROLES = ("satellite", ROUTER, MAIN_BRAIN, "computer")
+# Models of processors that a board with firmware may name, and their highest clocks in Hz (user manuals UM10114 and
+# UM10326). Without a name it has the LPC2194's devices at any clock.
+PROCESSORS = {"LPC2194": 60_000_000, "LPC2194/01": 60_000_000, "LPC3250": 208_000_000}
 
 
 @dataclasses.dataclass(frozen=True)

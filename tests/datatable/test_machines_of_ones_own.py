@@ -69,3 +69,17 @@ def test_c_dbc_and_catalogue_are_made_of_it_and_nothing_that_needs_a_main_brain(
 def test_parts_that_do_not_belong_together_are_reported(tmp_path, boards, rows, rule):
     with pytest.raises(TableError, match=rule):
         table(tmp_path, boards, rows)
+
+
+def test_a_processor_without_a_model_and_a_clock_above_its_highest_are_refused(tmp_path):
+    """The LPC2194's user manual allows 60 MHz. Without a processor any clock is taken."""
+    at = "slot_us = 1000\nrows = [["
+    unknown = BOARDS.replace(at, 'processor = "STM32F4"\nclock_hz = 168_000_000\n' + at, 1)
+    with pytest.raises(TableError, match=r"boards.toml:5 ARM processor: no model of 'STM32F4' \(available: LPC2194, "):
+        table(tmp_path, unknown)
+    fast = unknown.replace("STM32F4", "LPC2194")
+    with pytest.raises(TableError, match="boards.toml:5 ARM clock_hz: is 168000000, above the 60000000 Hz of an LPC2194"):
+        table(tmp_path, fast)
+    assert table(tmp_path, fast.replace('processor = "LPC2194"\n', "")).board("ARM").clock_hz == 168_000_000
+    elsewhere = unknown.replace("firmware = true", "firmware = false", 1)  # a board that runs somewhere else
+    assert table(tmp_path, elsewhere).board("ARM").processor == "STM32F4"
