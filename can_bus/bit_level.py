@@ -277,6 +277,23 @@ class BitLevel:
         brs, delimiter = (fields.index(FIELD_BRS), fields.index(FIELD_CRC_DELIMITER)) if switches else (-1, -1)
         return self.timing.offset(place, brs, delimiter)
 
+    def ticks_of(self, row, places) -> list:
+        """Ticks from the start of the frame in `row` to bits of it; after the first place an error frame may follow.
+
+        `places`: one bit, or two: an error, and a bit of its error flag.
+        """
+        if not self.is_timed:
+            return list(places)
+        first = self.tick_of(row, places[0])
+        found = [first]
+        timing = self.timing
+        bit_end = self.tick_of(row, places[0] + 1)
+        if bit_end - first == timing.data:  # the flag follows at the nominal rate, from the sample point on
+            bit_end = first + timing.data_sample + timing.nominal - timing.sample
+        for place in places[1:]:
+            found.append(bit_end + (place - places[0] - 1) * timing.nominal)
+        return found
+
     def _hit_frame(self, row, bit) -> None:
         """On a CAN FD bus: plan the bit of the frame in `row`, which begins at `bit`, that is to be inverted."""
         flags = self.buffers.rows[row + FLAGS]

@@ -55,6 +55,17 @@ class BitTiming:
         self.sample = round(sample_point * self.nominal)
         self.data_sample = round(data_sample_point * self.data)
 
+    def at_rates(self, bitrate, data_bitrate) -> "BitTiming":
+        """The timing of a node of this bus whose rates are wrong (0: right), with bits of whole ticks and these sample
+        points."""
+        wrong: BitTiming = BitTiming("", self.rate // self.nominal, self.rate // self.data)
+        wrong.rate = self.rate
+        wrong.nominal = round(self.rate / bitrate) if bitrate else self.nominal
+        wrong.data = round(self.rate / data_bitrate) if data_bitrate else self.data
+        wrong.sample = round(self.sample * wrong.nominal / self.nominal)
+        wrong.data_sample = round(self.data_sample * wrong.data / self.data)
+        return wrong
+
     def offset(self, place, brs, delimiter) -> int:
         """Ticks from the start of a frame to the start of its bit `place`.
 

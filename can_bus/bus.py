@@ -613,9 +613,7 @@ class Bus:
         self._aim()
 
     def tamper(self, tampering) -> None:
-        """Let faults affect frames from now on (`tampering.Tampering`); None: no longer. UserError on a CAN FD bus."""
-        if tampering is not None:
-            self.check_classic("faults of frames")
+        """Let faults affect frames from now on (`tampering.Tampering`); None: no longer."""
         self.tampering = tampering
         self.bit_level.tampering = tampering
         self._aim()

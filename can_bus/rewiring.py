@@ -42,29 +42,41 @@ def plug(bus: Any, node: int, time: int) -> None:
         bus.recompute_next()
 
 
-def check_rate(bus: Any, rate: int, where: str) -> None:
-    """Raise UserError, naming `where`, for a rate (bit/s) too close to that of `bus`, or too far from it."""
-    off = abs(rate / bus.bitrate - 1.0)
-    if not (off >= LEAST_MISMATCH and bus.bitrate <= MOST_TIMES * rate <= MOST_TIMES**2 * bus.bitrate):
+def check_rate(bus: Any, rate: int, where: str, right: int = 0) -> None:
+    """Raise UserError, naming `where`, for a rate (bit/s) too close to the bit rate of `bus`, or too far from it.
+
+    `right`: to be compared with in its place.
+    """
+    right = right or bus.bitrate
+    off = abs(rate / right - 1.0)
+    if not (off >= LEAST_MISMATCH and right <= MOST_TIMES * rate <= MOST_TIMES**2 * right):
         raise BusError(
-            f"{where}: {rate} bit/s must be {LEAST_MISMATCH:.0%} off {bus.bitrate} at least, because synchronisation"
+            f"{where}: {rate} bit/s must be {LEAST_MISMATCH:.0%} off {right} at least, because synchronisation"
             f" makes up for less, and {MOST_TIMES} times off at most"
         )
 
 
-def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
-    """Set a controller's bit rate to `rate` bit/s from `time` (ns) on; 0: the bus's.
+def set_rate_of(bus: Any, node: int, rate: int, time: int, data_rate: int = 0) -> None:
+    """Set a controller's bit rate to `rate` bit/s from `time` (ns) on; 0: the bus's. `data_rate`: of a CAN FD bus.
 
     That takes a reset, because CxBTR can be written in reset mode only: waiting frames are answered with TX_ABORTED.
-    UserError for a rate that is too close, or too far off.
+    UserError for a rate that is too close, or too far off. On a CAN FD bus its bits are whole ticks of the bus.
     """
     controller = bus.nodes[node]
-    bus.check_classic("nodes at a wrong bit rate")
+    where = f"bus {bus.name}, {controller.name}"
+    if data_rate and not bus.is_fd:
+        raise BusError(f"{where}: a classic bus has no data bit rate")
     if rate:
-        check_rate(bus, rate, f"bus {bus.name}, {controller.name}")
+        check_rate(bus, rate, where)
+    if data_rate:
+        check_rate(bus, data_rate, f"{where}, data phase", bus.data_bitrate)
     takes_part = controller.mode in (OPERATING, JOINING)
     bus._reset(controller, time)
-    bus.bit_level.machines[node].own_rate = rate
+    machine = bus.bit_level.machines[node]
+    if bus.is_fd:
+        machine.timing = bus.timing.at_rates(rate, data_rate)
+    else:
+        machine.own_rate = rate
     if takes_part:
         bus._set_going(controller, time)
     bus.recompute_next()

@@ -6,7 +6,6 @@ from typing import Any
 
 from ranger_sim.firmware_sim.peripherals import adc_external
 
-
 DEFAULT_HZ = 60_000_000  # the most that an LPC2194 allows (user manual UM10114), as on the robot
 
 

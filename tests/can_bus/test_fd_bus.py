@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from ranger_sim.can_bus.bit_timing import BitTiming
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.node import BUS_OFF, OPERATING, PASSIVE_LIMIT, RESET
-from ranger_sim.can_bus.rewiring import Cut, set_rate_of
-from ranger_sim.can_bus.tampering import Loss, tampering_of
+from ranger_sim.can_bus.rewiring import Cut
 from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_STATUS,
@@ -256,11 +255,7 @@ def test_a_classic_bus_refuses_fd_frames_and_classic_nodes():
     assert not bus.is_fd and bus.data_bitrate == 0
 
 
-def test_faults_that_are_modelled_on_classic_buses_only_are_refused(fd):
-    with pytest.raises(BusError, match="faults of frames exist on classic buses only"):
-        tampering_of(fd.bus).add(Loss(1))
-    with pytest.raises(BusError, match="nodes at a wrong bit rate exist on classic buses only"):
-        set_rate_of(fd.bus, 1, 400_000, 0)
+def test_a_cut_wire_is_modelled_on_classic_buses_only_and_refused(fd):
     with pytest.raises(BusError, match="cut wires exist on classic buses only"):
         Cut(fd.bus, 1).part(0)
 
