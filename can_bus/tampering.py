@@ -7,7 +7,7 @@ Errors have the names of FMI-LS-BUS: BIT, BIT_STUFFING, FORM, CRC, ACK, BROKEN_E
 misread a bit sees the error first and signals it: its error is primary. Errors that others see because of its error
 flag are secondary.
 
-CAN FD buses have the same faults; BRS is one of its own: a node that misreads that bit receives at the wrong rate.
+CAN FD buses have the same faults, and one more: a node that misreads BRS receives at the wrong rate.
 """
 
 from collections import Counter
@@ -265,7 +265,8 @@ class Misreading(Tamper):
 
     def frame_begins(self, level: Any, row: int, bit: int) -> None:
         node = level.machines[self.node].node
-        places = places_of_error(self.error, self.of_sender, *level.buffers.wire(row), node.fdf, node.iso)
+        bits, fields = level.buffers.wire(row)
+        places = places_of_error(self.error, self.of_sender, bits, fields, node.fdf, node.iso)
         if not places or node.mode != OPERATING:
             self.unfit += 1
             self.hit = False
