@@ -155,7 +155,9 @@ class Decoded:
 
     def note(self) -> str:
         """What is missing, as text."""
-        return self.missing + (f" CAN FD frames ({self.fd_frames}) are shown as channels only." if self.fd_frames else "")
+        return self.missing + (
+            f" CAN FD frames ({self.fd_frames}) are shown as channels only." if self.fd_frames else ""
+        )
 
 
 def profile_of(folder: pathlib.Path) -> str | None:
