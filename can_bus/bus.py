@@ -269,11 +269,6 @@ class Bus:
         """Whether a classic node on a CAN FD bus will disturb FD frames."""
         return any(node.fdf == FDF_REFUSED for node in self.nodes)
 
-    def check_classic(self, what) -> None:
-        """Raise UserError, naming `what`, on a CAN FD bus."""
-        if self.timing.is_fd:
-            raise BusError(f"bus {self.name}: {what} exist on classic buses only, and this is a CAN FD bus")
-
     def set_classic(self, node, classic=True) -> None:
         """Let a node of a CAN FD bus know classic frames only (or FD frames again).
 
@@ -476,8 +471,6 @@ class Bus:
         """
         if flags & FLAG_ESI:
             flags |= ESI_REQUESTED
-        elif flags & ESI_REQUESTED:  # as `take_out` returned it
-            flags &= ~ESI_REQUESTED
         data = bytes(data)
         if flags & FLAG_FD and not flags & FLAG_REMOTE:
             expected = fd_data_length(flags)
@@ -798,12 +791,19 @@ class Bus:
         self._note_changes()
 
     def take_out(self, node, time) -> list:
-        """Take the requests that wait at a node, neither lost nor answered: (buffer, identifier, flags, lo, hi)."""
+        """Take the requests that wait at a node, neither lost nor answered: (buffer, identifier, flags, lo, hi).
+
+        `hi` of a CAN FD frame holds all bytes from the fifth on.
+        """
         waited = []
         for row in self.buffers.waiting_of(node):
             rows = self.buffers.rows
-            frame = rows[row + IDENTIFIER], rows[row + FLAGS], rows[row + LOW], rows[row + HIGH]
-            waited.append((row >> BUFFER_SHIFT & BUFFER_MASK, *frame))
+            identifier, flags, hi = rows[row + IDENTIFIER], rows[row + FLAGS], rows[row + HIGH]
+            if flags & FLAG_FD:
+                hi = int.from_bytes(self.buffers.payloads[row][4:], "little")
+                requested = FLAG_ESI if flags & ESI_REQUESTED else 0  # without the one that its own state shows
+                flags = flags & ~(FLAG_ESI | ESI_REQUESTED) | requested
+            waited.append((row >> BUFFER_SHIFT & BUFFER_MASK, identifier, flags, rows[row + LOW], hi))
             self.bit_level.forget(row)
             self.buffers.remove(row)
             self.buffers.rows[row + FREE_AT] = time

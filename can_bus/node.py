@@ -212,6 +212,7 @@ class Node:
         self.listening = other.listening
         self.silent = other.silent
         self.off_ns = other.off_ns
+        self.fdf = other.fdf
 
     def start_joining(self, bit) -> None:
         """Wait from `bit` on: after reset for one recessive sequence, after bus-off for its recovery."""

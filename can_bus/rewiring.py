@@ -6,7 +6,9 @@ Everything here takes effect between two bits that are decided: a plain frame un
 from typing import Any
 
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.fd_frame import LONGEST, fd_data_length
 from ranger_sim.can_bus.node import JOINING, OPERATING, UNPLUGGED
+from ranger_sim.foundation.events import FLAG_FD
 from ranger_sim.foundation.user_error import BusError
 
 # A rate for which synchronisation compensates is not a fault: bits of ten time quanta with a jump width of two tolerate
@@ -94,10 +96,12 @@ class Cut:
         self.far: Any = None
 
     def part(self, time: int) -> Any:
-        """Cut at `time` (ns); returns `far`. UserError on a CAN FD bus."""
-        self.bus.check_classic("cut wires")
+        """Cut at `time` (ns); returns `far`."""
         bus, controller = self.bus, self.bus.nodes[self.node]
-        self.far = far = Bus(f"{bus.name} behind the cut", bus.bitrate, log_capacity=0)
+        timing = bus.timing
+        points = timing.sample / timing.nominal, timing.data_sample / timing.data
+        rates = {"data_bitrate": bus.data_bitrate, "sample_point": points[0], "data_sample_point": points[1]}
+        self.far = far = Bus(f"{bus.name} behind the cut", bus.bitrate, log_capacity=0, iso=bus.iso, **rates)
         far.add_node(controller.name, controller.inbox, controller.controller, controller.order)
         _move(bus, self.node, far, 0, time)
         return far
@@ -121,4 +125,8 @@ def _move(source: Any, place: int, target: Any, to: int, time: int) -> None:
         after.mode = mode
         target.recompute_next()
     for buffer, identifier, flags, low, high in waited:
-        target.request(to, buffer, time, identifier, flags, low, high)
+        if flags & FLAG_FD:
+            data = (low | high << 32).to_bytes(LONGEST, "little")[: fd_data_length(flags)]
+            target.request_fd(to, buffer, time, identifier, flags, data)
+        else:
+            target.request(to, buffer, time, identifier, flags, low, high)

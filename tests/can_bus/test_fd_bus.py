@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from ranger_sim.can_bus.bit_timing import BitTiming
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.node import BUS_OFF, OPERATING, PASSIVE_LIMIT, RESET
-from ranger_sim.can_bus.rewiring import Cut
 from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_STATUS,
@@ -253,11 +252,6 @@ def test_a_classic_bus_refuses_fd_frames_and_classic_nodes():
     with pytest.raises(BusError, match="all nodes of a classic bus are classic"):
         bus.set_classic(0)
     assert not bus.is_fd and bus.data_bitrate == 0
-
-
-def test_a_cut_wire_is_modelled_on_classic_buses_only_and_refused(fd):
-    with pytest.raises(BusError, match="cut wires exist on classic buses only"):
-        Cut(fd.bus, 1).part(0)
 
 
 def test_two_words_are_enough_for_a_request_of_eight_bytes(fd):

@@ -5,7 +5,7 @@ import pytest
 from ranger_sim.can_bus import rewiring, tampering
 from ranger_sim.can_bus.frame import FIELD_ACK_SLOT, FIELD_CRC_DELIMITER
 from ranger_sim.can_bus.node import OPERATING
-from ranger_sim.foundation.events import FLAG_FD
+from ranger_sim.foundation.events import FLAG_ESI, FLAG_FD
 from ranger_sim.foundation.user_error import BusError
 
 from .test_fd_bus import BIT_NS, FAST, FdBus
@@ -194,3 +194,49 @@ def test_the_places_of_errors_are_in_the_data_phase():
         ("ACK", True, fields.index(FIELD_ACK_SLOT)),
     ):  # fmt: skip
         assert tampering.places_of_error(error, of_sender, bits, fields) == [place]
+
+
+def test_a_cut_leaves_each_side_alone_and_a_mended_cable_carries_what_waited():
+    """As on a classic bus (test_tampering.py); what waited has all its bytes."""
+    fd = FdBus()
+    cut = rewiring.Cut(fd.bus, 2)
+    fd.send(2, 0x10, FAST | 15, bytes(range(64)), time=100)
+    far = cut.part(200)
+    assert (far.data_bitrate, far.timing.sample, far.timing.data_sample) == (2_000_000, 64, 16)
+    fd.send(0, 0x20, FAST | 9, bytes(12), time=300)
+    for until in range(0, 200 * MS, MS):
+        fd.bus.advance(until)
+        far.advance(until)
+    assert [frame[1] for frame in fd.of(1, "rx")] == [0x20] and fd.of(2, "rx") == []
+    assert far.nodes[0].transmit_errors == 128 and far.nodes[0].mode == OPERATING
+    cut.mend(200 * MS)
+    fd.bus.advance(1000 * MS)
+    assert [frame[1:] for frame in fd.of(0, "rx")] == [(0x10, FAST | FLAG_ESI | 15, bytes(range(64)))]
+    assert fd.bus.nodes[2].transmit_errors == 127 and far.buffers.waiting_count == 0
+
+
+def test_a_frame_that_waited_at_a_cut_shows_the_error_state_of_its_sender_when_it_is_sent():
+    """Passive when it was offered, active when the wire is mended; a gateway's ESI remains."""
+    fd = FdBus()
+    cut = rewiring.Cut(fd.bus, 2)
+    far = cut.part(200)
+    far.nodes[0].transmit_errors, far.nodes[0].passive = 128, True
+    far.request_fd(0, 1, 300, 0x10, FAST | 8, bytes(8))
+    far.request_fd(0, 2, 300, 0x11, FAST | FLAG_ESI | 8, bytes(8))
+    far.advance(MS)  # no node acknowledges
+    far.nodes[0].forgive()
+    cut.mend(2 * MS)
+    fd.bus.advance(10 * MS)
+    assert [frame[1:3] for frame in fd.of(0, "rx")] == [(0x10, FAST | 8), (0x11, FAST | FLAG_ESI | 8)]
+
+
+def test_a_classic_node_behind_a_cut_remains_one():
+    fd = FdBus()
+    fd.bus.set_classic(2)
+    cut = rewiring.Cut(fd.bus, 2)
+    far = cut.part(200)
+    with pytest.raises(ValueError, match="node 0 is a classic node"):
+        far.request_fd(0, 1, 300, 0x10, FAST | 9, bytes(12))
+    cut.mend(400)
+    with pytest.raises(ValueError, match="node 2 is a classic node"):
+        fd.send(2, 0x10, FAST | 9, bytes(12), time=500)
