@@ -2,7 +2,8 @@
 
 A message set is simulated twice: at its critical instant (the whole level of the second lowest priority is released at
 once, just after the longest frame of lower priority has started, every frame as long as stuffing makes it) and at
-random (phases, jitters and contents). Functions return figures; nothing is printed.
+random (phases, jitters and contents). Functions return figures; nothing is printed. With data rates the bus is a CAN FD
+bus, and most frames are of CAN FD.
 """
 
 from __future__ import annotations
@@ -13,20 +14,24 @@ import functools
 import heapq
 from collections.abc import Callable, Sequence
 
-from ranger_sim.can_bus.bounds import Bound, Message, level_of, message, response_times, utilisation
+from ranger_sim.can_bus.bounds import Bound, Message, Rates, level_of, message, response_times, utilisation
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.frame import INTERMISSION_BITS, frame_bits, worst_case_bits
+from ranger_sim.can_bus.fd_frame import LONGEST, PHASE_MASK, PHASE_SHIFT, fd_data_length, fd_worst_case_phases, phases
+from ranger_sim.can_bus.frame import INTERMISSION_BITS, LENGTH_CODE, frame_bits, worst_case_bits
 from ranger_sim.can_bus.transmit_buffers import BUFFERS
-from ranger_sim.foundation.events import CAN_TX_DONE, FLAG_EXTENDED, NEVER, STAGE_BUS, EventQueue
+from ranger_sim.foundation.events import CAN_TX_DONE, FLAG_BRS, FLAG_EXTENDED, FLAG_FD, NEVER, STAGE_BUS, EventQueue
 from ranger_sim.foundation.random_stream import RandomStream
 
 BIT_RATES = (125_000, 250_000, 500_000, 1_000_000, 3_000_000)
+DATA_RATES = {125_000: 500_000, 250_000: 2_000_000, 500_000: 2_000_000, 1_000_000: 5_000_000}  # by the nominal one
+LONGEST_FD = FLAG_FD | FLAG_EXTENDED | LENGTH_CODE
 LEAD_NS = 1  # the blocking frame is requested this long before the start that the others miss
 
 
 @dataclasses.dataclass(frozen=True)
 class Sender:
-    """A message of a set with what it sends: identifier, flags, and the words of its longest content."""
+    """A message of a set with what it sends: identifier, flags, and the words of its longest content (`hi` of CAN FD:
+    all bytes from the fifth on)."""
 
     message: Message
     identifier: int
@@ -43,20 +48,37 @@ def longest_content(identifier: int, flags: int) -> tuple[int, int]:
     of its eight phases is tried, with every value of the first byte (the identifier decides how the run begins) and
     some of the last (for the CRC).
     """
-    best, words = -1, (0, 0)
+    best, words = (-1, -1), (0, 0)
+    length = LONGEST if flags & FLAG_FD else 8
+    most = fd_worst_case_phases(flags) if flags & FLAG_FD else (worst_case_bits(flags), 0)
     for phase in range(8):
         pattern = (0x0F0F >> phase) & 0xFF
-        body = int.from_bytes(bytes([pattern] * 8), "little")
+        body = int.from_bytes(bytes([pattern] * length), "little") & ~(0xFF << 8 * (length - 1))
         for first in (pattern, *(0xFF >> n for n in range(9)), *(0xFF << n & 0xFF for n in range(1, 8))):
             for last in (pattern, 0x00, 0xFF, 0x3C, 0xC3, 0x78, 0x87):
-                value = body & ~0xFF & ((1 << 56) - 1) | first | last << 56
+                value = body & ~0xFF | first | last << 8 * (length - 1)
+                if flags & FLAG_FD:  # the last byte is the last one that is sent
+                    value &= (1 << 8 * fd_data_length(flags)) - 1
                 lo, hi = value & 0xFFFFFFFF, value >> 32
-                bits = frame_bits(identifier, flags, lo, hi)
+                bits = bits_of(identifier, flags, lo, hi)
                 if bits > best:
                     best, words = bits, (lo, hi)
-        if best == worst_case_bits(flags):
+        if best == most:
             break
     return words
+
+
+def bits_of(identifier: int, flags: int, lo: int, hi: int) -> tuple[int, int]:
+    """(nominal bits, data bits) of a frame, intermission not included."""
+    if not flags & FLAG_FD:
+        return frame_bits(identifier, flags, lo, hi), 0
+    packed = phases(identifier, flags, data_of(flags, lo, hi))
+    return packed & PHASE_MASK, packed >> PHASE_SHIFT
+
+
+def data_of(flags: int, lo: int, hi: int) -> bytes:
+    """The data of a CAN FD frame."""
+    return (lo | hi << 32).to_bytes(LONGEST, "little")[: fd_data_length(flags)]
 
 
 class _Lane:
@@ -93,6 +115,7 @@ def play(
     bit_rate: int,
     releases: Sequence[Sequence[tuple[int, int]]],
     contents: Callable[[int], tuple[int, int]] | None = None,
+    data_bit_rate: int = 0,
 ) -> list[int]:
     """Play a set on a bus; the longest response of each message in ns, 0 where none was released.
 
@@ -100,7 +123,7 @@ def play(
     instances queued while an earlier one waits follow in order. Messages of one queue share two buffers, which are
     filled as they become free. `contents(message)`: words of its next frame.
     """
-    bus = Bus("bounds", bit_rate, log_capacity=0)
+    bus = Bus("bounds", bit_rate, log_capacity=0, data_bitrate=data_bit_rate)
     lanes, nodes = lanes_of([sender.message for sender in senders])
     inboxes = [EventQueue(16) for _ in range(nodes + 1)]  # the last node only receives
     for n, inbox in enumerate(inboxes):
@@ -127,7 +150,10 @@ def play(
                 index, buffer = lane.waiting.popleft(), lane.free.pop()
                 one = senders[index]
                 lo, hi = (one.lo, one.hi) if contents is None else contents(index)
-                bus.request(lane.node, buffer, time, one.identifier, one.flags, lo, hi)
+                if one.flags & FLAG_FD:
+                    bus.request_fd(lane.node, buffer, time, one.identifier, one.flags, data_of(one.flags, lo, hi))
+                else:
+                    bus.request(lane.node, buffer, time, one.identifier, one.flags, lo, hi & 0xFFFFFFFF)
                 loaded[lane.node, buffer] = index
         for n, inbox in enumerate(inboxes):
             while inbox.take():
@@ -141,7 +167,7 @@ def play(
 
 
 def critical_releases(
-    senders: Sequence[Sender], place: int, bit_rate: int, busy_ns: int
+    senders: Sequence[Sender], place: int, bit_rate: int, busy_ns: int, data_bit_rate: int = 0
 ) -> list[list[tuple[int, int]]]:
     """Releases at the critical instant of message `place` for a busy period.
 
@@ -153,7 +179,8 @@ def critical_releases(
     level = level_of(messages[place], messages)
     start = -(-100 * 10**9 // bit_rate)  # an edge: frames queued then take part from the next one on
     lower = [i for i, m in enumerate(messages) if m.key > level and m.offset_ns is None]
-    longest = max(lower, key=lambda i: messages[i].bits, default=-1)
+    rates = Rates(bit_rate, data_bit_rate)
+    longest = max(lower, key=lambda i: rates.length(messages[i]), default=-1)
     releases: list[list[tuple[int, int]]] = []
     for index, one in enumerate(messages):
         if one.key > level and one.offset_ns is None:  # a train keeps its offsets, independent of its frames' levels
@@ -173,12 +200,15 @@ def critical_releases(
     return releases
 
 
-def random_set(stream: RandomStream) -> tuple[list[Sender], int]:
+def random_set(stream: RandomStream, fd: bool = False) -> tuple[list[Sender], int]:
     """A message set and its bit rate: 2 to 12 messages, 20 to 95 % of the bus in the worst case.
 
     In a quarter of the sets some messages share first-in-first-out queues, in another the first half is a train.
+    `fd`: for a CAN FD bus, whose data rate is that of DATA_RATES; three quarters of its frames are of CAN FD.
     """
-    bit_rate = BIT_RATES[stream.integer(len(BIT_RATES))]
+    bit_rates = tuple(DATA_RATES) if fd else BIT_RATES
+    bit_rate = bit_rates[stream.integer(len(bit_rates))]
+    rates = Rates(bit_rate, DATA_RATES[bit_rate] if fd else 0)
     count = 2 + stream.integer(11)
     load = 0.2 + 0.75 * stream.uniform()
     shares = [0.1 + stream.uniform() for _ in range(count)]
@@ -190,18 +220,21 @@ def random_set(stream: RandomStream) -> tuple[list[Sender], int]:
     senders = []
     for index, share in enumerate(shares):
         flags = stream.integer(9) | (FLAG_EXTENDED if stream.integer(4) == 0 else 0)
+        if fd and stream.integer(4):
+            flags = flags & ~LENGTH_CODE | FLAG_FD | stream.integer(16) | (FLAG_BRS if stream.integer(4) else 0)
         identifier = stream.integer(1 << 29 if flags & FLAG_EXTENDED else 0x7F0)
         while identifier in used:
             identifier += 1
         used.add(identifier)
-        bits = worst_case_bits(flags) + INTERMISSION_BITS
-        period = int(bits * 1e9 / bit_rate * sum(shares) / (share * load))
+        length_ns = rates.length(message("", identifier, 1, flags)) / rates.rate
+        period = int(length_ns * sum(shares) / (share * load))
         jitter = stream.integer(period) if with_jitter and stream.integer(2) else 0
         queue = queues[stream.integer(len(queues))]
         offset = None
         if kind == 1 and index < count // 2:  # one frame per slot, anywhere in it; some every other cycle only
             # as many frames as if each had the worst of the periods: at most the target load
-            cycle = cycle or int(160 * 1e9 / bit_rate * sum(shares) / (min(shares[: count // 2]) * load))
+            most_ns = rates.length(message("", 0, 1, LONGEST_FD)) / rates.rate if fd else 160 * 1e9 / bit_rate
+            cycle = cycle or int(most_ns * sum(shares) / (min(shares[: count // 2]) * load))
             slot = cycle // (count // 2)
             period = cycle * (1 + stream.integer(2))
             offset, jitter, queue = index * slot, slot if with_jitter else 0, "train"
@@ -232,10 +265,11 @@ def random_releases(senders: Sequence[Sender], stream: RandomStream, length_ns: 
 
 def lengths_as_sent(senders: Sequence[Sender]) -> list[Message]:
     """The messages with the actual lengths of their contents instead of the longest possible ones."""
-    return [
-        dataclasses.replace(s.message, bits=frame_bits(s.identifier, s.flags, s.lo, s.hi) + INTERMISSION_BITS)
-        for s in senders
-    ]
+    found = []
+    for sender in senders:
+        bits, data_bits = bits_of(sender.identifier, sender.flags, sender.lo, sender.hi)
+        found.append(dataclasses.replace(sender.message, bits=bits + INTERMISSION_BITS, data_bits=data_bits))
+    return found
 
 
 @dataclasses.dataclass
@@ -268,10 +302,12 @@ class Figures:
         return found
 
 
-def check_set(senders: Sequence[Sender], bit_rate: int, stream: RandomStream, figures: Figures) -> list[Bound]:
+def check_set(
+    senders: Sequence[Sender], bit_rate: int, stream: RandomStream, figures: Figures, data_bit_rate: int = 0
+) -> list[Bound]:
     """One set at every message's critical instant and at random, added to `figures`; returns its bounds."""
-    bounds = response_times([sender.message for sender in senders], bit_rate)
-    as_sent = response_times(lengths_as_sent(senders), bit_rate)
+    bounds = response_times([sender.message for sender in senders], bit_rate, data_bit_rate=data_bit_rate)
+    as_sent = response_times(lengths_as_sent(senders), bit_rate, data_bit_rate=data_bit_rate)
     figures.sets += 1
     figures.messages += len(senders)
 
@@ -285,7 +321,8 @@ def check_set(senders: Sequence[Sender], bit_rate: int, stream: RandomStream, fi
             figures.unbounded += 1
             continue
         figures.later_instances += bound.instance > 0
-        worst = play(senders, bit_rate, critical_releases(senders, place, bit_rate, bound.busy_ns))
+        releases = critical_releases(senders, place, bit_rate, bound.busy_ns, data_bit_rate)
+        worst = play(senders, bit_rate, releases, data_bit_rate=data_bit_rate)
         hold(worst, bounds)
         hold(worst, as_sent)
         if not any(sender.message.queue for sender in senders):  # with queues, the critical instant is a different one
@@ -296,19 +333,24 @@ def check_set(senders: Sequence[Sender], bit_rate: int, stream: RandomStream, fi
     def contents(index: int) -> tuple[int, int]:
         if stream.integer(2):
             return senders[index].lo, senders[index].hi
-        return stream.integer(1 << 32), stream.integer(1 << 32)
+        words = [stream.integer(1 << 32) for _ in range(2 if data_bit_rate == 0 else LONGEST // 4)]
+        return words[0], sum(word << 32 * place for place, word in enumerate(words[1:]))
 
-    hold(play(senders, bit_rate, random_releases(senders, stream, 3 * longest), contents), bounds)
+    hold(play(senders, bit_rate, random_releases(senders, stream, 3 * longest), contents, data_bit_rate), bounds)
     return bounds
 
 
-def random_sets(count: int, seed: int = 1) -> dict:
-    """Compare `count` random message sets with their bounds: figures of `Figures.summary`, mean load and seed."""
+def random_sets(count: int, seed: int = 1, fd: bool = False) -> dict:
+    """Compare `count` random message sets with their bounds: figures of `Figures.summary`, mean load and seed.
+
+    `fd`: sets of CAN FD buses.
+    """
     figures = Figures()
     load = 0.0
     for number in range(count):
         stream = RandomStream(seed, f"bounds {number}")
-        senders, bit_rate = random_set(stream)
-        load += float(utilisation((sender.message for sender in senders), bit_rate))
-        check_set(senders, bit_rate, stream, figures)
+        senders, bit_rate = random_set(stream, fd)
+        data_bit_rate = DATA_RATES[bit_rate] if fd else 0
+        load += float(utilisation((sender.message for sender in senders), bit_rate, data_bit_rate))
+        check_set(senders, bit_rate, stream, figures, data_bit_rate)
     return {**figures.summary(), "load_mean": load / count, "seed": seed}

@@ -26,9 +26,12 @@ Trains. Messages of one queue that one clock releases at known offsets are never
 train: ceil((w + J) / T) is replaced by the largest number of its frames in any window of w + J, and q T by the distance
 between the releases of the first frame and the examined one, over all frames it may begin with.
 
+Two bit rates. C of a CAN FD frame with BRS is the time of its nominal bits and that of its data bits, each phase with
+all stuff bits it can have; frames still start with nominal bits only, so nothing else changes.
+
 The bounds hold without bit errors, for controllers that offer their frame at every opportunity. All times are whole
-numbers: a tick is 1 / bit rate of a nanosecond, so that a bit is 10^9 ticks at any bit rate. Python has no largest
-integer.
+numbers: a tick is 1 / rate of a nanosecond, where `rate` is the bit rate, or the least common multiple of both
+(`Rates`). Python has no largest integer.
 """
 
 from __future__ import annotations
@@ -39,9 +42,11 @@ import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
+from ranger_sim.can_bus.fd_frame import fd_worst_case_phases
 from ranger_sim.can_bus.frame import INTERMISSION_BITS, arbitration_key, worst_case_bits
+from ranger_sim.foundation.events import FLAG_FD
 
-TICKS_PER_BIT = 10**9
+SECOND_NS = 10**9
 # A busy period of more instances than this counts as unbounded, so that an answer takes seconds at most. Chosen by
 # us: at a utilisation of 99.9 % a level of 100 frames with one period needs some 1000.
 MOST_INSTANCES = 2_000
@@ -51,6 +56,7 @@ MOST_ROUNDS = 100_000  # of one search for a fixed point; each but the last find
 @dataclasses.dataclass(frozen=True)
 class Message:
     """A stream of frames. `key`: arbitration key, the lower wins. `bits`: longest length, intermission included.
+    `data_bits`: further bits at the data rate of a CAN FD bus.
 
     Times in ns. `queue`: name of the first-in-first-out queue that it shares with others of its controller;
     empty where it has a transmit buffer to itself (or the driver keeps its queue sorted by priority). `pause_ns`: how
@@ -69,13 +75,42 @@ class Message:
     pause_ns: int = 0
     last_key: int = -1
     offset_ns: int | None = None
+    data_bits: int = 0
 
     def __post_init__(self) -> None:
-        if min(self.bits, self.period_ns, self.deadline_ns) < 1 or min(self.jitter_ns, self.pause_ns) < 0:
+        least = min(self.jitter_ns, self.pause_ns, self.data_bits)
+        if min(self.bits, self.period_ns, self.deadline_ns) < 1 or least < 0:
             raise ValueError(
                 f"message {self.name}: bits {self.bits}, period {self.period_ns} ns and deadline {self.deadline_ns} ns "
-                f"must be above 0, jitter {self.jitter_ns} ns and pause {self.pause_ns} ns not below"
+                f"must be above 0, jitter {self.jitter_ns} ns, pause {self.pause_ns} ns and data bits {self.data_bits} "
+                "not below"
             )
+
+
+@dataclasses.dataclass(frozen=True)
+class Rates:
+    """Bit rates of a bus in bit/s; `data` 0: a classic one."""
+
+    nominal: int
+    data: int = 0
+
+    @property
+    def rate(self) -> int:
+        """Ticks per ns: both bits are whole numbers of ticks."""
+        return math.lcm(self.nominal, self.data) if self.data else self.nominal
+
+    @property
+    def bit(self) -> int:
+        """Ticks of a nominal bit."""
+        return SECOND_NS * self.rate // self.nominal
+
+    def length(self, message: Message) -> int:
+        """C of a message in ticks. ValueError for data bits without a data rate."""
+        if not message.data_bits:
+            return message.bits * self.bit
+        if not self.data:
+            raise ValueError(f"message {message.name}: has bits at a data rate, and the bus has no data bit rate")
+        return message.bits * self.bit + message.data_bits * SECOND_NS * self.rate // self.data
 
 
 def message(
@@ -90,15 +125,17 @@ def message(
 ) -> Message:
     """A stream of frames with this identifier and these flags (length code and FLAG_*), as long as stuffing can make
     them. Deadline: the period unless given."""
+    bits, data_bits = fd_worst_case_phases(flags) if flags & FLAG_FD else (worst_case_bits(flags), 0)
     return Message(
         name,
         arbitration_key(identifier, flags),
-        worst_case_bits(flags) + INTERMISSION_BITS,
+        bits + INTERMISSION_BITS,
         period_ns,
         period_ns if deadline_ns is None else deadline_ns,
         jitter_ns,
         queue,
         offset_ns=offset_ns,
+        data_bits=data_bits,
     )
 
 
@@ -123,9 +160,10 @@ class Bound:
         return self.response_ns is not None and self.response_ns <= self.message.deadline_ns
 
 
-def utilisation(messages: Iterable[Message], bit_rate: int) -> Fraction:
+def utilisation(messages: Iterable[Message], bit_rate: int, data_bit_rate: int = 0) -> Fraction:
     """Largest share of the bus that the messages need, exact; above 1 the bus is overloaded."""
-    return sum((Fraction(m.bits * 10**9, m.period_ns * bit_rate) for m in messages), Fraction(0))
+    rates = Rates(bit_rate, data_bit_rate)
+    return sum((Fraction(rates.length(m), m.period_ns * rates.rate) for m in messages), Fraction(0))
 
 
 def level_of(message: Message, messages: Iterable[Message]) -> int:
@@ -138,20 +176,21 @@ def level_of(message: Message, messages: Iterable[Message]) -> int:
 class _Train:
     """Frames released on one clock, in ticks: `entries` (offset, message) over one cycle, by offset."""
 
-    def __init__(self, messages: Sequence[Message], level: int, bit_rate: int, clock_ppm: int) -> None:
+    def __init__(self, messages: Sequence[Message], level: int, rates: Rates, clock_ppm: int) -> None:
+        rate = rates.rate
         self.queue = messages[0].queue
         self.level = level
-        self.length = max(one.bits for one in messages) * TICKS_PER_BIT
-        self.jitter = max(one.jitter_ns for one in messages) * bit_rate
-        self.pause = max(one.pause_ns for one in messages) * bit_rate
-        self.cycle = math.lcm(*(one.period_ns for one in messages)) * bit_rate
+        self.length = max(rates.length(one) for one in messages)
+        self.jitter = max(one.jitter_ns for one in messages) * rate
+        self.pause = max(one.pause_ns for one in messages) * rate
+        self.cycle = math.lcm(*(one.period_ns for one in messages)) * rate
         self.clock_ppm = clock_ppm
         self.held: int | None = 0  # longest time behind others of its queue; None: no bound
         self.entries: list[tuple[int, Message]] = []
-        if sum(self.cycle // (one.period_ns * bit_rate) for one in messages) > MOST_INSTANCES:
+        if sum(self.cycle // (one.period_ns * rate) for one in messages) > MOST_INSTANCES:
             raise ValueError(f"queue {self.queue}: periods have no common multiple of at most {MOST_INSTANCES} frames")
         for one in messages:
-            first, period = (one.offset_ns or 0) * bit_rate, one.period_ns * bit_rate
+            first, period = (one.offset_ns or 0) * rate, one.period_ns * rate
             self.entries += [(at % self.cycle, one) for at in range(first, first + self.cycle, period)]
         self.entries.sort(key=lambda entry: entry[0])
         self.known_spans: dict[int | None, list[int]] = {}
@@ -188,18 +227,18 @@ class _Train:
         return ticks if not self.clock_ppm else ticks - -(-ticks * self.clock_ppm // 1_000_000)
 
 
-def _trains(messages: Sequence[Message], bit_rate: int, clock_ppm: int) -> list[_Train]:
+def _trains(messages: Sequence[Message], rates: Rates, clock_ppm: int) -> list[_Train]:
     """Each queue whose messages all have offsets is one train, any other message is a separate train."""
     trains = []
     free = [one for one in messages if not one.queue]
     for queue in dict.fromkeys(one.queue for one in messages if one.queue):
         members = [one for one in messages if one.queue == queue]
         if all(one.offset_ns is not None for one in members):
-            trains.append(_Train(members, level_of(members[0], members), bit_rate, clock_ppm))
+            trains.append(_Train(members, level_of(members[0], members), rates, clock_ppm))
         else:
             free += members
     for one in free:
-        trains.append(_Train([one], level_of(one, messages), bit_rate, clock_ppm))
+        trains.append(_Train([one], level_of(one, messages), rates, clock_ppm))
     return trains
 
 
@@ -238,29 +277,32 @@ class _Delays:
         return sum((Fraction(len(t.spans(level)) * t.length, t.cycle) for t, level, _ in self.sources), Fraction(0))
 
 
-def response_times(messages: Iterable[Message], bit_rate: int, clock_ppm: int = 0) -> list[Bound]:
-    """The bound of every message at `bit_rate` (bit/s), in the order given.
+def response_times(
+    messages: Iterable[Message], bit_rate: int, clock_ppm: int = 0, data_bit_rate: int = 0
+) -> list[Bound]:
+    """The bound of every message at `bit_rate` (bit/s), in the order given; `data_bit_rate`: of a CAN FD bus.
 
     Periods and offsets are by clocks that may be fast or slow by `clock_ppm`. Two messages with one key (the same
     identifier in two places of a schedule) delay each other.
     """
     given = list(messages)
-    trains = _trains(given, bit_rate, clock_ppm)
+    rates = Rates(bit_rate, data_bit_rate)
+    trains = _trains(given, rates, clock_ppm)
     found: dict[int, Bound] = {}
     # from the lowest level up: only queues of lower levels add jitter to a level above them
     for own in sorted(trains, key=lambda train: -train.level):
         delays = _Delays(own, trains)
-        busy = _busy_period(own, delays, bit_rate)
+        busy = _busy_period(own, delays)
         for one in dict.fromkeys(id(one) for _, one in own.entries):
-            found[one] = _bound(one, own, delays, busy, bit_rate)
+            found[one] = _bound(one, own, delays, busy, rates)
         if own.queue:
             answers = [found[id(one)].response_ns for _, one in own.entries]
-            held = None if None in answers else max(answer * bit_rate - own.jitter for answer in answers if answer)
+            held = None if None in answers else max(answer * rates.rate - own.jitter for answer in answers if answer)
             own.held = held
     return [found[id(one)] for one in given]
 
 
-def _busy_period(own: _Train, delays: _Delays, bit_rate: int) -> int | None:
+def _busy_period(own: _Train, delays: _Delays) -> int | None:
     """Longest busy period of the level of `own` in ticks; None when it does not end."""
     load = delays.load() + Fraction(len(own.entries) * own.length, own.cycle)
     jitter = own.jitter or own.clock_ppm or any(jitter for _, _, jitter in delays.sources)
@@ -276,11 +318,11 @@ def _busy_period(own: _Train, delays: _Delays, bit_rate: int) -> int | None:
     return busy
 
 
-def _bound(which: int, own: _Train, delays: _Delays, busy: int | None, bit_rate: int) -> Bound:
+def _bound(which: int, own: _Train, delays: _Delays, busy: int | None, rates: Rates) -> Bound:
     """The bound of the message with this id() in its train."""
     places = [place for place, (_, one) in enumerate(own.entries) if id(one) == which]
     message = own.entries[places[0]][1]
-    blocking_ns = -(-delays.blocking // bit_rate)
+    blocking_ns = -(-delays.blocking // rates.rate)
     if busy is None:
         return Bound(message, None, blocking_ns, 0, 0, None)
     instances = own.most(None, busy + own.jitter)
@@ -295,7 +337,7 @@ def _bound(which: int, own: _Train, delays: _Delays, busy: int | None, bit_rate:
                 break
             wait = delays.blocking + before * own.length
             while True:
-                horizon = wait + TICKS_PER_BIT
+                horizon = wait + rates.bit
                 passing = _passing(own, first, before, later, horizon + own.jitter)
                 longer = delays.blocking + (before + passing) * own.length + delays.work(horizon)
                 if longer <= wait:
@@ -304,7 +346,7 @@ def _bound(which: int, own: _Train, delays: _Delays, busy: int | None, bit_rate:
             response = own.jitter + wait + own.length - since
             if response > worst:
                 worst, latest = response, before
-    return Bound(message, -(-worst // bit_rate), blocking_ns, latest, instances, -(-busy // bit_rate))
+    return Bound(message, -(-worst // rates.rate), blocking_ns, latest, instances, -(-busy // rates.rate))
 
 
 def _passing(own: _Train, first: int, before: int, later: Sequence[int], window: int) -> int:
@@ -323,7 +365,9 @@ def _passing(own: _Train, first: int, before: int, later: Sequence[int], window:
         turns += 1
 
 
-def most_waiting(bounds: Iterable[Bound], queue: str, bit_rate: int, clock_ppm: int = 0) -> int | None:
+def most_waiting(
+    bounds: Iterable[Bound], queue: str, bit_rate: int, clock_ppm: int = 0, data_bit_rate: int = 0
+) -> int | None:
     """Largest number of frames of a queue under way at once, including the one being sent; None: no bound.
 
     At any time these are frames that were queued within the longest response.
@@ -334,5 +378,6 @@ def most_waiting(bounds: Iterable[Bound], queue: str, bit_rate: int, clock_ppm: 
         if bound.response_ns is None:
             return None
         longest = max(longest, bound.response_ns)
-    trains = _trains([bound.message for bound in own], bit_rate, clock_ppm)
-    return sum(train.most(None, longest * bit_rate) for train in trains)
+    rates = Rates(bit_rate, data_bit_rate)
+    trains = _trains([bound.message for bound in own], rates, clock_ppm)
+    return sum(train.most(None, longest * rates.rate) for train in trains)

@@ -28,8 +28,16 @@ from typing import TYPE_CHECKING, Annotated, Final
 import cython
 
 from ranger_sim.can_bus.bit_level import BitLevel
+from ranger_sim.can_bus.bit_timing import SAMPLE_POINT, BitTiming
 from ranger_sim.can_bus.bus_counters import BusCounters
 from ranger_sim.can_bus.disturbance import HIGHEST_RATE, Disturbance
+from ranger_sim.can_bus.fd_frame import (
+    PHASE_MASK,
+    PHASE_SHIFT,
+    fault_of_fd_flags,
+    fd_data_length,
+    phases,
+)
 from ranger_sim.can_bus.frame import (
     ACK_DELIMITER_FROM_END,
     EIGHT_BYTES,
@@ -60,12 +68,25 @@ from ranger_sim.can_bus.medium_access import (
     MET_START,
     MediumAccess,
 )
-from ranger_sim.can_bus.node import BUS_OFF, ICR_ERROR_WARNING, JOINING, OPERATING, RESET, SUSPEND_BITS, UNPLUGGED, Node
+from ranger_sim.can_bus.node import (
+    BUS_OFF,
+    FDF_KNOWN,
+    FDF_REFUSED,
+    ICR_ERROR_WARNING,
+    JOINING,
+    OPERATING,
+    RESET,
+    SEQUENCE_BITS,
+    SUSPEND_BITS,
+    UNPLUGGED,
+    Node,
+)
 from ranger_sim.can_bus.transmit_buffers import (
     ASKED,
     BUFFER_MASK,
     BUFFER_SHIFT,
     BUFFERS,
+    ESI_REQUESTED,
     FLAGS,
     FREE_AT,
     HIGH,
@@ -80,7 +101,10 @@ from ranger_sim.can_bus.transmit_buffers import (
 from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_TX_DONE,
+    FLAG_BRS,
+    FLAG_ESI,
     FLAG_EXTENDED,
+    FLAG_FD,
     FLAG_REMOTE,
     FLAG_SINGLE_SHOT,
     NEVER,
@@ -91,6 +115,7 @@ from ranger_sim.foundation.events import (
 )
 from ranger_sim.foundation.numbers import integers
 from ranger_sim.foundation.random_stream import RandomStream
+from ranger_sim.foundation.user_error import BusError
 
 if TYPE_CHECKING:
     pass
@@ -100,12 +125,24 @@ COMMAND_ABORT: Final = 1
 COMMAND_MODE: Final = 2
 
 SECOND_NS: Final = 1_000_000_000
+FD_FLAGS: Final = 1792  # FLAG_FD, FLAG_BRS and FLAG_ESI
+
+
+def _bytes_of(flags, lo, hi) -> bytes:
+    """The data bytes of two words, as many as a CAN FD frame with these flags has; zeros from the ninth on."""
+    length = fd_data_length(flags)
+    return (lo & 0xFFFFFFFF | (hi & 0xFFFFFFFF) << 32).to_bytes(8, "little")[:length].ljust(length, b"\0")
 
 
 @cython.final
 @cython.cclass
 class Bus:
     """A CAN bus. `bitrate` in bit/s; `seed` feeds the noise source of `set_bit_error_rate` only.
+
+    A `data_bitrate` makes it a CAN FD bus: its nodes send and receive frames of both kinds (`request_fd`), classic
+    nodes (`set_classic`) answer FD frames with form errors. `iso` False: as before ISO 11898-1:2015 (`fd_frame`).
+    Sample points are shares of a bit, of the nominal and the data rate. "Bits" of such a bus are its ticks
+    (`bit_timing`), wherever this class counts bits; frames start whole nominal bits after the end of the last one.
 
     `counters`, `load` and `log` record the past; `buffers` holds the waiting frames.
     """
@@ -147,13 +184,33 @@ class Bus:
     suspended_until: cython.longlong
     rivals: cython.longlong
     tampering: object
+    tick_rate: cython.longlong
+    bit_ticks: cython.longlong
+    intermission: cython.longlong
+    timing: BitTiming
+    fd_data: bytes
 
-    def __init__(self, name, bitrate, seed=0, log_capacity=4096) -> None:
+    def __init__(
+        self,
+        name,
+        bitrate,
+        seed=0,
+        log_capacity=4096,
+        data_bitrate=0,
+        iso=True,
+        sample_point=SAMPLE_POINT,
+        data_sample_point=SAMPLE_POINT,
+    ) -> None:
         if bitrate < 1000 or bitrate > 100_000_000:
             raise ValueError(f"bus {name}: bit rate {bitrate} bit/s is outside 1000 ... 100000000")
         second: cython.longlong = SECOND_NS
         self.name = name
         self.bitrate = bitrate
+        self.timing = BitTiming(f"bus {name}", bitrate, data_bitrate, sample_point, data_sample_point)
+        self.tick_rate = self.timing.rate
+        self.bit_ticks = self.timing.nominal
+        self.intermission = INTERMISSION_BITS * self.bit_ticks
+        self.fd_data = None  # of the request that is being made
         self.nodes = []
         self.node_count = 0
         self.acknowledging = 0
@@ -174,21 +231,53 @@ class Bus:
         # the second in which the last frame began: its first bit and its time
         self.second_bit = 0
         self.second_ns = 0
-        self.bit_ns, self.bit_rest = divmod(second, bitrate)  # a bit in ns, and the remainder times bitrate
-        self.intermission_ns, self.intermission_rest = divmod(INTERMISSION_BITS * second, bitrate)
+        self.bit_ns, self.bit_rest = divmod(self.bit_ticks * second, self.tick_rate)  # a bit in ns, and
+        # the remainder times the rate
+        self.intermission_ns, self.intermission_rest = divmod(self.intermission * second, self.tick_rate)
         self.buffers = TransmitBuffers()
+        self.buffers.iso = iso
         self.disturbance = Disturbance(RandomStream(seed, f"can_bus/{name}/bit errors"))
-        self.bit_level = BitLevel(self.buffers, self.disturbance, bitrate)
+        self.disturbance.set_timing(self.bit_ticks, self.timing.data)
+        self.bit_level = BitLevel(self.buffers, self.disturbance, bitrate, self.timing)
         self.tampering = None
         self.rivals = 0  # frames that were ready together with the winner of the last arbitration
         self.counters = BusCounters()
-        self.load = LoadMeter(bitrate)
+        self.load = LoadMeter(self.tick_rate)
         self.log = FrameLog(log_capacity)
 
     def reset_statistics(self, time) -> None:
         """Set every statistic to zero; loads count from `time` (ns) on. Waiting frames count as accepted."""
         self.counters.reset()
         self.load.start(self.bit_of(time))
+
+    @property
+    def is_fd(self) -> bool:
+        """Whether this is a CAN FD bus."""
+        return bool(self.timing.is_fd)
+
+    @property
+    def data_bitrate(self) -> int:
+        """The data bit rate of a CAN FD bus, bit/s; 0 of a classic one."""
+        return self.tick_rate // self.timing.data if self.timing.is_fd else 0
+
+    @property
+    def iso(self) -> bool:
+        """How CAN FD frames are coded; see the class."""
+        return bool(self.buffers.iso)
+
+    def _refuses_fd(self) -> bool:
+        """Whether a classic node on a CAN FD bus will disturb FD frames."""
+        return any(node.fdf == FDF_REFUSED for node in self.nodes)
+
+    def set_classic(self, node, classic=True) -> None:
+        """Let a node of a CAN FD bus know classic frames only (or FD frames again).
+
+        It answers a recessive FDF bit with a form error. UserError on a classic bus.
+        """
+        if not self.timing.is_fd:
+            raise BusError(f"bus {self.name}: all nodes of a classic bus are classic")
+        controller: Node = self.nodes[node]
+        controller.fdf = FDF_REFUSED if classic else FDF_KNOWN
 
     @property
     def operating(self) -> int:
@@ -232,19 +321,29 @@ class Bus:
 
     @cython.ccall
     @cython.exceptval(check=False)
+    @cython.cdivision(True)  # bits are not negative
+    def aligned(self, bit: cython.longlong) -> cython.longlong:
+        """The first tick not before `bit` that is whole nominal bits after the tick at which the bus is free."""
+        rest: cython.longlong = bit - self.free_bit
+        if rest <= 0:
+            return bit
+        return self.free_bit + (rest + self.bit_ticks - 1) // self.bit_ticks * self.bit_ticks
+
+    @cython.ccall
+    @cython.exceptval(check=False)
     def bit_of(self, time: cython.longlong) -> cython.longlong:
-        """Number of the bit in progress at `time` (ns): floor(time * bitrate / 10^9)."""
+        """Number of the bit in progress at `time` (ns): floor(time * rate / 10^9)."""
         seconds: cython.longlong = time // SECOND_NS
-        return seconds * self.bitrate + (time - seconds * SECOND_NS) * self.bitrate // SECOND_NS
+        return seconds * self.tick_rate + (time - seconds * SECOND_NS) * self.tick_rate // SECOND_NS
 
     @cython.ccall
     @cython.exceptval(check=False)
     @cython.cdivision(True)  # bits are not negative
     def edge_ns(self, bit: cython.longlong) -> cython.longlong:
-        """First whole ns at which bit number `bit` has begun: ceil(bit * 10^9 / bitrate)."""
-        seconds: cython.longlong = bit // self.bitrate
-        rest: cython.longlong = bit - seconds * self.bitrate
-        return seconds * SECOND_NS + (rest * SECOND_NS + self.bitrate - 1) // self.bitrate
+        """First whole ns at which bit number `bit` has begun: ceil(bit * 10^9 / rate)."""
+        seconds: cython.longlong = bit // self.tick_rate
+        rest: cython.longlong = bit - seconds * self.tick_rate
+        return seconds * SECOND_NS + (rest * SECOND_NS + self.tick_rate - 1) // self.tick_rate
 
     # ---- requests
 
@@ -260,6 +359,10 @@ class Bus:
         if index > 0:
             node.following = self.nodes[0]
             self.nodes[index - 1].following = node
+        node.sequence = SEQUENCE_BITS * self.bit_ticks
+        if self.timing.is_fd:
+            node.fdf = FDF_KNOWN
+            node.iso = self.iso
         self.nodes.append(node)
         self.node_count += 1
         self.buffers.add_node()
@@ -304,6 +407,8 @@ class Bus:
         lo &= mask
         hi &= mask
         if identifier >> 11 or flags & ~FLAG_SINGLE_SHOT != EIGHT_BYTES:  # no standard frame of eight bytes
+            if flags & FD_FLAGS and self.fd_data is None:
+                return self.request_fd(node, buffer, time, identifier, flags, _bytes_of(flags, lo, hi))
             self._check_frame(identifier, flags)
             if flags & FLAG_REMOTE:  # a remote frame carries no data
                 lo = 0
@@ -326,9 +431,9 @@ class Bus:
             start = self.free_time
         else:  # the bit after bit_of(time), and its edge_ns
             second = time // SECOND_NS
-            first = (time - second * SECOND_NS) * self.bitrate // SECOND_NS + 1
-            start = second * SECOND_NS + (first * SECOND_NS + self.bitrate - 1) // self.bitrate
-            first += second * self.bitrate
+            first = (time - second * SECOND_NS) * self.tick_rate // SECOND_NS + 1
+            start = second * SECOND_NS + (first * SECOND_NS + self.tick_rate - 1) // self.tick_rate
+            first += second * self.tick_rate
         if first < self.hindered_until:
             first = self._hindered(node, buffer, time, flags, first)
             if first < 0:
@@ -347,6 +452,9 @@ class Bus:
             slots[row : row + ROW] = (NEVER, first, time, self.buffers.first, identifier, flags, lo, hi)
         self.buffers.first = row
         self.buffers.waiting_count += 1
+        if self.bit_ticks > 1 and first < NEVER:
+            first = self.aligned(first)
+            start = self.edge_ns(first)
         if first < self.next_bit:
             self.next_bit = first
         if start < self.next_time:
@@ -354,6 +462,34 @@ class Bus:
             if start < self.due[self.wake_place]:
                 self.due[self.wake_place] = start
         return True
+
+    def request_fd(self, node, buffer, time, identifier, flags, data) -> bool:
+        """`request` of a CAN FD frame with `data` (bytes); flags with FLAG_FD and the length code of so many bytes.
+
+        FLAG_ESI shows the error state of another node, as a gateway does; otherwise the sender's own state decides.
+        ValueError also for a classic bus or node, a remote frame, and a number of bytes that the code does not mean.
+        """
+        if flags & FLAG_ESI:
+            flags |= ESI_REQUESTED
+        data = bytes(data)
+        if flags & FLAG_FD and not flags & FLAG_REMOTE:
+            expected = fd_data_length(flags)
+            if len(data) != expected:
+                raise ValueError(
+                    f"bus {self.name}: identifier {identifier:#x} has {len(data)} data bytes, its length code means "
+                    f"{expected}"
+                )
+        if 0 <= node < self.node_count and self.timing.is_fd and self.nodes[node].fdf != FDF_KNOWN:
+            raise ValueError(f"bus {self.name}: node {node} is a classic node and cannot send CAN FD frames")
+        lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:8], "little")
+        self.fd_data = data
+        try:
+            accepted = self.request(node, buffer, time, identifier, flags, lo, hi)
+        finally:
+            self.fd_data = None
+        if accepted:
+            self.buffers.payloads[node << NODE_SHIFT | buffer << BUFFER_SHIFT] = data
+        return bool(accepted)
 
     @cython.cfunc
     def _no_such_buffer(self, node: cython.longlong, buffer: cython.longlong) -> None:
@@ -369,7 +505,13 @@ class Bus:
                 raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 29 bits")
         elif identifier < 0 or identifier > HIGHEST_STANDARD:
             raise ValueError(f"bus {self.name}: identifier {identifier} does not fit in 11 bits")
-        if flags & ~SENDABLE:
+        if flags & FD_FLAGS:
+            fault = fault_of_fd_flags(flags & ~ESI_REQUESTED)
+            if not fault and not self.timing.is_fd:
+                fault = "this bus is classic CAN, without a data bit rate"
+            if fault:
+                raise ValueError(f"bus {self.name}: identifier {identifier:#x}: {fault}")
+        elif flags & ~SENDABLE:
             raise ValueError(f"bus {self.name}: flags {flags:#x} of identifier {identifier:#x} cannot be sent")
 
     @cython.cfunc
@@ -496,7 +638,9 @@ class Bus:
                 self._pass_bits(until)
             elif self.next_change > until or not self._change(until):
                 if self.strike_bit < self.next_bit:
-                    self._begin_bits(self.strike_bit)
+                    self._begin_bits(self._strike_start())
+                elif self.bit_ticks > 1:
+                    self._attempt_timed(self.next_bit)
                 else:
                     self._attempt(self.next_bit)
             if self.buffers.first < 0 and self.next_change == NEVER and self.strike_bit == NEVER and not self.disturbed:
@@ -507,6 +651,15 @@ class Bus:
         return self.next_time
 
     @cython.cfunc
+    @cython.exceptval(check=False)
+    def _strike_start(self) -> cython.longlong:
+        """The bit of the next inverted one; on a CAN FD bus the start of the nominal bit in which it is."""
+        strike: cython.longlong = self.strike_bit
+        if self.bit_ticks > 1 and strike < NEVER:
+            return self.free_bit + max(strike - self.free_bit, 0) // self.bit_ticks * self.bit_ticks
+        return strike
+
+    @cython.cfunc
     def _find_next(self) -> cython.void:
         """Set `next_bit` and `next_time` from the waiting frames; bit by bit, the next bit that waits for programs."""
         first: cython.longlong = self.buffers.first_ready()
@@ -514,15 +667,17 @@ class Bus:
             self.next_bit = self.free_bit
             self.next_time = self.free_time
         else:
+            if self.bit_ticks > 1 and first < NEVER:
+                first = self.aligned(first)
             self.next_bit = first
             self.next_time = self.edge_ns(first) if first < NEVER else NEVER
         if self.disturbed:
             return
         if self.strike_bit < self.next_bit:
-            self.next_time = self.edge_ns(self.strike_bit)
+            self.next_time = self.edge_ns(self._strike_start())
         if self.next_change < NEVER:
             first = self._next_join()
-            if first < self.next_bit and first < self.strike_bit:
+            if first < self.next_bit and first < self._strike_start():
                 self.next_time = self.edge_ns(first)
             if self.commands.head_time < self.next_time:
                 self.next_time = self.commands.head_time
@@ -541,7 +696,7 @@ class Bus:
         node: Node
         last: cython.longlong = self.bit_of(until)
         join: cython.longlong = self._next_join()
-        start: cython.longlong = min(self.next_bit, self.strike_bit)
+        start: cython.longlong = min(self.next_bit, self._strike_start())
         first: cython.longlong = self.edge_ns(min(start, join, last + 1))
         if self.commands.head_time <= until and self.commands.head_time < first:
             self._execute()
@@ -628,19 +783,27 @@ class Bus:
 
     def _set_going(self, node: Node, time) -> None:
         """A node off the bus waits for its recessive sequences from `time` (ns) on."""
-        node.start_joining(self.bit_of(time) + 1)
+        first: cython.longlong = self.bit_of(time) + 1
+        node.start_joining(first + (self.free_bit - first) % self.bit_ticks)  # as the nominal bits around it
         self.joining += 1
         if self.disturbed and self.bit_level.join(node, node.join_from) & MET_JOIN:
             self._join(node, self.bit_level.bit)
         self._note_changes()
 
     def take_out(self, node, time) -> list:
-        """Take the requests that wait at a node, neither lost nor answered: (buffer, identifier, flags, lo, hi)."""
+        """Take the requests that wait at a node, neither lost nor answered: (buffer, identifier, flags, lo, hi).
+
+        `hi` of a CAN FD frame holds all bytes from the fifth on.
+        """
         waited = []
         for row in self.buffers.waiting_of(node):
             rows = self.buffers.rows
-            frame = rows[row + IDENTIFIER], rows[row + FLAGS], rows[row + LOW], rows[row + HIGH]
-            waited.append((row >> BUFFER_SHIFT & BUFFER_MASK, *frame))
+            identifier, flags, hi = rows[row + IDENTIFIER], rows[row + FLAGS], rows[row + HIGH]
+            if flags & FLAG_FD:
+                hi = int.from_bytes(self.buffers.payloads[row][4:], "little")
+                requested = FLAG_ESI if flags & ESI_REQUESTED else 0  # without the one that its own state shows
+                flags = flags & ~(FLAG_ESI | ESI_REQUESTED) | requested
+            waited.append((row >> BUFFER_SHIFT & BUFFER_MASK, identifier, flags, rows[row + LOW], hi))
             self.bit_level.forget(row)
             self.buffers.remove(row)
             self.buffers.rows[row + FREE_AT] = time
@@ -674,7 +837,7 @@ class Bus:
         rest: cython.longlong
         asked: cython.longlong
         bits: cython.longlong
-        rate: cython.longlong = self.bitrate
+        rate: cython.longlong = self.tick_rate
         sender: Node
         node: Node
         slots: cython.p_longlong = self.buffers.slots
@@ -746,6 +909,106 @@ class Bus:
             self._note_times(k, asked, done, row, flags)
         return self.free_bit
 
+    # ---- one frame on a CAN FD bus
+
+    @cython.cfunc
+    def _attempt_timed(self, k: cython.longlong) -> cython.longlong:
+        """`_attempt` on a CAN FD bus, for frames of both kinds."""
+        row: cython.longlong
+        end: cython.longlong
+        flags: cython.longlong
+        identifier: cython.longlong
+        lo: cython.longlong
+        hi: cython.longlong
+        merged: cython.bint = False
+        any_received: cython.bint = False
+        sender: Node
+        node: Node
+        slots: cython.p_longlong = self.buffers.slots
+        self._show_error_states()
+        row = self._arbitrate(k)
+        if row < 0:
+            row = -row
+            merged = True
+        end = k + self._ticks_of(row)
+        identifier = slots[row + IDENTIFIER]
+        flags = slots[row + FLAGS] & RECEIVERS_SEE
+        lo = slots[row + LOW]
+        hi = slots[row + HIGH]
+        data = self.buffers.payloads[row] if flags & FLAG_FD else None
+        special: cython.bint = data is not None and self._refuses_fd()
+        plain: cython.bint = not merged and not special and self.next_strike >= end + self.intermission
+        if not plain and self._is_disturbed(k, row, end, merged):
+            self._begin_bits(k)
+            return k
+        if self.rivals > 0:
+            self._contend(k, row)
+            self.rivals = 0
+        done = self.edge_ns(end)
+        received = self.edge_ns(end - self.bit_ticks)
+        self.free_bit = end + self.intermission
+        self.free_time = self.edge_ns(self.free_bit)
+        self.load.take(k, self.free_bit)
+        self.counters.frames += 1
+        self._note_result(received)
+        asked = slots[row + ASKED]
+        self.buffers.remove(row)
+        slots[row + FREE_AT] = done
+        sender = self.nodes[row >> NODE_SHIFT]
+        buffer = row >> BUFFER_SHIFT & BUFFER_MASK
+        if not sender.ends.write(buffer, done, TX_SENT):
+            sender.inbox.put(done, sender.order, CAN_TX_DONE, sender.controller, buffer, TX_SENT, 0, 0, 0)
+        sender.sent += 1
+        if sender.transmit_errors > 0 or sender.passive:
+            self._after_success(sender, end, done)
+        node = sender.following
+        while node is not sender:
+            if node.mode == OPERATING and not (merged and node.sending_end == end):
+                if node.receive_errors > 0:
+                    node.count_reception()
+                    # behind the ACK slot
+                    self._confine(node, self.edge_ns(end - ACK_DELIMITER_FROM_END * self.bit_ticks), 0)
+                if node.listening:
+                    node.inbox.push(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0, data)
+                    node.received += 1
+                    any_received = True
+            node = node.following
+        if not any_received:
+            self.counters.lost += 1
+        if not flags & FLAG_EXTENDED:
+            self.counters.note_answer(identifier, done - asked)
+        if data is None:
+            self.log.add(received, identifier, flags, lo, hi, row >> NODE_SHIFT)
+        else:
+            self._note_fd(row, received, flags, data)
+        if self.log.times is not None:
+            self._note_times(k, asked, done, row, flags)
+        return self.free_bit
+
+    def _show_error_states(self) -> None:
+        """Set ESI of waiting CAN FD frames by the error states of their senders (ISO 11898-1:2015)."""
+        rows = self.buffers.rows
+        for row in self.buffers.waiting():
+            if rows[row + FLAGS] & FLAG_FD:
+                shown = self.nodes[row >> NODE_SHIFT].passive or rows[row + FLAGS] & ESI_REQUESTED
+                rows[row + FLAGS] = rows[row + FLAGS] & ~FLAG_ESI | (FLAG_ESI if shown else 0)
+
+    def _ticks_of(self, row) -> int:
+        """Ticks of the frame in a row of a CAN FD bus, from start of frame to the end of EOF."""
+        rows = self.buffers.rows
+        identifier, flags = rows[row + IDENTIFIER], rows[row + FLAGS]
+        if flags & FLAG_FD:
+            packed = phases(identifier, flags, self.buffers.payloads[row], self.iso)
+            return int((packed & PHASE_MASK) * self.bit_ticks + (packed >> PHASE_SHIFT) * self.timing.data)
+        return int((measure(identifier, flags, rows[row + LOW], rows[row + HIGH]) & MEASURED_BITS) * self.bit_ticks)
+
+    def _note_fd(self, row, received, flags, data) -> None:
+        """Record a CAN FD frame that its receivers have at `received` (ns)."""
+        identifier = self.buffers.rows[row + IDENTIFIER]
+        if flags & FLAG_BRS:
+            self.load.data_bits += (phases(identifier, flags, data, self.iso) >> PHASE_SHIFT) * self.timing.data
+        self.log.add_fd(received, identifier, flags, data, row >> NODE_SHIFT)
+
     @cython.cfunc
     def _note_times(
         self,
@@ -774,7 +1037,7 @@ class Bus:
             node.count_success()
             self._confine(node, done, 0)
         if node.passive:
-            self._suspend(node, end + INTERMISSION_BITS + SUSPEND_BITS)
+            self._suspend(node, end + self.intermission + SUSPEND_BITS * self.bit_ticks)
 
     # ---- arbitration
 
@@ -834,7 +1097,7 @@ class Bus:
             row = slots[row + NEXT]
         if skipped is not None:
             for lost in sorted(skipped):
-                self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best)))
+                self._skip(lost, self.edge_ns(k + self._bits_until_loss(lost, best) * self.bit_ticks))
 
     @cython.cfunc
     @cython.exceptval(check=False)
@@ -882,7 +1145,9 @@ class Bus:
 
         When it is, the other senders of a `merged` frame are completed here.
         """
-        if self.strike_bit < end + INTERMISSION_BITS or self.disturbance.frames_left > 0:
+        if self.strike_bit < end + self.intermission or self.disturbance.frames_left > 0:
+            return True
+        if self.buffers.rows[best + FLAGS] & FLAG_FD and self._refuses_fd():
             return True
         if self.tampering is not None and self.tampering.reaches(self, best, k):
             return True
@@ -950,9 +1215,12 @@ class Bus:
                 if level.at_rest and level.bit > level.first_bit:
                     break
                 level.start_frames()
-            level.pass_bit()
+            if level.is_timed:
+                level.pass_ticks()
+            else:
+                level.pass_bit()
             for machine in level.machines:
-                if machine.met:
+                if machine.met and (machine.next_start == level.bit or not level.is_timed):
                     self._follow(machine, level.bit)
             if level.in_error:
                 self._follow_error_frame()
@@ -960,9 +1228,9 @@ class Bus:
         self.disturbed = False
         for machine in level.machines:
             if machine.state == MAC_SUSPENDED:
-                self._suspend(machine.node, level.bit + SUSPEND_BITS - machine.count)
+                self._suspend(machine.node, level.bit + (SUSPEND_BITS - machine.count) * self.bit_ticks)
             elif machine.state == MAC_JOINING:
-                machine.node.join_from = level.bit - machine.count
+                machine.node.join_from = level.bit - machine.count * self.bit_ticks
         self._note_changes()
 
     @cython.cfunc
@@ -980,9 +1248,14 @@ class Bus:
         time: cython.longlong = self.edge_ns(bit)
         if met & MET_RECEIVED and node.listening and (self.tampering is None or self.tampering.receives(machine, time)):
             flags = machine.flags
-            node.inbox.put(
-                time, node.order, CAN_RX, node.controller, machine.identifier, flags, machine.lo, machine.hi, 0
-            )
+            if flags & FLAG_FD:
+                data = bytes(machine.payload)
+                lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:8], "little")
+                node.inbox.push(time, node.order, CAN_RX, node.controller, machine.identifier, flags, lo, hi, 0, data)
+            else:
+                node.inbox.put(
+                    time, node.order, CAN_RX, node.controller, machine.identifier, flags, machine.lo, machine.hi, 0
+                )
             node.received += 1
             self.bit_level.received_bit = bit
             self._note_result(time)
@@ -1012,7 +1285,7 @@ class Bus:
             elif self.buffers.rows[row + FLAGS] & FLAG_SINGLE_SHOT:
                 self._skip(row, time)
             else:
-                self.buffers.hold(row, bit + INTERMISSION_BITS - 1)  # its last bit may be a start
+                self.buffers.hold(row, bit + (INTERMISSION_BITS - 1) * self.bit_ticks)  # its last bit may be a start
         if met & MET_JOIN:
             self._join(node, bit)
         if met & MET_START:
@@ -1031,11 +1304,15 @@ class Bus:
         else:
             self.bit_level.sent_bit = bit
             self.counters.frames += 1
-            if self.bit_level.received_bit != bit - 1:
+            if self.bit_level.received_bit != bit - self.bit_ticks:
                 self.counters.lost += 1
             if not flags & FLAG_EXTENDED:
                 self.counters.note_answer(identifier, time - slots[row + ASKED])
-            self.log.add(self.edge_ns(bit - 1), identifier, flags, slots[row + LOW], slots[row + HIGH], node.index)
+            received: cython.longlong = self.edge_ns(bit - self.bit_ticks)
+            if flags & FLAG_FD:
+                self._note_fd(row, received, flags, self.buffers.payloads[row])
+            else:
+                self.log.add(received, identifier, flags, slots[row + LOW], slots[row + HIGH], node.index)
             if self.log.times is not None:
                 machine: MediumAccess = self.bit_level.machines[node.index]
                 self._note_times(machine.begun, slots[row + ASKED], time, row, flags)

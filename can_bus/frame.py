@@ -20,7 +20,7 @@ from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE, FLAG_SINGLE
 LENGTH_CODE: Final = 15  # bits 0-3
 EIGHT_BYTES: Final = 8  # the flags of a standard data frame of eight bytes, as the robot sends them
 SENDABLE: Final = 0x7F  # all flags that a request may have: length code, remote, single shot, extended
-RECEIVERS_SEE: Final = 0x5F  # the part of these on the wire: no single shot
+RECEIVERS_SEE: Final = 0x75F  # the part of these on the wire, and of CAN FD frames: no single shot
 
 HIGHEST_STANDARD: Final = 0x7FF  # identifiers of 11 bits
 HIGHEST_EXTENDED: Final = 0x1FFFFFFF  # identifiers of 29 bits
@@ -337,7 +337,7 @@ def arbitration_key(identifier: cython.longlong, flags: cython.longlong) -> cyth
 
 
 def data_length(flags: int) -> int:
-    """Data bytes that a frame with these flags carries, 0 ... 8."""
+    """Data bytes that a classic frame with these flags carries, 0 ... 8 (CAN FD: `fd_frame.fd_data_length`)."""
     return 0 if flags & FLAG_REMOTE else min(flags & LENGTH_CODE, 8)
 
 

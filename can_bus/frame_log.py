@@ -17,7 +17,7 @@ TIMES_IDENTIFIER: Final = 3
 TIMES_SENDER: Final = 4  # (node + 1) << SENDER_SHIFT | transmit buffer << TIMES_BUFFER_SHIFT | flags; node -1: none
 TIMES_LOW: Final = 5  # data bytes 0-3, or the field in which an error was detected (FIELD_*)
 TIMES_HIGH: Final = 6  # data bytes 4-7, or the position of that bit in the frame
-TIMES_BUFFER_SHIFT: Final = 8
+TIMES_BUFFER_SHIFT: Final = 12
 SENDER_SHIFT: Final = 16
 
 
@@ -96,6 +96,16 @@ class FrameLog:
         if self.stream is not None:
             self.stream.add(time, identifier, flags, lo, hi)
         elif len(self.frames) < self.capacity:
+            self.frames.append((time, identifier, flags, lo, hi, node))
+        else:
+            self.dropped += 1
+
+    def add_fd(self, time, identifier, flags, data, node) -> None:
+        """Record a CAN FD frame: `hi` holds all bytes from the fifth on."""
+        if self.stream is not None:
+            raise ValueError("a stream of frames holds classic frames only")
+        if len(self.frames) < self.capacity:
+            lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
             self.frames.append((time, identifier, flags, lo, hi, node))
         else:
             self.dropped += 1

@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, initializedcheck=False
 # (every index below is a place of the ring)
-"""Load of a bus: overall, and in windows of 10 ms. All counts are bits since power-up."""
+"""Load of a bus: overall, and in windows of 10 ms. All counts are bits since power-up, of a CAN FD bus its ticks."""
 
 import array
 from typing import Final
@@ -17,10 +17,12 @@ WINDOWS_PER_SECOND = 100
 class LoadMeter:
     """Counts the bits for which a bus is busy: stuff bits, intermission and error frames included.
 
-    `bits`: busy bits since `start`. `count`: windows closed since then. `window_busy`: bits of the open window.
+    `bits`: busy bits since `start`; `data_bits`: the part of them at the data rate of CAN FD. `count`: windows closed
+    since then. `window_busy`: bits of the open window.
     """
 
     bits: cython.longlong
+    data_bits: cython.longlong
     window_busy: cython.longlong
     window_end: cython.longlong
     taken_until: cython.longlong
@@ -38,6 +40,7 @@ class LoadMeter:
     def start(self, bit) -> None:
         """Restart the count from `bit` on."""
         self.bits = 0
+        self.data_bits = 0
         self.origin_bit = bit
         self.window_end = bit + self.window_bits
         self.window_busy = 0
@@ -88,6 +91,10 @@ class LoadMeter:
             return 0.0
         ahead = max(self.taken_until - bit, 0) if self.bits else 0  # part of a frame decided but not over
         return max(self.bits - ahead, 0) / (bit - self.origin_bit)
+
+    def data_share(self) -> float:
+        """Share of the busy time for which frames were at the data rate of CAN FD, 0 ... 1; 0 before any frame."""
+        return self.data_bits / self.bits if self.bits else 0.0
 
     def largest(self) -> float:
         """Load of the fullest window (the open one counts with what it has), 0 ... 1."""

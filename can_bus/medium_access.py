@@ -16,12 +16,35 @@ and no bit was dominant while it sent its passive flag. Exception 2: a stuff err
 (g) a frame sent (acknowledged, and without error to its last bit): transmit errors - 1.
 (h) a frame received (without error to the ACK slot, and the ACK bit sent): receive errors - 1, or to 119 from above
     127.
+
+CAN FD (ISO 11898-1:2015). A recessive FDF makes a frame an FD frame, to a node that knows these; from the sample point
+of a recessive BRS to that of the CRC delimiter the node is `fast`, at the data rate. An error ends that at once, so
+error flags are at the nominal rate. A fixed stuff bit equal to the bit before it is a form error, as is a recessive
+res (protocol exceptions are disabled); a wrong stuff count is a CRC error. Not modelled: the second bit of CRC
+delimiter and ACK slot that real nodes tolerate, because of propagation times that do not exist here.
 """
 
 from typing import Final
 
 import cython
 
+from ranger_sim.can_bus.bit_timing import BitTiming
+from ranger_sim.can_bus.fd_frame import (
+    CRC17_BITS,
+    CRC17_POLYNOMIAL,
+    CRC21_BITS,
+    CRC21_POLYNOMIAL,
+    FIELD_BRS,
+    FIELD_ESI,
+    FIELD_RES,
+    FIELD_STUFF_COUNT,
+    FIXED_STUFF_EVERY,
+    LENGTHS,
+    SHORT_CRC_UP_TO,
+    STUFF_COUNT_BITS,
+    STUFF_COUNT_CODES,
+    next_crc,
+)
 from ranger_sim.can_bus.frame import (
     CRC_BITS,
     CRC_MASK,
@@ -58,6 +81,9 @@ from ranger_sim.can_bus.frame import (
     STUFF_AFTER,
 )
 from ranger_sim.can_bus.node import (
+    FDF_IGNORED,
+    FDF_KNOWN,
+    FDF_REFUSED,
     ICR_BUS_ERROR,
     ICR_FIELD_SHIFT,
     ICR_KIND_SHIFT,
@@ -73,7 +99,7 @@ from ranger_sim.can_bus.node import (
     SUSPEND_BITS,
     Node,
 )
-from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE, NEVER
 
 # States.
 MAC_AWAY: Final = 0  # in reset or bus-off
@@ -104,6 +130,8 @@ FLAG_BITS: Final = 6  # of an error or overload flag
 DELIMITER_BITS: Final = 8  # recessive, after the last flag
 TOLERATED_BITS: Final = 8  # rule (f)
 
+CLASSIC = BitTiming("a classic bus", 1)
+
 
 @cython.final
 @cython.cclass
@@ -118,6 +146,11 @@ class MediumAccess:
     is not for it. `met`: result of the last bit. `stuff_run`, `stuff_level`: equal bits seen last. `own_rate`: its bit
     rate where it differs from the bus's (0: it does not); then `own_bit` counts its own bits, and `own_rest` is the
     part of the next one that has passed.
+
+    On a CAN FD bus: `payload`: the data of an FD frame. `fixed_left`: bits to the next fixed stuff bit, -1 outside the
+    CRC field. `stuffed`: stuff bits so far, -1 once the stuff count was wrong. `short_register`, `long_register`:
+    CRC-17 and CRC-21. `fast`: it is at the data rate. Ticks: `bit_start` of its present bit, `sample_at` its sample
+    point (NEVER once sampled), `next_start` the start of the next one (NEVER until sampled); `timing`: its bits.
     """
 
     node: Node
@@ -153,9 +186,26 @@ class MediumAccess:
     own_rate: cython.longlong
     own_bit: cython.longlong
     own_rest: cython.longlong
+    # CAN FD
+    fast: cython.bint
+    payload: bytearray
+    fixed_left: cython.longlong
+    stuffed: cython.longlong
+    short_register: cython.longlong
+    long_register: cython.longlong
+    timing: BitTiming
+    bit_start: cython.longlong
+    sample_at: cython.longlong
+    next_start: cython.longlong
 
-    def __init__(self, node) -> None:
+    def __init__(self, node, timing=CLASSIC) -> None:
         self.node = node
+        self.timing = timing
+        self.fast = False
+        self.payload = bytearray()
+        self.bit_start = 0
+        self.sample_at = NEVER
+        self.next_start = NEVER
         self.state = MAC_AWAY
         self.count = 0
         self.driven = RECESSIVE
@@ -190,6 +240,19 @@ class MediumAccess:
         self.lo = 0
         self.hi = 0
         self.unheeded = False
+        self.fast = False
+        self.fixed_left = -1
+        if self.node.fdf == FDF_KNOWN:
+            self._forget_fd()
+
+    @cython.cfunc
+    def _forget_fd(self) -> cython.void:
+        """The part of it for nodes that know CAN FD."""
+        one: cython.longlong = 1 if self.node.iso else 0
+        self.payload = bytearray()
+        self.stuffed = 0
+        self.short_register = one << (CRC17_BITS - 1)
+        self.long_register = one << (CRC21_BITS - 1)
 
     @cython.ccall
     def place(self, bit: cython.longlong, free_bit: cython.longlong) -> cython.void:
@@ -201,16 +264,24 @@ class MediumAccess:
         self.offered = -1
         self.count = 0
         self.field = FIELD_INTERMISSION
+        self.driven = RECESSIVE
+        self.fast = False
+        self.next_start = bit
+        self.sample_at = NEVER
+        self.met = 0
         if node.mode == OPERATING:
             self.state = MAC_IDLE
             if node.suspend_bit > bit:
                 self.state = MAC_SUSPENDED
-                self.count = SUSPEND_BITS - (node.suspend_bit - bit)
+                self.count = SUSPEND_BITS - (node.suspend_bit - bit) // self.timing.nominal
         elif node.mode == JOINING:
             self.state = MAC_JOINING
-            self.count = max(bit - max(free_bit - SEQUENCE_BITS, node.join_from), 0) % SEQUENCE_BITS
+            self.count = (
+                max(bit - max(free_bit - node.sequence, node.join_from), 0) // self.timing.nominal % SEQUENCE_BITS
+            )
         else:
             self.state = MAC_AWAY
+            self.next_start = NEVER
 
     @cython.cfunc
     @cython.exceptval(check=False)
@@ -294,8 +365,28 @@ class MediumAccess:
             met = self._sample_delimiter(level)
         else:
             met = self._sample_intermission(level, bit)
-        self.position = bit + 1 - self.begun
+        if self.timing.is_fd:
+            self.position += 1
+        else:
+            self.position = bit + 1 - self.begun
         return met
+
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    def begin_bit(self, tick: cython.longlong) -> cython.void:
+        """On a CAN FD bus: its bit begins at `tick`, or again there, by hard synchronisation to an edge."""
+        self.bit_start = tick
+        self.sample_at = tick + (self.timing.data_sample if self.fast else self.timing.sample)
+        self.next_start = NEVER
+
+    @cython.cfunc
+    def sample_at_tick(self, level: cython.longlong, tick: cython.longlong) -> cython.longlong:
+        """On a CAN FD bus: `sample` at `tick`; the rate after the sample point is that of the state it leads to."""
+        self.met = self.sample(level, self.bit_start)
+        self.sample_at = NEVER
+        timing: BitTiming = self.timing
+        self.next_start = tick + (timing.data - timing.data_sample if self.fast else timing.nominal - timing.sample)
+        return self.met
 
     @cython.cfunc
     @cython.exceptval(check=False)
@@ -366,14 +457,48 @@ class MediumAccess:
                 return self._error(KIND_STUFF, SENDER_PENALTY, RECEIVER_PENALTY)
             self.stuff_run = 1
             self.stuff_level = level
+            if self.node.fdf == FDF_KNOWN:
+                self.stuffed += 1
+                self._to_long_crcs(level)
+            return 0
+        if self.fixed_left == 0:
+            self.fixed_left = FIXED_STUFF_EVERY
+            if level == self.stuff_level:
+                return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
+            self.stuff_level = level
             return 0
         self.left -= 1
         if self.field >= FIELD_CRC_DELIMITER:
             return self._fixed_form(level)
         self.stuff_run = self.stuff_run + 1 if level == self.stuff_level else 1
         self.stuff_level = level
+        if self.node.fdf != FDF_IGNORED and self._is_refused(level):
+            return self._error(KIND_FORM, SENDER_PENALTY, RECEIVER_PENALTY)
         self._take(level)
+        if self.flags & FLAG_FD and self.left == 0:
+            if self.field == FIELD_DATA or (self.field == FIELD_DLC and not self.flags & LENGTH_CODE):
+                self.stuff_run = 0  # a fixed stuff bit follows, in the place of a dynamic one
         return 0
+
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    def _is_refused(self, level: cython.longlong) -> cython.bint:
+        """On a CAN FD bus: a recessive FDF for a classic node, or a recessive res."""
+        if level == DOMINANT:
+            return False
+        if self.field == FIELD_RES:
+            return True
+        if self.node.fdf != FDF_REFUSED:
+            return False
+        # the r0 of an extended frame, behind a dominant r1, is a reserved bit also on a CAN FD bus
+        return self.field == FIELD_R1 or (self.field == FIELD_R0 and not self.flags & FLAG_EXTENDED)
+
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    def _to_long_crcs(self, level: cython.longlong) -> cython.void:
+        """A bit that CRC-17 and CRC-21 cover."""
+        self.short_register = next_crc(self.short_register, level, CRC17_BITS, CRC17_POLYNOMIAL)
+        self.long_register = next_crc(self.long_register, level, CRC21_BITS, CRC21_POLYNOMIAL)
 
     @cython.cfunc
     def _next_field(self) -> cython.void:
@@ -404,6 +529,8 @@ class MediumAccess:
             self.field = FIELD_RTR
         elif field == FIELD_RTR:
             self.field = FIELD_R1
+        elif self.flags & FLAG_FD and field != FIELD_CRC and field < FIELD_CRC_DELIMITER:
+            self._next_fd_field()
         elif field == FIELD_IDE or field == FIELD_R1:
             self.field = FIELD_R0
         elif field == FIELD_R0:
@@ -418,6 +545,11 @@ class MediumAccess:
             self.left = CRC_BITS
         elif field == FIELD_CRC:
             self.field = FIELD_CRC_DELIMITER
+            if self.flags & FLAG_FD:
+                self.fixed_left = -1
+                self.register = self.long_register if self._has_long_crc() else self.short_register
+                if self.stuffed < 0:
+                    self.register = 1
         elif field == FIELD_CRC_DELIMITER:
             self.field = FIELD_ACK_SLOT
         elif field == FIELD_ACK_SLOT:
@@ -425,6 +557,57 @@ class MediumAccess:
         else:
             self.field = FIELD_END
             self.left = 7
+
+    @cython.cfunc
+    def _next_fd_field(self) -> cython.void:
+        """`_next_field` of a CAN FD frame, from FDF to the stuff count."""
+        field: cython.longlong = self.field
+        if field == FIELD_R0 or field == FIELD_R1:  # FDF
+            self.field = FIELD_RES
+        elif field == FIELD_RES:
+            self.field = FIELD_BRS
+        elif field == FIELD_BRS:
+            self.field = FIELD_ESI
+        elif field == FIELD_ESI:
+            self.field = FIELD_DLC
+            self.left = 4
+        elif field == FIELD_DLC and self.flags & LENGTH_CODE:
+            self.field = FIELD_DATA
+            self.left = 8 * LENGTHS[self.flags & LENGTH_CODE]
+            self.count = 0
+        elif field == FIELD_STUFF_COUNT or not self.node.iso:
+            self.field = FIELD_CRC
+            self.left = CRC21_BITS if self._has_long_crc() else CRC17_BITS
+        else:
+            self.field = FIELD_STUFF_COUNT
+            self.left = STUFF_COUNT_BITS
+            self.count = 0
+        if self.fixed_left < 0 and (self.field == FIELD_STUFF_COUNT or self.field == FIELD_CRC):
+            self.fixed_left = 0
+
+    @cython.cfunc
+    def _has_long_crc(self) -> cython.bint:
+        return LENGTHS[self.flags & LENGTH_CODE] > SHORT_CRC_UP_TO
+
+    @cython.cfunc
+    def _take_fd(self, level: cython.longlong) -> cython.void:
+        """`_take` of a bit that only CAN FD frames have, or have otherwise."""
+        field: cython.longlong = self.field
+        if field == FIELD_DATA:
+            if self.count & 7 == 0:
+                self.payload.append(0)
+            self.payload[self.count >> 3] |= level << (7 - (self.count & 7))
+            self.count += 1
+        elif field == FIELD_BRS:
+            if level:
+                self.flags |= FLAG_BRS
+                self.fast = True
+        elif field == FIELD_ESI:
+            self.flags |= FLAG_ESI if level else 0
+        elif field == FIELD_STUFF_COUNT:
+            self.count = self.count << 1 | level
+            if self.left == 0 and self.count != STUFF_COUNT_CODES[self.stuffed & 7]:
+                self.stuffed = -1
 
     @cython.cfunc
     def _take(self, level: cython.longlong) -> cython.void:
@@ -435,14 +618,24 @@ class MediumAccess:
         self.register = self.register << 1 & CRC_MASK
         if feedback:
             self.register ^= CRC_POLYNOMIAL
-        if field == FIELD_DATA:
+        if self.node.fdf == FDF_KNOWN:
+            self._to_long_crcs(level)
+        if self.fixed_left > 0:
+            self.fixed_left -= 1
+            self.stuff_run = 0  # no dynamic stuff bits
+        if self.flags & FLAG_FD and field != FIELD_DLC:
+            self._take_fd(level)
+        elif field == FIELD_DATA:
             place = (self.count & 24) + 7 - (self.count & 7)  # bytes little-endian, their bits not
             if self.count < 32:
                 self.lo |= level << place
             else:
                 self.hi |= level << place
             self.count += 1
-        elif field == FIELD_CRC or field == FIELD_START or field == FIELD_R0 or field == FIELD_R1:
+        elif field == FIELD_R1 or (field == FIELD_R0 and not self.flags & FLAG_EXTENDED):
+            if level and self.node.fdf == FDF_KNOWN:
+                self.flags = (self.flags | FLAG_FD) & ~FLAG_REMOTE  # RRS may have either level
+        elif field == FIELD_CRC or field == FIELD_START or field == FIELD_R0:
             return
         elif field == FIELD_DLC:
             self.flags |= level << self.left
@@ -457,6 +650,7 @@ class MediumAccess:
     @cython.exceptval(check=False)
     def _fixed_form(self, level: cython.longlong) -> cython.longlong:
         """A bit after the CRC: recessive, except for the ACK slot. `register` is 0 when the CRC was right."""
+        self.fast = False
         if self.field == FIELD_ACK_SLOT:
             if not self.sending and self.driven == DOMINANT:
                 if level == RECESSIVE:
@@ -568,6 +762,7 @@ class MediumAccess:
         self.state = MAC_PASSIVE_FLAG if node.passive else MAC_ACTIVE_FLAG
         self.field = FIELD_PASSIVE_FLAG if node.passive else FIELD_ACTIVE_FLAG
         self.count = 0
+        self.fast = False
         self.after_error = True
         self.unacknowledged = False
         return met

@@ -45,6 +45,10 @@ SENDER_PENALTY: Final = 8  # transmit errors that an error costs the sender; the
 SUSPEND_BITS: Final = 8  # suspend transmission: how long an error-passive sender waits after the intermission
 SEQUENCE_BITS: Final = 11  # a recessive sequence, as between two frames
 RECOVERY_SEQUENCES: Final = 128  # number of them for which a bus-off node waits before it returns
+# What a node makes of a recessive FDF bit, r0 (extended frames: r1) of classic CAN.
+FDF_IGNORED: Final = 0  # a reserved bit, as in CAN 2.0: either level is accepted; so on a classic bus
+FDF_REFUSED: Final = 1  # a form error: a classic node on a CAN FD bus
+FDF_KNOWN: Final = 2  # a CAN FD frame
 TRANSMIT_ERRORS_OFF: Final = 127  # reading of the transmit counter of an LPC2194 while it is bus-off
 
 
@@ -60,6 +64,7 @@ class Node:
     nothing before that bit. `off_ns`: when it went bus-off last; earlier requests of its program do not bring it back.
     `sending_end`: the last bit of a frame that it sent together with another node. While it is joining,
     `sequences_left` recessive sequences, of which the first begins at bit `join_from` or later, are missing.
+    `fdf`: FDF_*. `iso`: how it codes CAN FD frames (`fd_frame`). `sequence`: SEQUENCE_BITS in the bus's unit of time.
     """
 
     # fields used by every frame come first: few cache lines
@@ -90,6 +95,9 @@ class Node:
     flushed: cython.longlong
     arbitrations_lost: cython.longlong
     retries: cython.longlong
+    fdf: cython.longlong
+    iso: cython.bint
+    sequence: cython.longlong
 
     def __init__(self, name, index, inbox, controller, order) -> None:
         self.inbox = inbox
@@ -112,6 +120,9 @@ class Node:
         self.flushed = 0
         self.arbitrations_lost = 0
         self.retries = 0
+        self.fdf = FDF_IGNORED
+        self.iso = True
+        self.sequence = SEQUENCE_BITS
         self.renew(name)
 
     def renew(self, name) -> None:
@@ -201,6 +212,7 @@ class Node:
         self.listening = other.listening
         self.silent = other.silent
         self.off_ns = other.off_ns
+        self.fdf = other.fdf
 
     def start_joining(self, bit) -> None:
         """Wait from `bit` on: after reset for one recessive sequence, after bus-off for its recovery."""
@@ -215,12 +227,12 @@ class Node:
 
         `free_bit`: where the bus is free. A frame and its intermission end in one recessive sequence.
         """
-        return max(free_bit - SEQUENCE_BITS, self.join_from) + SEQUENCE_BITS * self.sequences_left
+        return max(free_bit - self.sequence, self.join_from) + self.sequence * self.sequences_left
 
     def count_sequences(self, free_bit, start) -> None:
         """Count the sequences that have passed: a frame starts at bit `start`, the bus was free from `free_bit` on."""
-        run = start - max(free_bit - SEQUENCE_BITS, self.join_from)
-        self.sequences_left -= max(run, 0) // SEQUENCE_BITS
+        run = start - max(free_bit - self.sequence, self.join_from)
+        self.sequences_left -= max(run, 0) // self.sequence
 
     def join(self) -> cython.bint:
         """Take part; True when that ends bus-off, with both counters at zero."""

@@ -6,7 +6,9 @@ Everything here takes effect between two bits that are decided: a plain frame un
 from typing import Any
 
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.fd_frame import LONGEST, fd_data_length
 from ranger_sim.can_bus.node import JOINING, OPERATING, UNPLUGGED
+from ranger_sim.foundation.events import FLAG_FD
 from ranger_sim.foundation.user_error import BusError
 
 # A rate for which synchronisation compensates is not a fault: bits of ten time quanta with a jump width of two tolerate
@@ -42,28 +44,41 @@ def plug(bus: Any, node: int, time: int) -> None:
         bus.recompute_next()
 
 
-def check_rate(bus: Any, rate: int, where: str) -> None:
-    """Raise UserError, naming `where`, for a rate (bit/s) too close to that of `bus`, or too far from it."""
-    off = abs(rate / bus.bitrate - 1.0)
-    if not (off >= LEAST_MISMATCH and bus.bitrate <= MOST_TIMES * rate <= MOST_TIMES**2 * bus.bitrate):
+def check_rate(bus: Any, rate: int, where: str, right: int = 0) -> None:
+    """Raise UserError, naming `where`, for a rate (bit/s) too close to the bit rate of `bus`, or too far from it.
+
+    `right`: to be compared with in its place.
+    """
+    right = right or bus.bitrate
+    off = abs(rate / right - 1.0)
+    if not (off >= LEAST_MISMATCH and right <= MOST_TIMES * rate <= MOST_TIMES**2 * right):
         raise BusError(
-            f"{where}: {rate} bit/s must be {LEAST_MISMATCH:.0%} off {bus.bitrate} at least, because synchronisation"
+            f"{where}: {rate} bit/s must be {LEAST_MISMATCH:.0%} off {right} at least, because synchronisation"
             f" makes up for less, and {MOST_TIMES} times off at most"
         )
 
 
-def set_rate_of(bus: Any, node: int, rate: int, time: int) -> None:
-    """Set a controller's bit rate to `rate` bit/s from `time` (ns) on; 0: the bus's.
+def set_rate_of(bus: Any, node: int, rate: int, time: int, data_rate: int = 0) -> None:
+    """Set a controller's bit rate to `rate` bit/s from `time` (ns) on; 0: the bus's. `data_rate`: of a CAN FD bus.
 
     That takes a reset, because CxBTR can be written in reset mode only: waiting frames are answered with TX_ABORTED.
-    UserError for a rate that is too close, or too far off.
+    UserError for a rate that is too close, or too far off. On a CAN FD bus its bits are whole ticks of the bus.
     """
     controller = bus.nodes[node]
+    where = f"bus {bus.name}, {controller.name}"
+    if data_rate and not bus.is_fd:
+        raise BusError(f"{where}: a classic bus has no data bit rate")
     if rate:
-        check_rate(bus, rate, f"bus {bus.name}, {controller.name}")
+        check_rate(bus, rate, where)
+    if data_rate:
+        check_rate(bus, data_rate, f"{where}, data phase", bus.data_bitrate)
     takes_part = controller.mode in (OPERATING, JOINING)
     bus._reset(controller, time)
-    bus.bit_level.machines[node].own_rate = rate
+    machine = bus.bit_level.machines[node]
+    if bus.is_fd:
+        machine.timing = bus.timing.at_rates(rate, data_rate)
+    else:
+        machine.own_rate = rate
     if takes_part:
         bus._set_going(controller, time)
     bus.recompute_next()
@@ -83,7 +98,10 @@ class Cut:
     def part(self, time: int) -> Any:
         """Cut at `time` (ns); returns `far`."""
         bus, controller = self.bus, self.bus.nodes[self.node]
-        self.far = far = Bus(f"{bus.name} behind the cut", bus.bitrate, log_capacity=0)
+        timing = bus.timing
+        points = timing.sample / timing.nominal, timing.data_sample / timing.data
+        rates = {"data_bitrate": bus.data_bitrate, "sample_point": points[0], "data_sample_point": points[1]}
+        self.far = far = Bus(f"{bus.name} behind the cut", bus.bitrate, log_capacity=0, iso=bus.iso, **rates)
         far.add_node(controller.name, controller.inbox, controller.controller, controller.order)
         _move(bus, self.node, far, 0, time)
         return far
@@ -107,4 +125,8 @@ def _move(source: Any, place: int, target: Any, to: int, time: int) -> None:
         after.mode = mode
         target.recompute_next()
     for buffer, identifier, flags, low, high in waited:
-        target.request(to, buffer, time, identifier, flags, low, high)
+        if flags & FLAG_FD:
+            data = (low | high << 32).to_bytes(LONGEST, "little")[: fd_data_length(flags)]
+            target.request_fd(to, buffer, time, identifier, flags, data)
+        else:
+            target.request(to, buffer, time, identifier, flags, low, high)

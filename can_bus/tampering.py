@@ -6,11 +6,14 @@ wrongly (error flags, counters, repetitions, bus-off) then come from the control
 Errors have the names of FMI-LS-BUS: BIT, BIT_STUFFING, FORM, CRC, ACK, BROKEN_ERROR_FRAME. The node that a fault makes
 misread a bit sees the error first and signals it: its error is primary. Errors that others see because of its error
 flag are secondary.
+
+CAN FD buses have the same faults, and one more: a node that misreads BRS receives at the wrong rate.
 """
 
 from collections import Counter
 from typing import Any
 
+from ranger_sim.can_bus.fd_frame import FIELD_BRS, FIELD_ESI
 from ranger_sim.can_bus.frame import (
     DOMINANT,
     EIGHT_BYTES,
@@ -36,6 +39,7 @@ from ranger_sim.can_bus.medium_access import MET_ERROR, MediumAccess
 from ranger_sim.can_bus.node import (
     BUS_OFF,
     BUS_OFF_LIMIT,
+    FDF_IGNORED,
     ICR_FIELD_MASK,
     ICR_FIELD_SHIFT,
     ICR_KIND_SHIFT,
@@ -49,7 +53,7 @@ from ranger_sim.can_bus.node import (
 )
 from ranger_sim.can_bus.transmit_buffers import BUFFER_SHIFT, FLAGS, HIGH, IDENTIFIER, LOW, NODE_SHIFT
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
-from ranger_sim.foundation.events import CAN_RX, NEVER, STAGE_BUS, EventQueue
+from ranger_sim.foundation.events import CAN_RX, FLAG_FD, NEVER, STAGE_BUS, EventQueue
 from ranger_sim.foundation.user_error import BusError
 
 ERRORS = ("BIT", "BIT_STUFFING", "FORM", "CRC", "ACK", "BROKEN_ERROR_FRAME")
@@ -62,6 +66,7 @@ IMPOSSIBLE = {
 INTRUDERS_ORDER = STAGE_BUS * 256 + 255  # no node of the robot has it
 FLAG_BIT_BROKEN = 3  # bits from an error to the one of its error flag that is misread: the third of six
 BIT_BEHIND_ARBITRATION = (FIELD_R1, FIELD_R0, FIELD_DLC, FIELD_DATA, FIELD_CRC)
+BEHIND_BRS = (FIELD_ESI, FIELD_DLC, FIELD_DATA, FIELD_CRC)  # the same of a CAN FD frame: in its data phase
 
 
 def error_name(capture: int) -> str:
@@ -77,16 +82,20 @@ def error_name(capture: int) -> str:
     return named.get(kind, "ACK" if field == FIELD_ACK_SLOT else "CRC")
 
 
-def places_of_error(error: str, of_sender: bool, bits: list, fields: list) -> list:
+def places_of_error(
+    error: str, of_sender: bool, bits: list, fields: list, fdf: int = FDF_IGNORED, iso: bool = True
+) -> list:
     """Positions from the start of a frame at which a node must misread the bus in order to see `error`.
 
-    `bits` and `fields` of the frame on the wire, as `frame.wire` gives them. Empty: this frame has no such position.
+    `bits` and `fields` of the frame on the wire, as `frame.wire` gives them. `fdf`, `iso`: as of `Node`. Empty: this
+    frame has no such position.
     """
     if error == "ACK" or (error == "BIT" and not of_sender):  # of a receiver: the acknowledgement that it sends itself
         return [fields.index(FIELD_ACK_SLOT)]
     if error == "FORM":
         return [fields.index(FIELD_CRC_DELIMITER)]
-    behind = next(n for n, field in enumerate(fields) if field in BIT_BEHIND_ARBITRATION)
+    candidates = BEHIND_BRS if FIELD_ESI in fields else BIT_BEHIND_ARBITRATION
+    behind = next(n for n, field in enumerate(fields) if field in candidates)
     if error == "BIT":
         return [behind]
     if error == "BROKEN_ERROR_FRAME":
@@ -96,7 +105,7 @@ def places_of_error(error: str, of_sender: bool, bits: list, fields: list) -> li
         return _recessive_stuff_bit(bits, fields)[:1]
     wanted = "BIT_STUFFING" if error == "BIT_STUFFING" else "CRC"
     for place in range(behind, fields.index(FIELD_CRC_DELIMITER)):
-        if _what_a_receiver_sees(bits, fields, place) == wanted:
+        if _what_a_receiver_sees(bits, fields, place, fdf, iso) == wanted:
             return [place]
     return []
 
@@ -113,9 +122,11 @@ def _recessive_stuff_bit(bits: list, fields: list) -> list:
     return found
 
 
-def _what_a_receiver_sees(bits: list, fields: list, misread: int) -> str:
+def _what_a_receiver_sees(bits: list, fields: list, misread: int, fdf: int = FDF_IGNORED, iso: bool = True) -> str:
     """Name of the first error of a receiver that misreads one bit of the frame, "" for none."""
-    machine = MediumAccess(Node("probe", 0, EventQueue(1), 1, 0))
+    node = Node("probe", 0, EventQueue(1), 1, 0)
+    node.fdf, node.iso = fdf, iso
+    machine = MediumAccess(node)
     machine.place(0, 0)
     acknowledged = fields.index(FIELD_ACK_SLOT)
     for place, bit in enumerate(bits):
@@ -253,14 +264,16 @@ class Misreading(Tamper):
         self.unfit = 0
 
     def frame_begins(self, level: Any, row: int, bit: int) -> None:
-        places = places_of_error(self.error, self.of_sender, *level.buffers.wire(row))
-        if not places or level.machines[self.node].node.mode != OPERATING:
+        node = level.machines[self.node].node
+        bits, fields = level.buffers.wire(row)
+        places = places_of_error(self.error, self.of_sender, bits, fields, node.fdf, node.iso)
+        if not places or node.mode != OPERATING:
             self.unfit += 1
             self.hit = False
             return
         self.tampered += 1
-        for place in places:
-            level.disturbance.hit_node(bit + place, self.node)
+        for later in level.ticks_of(row, places):
+            level.disturbance.hit_node(bit + later, self.node)
 
     def notices(self, machine: Any, time: int) -> None:
         error = error_name(machine.capture) if machine.met & MET_ERROR else ""
@@ -300,7 +313,11 @@ class Corruption(Tamper):
     def receives(self, machine: Any, time: int) -> bool:
         if machine.node.index == self.node:
             self.tampered += 1
-            machine.lo ^= self.mask
+            if machine.flags & FLAG_FD:
+                for place, byte in enumerate(self.mask.to_bytes(4, "little")[: len(machine.payload)]):
+                    machine.payload[place] ^= byte
+            else:
+                machine.lo ^= self.mask
             self.note(time)
         return True
 
@@ -320,9 +337,11 @@ class Delay(Tamper):
         self.tampered += 1
         node.received += 1
         late = time + self.delay_ns
-        node.inbox.put(
-            late, node.order, CAN_RX, node.controller, machine.identifier, machine.flags, machine.lo, machine.hi, 0
-        )
+        lo, hi, data = machine.lo, machine.hi, None
+        if machine.flags & FLAG_FD:
+            data = bytes(machine.payload)
+            lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:8], "little")
+        node.inbox.push(late, node.order, CAN_RX, node.controller, machine.identifier, machine.flags, lo, hi, 0, data)
         self.note(time, self.delay_ns * 1e-3)
         return False
 
@@ -343,6 +362,26 @@ class Silence(Misreading):
         Misreading.notices(self, machine, time)
         if machine.node.index == self.node and self.count == 0 and machine.node.transmit_errors >= BUS_OFF_LIMIT:
             self.count = self.tampered  # no more
+            self.note(time)
+
+
+class MisreadSwitch(Tamper):
+    """`node` misreads BRS in the CAN FD frames of others that are picked, so that it samples at the other rate."""
+
+    def __init__(self, node: int, identifier: int = -1) -> None:
+        Tamper.__init__(self, identifier, but=node)
+        self.node = node
+
+    def frame_begins(self, level: Any, row: int, bit: int) -> None:
+        _, fields = level.buffers.wire(row)
+        if FIELD_BRS not in fields or level.machines[self.node].node.mode != OPERATING:
+            self.hit = False
+            return
+        self.tampered += 1
+        level.disturbance.hit_node(bit + level.ticks_of(row, [fields.index(FIELD_BRS)])[0], self.node)
+
+    def notices(self, machine: Any, time: int) -> None:
+        if self.hit and machine.node.index == self.node and machine.met & MET_ERROR:
             self.note(time)
 
 
@@ -374,9 +413,12 @@ class Intruder:
         self.ends = TransmitEnds()
         self.node.connect(self.ends)
 
-    def offer(self, buffer: int, ready: int, identifier: int, flags: int, low: int, high: int) -> bool:
+    def offer(
+        self, buffer: int, ready: int, identifier: int, flags: int, low: int, high: int, data: bytes | None = None
+    ) -> bool:
         """Put a frame that may start at bit `ready` in a transmit buffer, even if the bus has advanced further.
 
+        `data`: all bytes of a CAN FD frame.
         False while the buffer holds one, or while it is off the bus.
         """
         buffers = self.bus.buffers
@@ -393,6 +435,8 @@ class Intruder:
             buffers.rows[row + place] = word
         buffers.first = row
         buffers.waiting_count += 1
+        if data is not None:
+            buffers.payloads[row] = data
         return True
 
 
@@ -410,7 +454,12 @@ class Duplicate(Tamper):
             return False
         rows = bus.buffers.rows
         flags, low, high = rows[row + FLAGS] & RECEIVERS_SEE, rows[row + LOW] ^ self.mask, rows[row + HIGH]
-        if not self.intruder.offer(1, bit, self.identifier, flags, low & 0xFFFFFFFF, high):
+        data = None
+        if flags & FLAG_FD:
+            data = bus.buffers.payloads[row]
+            words = int.from_bytes(data, "little") ^ self.mask & ((1 << 8 * len(data)) - 1)
+            data = words.to_bytes(len(data), "little")
+        if not self.intruder.offer(1, bit, self.identifier, flags, low & 0xFFFFFFFF, high, data):
             return False
         self.tampered += 1
         self.note(bus.edge_ns(bit))

@@ -11,8 +11,9 @@ from typing import Annotated, Final
 
 import cython
 
+from ranger_sim.can_bus.fd_frame import fd_wire
 from ranger_sim.can_bus.frame import wire
-from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.events import FLAG_FD, NEVER
 from ranger_sim.foundation.numbers import integers
 
 BUFFERS: Final = 3  # transmit buffers of an LPC2194 CAN controller
@@ -26,6 +27,7 @@ FLAGS: Final = 5
 LOW: Final = 6  # data bytes 0-3
 HIGH: Final = 7  # data bytes 4-7
 ROW: Final = 8  # numbers in a row
+ESI_REQUESTED: Final = 2048  # flag of a waiting CAN FD frame: it shows ESI whatever the state of its sender
 # the parts of a row's name
 BUFFER_SHIFT: Final = 3
 BUFFER_MASK: Final = 3
@@ -38,6 +40,8 @@ class TransmitBuffers:
     """`rows`: the numbers. `first`: the first of the waiting rows, in no order, -1 for none; `waiting_count`: their
     number.
 
+    `payloads`: by row, the data of a CAN FD frame, all bytes. `iso`: how CAN FD frames are coded (`fd_frame`).
+
     `rows` is accessed through `slots`: compiled, an address, in one cache line with the other fields, where a
     memoryview takes 208 bytes.
     """
@@ -47,8 +51,12 @@ class TransmitBuffers:
     waiting_count: cython.longlong
     # the array that `slots` points into: replaced only by `add_node`, which sets both
     rows: Annotated[cython.longlong[::1], "readonly"]
+    payloads: dict
+    iso: cython.bint
 
     def __init__(self) -> None:
+        self.payloads = {}
+        self.iso = True
         self.rows = integers(ROW)
         self.first = -1
         self.waiting_count = 0
@@ -101,6 +109,8 @@ class TransmitBuffers:
 
     def wire(self, row) -> tuple:
         """The bits of the frame in a row and their fields."""
+        if self.rows[row + FLAGS] & FLAG_FD:
+            return fd_wire(self.rows[row + IDENTIFIER], self.rows[row + FLAGS], self.payloads[row], self.iso)
         return wire(self.rows[row + IDENTIFIER], self.rows[row + FLAGS], self.rows[row + LOW], self.rows[row + HIGH])
 
     @cython.cfunc

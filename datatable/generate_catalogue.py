@@ -19,6 +19,7 @@ def catalogue(table: Table) -> dict[str, object]:
         "table_hash": table.hash,
         "buses": [
             {"name": bus, "channel": channel, "bit_rate": table.bit_rates[bus]}
+            | ({"data_bit_rate": table.data_bit_rates[bus]} if bus in table.data_bit_rates else {})
             for bus, channel in table.channels.items()
         ],
         "boards": [
@@ -49,6 +50,7 @@ def catalogue(table: Table) -> dict[str, object]:
                 "spare": variable.is_spare,
                 "description": variable.description,
             }
+            | ({"count": variable.count} if variable.count > 1 else {})
             for variable in table.variables
         ],
         "errors": [

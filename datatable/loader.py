@@ -12,7 +12,7 @@ import io
 import keyword
 import pathlib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -23,6 +23,8 @@ from ranger_sim.datatable.model import (
     LIMITS,
     LONGEST_NAME,
     MAIN_BRAIN,
+    MOST_ELEMENTS,
+    PROCESSORS,
     ROLES,
     ROUTER,
     TYPES,
@@ -218,7 +220,12 @@ class BoardReader:
 
 
 def board_of(
-    name: str, content: object, channels: dict[str, int], routed: bool, report: Callable[[str, str], None]
+    name: str,
+    content: object,
+    channels: dict[str, int],
+    fd_buses: Collection[str],
+    routed: bool,
+    report: Callable[[str, str], None],
 ) -> Board:
     """A board from its TOML table. `routed`: for a machine with a router, the bus given by its ribbon."""
     reader = BoardReader(name, content, report)
@@ -248,6 +255,13 @@ def board_of(
     occasional_row = None
     if occasional:
         occasional_row = reader.take_whole("occasional_row", 0, max(0, len(rows) - 1))
+    processor = reader.take("processor", str, "")
+    clock_hz = reader.take_whole("clock_hz", 0, 10**10, 0)
+    if firmware and processor:
+        _check_processor(processor, clock_hz, report)
+    for bus in buses if firmware else ():
+        if bus in fd_buses:
+            report("buses", f"{bus} is a CAN FD bus; a board with firmware has the classic controllers of an LPC2194")
     board = Board(
         name=name,
         number=reader.take_whole("number", 0, 63),
@@ -257,8 +271,8 @@ def board_of(
         buses=buses,
         controller=controller,
         ribbon=ribbon,
-        processor=reader.take("processor", str, ""),
-        clock_hz=reader.take_whole("clock_hz", 0, 10**10, 0),
+        processor=processor,
+        clock_hz=clock_hz,
         sends_itself=reader.take_names("sends_itself", []),
         slot_us=slot_us,
         every=every,
@@ -268,6 +282,18 @@ def board_of(
     )
     reader.finish()
     return board
+
+
+def _check_processor(processor: str, clock_hz: int, report: Callable[[str, str], None]) -> None:
+    """Report a processor without a model, and a clock above its highest one."""
+    if processor not in PROCESSORS:
+        report(
+            "processor",
+            f"no model of {shown(processor)} (available: {', '.join(PROCESSORS)}); without the key the board has the "
+            "LPC2194's devices at any clock_hz",
+        )
+    elif clock_hz > PROCESSORS[processor]:
+        report("clock_hz", f"is {clock_hz}, above the {PROCESSORS[processor]} Hz of an {processor}")
 
 
 def line_of_table(text: str, name: str) -> int:
@@ -280,13 +306,14 @@ def line_of_table(text: str, name: str) -> int:
 
 def read_boards(
     path: pathlib.Path, faults: Faults
-) -> tuple[dict[str, Board], dict[str, int], dict[str, int], dict[str, int]]:
-    """Boards by name, their lines, channel and bit rate of each bus."""
+) -> tuple[dict[str, Board], dict[str, int], dict[str, int], dict[str, int], dict[str, int]]:
+    """Boards by name, their lines, channel, bit rate and (CAN FD) data bit rate of each bus."""
     boards: dict[str, Board] = {}
     lines: dict[str, int] = {}
     channels: dict[str, int] = {}
     rates: dict[str, int] = {}
-    nothing = boards, lines, channels, rates
+    data_rates: dict[str, int] = {}
+    nothing = boards, lines, channels, rates, data_rates
     text = read_text(path, faults)
     if text is None:
         return nothing
@@ -309,16 +336,24 @@ def read_boards(
     for name, bus in sections["buses"].items():
         if (
             not isinstance(bus, dict)
-            or set(bus) != {"channel", "bit_rate"}
+            or set(bus) - {"data_bit_rate"} != {"channel", "bit_rate"}
             or not all(type(value) is int and 0 <= value < 10**9 for value in bus.values())
         ):
-            report(f"buses {shown(name)}", "needs exactly channel and bit_rate, both whole numbers below 10^9")
+            text = "needs exactly channel and bit_rate (a CAN FD bus data_bit_rate, too), whole numbers below 10^9"
+            report(f"buses {shown(name)}", text)
         elif bus["channel"] > 4 or bus["channel"] in channels.values():
             report(f"buses {shown(name)}", f"channel {bus['channel']} is above 4 or used twice")
         elif name != ("SSP" if bus["channel"] == 0 else f"CAN{bus['channel']}"):
             report(f"buses {shown(name)}", "channel 0 is SSP, channels 1-4 are CAN1-CAN4")
         else:
             channels[name], rates[name] = bus["channel"], bus["bit_rate"]
+            if "data_bit_rate" in bus:
+                data_rates[name] = bus["data_bit_rate"]
+                if name == "SSP":
+                    report(f"buses {name}", "a serial link has no data_bit_rate")
+                elif bus["data_bit_rate"] < bus["bit_rate"]:
+                    text = f"data_bit_rate {bus['data_bit_rate']} is below bit_rate {bus['bit_rate']}"
+                    report(f"buses {name}", text)
     routed = "SSP" in channels or any(
         isinstance(board, dict) and board.get("role") in (MAIN_BRAIN, ROUTER) for board in sections["boards"].values()
     )
@@ -326,7 +361,8 @@ def read_boards(
         report("buses", "SSP, the link between router and main brain, is missing")
     for name, table in sections["boards"].items():
         lines[name] = line_of_table(text, name)
-        boards[name] = board_of(name, table, channels, routed, faults.at(path.name, lines[name], shown(name)[1:-1]))
+        of_board = faults.at(path.name, lines[name], shown(name)[1:-1])
+        boards[name] = board_of(name, table, channels, data_rates, routed, of_board)
     by_number: dict[int, str] = {}
     without_number = {fault.row for fault in faults.found if fault.field == "number"}
     for name, board in boards.items():
@@ -373,6 +409,12 @@ def names_of(text: str) -> list[str]:
     return [name.strip() for name in text.split(";")] if text else []
 
 
+def type_of(text: str) -> tuple[str, int]:
+    """(type, number of values) of a cell such as f32 or f32[12]."""
+    found = re.fullmatch(r"(\w+)\[(\d{1,3})\]", text)
+    return (found[1], int(found[2])) if found else (text, 1)
+
+
 def value_of(text: str, kind: str, field: str, report: Callable[[str, str], None]) -> float | int | None:
     """A number that the type can hold; a fault and None otherwise."""
     low, high = LIMITS[kind]
@@ -397,9 +439,12 @@ def repeated(names: Iterable[str]) -> list[str]:
 class VariableChecker:
     """Turns rows of variables.csv into variables, using the data of the boards."""
 
-    def __init__(self, boards: dict[str, Board], channels: dict[str, int], faults: Faults) -> None:
+    def __init__(
+        self, boards: dict[str, Board], channels: dict[str, int], fd_buses: Collection[str], faults: Faults
+    ) -> None:
         self.boards = boards
         self.channels = channels
+        self.fd_buses = fd_buses
         self.routed = any(board.role == ROUTER for board in boards.values())
         self.faults = faults
         self.periods = {name: board.periods_ms() for name, board in boards.items()}
@@ -414,13 +459,15 @@ class VariableChecker:
         name = name_of(row["name"], report)
         if name in RESERVED_NAMES or name.startswith(RESERVED_PREFIXES) or name.endswith(RESERVED_SUFFIXES):
             report("name", f"{name} is reserved for generated code")
-        kind = row["type"]
+        kind, count = type_of(row["type"])
         if kind not in TYPES:
-            report("type", f"is {shown(kind)}, not one of {', '.join(TYPES)}")
+            report("type", f"is {shown(row['type'])}, not one of {', '.join(TYPES)}")
         publisher = self.publisher_of(row["publisher"], report)
         self.note_duplicates(line, number, name, row["publisher"], report)
         subscribers = self.subscribers_of(row["subscribers"], publisher, report)
         buses = self.buses_of(row["bus"], number, report)
+        if count != 1:
+            self.check_count(row["type"], count, name, buses, report)
         if publisher is not None:
             for subscriber in subscribers:
                 reason = unreachable(publisher, self.boards[subscriber], buses, self.routed)
@@ -460,7 +507,21 @@ class VariableChecker:
             minimum=minimum,
             maximum=maximum,
             description=description,
+            count=count,
         )
+
+    def check_count(
+        self, text: str, count: int, name: str, buses: tuple[str, ...], report: Callable[[str, str], None]
+    ) -> None:
+        """A variable of several values has its place in one CAN FD frame."""
+        if not 2 <= count <= MOST_ELEMENTS:
+            report("type", f"is {shown(text)}, and a variable of several values has 2 ... {MOST_ELEMENTS} of them")
+        if name.startswith("ERROR_"):
+            report("type", f"is {shown(text)}, and an error word is one value")
+        classic = [bus for bus in buses if bus not in self.fd_buses]
+        if classic or not buses:
+            where = f"{classic[0]} is not" if classic else "it is not on"
+            report("type", f"is {shown(text)}: several values need a CAN FD bus, and {where} one")
 
     def note_duplicates(
         self, line: int, number: int | None, name: str, publisher: str, report: Callable[[str, str], None]
@@ -622,10 +683,10 @@ def load_table(folder: str | pathlib.Path | None = None) -> Table:
     """The checked table of a folder with boards.toml, variables.csv and errors.csv; TableError names all faults."""
     master = folder_of(folder)
     faults = Faults()
-    boards, lines, channels, rates = read_boards(master / BOARDS_FILE, faults)
+    boards, lines, channels, rates, data_rates = read_boards(master / BOARDS_FILE, faults)
     rows = read_rows(master / VARIABLES_FILE, VARIABLE_COLUMNS, faults)
     if boards:
-        checker = VariableChecker(boards, channels, faults)
+        checker = VariableChecker(boards, channels, data_rates, faults)
         variables = [variable for line, row in rows if (variable := checker.check(line, row)) is not None]
         if rows:  # an unreadable file is one fault, not one for each name missing from it
             check_schedules(boards, lines, rows, faults)
@@ -642,6 +703,7 @@ def load_table(folder: str | pathlib.Path | None = None) -> Table:
         channels=channels,
         bit_rates=rates,
         hash=hash_of_master_files(master),
+        data_bit_rates=data_rates,
     )
 
 

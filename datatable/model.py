@@ -12,6 +12,8 @@ LARGEST_CAN_ID = 2031  # identifiers 2032-2047 are illegal: their first 7 bits a
 LARGEST_ID = 0xFFFF  # ids have 16 bits (appendix 4.1)
 LONGEST_NAME = 32  # characters; the limit of a name in a DBC file and of a portable C identifier
 TYPES = ("f32", "i32", "u32")
+FD_LENGTHS = (8, 12, 16, 20, 24, 32, 48, 64)  # bytes of CAN FD frames that hold a value and a time
+MOST_ELEMENTS = 15  # of a variable on a CAN FD bus: 64 bytes, of which the time has four
 LARGEST_SINGLE = float.fromhex("0x1.fffffep127")
 LIMITS = {
     "f32": (-LARGEST_SINGLE, LARGEST_SINGLE),
@@ -21,6 +23,9 @@ LIMITS = {
 COMPUTER = "PC"  # the board that publishes parameters
 ROUTER, MAIN_BRAIN = "router", "main brain"
 ROLES = ("satellite", ROUTER, MAIN_BRAIN, "computer")
+# Models of processors that a board with firmware may name, and their highest clocks in Hz (user manuals UM10114 and
+# UM10326). Without a name it has the LPC2194's devices at any clock.
+PROCESSORS = {"LPC2194": 60_000_000, "LPC2194/01": 60_000_000, "LPC3250": 208_000_000}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +102,7 @@ class Board:
 
 @dataclasses.dataclass(frozen=True)
 class Variable:
-    """One row of variables.csv."""
+    """One row of variables.csv. `count`: values in one frame, above 1 on CAN FD buses only."""
 
     id: int
     name: str
@@ -111,6 +116,12 @@ class Variable:
     minimum: float | int | None
     maximum: float | int | None
     description: str
+    count: int = 1
+
+    @property
+    def frame_bytes(self) -> int:
+        """Length of its frame: its values and a time of four bytes each, filled up to a length that there is."""
+        return next(length for length in FD_LENGTHS if length >= 4 * self.count + 4)
 
     @property
     def initial_as_stored(self) -> float | int:
@@ -150,6 +161,7 @@ class Table:
     channels: dict[str, int]  # bus name -> the router's channel number
     bit_rates: dict[str, int]  # bus name -> bit/s
     hash: str
+    data_bit_rates: dict[str, int] = dataclasses.field(default_factory=dict)  # CAN FD bus name -> bit/s
 
     def board(self, name: str) -> Board:
         """The board of that name. UserError for an unknown name."""

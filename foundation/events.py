@@ -49,6 +49,10 @@ FLAG_REMOTE: Final = 16
 FLAG_SINGLE_SHOT: Final = 32
 FLAG_EXTENDED: Final = 64
 FLAG_ERROR: Final = 128
+# of a CAN FD frame (ISO 11898-1:2015)
+FLAG_FD: Final = 256  # FDF recessive: up to 64 bytes, length codes 9-15
+FLAG_BRS: Final = 512  # bit rate switch: the data phase at the data bit rate
+FLAG_ESI: Final = 1024  # error state indicator: its sender was error passive
 
 # Status of CAN_TX_DONE.
 TX_SENT: Final = 0

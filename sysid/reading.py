@@ -229,7 +229,7 @@ def _decoded(
     """The channels of recorded frames, with what became of the file's lines."""
     from ranger_sim.can_bus.edge.logs import read_log  # python-can: a fifth of a second
 
-    log = read_log(path)
+    log = read_log(path, fd=True)
 
     def passing() -> Iterator[frames.Frame]:
         for frame in log:

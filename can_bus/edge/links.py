@@ -42,6 +42,7 @@ class Link:
     """A place on a bus: received frames, frames to send, the state of the controller."""
 
     acknowledge_hint = ""  # actions of a client that is alone
+    data_bitrate = 0  # of a CAN FD bus, bit/s
 
     def __init__(self, label: str, receive_own: bool, queue_limit: int) -> None:
         self.label = label

@@ -7,6 +7,7 @@ with the lines or objects of the file.
 
 import calendar
 import contextlib
+import functools
 import io
 import itertools
 import logging
@@ -18,8 +19,9 @@ from collections.abc import Callable, Iterable, Iterator
 import can
 
 from ranger_sim.can_bus.edge import log_kinds, pcap
-from ranger_sim.can_bus.edge.candump import CanFdError, frame_of_line
+from ranger_sim.can_bus.edge.candump import CanFdError, fd_words, frame_of_line
 from ranger_sim.can_bus.edge.messages import frame_of_message, words_of_data
+from ranger_sim.can_bus.fd_frame import LENGTHS
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError, DataError, UserError
 
@@ -37,13 +39,15 @@ WORD_EXTENDED, WORD_REMOTE, WORD_ERROR = 1 << 31, 1 << 30, 1 << 29  # of SocketC
 class RecordedFrames:
     """The frames of a recording, error frames left out. Iterating raises UserError for an unreadable file.
 
+    `wants_fd`: return CAN FD frames as such; otherwise those of up to eight bytes become classic, longer ones are lost.
     Afterwards `read` is the number of frames in the file, or as stated by it, including error frames, and `losses` are
     the frames that were not returned: (reason, count, position of the first); reason "cut_off", "not_frames" or
     "can_fd".
     """
 
-    def __init__(self, source: pathlib.Path) -> None:
+    def __init__(self, source: pathlib.Path, wants_fd: bool = False) -> None:
         self.source = source
+        self.wants_fd = wants_fd
         self.read = 0
         self.losses: list[tuple[str, int, str]] = []
         self.fd = 0
@@ -62,8 +66,13 @@ class RecordedFrames:
             text = f"{self.source}: the recording cannot be read ({cause or type(error).__name__})"
             raise DataError(text) from None
 
-    def is_fd(self, message: can.Message) -> bool:
-        """True for a frame of CAN FD with more than eight bytes, which is counted; a shorter one becomes classic."""
+    def is_too_long(self, message: can.Message) -> bool:
+        """True for a frame of CAN FD that has to become classic and has more than eight bytes, which is counted."""
+        message.is_fd = message.is_fd or len(message.data) > 8  # .csv and .db have no mark for it
+        if message.is_fd and message.is_remote_frame:  # the reader of .asc calls every frame without data one
+            message.is_fd, message.is_remote_frame = message.dlc == 0, message.dlc > 0
+        if self.wants_fd:
+            return False
         too_long = message.is_fd and len(message.data) > 8
         self.fd += too_long
         message.is_fd = message.bitrate_switch = message.error_state_indicator = False
@@ -80,12 +89,13 @@ class RecordedFrames:
             self.losses.append((reason, count, where))
 
 
-def read_log(path: str | pathlib.Path) -> RecordedFrames:
+def read_log(path: str | pathlib.Path, fd: bool = False) -> RecordedFrames:
     """(channel, time_ns, identifier, flags, lo, hi) of every frame in a recording, while iterating over it.
 
-    Times are as in the file, or since its first frame where the format defines them so.
+    Times are as in the file, or since its first frame where the format defines them so. `fd`: with CAN FD frames, whose
+    `hi` holds all bytes from the fifth on; else the recording is read as one of a classic bus (`RecordedFrames`).
     """
-    return RecordedFrames(pathlib.Path(path))
+    return RecordedFrames(pathlib.Path(path), fd)
 
 
 def _opened(log: RecordedFrames) -> Iterator[Frame]:
@@ -101,13 +111,13 @@ def _opened(log: RecordedFrames) -> Iterator[Frame]:
     if kind == log_kinds.ASC:
         return _by_lines(log, can.ASCReader, _asc_lines(log), ASC_FRAME)
     if kind == log_kinds.TRC:
-        return _by_lines(log, can.TRCReader, _text_lines(log), TRC_FRAME)
+        return _by_lines(log, _trc_messages, _text_lines(log), TRC_FRAME)
     return _by_python_can(log)
 
 
 def _frame(message: can.Message) -> Frame:
     channel = "" if message.channel is None else str(message.channel)
-    return channel, round(message.timestamp * 1e9), *frame_of_message(message)
+    return channel, round(message.timestamp * 1e9), *frame_of_message(message, fd=True)
 
 
 # --- by python-can ------------------------------------------------------------------------------------------------
@@ -133,7 +143,7 @@ def _by_python_can(log: RecordedFrames) -> Iterator[Frame]:
     with can.LogReader(log.source) as reader:
         for message in reader:
             log.read += 1
-            if not log.is_fd(message):
+            if not log.is_too_long(message):
                 yield _frame(message)
         if isinstance(reader, can.BLFReader):
             _count_blf(log, reader)
@@ -186,6 +196,8 @@ def _captured(log: RecordedFrames) -> Iterator[Frame]:
                 identifier = word & (0x1FFFFFFF if word & WORD_EXTENDED else 0x7FF)
                 if not packet.is_whole and not word & WORD_REMOTE:
                     broken, first = broken + 1, first or log.read
+                elif packet.is_fd and log.wants_fd:
+                    yield packet.bus, packet.time_ns, identifier, *fd_words(flags | packet.switches, packet.data)
                 elif len(packet.data) > 8:
                     log.fd += 1
                 elif word & WORD_ERROR:
@@ -262,7 +274,7 @@ def _by_lines(
             if given.is_torn(message):
                 continue  # it is counted as lost with its line
             given.waiting = 0
-            if not log.is_fd(message):
+            if not log.is_too_long(message):
                 yield _frame(message)
         given.settle()
     except (ValueError, IndexError) as error:
@@ -274,6 +286,14 @@ def _by_lines(
         return
     if given.lost:
         log.lose("not_frames", len(given.lost), f"in line {given.lost[0]}")
+
+
+def _trc_messages(lines: Iterable[str]) -> Iterator[can.Message]:
+    """Messages of a TRC file: the reader takes the length code of a CAN FD frame for its length."""
+    for message in can.TRCReader(lines):  # type: ignore[arg-type]
+        if message.is_fd:
+            message.dlc = LENGTHS[message.dlc]
+        yield message
 
 
 def _text_lines(log: RecordedFrames) -> Iterator[str]:
@@ -336,14 +356,14 @@ def _candump_or_busmaster(log: RecordedFrames) -> Iterator[Frame]:
     except UnicodeDecodeError:
         raise DataError(f"{log.source}: the recording cannot be read (not plain ASCII)") from None
     lines = [(number, line) for number, line in enumerate(text.splitlines(keepends=True), 1) if line.strip()]
-    parse: Callable[[str], Frame] = frame_of_line
+    parse: Callable[[str], Frame] = functools.partial(frame_of_line, fd=log.wants_fd)
     if lines and lines[0][1].startswith(BUSMASTER_HEADER):
         if any("***DEC***" in line for _, line in lines[:20]):
             raise DataError(f"{log.source}: BUSMASTER's log in decimal numbers; write it in hexadecimal ones")
         lines = [(number, line) for number, line in lines if not line.startswith("***")]
         parse = _busmaster_frame
     elif lines and SCREEN.match(lines[0][1]):
-        parse = _ScreenLine([line for _, line in lines])
+        parse = _ScreenLine([line for _, line in lines], log.wants_fd)
     lengths: dict[tuple[str, int, int], int] = {}  # of the frames so far, in bytes
     for number, line in lines:
         log.read += 1
@@ -373,7 +393,8 @@ class _ScreenLine:
     With -td they are since the previous frame, and resemble those of -tz, except that they may decrease.
     """
 
-    def __init__(self, lines: list[str]) -> None:
+    def __init__(self, lines: list[str], fd: bool) -> None:
+        self.fd = fd
         stamps = [float(found[1]) for line in lines if (found := re.match(r"\s*\((\d{1,9}\.\d{6})\)", line))]
         self.since_before = any(stamp < before for before, stamp in itertools.pairwise(stamps))
         self.time_ns = 0
@@ -390,7 +411,11 @@ class _ScreenLine:
         flags = FLAG_EXTENDED if len(found["id"]) == 8 else 0
         if "remote request" in found["data"]:
             return found["bus"], time_ns, identifier, flags | FLAG_REMOTE | min(length, 8), 0, 0
-        return found["bus"], time_ns, *_words(identifier, flags, length, found["data"].split("'")[0].split()[:length])
+        return (
+            found["bus"],
+            time_ns,
+            *_words(identifier, flags, length, found["data"].split("'")[0].split()[:length], self.fd),
+        )
 
 
 def _stamp_ns(text: str) -> int:
@@ -405,13 +430,17 @@ def _stamp_ns(text: str) -> int:
     return calendar.timegm((*numbers[:6], 0, 0, 0)) * SECOND_NS + numbers[6] * 1000
 
 
-def _words(identifier: int, flags: int, length: int, data: list[str]) -> tuple[int, int, int, int]:
-    """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError if they are not a classic frame."""
-    if length > 8:
-        raise CanFdError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
+def _words(identifier: int, flags: int, length: int, data: list[str], fd: bool = False) -> tuple[int, int, int, int]:
+    """(identifier, flags, lo, hi) of bytes in hexadecimal. ValueError if they are not a classic frame, or (`fd`) one of
+    CAN FD, as which one of more than eight bytes is taken: these formats have no mark for it."""
     if len(data) != length or not all(re.fullmatch("[0-9A-Fa-f]{2}", byte) for byte in data):
         raise ValueError(f"frame {identifier:x} has {length} bytes and the data {' '.join(data)[:40]!r}")
-    lo, hi = words_of_data(bytes.fromhex("".join(data)))
+    content = bytes.fromhex("".join(data))
+    if length > 8:
+        if not fd:
+            raise CanFdError(f"frame {identifier:x} has {length} bytes, CAN FD; these logs are classic CAN")
+        return identifier, *fd_words(flags, content)
+    lo, hi = words_of_data(content)
     return identifier, flags | length, lo, hi
 
 
@@ -447,7 +476,9 @@ def _csv(log: RecordedFrames) -> Iterator[Frame]:
         try:
             flags = FLAG_EXTENDED if cells[place["extended"]].lower() == "true" else 0
             length = int(cells[place["len"]])
-            words = _words(int(cells[place["id"]], 16), flags, length, cells[place["d1"] : place["d1"] + length])
+            words = _words(
+                int(cells[place["id"]], 16), flags, length, cells[place["d1"] : place["d1"] + length], log.wants_fd
+            )
             yield cells[place["bus"]], int(cells[0]) * 1000, *words
         except (ValueError, IndexError, KeyError) as error:
             if not line.endswith("\n"):

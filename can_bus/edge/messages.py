@@ -1,9 +1,13 @@
-"""Frames of the bus as messages of python-can, and back."""
+"""Frames of the bus as messages of python-can, and back.
+
+A CAN FD frame of more than eight bytes has all bytes from the fifth on in its word `hi`.
+"""
 
 import can
 
+from ranger_sim.can_bus.fd_frame import fd_data_length, length_code, padded
 from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError
 
 
@@ -23,6 +27,20 @@ def message_of_frame(
     if flags & FLAG_ERROR:
         return can.Message(timestamp=time_ns * 1e-9, is_error_frame=True, channel=channel, is_rx=is_rx)
     remote = bool(flags & FLAG_REMOTE)
+    if flags & FLAG_FD:
+        return can.Message(
+            timestamp=time_ns * 1e-9,
+            arbitration_id=identifier,
+            is_extended_id=bool(flags & FLAG_EXTENDED),
+            dlc=fd_data_length(flags),
+            data=data_of_words(flags, lo, hi),
+            channel=channel,
+            is_rx=is_rx,
+            is_fd=True,
+            bitrate_switch=bool(flags & FLAG_BRS),
+            error_state_indicator=bool(flags & FLAG_ESI),
+            check=True,
+        )
     # python-can holds classic lengths to 8; codes above mean eight bytes
     length = min(flags & LENGTH_CODE, 8)
     data = None if remote else data_of_words(flags, lo, hi)
@@ -39,15 +57,24 @@ def message_of_frame(
     )
 
 
-def frame_of_message(message: can.Message) -> tuple[int, int, int, int]:
-    """(identifier, flags, lo, hi) of a python-can message, ready for `Bus.request`.
+def frame_of_message(message: can.Message, fd: bool = False) -> tuple[int, int, int, int]:
+    """(identifier, flags, lo, hi) of a python-can message.
 
-    UserError for CAN FD, which these buses do not support. An error frame has FLAG_ERROR, identifier 0.
+    UserError for a CAN FD message unless `fd`; it is filled up with zeros to the next length that CAN FD has. An error
+    frame has FLAG_ERROR, identifier 0.
     """
-    if message.is_fd:
-        raise BusError(
-            f"message {message.arbitration_id:#x}: CAN FD cannot be sent, the buses are classic CAN (8 bytes)"
-        )
+    if message.is_fd and not fd:
+        raise BusError(f"message {message.arbitration_id:#x}: CAN FD cannot be sent, the bus is classic CAN (8 bytes)")
+    if message.is_fd and not message.is_error_frame:
+        if message.is_remote_frame:
+            raise BusError(f"message {message.arbitration_id:#x}: CAN FD has no remote frames")
+        try:
+            data = padded(bytes(message.data))
+        except ValueError as fault:
+            raise BusError(f"message {message.arbitration_id:#x}: {fault}") from None
+        flags = FLAG_FD | length_code(len(data)) | (FLAG_EXTENDED if message.is_extended_id else 0)
+        flags |= (FLAG_BRS if message.bitrate_switch else 0) | (FLAG_ESI if message.error_state_indicator else 0)
+        return message.arbitration_id, flags, int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
     if message.is_error_frame:
         return 0, FLAG_ERROR, 0, 0
     flags = message.dlc
@@ -60,7 +87,9 @@ def frame_of_message(message: can.Message) -> tuple[int, int, int, int]:
 
 
 def data_of_words(flags: int, lo: int, hi: int) -> bytes:
-    """The data bytes that a frame carries, 0 ... 8."""
+    """The data bytes that a frame carries, 0 ... 8; CAN FD 0 ... 64."""
+    if flags & FLAG_FD:
+        return (lo | hi << 32).to_bytes(64, "little")[: fd_data_length(flags)]
     return (lo.to_bytes(4, "little") + hi.to_bytes(4, "little"))[: data_length(flags)]
 
 

@@ -1,5 +1,6 @@
 """A bus with its own clock: private buses follow the wall clock, or run as fast as frames are offered."""
 
+from ranger_sim.can_bus.bit_timing import SAMPLE_POINT
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge.taps import ORDER, TRANSMIT_QUEUE, Tap, Taps
 from ranger_sim.can_bus.transmit_buffers import NODE_SHIFT
@@ -9,6 +10,7 @@ from ranger_sim.foundation.user_error import BusError
 
 # bit/s; chosen by us, because it is the fastest rate of classic CAN adapters (ISO 11898-2)
 DEFAULT_BITRATE = 1_000_000
+DEFAULT_DATA_BITRATE = 2_000_000  # of CAN FD, bit/s; chosen by us: the first step of most transceivers
 MAX = "max"
 BURST = 1024  # most events per call, so that the caller can serve its clients; chosen by us
 
@@ -45,8 +47,8 @@ def hold_off(bus: Bus, bit: int) -> None:
     """Delay attempts on `bus` until `bit`: waiting frames become ready then."""
     for row in bus.buffers.waiting():
         bus.buffers.hold(row, bit)
-    bus.next_bit = max(bus.next_bit, bit)
-    bus.next_time = max(bus.next_time, bus.edge_ns(bit))
+    bus.next_bit = max(bus.next_bit, bus.aligned(bit))
+    bus.next_time = max(bus.next_time, bus.edge_ns(bus.aligned(bit)))
 
 
 class PacedBus:
@@ -54,7 +56,7 @@ class PacedBus:
 
     `speed`: virtual over wall time; 0.0 advances time only while there are frames to send, without delay. Stamps plus
     `epoch_ns` are nanoseconds since 1970 (at a speed other than 1: the opening time plus virtual time).
-    `acknowledge`: see `add_acknowledger`.
+    `acknowledge`: see `add_acknowledger`. `data_bitrate`, `iso`, `sample_points`: of a CAN FD bus (`bus.Bus`).
     """
 
     def __init__(
@@ -66,9 +68,12 @@ class PacedBus:
         bit_error_rate: float = 0.0,
         depth: int = TRANSMIT_QUEUE,
         acknowledge: bool = False,
+        data_bitrate: int = 0,
+        iso: bool = True,
+        sample_points: tuple[float, float] = (SAMPLE_POINT, SAMPLE_POINT),
     ) -> None:
         try:
-            self.bus = Bus(channel, bitrate, seed, log_capacity=0)
+            self.bus = Bus(channel, bitrate, seed, 0, data_bitrate, iso, *sample_points)
             if bit_error_rate:
                 self.bus.set_bit_error_rate(bit_error_rate)
         except ValueError as fault:

@@ -9,6 +9,8 @@ import struct
 from collections.abc import Iterator
 from typing import BinaryIO
 
+from ranger_sim.can_bus.edge.candump import FD_BRS, FD_ESI
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_ESI
 from ranger_sim.foundation.user_error import DataError
 
 MAGIC_US, MAGIC_NS, MAGIC_NG = 0xA1B2C3D4, 0xA1B23C4D, 0x0A0D0D0A
@@ -27,7 +29,8 @@ SECOND_NS = 1_000_000_000
 
 @dataclasses.dataclass(frozen=True)
 class Packet:
-    """A captured CAN frame. word: identifier with SocketCAN's flags; is_whole: nothing of it was cut off."""
+    """A captured CAN frame. word: identifier with SocketCAN's flags; is_whole: nothing of it was cut off. switches:
+    FLAG_BRS and FLAG_ESI of a CAN FD frame."""
 
     bus: str
     time_ns: int
@@ -35,6 +38,7 @@ class Packet:
     data: bytes
     is_fd: bool = False
     is_whole: bool = True
+    switches: int = 0
 
 
 class CutOffError(Exception):
@@ -175,4 +179,5 @@ def _packet(interface: _Interface, order: str, time_ns: int, content: bytes, is_
         return Packet(bus, time_ns, word, b"", is_whole=False)
     is_fd = protocol == PROTOCOL_CAN_FD or bool(flags & CAN_FD_FLAG) or length > 8
     data = content[8 : 8 + length]
-    return Packet(bus, time_ns, word, data, is_fd, is_whole and len(data) == length)
+    switches = (FLAG_BRS if flags & FD_BRS else 0) | (FLAG_ESI if flags & FD_ESI else 0) if is_fd else 0
+    return Packet(bus, time_ns, word, data, is_fd, is_whole and len(data) == length, switches)

@@ -60,14 +60,18 @@ class PrivateLink(Link):
         listen_only: bool = False,
         receive_own: bool = False,
         queue_limit: int = RECEIVE_QUEUE,
+        fd: bool = False,
     ) -> None:
         super().__init__(label, receive_own, queue_limit)
         self.bus = bus
         self.bitrate = bus.paced.bitrate
+        self.data_bitrate = bus.paced.bus.data_bitrate
         self.changed = threading.Condition(bus.lock)
         self.pump: threading.Thread | None = None
         with bus.lock:
             self.tap = bus.paced.add(label)
+            if bus.paced.bus.is_fd:
+                bus.paced.bus.set_classic(self.tap.node, not fd)
             if listen_only:
                 self.tap.listen(bus.paced.time)
             bus.links.append(self)

@@ -17,8 +17,8 @@ from can.broadcastmanager import CyclicSendTaskABC, ThreadBasedCyclicSendTask
 from ranger_sim.can_bus.edge.attach_records import DEFAULT_NAME, names_running
 from ranger_sim.can_bus.edge.attached_link import AttachedLink, channels_of
 from ranger_sim.can_bus.edge.links import RECEIVE_QUEUE, LinkError
-from ranger_sim.can_bus.edge.messages import frame_of_message
-from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
+from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
+from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, DEFAULT_DATA_BITRATE, PacedBus, speed_of
 from ranger_sim.can_bus.edge.private_link import PrivateBus, PrivateLink
 from ranger_sim.can_bus.edge.taps import (
     ERROR_ACTIVE,
@@ -31,7 +31,7 @@ from ranger_sim.can_bus.edge.taps import (
 )
 from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError, UserError
 
 log = logging.getLogger("can.ranger_sim")
@@ -62,6 +62,10 @@ class RangerSimBus(can.BusABC):
     are on the bus whole. listen_only: receive without acknowledging. rx_queue_size: frames kept for the reader; later
     ones are dropped, counted (`statistics`) and reported by an error frame.
 
+    fd: True makes the private bus CAN FD, with data_bitrate (default 2 Mbit/s, or the nominal rate where that is
+    higher), fd_non_iso as before ISO 11898-1:2015, and the sample points of timing, a can.BitTimingFd. On such a bus a
+    client without fd is a classic node, which answers FD frames with error frames. Robots and hosts are classic.
+
     Stamps of a robot are its own time since power-up, those of other buses seconds since 1970.
     """
 
@@ -82,6 +86,8 @@ class RangerSimBus(can.BusABC):
         listen_only: bool | str = False,
         rx_queue_size: int | str = RECEIVE_QUEUE,
         fd: bool | str = False,
+        data_bitrate: int | str | None = None,
+        fd_non_iso: bool | str = False,
         **kwargs: Any,
     ) -> None:
         name, slash, bus_name = str(channel).rpartition("/")
@@ -93,10 +99,19 @@ class RangerSimBus(can.BusABC):
         try:
             if not bus_name:
                 raise BusError("ranger_sim: no channel was given (for example can1)")
-            if _truth(fd) or isinstance(timing, can.BitTimingFd):
-                raise BusError(f"ranger_sim {channel}: CAN FD is asked for, these buses are classic CAN")
-            if timing is not None:
+            self._fd = _truth(fd) or isinstance(timing, can.BitTimingFd)
+            self._wanted_fd: dict[str, Any] = {}
+            if isinstance(timing, can.BitTimingFd):
+                bitrate, data_bitrate = timing.nom_bitrate, timing.data_bitrate
+                points = timing.nom_sample_point / 100.0, timing.data_sample_point / 100.0
+                self._wanted_fd["sample_points"] = points
+            elif timing is not None:
                 bitrate = timing.bitrate
+            if not self._fd and (data_bitrate is not None or _truth(fd_non_iso)):
+                raise BusError(f"ranger_sim {channel}: data_bitrate and fd_non_iso need fd=True")
+            if data_bitrate is not None:
+                self._wanted_fd["data_bitrate"] = _whole("data_bitrate", data_bitrate, 1000, 100_000_000)
+            self._wanted_fd["iso"] = not _truth(fd_non_iso)
             rate = None if bitrate is None else _whole("bitrate", bitrate, 1000, 100_000_000)
             limit = _whole("rx_queue_size", rx_queue_size, 1, 100_000_000)
             if named and _truth(private):
@@ -118,6 +133,10 @@ class RangerSimBus(can.BusABC):
             else f"ranger_sim private bus {bus_name} of this process, {self.bitrate} bit/s "
             "(to share one between processes: ranger-sim bus)"
         )
+        if self._fd:
+            self.channel_info += f", CAN FD, {self._link.data_bitrate} bit/s"
+            protocol = can.CanProtocol.CAN_FD if self._wanted_fd["iso"] else can.CanProtocol.CAN_FD_NON_ISO
+            self._can_protocol = protocol
         super().__init__(channel=channel, can_filters=can_filters, **kwargs)
 
     def _attached(
@@ -139,7 +158,9 @@ class RangerSimBus(can.BusABC):
                 return None  # a system without abstract sockets
             raise
         fault = ""
-        if rate is not None and rate != link.bitrate:
+        if self._fd:
+            fault = "is classic CAN, not CAN FD"
+        elif rate is not None and rate != link.bitrate:
             fault = f"runs at {link.bitrate} bit/s, not at {rate}"
         given = [option for option, value in self._wanted_private.items() if value is not None]
         if given:
@@ -157,18 +178,26 @@ class RangerSimBus(can.BusABC):
         with _private_lock:
             bus = _private.get(channel)
             if bus is None or not bus.links:
+                nominal = DEFAULT_BITRATE if rate is None else rate
+                options = {"data_bitrate": max(DEFAULT_DATA_BITRATE, nominal)} | self._wanted_fd if self._fd else {}
                 paced = PacedBus(
                     channel,
-                    DEFAULT_BITRATE if rate is None else rate,
+                    nominal,
                     1.0 if speed is None else speed,
                     int(wanted["seed"] or 0),
                     errors or 0.0,
+                    **options,
                 )
                 bus = _private[channel] = PrivateBus(paced)
+            if self._fd and not bus.paced.bus.is_fd:
+                raise BusError(f"ranger_sim: the private bus {channel} is open as classic CAN, not as CAN FD")
+            if self._fd and self._wanted_fd["iso"] != bus.paced.bus.iso:
+                raise BusError(f"ranger_sim: the private bus {channel} is open with fd_non_iso {not bus.paced.bus.iso}")
             for what, want, have in (
                 ("bitrate", rate, bus.paced.bitrate),
                 ("speed", speed, bus.paced.speed),
                 ("bit_error_rate", errors, bus.paced.bit_error_rate),
+                ("data_bitrate", self._wanted_fd.get("data_bitrate"), bus.paced.bus.data_bitrate),
             ):
                 if want is not None and want != have:
                     raise BusError(
@@ -178,7 +207,7 @@ class RangerSimBus(can.BusABC):
             if wanted["acknowledge"]:
                 with bus.lock:
                     bus.paced.add_acknowledger()
-            return PrivateLink(bus, channel, listen, own, limit)
+            return PrivateLink(bus, channel, listen, own, limit, self._fd)
 
     # ---- methods required by python-can
 
@@ -186,13 +215,14 @@ class RangerSimBus(can.BusABC):
         """Queue a message; while the queue is full, wait up to `timeout` s (None: as long as the bus carries frames).
 
         can.CanOperationError: no place in time, no node to acknowledge, bus-off, listening only, the robot has gone, or
-        a message that classic CAN does not have.
+        a message that the bus does not have: CAN FD without fd=True, or a remote frame of CAN FD. An FD message is
+        filled up with zeros to the next length that CAN FD has.
         """
         try:
             if msg.is_error_frame:
                 raise LinkError(f"{self._link.label}: an error frame cannot be sent")
-            frame = frame_of_message(msg)
-            fault = fault_of_frame(*frame)
+            frame = frame_of_message(msg, self._fd)
+            fault = fault_of_frame(*frame, self._fd)
             if fault:
                 raise LinkError(f"{self._link.label}: {fault}")
             self._link.send(*frame, timeout)
@@ -344,6 +374,8 @@ def message_of_event(event: Event, channel: Any) -> can.Message:
             channel=channel,
         )
     remote = bool(flags & FLAG_REMOTE)
+    if flags & FLAG_FD:
+        return message_of_frame(time_ns, identifier, flags, lo, hi, channel, kind != SENT)
     return can.Message(
         timestamp=time_ns * 1e-9,
         arbitration_id=identifier,

@@ -9,6 +9,7 @@ from typing import Any
 
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.edge import linux_errors
+from ranger_sim.can_bus.fd_frame import LONGEST, fault_of_fd_flags, fd_data_length
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE, arbitration_key
 from ranger_sim.can_bus.node import BUS_OFF, OPERATING, PASSIVE_LIMIT, RESET
 from ranger_sim.can_bus.transmit_buffers import BUFFERS
@@ -17,6 +18,7 @@ from ranger_sim.foundation.events import (
     CAN_STATUS,
     CAN_TX_DONE,
     FLAG_EXTENDED,
+    FLAG_FD,
     FLAG_REMOTE,
     NEVER,
     STAGE_BUS,
@@ -61,11 +63,15 @@ def overflow_frame(time_ns: int) -> Event:
     return (RECEIVED, time_ns, *linux_errors.overflow())
 
 
-def fault_of_frame(identifier: int, flags: int, lo: int, hi: int) -> str:
-    """Error message for a frame that a client wants to send; empty when it is valid."""
+def fault_of_frame(identifier: int, flags: int, lo: int, hi: int, fd: bool = False) -> str:
+    """Error message for a frame that a client wants to send; empty when it is valid. `fd`: CAN FD frames are."""
     limit = HIGHEST_EXTENDED if flags & FLAG_EXTENDED else HIGHEST_STANDARD
     if not 0 <= identifier <= limit:
         return f"identifier {identifier:#x} is above {limit:#x}"
+    if fd and flags & FLAG_FD:
+        if hi >> 8 * (LONGEST - 4):
+            return f"more than {LONGEST} data bytes"
+        return fault_of_fd_flags(flags)
     if flags & ~(LENGTH_CODE | FLAG_REMOTE | FLAG_EXTENDED) or flags & LENGTH_CODE > 8:
         return f"flags {flags:#x} are not a classic data or remote frame of 0 ... 8 bytes"
     if lo >> 32 or hi >> 32:
@@ -77,7 +83,8 @@ class Tap:
     """One client's controller on a bus. Frames leave in the order in which they were offered.
 
     `events` collects events, oldest first: (kind, time_ns, identifier, flags, lo, hi); its owner
-    empties it. `poll` must be called with times that are never before the bus's time.
+    empties it. `hi` of a CAN FD frame holds all bytes from the fifth on, here and in what is offered. `poll` must be
+    called with times that are never before the bus's time.
     """
 
     def __init__(self, bus: Bus, name: str, depth: int = TRANSMIT_QUEUE) -> None:
@@ -136,7 +143,8 @@ class Tap:
         while inbox.head_time <= now:
             inbox.take()
             if inbox.kind == CAN_RX:
-                self.events.append((RECEIVED, inbox.time, inbox.b, inbox.c, inbox.d, inbox.e))
+                hi = inbox.e if inbox.ref is None else int.from_bytes(inbox.ref[4:], "little")
+                self.events.append((RECEIVED, inbox.time, inbox.b, inbox.c, inbox.d, hi))
                 self.received += 1
             elif inbox.kind == CAN_TX_DONE:
                 self._done(inbox.time, inbox.b, inbox.c)
@@ -168,7 +176,12 @@ class Tap:
                     return
             waiting.popleft()
             loaded.append((buffer, key, frame))
-            self.bus.request(self.node, buffer, now, *frame)
+            if frame[1] & FLAG_FD:
+                identifier, flags, lo, hi = frame
+                data = (lo | hi << 32).to_bytes(LONGEST, "little")[: fd_data_length(flags)]
+                self.bus.request_fd(self.node, buffer, now, identifier, flags, data)
+            else:
+                self.bus.request(self.node, buffer, now, *frame)
 
     def _done(self, time: int, buffer: int, status: int) -> None:
         """The frame in a buffer has been sent, or will not be."""

@@ -53,7 +53,6 @@ SUITES = {
         # the first needs a maker's library, the others put parts of their own into `virtual`
         tests=("test", *(f"--ignore=test/test_{name}.py" for name in ("interface_canalystii", *SCRIPTS))),
         environment=(("CI", "1"),),
-        changed=("test/config.py", "TEST_CAN_FD = True", "TEST_CAN_FD = False"),
     ),
     "canopen": Suite("canopen", "2.4.1"),
     "can-isotp": Suite(
@@ -87,7 +86,6 @@ SUITES = {
 # tests that fail on our bus and not on `virtual`, by a part of their name, with the reason
 EXPECTED: dict[str, dict[str, str]] = {
     "python-can": {
-        "test_fd_message": "these buses are classic CAN",
         "test_restart_perodic_tasks": "it counts the entries of a queue that only `virtual` has",
         "test_content_virtual": "it looks for channels that `virtual` makes up",
         "test_count_returned": "it counts those",

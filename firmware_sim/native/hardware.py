@@ -6,6 +6,8 @@ from typing import Any
 
 from ranger_sim.firmware_sim.peripherals import adc_external
 
+DEFAULT_HZ = 60_000_000  # the most that an LPC2194 allows (user manual UM10114), as on the robot
+
 
 @dataclasses.dataclass(frozen=True)
 class ExternalConverter:
@@ -41,13 +43,14 @@ class SpiDevice:
 
 @dataclasses.dataclass(frozen=True)
 class Hardware:
-    """Core clock (Hz), converters (None: no converter), and the device on each SPI.
+    """Core clock (Hz; 0: that of the master table, DEFAULT_HZ without one), converters (None: no converter), and the
+    device on each SPI.
 
     panel: makes, from the chip, what a person sees of the board, as boards/modules/front_panel.py: it has `words`,
     `move` and, as `ssp`, the device on the SSP. None: nothing to see, and no SspDevice.
     """
 
-    hz: int = 60_000_000
+    hz: int = 0
     external: ExternalConverter | None = dataclasses.field(default_factory=ExternalConverter)
     internal: InternalConverter = dataclasses.field(default_factory=InternalConverter)
     spi: dict[int, SpiDevice] = dataclasses.field(default_factory=lambda: {0: SpiDevice()})

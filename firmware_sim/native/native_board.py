@@ -11,7 +11,7 @@ from typing import Any
 
 from ranger_sim.firmware_sim.counters import CanCounters, ProgramCounters
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.native.hardware import Hardware
+from ranger_sim.firmware_sim.native.hardware import DEFAULT_HZ, Hardware
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
 from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
@@ -417,7 +417,7 @@ class NativeBoard(Microcontroller):
         record: Any = None,
     ) -> None:
         hardware = hardware if hardware is not None else Hardware()
-        Microcontroller.__init__(self, name, hardware.hz, crystal)
+        Microcontroller.__init__(self, name, hardware.hz or DEFAULT_HZ, crystal)
         self.library = Library(pathlib.Path(path))
         if record is not None:
             self.leave_record_in(record)

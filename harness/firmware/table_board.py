@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from ranger_sim.datatable.loader import load_table
 from ranger_sim.firmware_sim.native.hardware import Hardware
 from ranger_sim.firmware_sim.native.native_board import NativeBoard
 from ranger_sim.foundation.user_error import FirmwareError
@@ -32,6 +33,7 @@ class TableBoard(NativeBoard):
             given = hardware
         elif hardware is not None:  # a manifest cannot describe what a person sees of the board
             given = dataclasses.replace(given, panel=hardware.panel)
+        given = at_the_tables_clock(name, firmware, given if given is not None else Hardware())
         NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, given, record)
         wanted = table_version(firmware.table) if version is None and firmware.table is not None else version
         compiled = self.library.table_version()
@@ -45,3 +47,20 @@ class TableBoard(NativeBoard):
                 f"{firmware.library}: firmware_start() does not start CAN controller {controller}, "
                 f"on which {name}'s bus hangs (fw_can_start)"
             )
+
+
+def at_the_tables_clock(name: str, firmware: Firmware, hardware: Hardware) -> Hardware:
+    """`hardware` with the clock that the firmware's master table gives the board, if it gives one.
+
+    UserError where the manifest gives another one.
+    """
+    master = firmware.manifest.master
+    boards = () if master is None else load_table(master).boards
+    clock_hz = next((board.clock_hz for board in boards if board.name == name), 0)
+    if not clock_hz or hardware.hz == clock_hz:
+        return hardware
+    if hardware.hz:
+        raise FirmwareError(
+            f"{firmware.folder}: hardware.hz is {hardware.hz}, and clock_hz of {name} in {master} is {clock_hz}"
+        )
+    return dataclasses.replace(hardware, hz=clock_hz)

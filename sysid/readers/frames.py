@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.can_bus.fd_frame import LONGEST, fd_data_length
+from ranger_sim.can_bus.frame import data_length
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import columns
@@ -21,8 +23,6 @@ from ranger_sim.sysid.readers import columns
 Frame = tuple[str, int, int, int, int, int]  # bus, time_ns, identifier, flags (length in the low four bits), lo, hi
 Key = tuple[str, str, str]  # bus, message, signal
 EXTENDED_BIT = 1 << 31  # distinguishes extended identifiers from standard ones
-LENGTH_BITS = 15
-MOST_BYTES = 8
 
 
 def decode(
@@ -64,7 +64,9 @@ def decode(
         if message is None:
             unknown[identifier] = unknown.get(identifier, 0) + 1
             continue
-        data = (lo.to_bytes(4, "little") + hi.to_bytes(4, "little"))[: min(flags & LENGTH_BITS, MOST_BYTES)]
+        data = (lo | hi << 32).to_bytes(LONGEST, "little")[
+            : fd_data_length(flags) if flags & FLAG_FD else data_length(flags)
+        ]
         try:
             decoded = message.decode(data, decode_choices=False)
         except Exception:  # too short, or a multiplexer's value that has no signals: of many kinds

@@ -1,6 +1,7 @@
 """No frame of the bus answers later than its bound says, and the bound is no later than it has to be."""
 
 import dataclasses
+from fractions import Fraction
 
 import pytest
 from hypothesis import given, settings
@@ -9,8 +10,9 @@ from hypothesis import strategies as st
 from ranger_sim.can_bus import bound_check
 from ranger_sim.can_bus.bound_check import Sender, critical_releases, longest_content, play
 from ranger_sim.can_bus.bounds import Message, level_of, message, most_waiting, response_times, utilisation
+from ranger_sim.can_bus.fd_frame import fd_worst_case_phases
 from ranger_sim.can_bus.frame import frame_bits, worst_case_bits
-from ranger_sim.foundation.events import FLAG_EXTENDED
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_EXTENDED, FLAG_FD
 from ranger_sim.foundation.random_stream import RandomStream
 from tests.examples import examples
 
@@ -251,11 +253,61 @@ def test_no_answer_exceeds_its_bound_whatever_is_drawn(seed):
 
 
 def test_the_check_would_notice_a_bound_that_is_too_low(monkeypatch):
-    def low(messages, bit_rate):
-        return [dataclasses.replace(b, response_ns=b.response_ns * 3 // 4) for b in response_times(messages, bit_rate)]
+    def low(messages, bit_rate, data_bit_rate):
+        bounds = response_times(messages, bit_rate, data_bit_rate=data_bit_rate)
+        return [dataclasses.replace(b, response_ns=b.response_ns * 3 // 4) for b in bounds]
 
     monkeypatch.setattr(bound_check, "response_times", low)
     assert bound_check.random_sets(5)["exceeded"] > 0
+    assert bound_check.random_sets(5, fd=True)["exceeded"] > 0
+
+
+# ---- two bit rates
+
+
+def test_the_longest_frame_with_two_rates_is_that_of_its_phases_with_all_stuff_bits():
+    """64 bytes, base identifier, by hand. Nominal: 17 bits up to BRS with 3 stuff bits, ACK slot, its delimiter and end
+    of frame (9), intermission (3). Data: ESI and length code (5), 512, the rest of the stuff bits, the CRC field of 25
+    bits with 7 fixed stuff bits, the CRC delimiter."""
+    one = message("A", 1, MS, flags=FLAG_FD | FLAG_BRS | 15)
+    stuff = (17 + 5 + 512 - 2) // 4
+    assert (one.bits, one.data_bits) == (17 + 3 + 9 + 3, 5 + 512 + (stuff - 3) + 25 + 7 + 1)
+    assert message("A", 1, MS, flags=FLAG_FD | 15).bits == one.bits + one.data_bits
+    [bound] = response_times([one], 500_000, data_bit_rate=2_000_000)
+    assert bound.response_ns == one.bits * 2000 + one.data_bits * 500
+    with pytest.raises(ValueError, match="message A: has bits at a data rate, and the bus has no data bit rate"):
+        response_times([one], 500_000)
+
+
+def test_frames_of_two_rates_wait_for_each_other():
+    """Three equal frames at 500 kbit/s and 2 Mbit/s, as the example of the classic bus: the lowest one waits for both
+    others, the highest for one."""
+    three = [message(f"m{n}", n, 10 * MS, flags=FLAG_FD | FLAG_BRS | 8) for n in range(3)]
+    length = three[0].bits * 2000 + three[0].data_bits * 500
+    bounds = response_times(three, 500_000, data_bit_rate=2_000_000)
+    assert [bound.response_ns for bound in bounds] == [2 * length, 3 * length, 3 * length]
+    assert utilisation(three, 500_000, 2_000_000) == Fraction(3 * length, 10 * MS)
+
+
+@pytest.mark.parametrize("flags", [FLAG_FD | code for code in (0, 1, 8, 9, 12, 15)])
+@pytest.mark.parametrize("more", [0, FLAG_BRS, FLAG_EXTENDED, FLAG_BRS | FLAG_EXTENDED])
+def test_no_frame_lasts_longer_than_its_bound_counts(flags, more):
+    """Also not those that are made to be long; they come close."""
+    flags |= more
+    nominal, data = fd_worst_case_phases(flags)
+    for identifier in (0, 0x78, 0x7FF):
+        found = bound_check.bits_of(identifier, flags, *longest_content(identifier, flags))
+        assert found[0] <= nominal and sum(found) <= nominal + data
+        assert found[0] * 4 + found[1] >= 0.9 * (nominal * 4 + data)
+
+
+def test_no_answer_exceeds_its_bound_over_random_sets_with_two_rates():
+    figures = bound_check.random_sets(60, seed=7, fd=True)
+    assert figures["sets"] == 60 and figures["exceeded"] == 0 and figures["unbounded"] == 0
+    assert figures["worst_in_a_later_instance"] > 0
+    assert figures["reached_as_sent_90_percent"] > 0.99
+    assert figures["reached_90_percent"] > 0.5
+    assert 0.2 < figures["load_mean"] < 0.95
 
 
 @given(st.integers(0, 0x7FF), st.integers(0, 8))

@@ -355,11 +355,11 @@ def test_a_set_is_played_once_for_each_bound_and_once_at_random(monkeypatch):
     played = []
     answers = iter([[100, 201, 999], [81, 150, 0], [101, 200, 5]])
 
-    def bounded(messages, rate):
-        assert rate == RATE and messages in (whole, short)
+    def bounded(messages, rate, data_bit_rate):
+        assert (rate, data_bit_rate) == (RATE, 0) and messages in (whole, short)
         return bounds if messages == whole else as_sent
 
-    def answer(given, rate, releases, contents=None):
+    def answer(given, rate, releases, contents=None, data_bit_rate=0):
         played.append((given, rate, releases, contents))
         return next(answers)
 

@@ -371,7 +371,8 @@ BA_ "Baudrate" RATE;
 def test_a_dbc_file_gives_identifiers_lengths_and_periods(tmp_path):
     path = tmp_path / "net.dbc"
     path.write_text(DBC.replace("RATE", "500"))
-    messages, rate, silent = dbc.read_messages(path, None)
+    found = dbc.read_messages(path, None)
+    messages, rate, silent = found.messages, found.bit_rate, found.silent
     assert rate == 500_000 and silent == ["SILENT", "NEVER"]
     # bits: 44 or 64, eight a byte, a stuff bit for each four of the stuffed region but the first, three between frames
     assert [(m.name, m.key, m.bits, m.period_ns, m.deadline_ns, m.jitter_ns, m.queue) for m in messages] == [
@@ -379,7 +380,7 @@ def test_a_dbc_file_gives_identifiers_lengths_and_periods(tmp_path):
         ("LONG", 0x180000 | 1024 << 1, 64 + 64 + (54 + 64 - 1) // 4 + 3, 1_000_000, 1_000_000, 0, ""),
         ("SLOW", 4 << 21, 44 + 8 + (34 + 8 - 1) // 4 + 3, 10**15, 10**15, 0, ""),
     ]
-    assert dbc.read_messages(path, 125_000)[1] == 125_000
+    assert dbc.read_messages(path, 125_000).bit_rate == 125_000
 
 
 @pytest.mark.parametrize(
@@ -388,17 +389,17 @@ def test_a_dbc_file_gives_identifiers_lengths_and_periods(tmp_path):
 def test_below_10000_a_bit_rate_is_in_kbit_s(tmp_path, reported, rate):
     path = tmp_path / "net.dbc"
     path.write_text(DBC.replace("RATE", reported))
-    assert dbc.read_messages(path, None)[1] == rate
+    assert dbc.read_messages(path, None).bit_rate == rate
 
 
-def test_a_dbc_file_without_a_rate_or_with_can_fd_is_refused(tmp_path):
+def test_a_dbc_file_without_a_rate_that_it_needs_is_refused(tmp_path):
     path = tmp_path / "net.dbc"
     path.write_text(DBC.replace("RATE", "0"))
     with pytest.raises(UserError, match=r"net.dbc: has no bit rate .*--bit-rate"):
         dbc.read_messages(path, None)
-    assert dbc.read_messages(path, 250_000)[1] == 250_000
+    assert dbc.read_messages(path, 250_000).bit_rate == 250_000
     path.write_text(DBC.replace("RATE", "500").replace("SILENT: 1", "SILENT: 9"))
-    with pytest.raises(UserError, match="message SILENT has 9 bytes: CAN FD is not analysed"):
+    with pytest.raises(UserError, match="message SILENT is of CAN FD, and the file has no data bit rate"):
         dbc.read_messages(path, None)
     with pytest.raises(UserError, match="none.dbc: cannot be read: No such file"):
         dbc.read_messages(tmp_path / "none.dbc", None)

@@ -23,7 +23,7 @@ def train(clock_ppm=0, bit_rate=1, **more):
         reported(queue="q", offset_ns=0, jitter_ns=2, pause_ns=4, **more),
         reported("B", 5, 120, queue="q", offset_ns=13, jitter_ns=1, pause_ns=6),
     ]
-    return bounds._Train(members, 5, bit_rate, clock_ppm)
+    return bounds._Train(members, 5, bounds.Rates(bit_rate), clock_ppm)
 
 
 def test_a_train_has_its_longest_frame_jitter_and_pause_over_one_cycle():
@@ -66,9 +66,12 @@ def test_a_clock_that_is_fast_releases_more_and_a_slow_one_brings_releases_neare
 def test_periods_without_a_short_common_multiple_are_refused():
     members = [reported(period=997, queue="q", offset_ns=0), reported("B", 2, period=1009, queue="q", offset_ns=0)]
     with pytest.raises(ValueError, match="queue q: periods have no common multiple of at most 2000 frames"):
-        bounds._Train(members, 2, 1, 0)
+        bounds._Train(members, 2, bounds.Rates(1), 0)
     bounds._Train(
-        [reported(period=1999, queue="q", offset_ns=0), reported("B", 2, period=1, queue="q", offset_ns=0)], 2, 1, 0
+        [reported(period=1999, queue="q", offset_ns=0), reported("B", 2, period=1, queue="q", offset_ns=0)],
+        2,
+        bounds.Rates(1),
+        0,
     )
 
 

@@ -707,7 +707,7 @@ def test_states_can_be_ordered_except_for_the_one_that_cannot_be_chosen(opened):
         ({"channel": "robot/can1"}, "private=True and the name of a robot, 'robot', exclude each other"),
         ({"robot": "other"}, "private=True and the name of a robot, 'other', exclude each other"),
         ({"channel": "robot/"}, "no channel was given"),
-        ({"fd": "yes"}, "CAN FD is asked for"),
+        ({"fd": "yes", "data_bitrate": 999}, "data_bitrate 999 is not a whole number in 1000 ... 100000000"),
         ({"bitrate": 999}, "bitrate 999 is not a whole number in 1000 ... 100000000"),
         ({"bitrate": "fast"}, "bitrate 'fast' is not a whole number"),
         ({"rx_queue_size": 0}, "rx_queue_size 0 is not a whole number in 1 ... 100000000"),
@@ -737,7 +737,7 @@ def test_a_timing_has_the_bit_rate(opened):
     timing = can.BitTiming(8_000_000, brp=1, tseg1=11, tseg2=4, sjw=1)
     assert opened(timing=timing, speed="max").bitrate == 500_000
     fd = can.BitTimingFd(80_000_000, 1, 119, 40, 40, 1, 29, 10, 10)
-    with pytest.raises(can.CanInitializationError, match="CAN FD"):
+    with pytest.raises(can.CanInitializationError, match="open as classic CAN, not as CAN FD"):
         opened(timing=fd)
 
 

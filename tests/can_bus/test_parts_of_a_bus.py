@@ -12,7 +12,7 @@ from ranger_sim.can_bus import rewiring
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.can_bus.bus_counters import BusCounters
 from ranger_sim.can_bus.disturbance import Disturbance
-from ranger_sim.can_bus.frame_log import FrameTimes
+from ranger_sim.can_bus.frame_log import TIMES_BUFFER_SHIFT, FrameTimes
 from ranger_sim.can_bus.medium_access import MediumAccess
 from ranger_sim.can_bus.node import BUS_OFF, JOINING, OPERATING, RESET, UNPLUGGED, Node
 from ranger_sim.can_bus.transmit_ends import BY_MESSAGE, TransmitEnds
@@ -745,7 +745,15 @@ def test_a_recording_of_an_error_frame_begins_at_its_frame_and_names_its_sender(
     sender = (1 + 1) << 16
     assert error == [edge(begun), edge(begun), edge(end), 0x10, sender | 8 | FLAG_ERROR, 24, delimiter]
     again = end + 3
-    assert good == [edge(again), 1_000, edge(again + length(0x10, bytes(8))), 0x10, sender | 2 << 8 | 8, 0, 0]
+    assert good == [
+        edge(again),
+        1_000,
+        edge(again + length(0x10, bytes(8))),
+        0x10,
+        sender | 2 << TIMES_BUFFER_SHIFT | 8,
+        0,
+        0,
+    ]
 
 
 # ---- refusals
@@ -762,7 +770,8 @@ def test_a_recording_of_an_error_frame_begins_at_its_frame_and_names_its_sender(
         (-1, FLAG_EXTENDED, "identifier -1 does not fit in 29 bits"),
         (1, 15 | FLAG_REMOTE | FLAG_SINGLE_SHOT, ""),
         (1, 8 | 0x80, "flags 0x88 of identifier 0x1 cannot be sent"),
-        (1, 8 | 0x100, "flags 0x108 of identifier 0x1 cannot be sent"),
+        (1, 8 | 0x100, "identifier 0x1: this bus is classic CAN, without a data bit rate"),
+        (1, 8 | 0x800, "flags 0x808 of identifier 0x1 cannot be sent"),
     ],
 )
 def test_identifiers_and_flags_have_limits(identifier, flags, words):

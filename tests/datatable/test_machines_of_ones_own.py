@@ -1,5 +1,9 @@
 """A table without main brain, router and serial link: what it may have, what it may not, and what is made of it."""
 
+import json
+import struct
+
+import cantools
 import pytest
 
 from ranger_sim.datatable import generate
@@ -67,5 +71,88 @@ def test_c_dbc_and_catalogue_are_made_of_it_and_nothing_that_needs_a_main_brain(
     ],
 )
 def test_parts_that_do_not_belong_together_are_reported(tmp_path, boards, rows, rule):
+    with pytest.raises(TableError, match=rule):
+        table(tmp_path, boards, rows)
+
+
+def test_a_processor_without_a_model_and_a_clock_above_its_highest_are_refused(tmp_path):
+    """The LPC2194's user manual allows 60 MHz. Without a processor any clock is taken."""
+    at = "slot_us = 1000\nrows = [["
+    unknown = BOARDS.replace(at, 'processor = "STM32F4"\nclock_hz = 168_000_000\n' + at, 1)
+    with pytest.raises(TableError, match=r"boards.toml:5 ARM processor: no model of 'STM32F4' \(available: LPC2194, "):
+        table(tmp_path, unknown)
+    fast = unknown.replace("STM32F4", "LPC2194")
+    with pytest.raises(TableError, match="ARM clock_hz: is 168000000, above the 60000000 Hz of an LPC2194"):
+        table(tmp_path, fast)
+    assert table(tmp_path, fast.replace('processor = "LPC2194"\n', "")).board("ARM").clock_hz == 168_000_000
+    elsewhere = unknown.replace("firmware = true", "firmware = false", 1)  # a board that runs somewhere else
+    assert table(tmp_path, elsewhere).board("ARM").processor == "STM32F4"
+
+
+# ---- CAN FD buses: between boards that run somewhere else
+
+FD_BOARDS = (
+    BOARDS.replace("bit_rate = 500_000", "bit_rate = 500_000, data_bit_rate = 2_000_000")
+    .replace("firmware = true", "firmware = false")
+    .replace('["ARM_ANGLE"], []', '["ARM_ANGLES"], ["ARM_STATE"]')
+)
+FD_ROWS = "1,ARM_ANGLES,f32[12],rad,0,ARM,DESK,CAN1,2,-4,4,angles\n2,ARM_STATE,u32,,0,ARM,DESK,CAN1,2,,,a state\n"
+
+
+def test_messages_of_a_can_fd_bus_are_those_that_cantools_reads(tmp_path):
+    """Twelve values and a time are 52 bytes, so a frame of 64."""
+    found = table(tmp_path, FD_BOARDS, FD_ROWS)
+    assert found.data_bit_rates == {"CAN1": 2_000_000}
+    assert (found.variable("ARM_ANGLES").count, found.variable("ARM_STATE").count) == (12, 1)
+    text = generate.generated_files(found)["can1.dbc"]
+    database = cantools.database.load_string(text, database_format="dbc", strict=True)
+    angles, state = database.get_message_by_name("ARM_ANGLES"), database.get_message_by_name("ARM_STATE")
+    assert (angles.is_fd, angles.length, state.is_fd, state.length) == (True, 64, True, 8)
+    data = struct.pack("<12fI", *(0.25 * place for place in range(12)), 77).ljust(64, b"\0")
+    decoded = angles.decode(data)
+    assert [decoded[f"value_{place}"] for place in range(12)] == [0.25 * place for place in range(12)]
+    assert decoded["time_ms"] == 77 and angles.encode(decoded) == data
+    assert (angles.get_signal_by_name("value_3").unit, angles.get_signal_by_name("value_3").maximum) == ("rad", 4)
+    attributes = database.dbc.attributes
+    assert [attributes[name].value for name in ("BusType", "Baudrate", "BaudrateCANFD")] == ["CAN FD", 500000, 2000000]
+    assert angles.dbc.attributes["CANFD_BRS"].value == 1
+    assert "VFrameFormat" not in generate.generated_files(found)["can2.dbc"]
+
+
+def test_the_catalogue_names_the_data_rate_and_the_number_of_values(tmp_path):
+    catalogue = json.loads(generate.generated_files(table(tmp_path, FD_BOARDS, FD_ROWS))["catalogue.json"])
+    assert catalogue["buses"] == [
+        {"name": "CAN1", "channel": 1, "bit_rate": 500_000, "data_bit_rate": 2_000_000},
+        {"name": "CAN2", "channel": 2, "bit_rate": 250_000},
+    ]
+    assert [row.get("count") for row in catalogue["variables"]] == [12, None]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        (
+            "firmware = false",
+            "firmware = true",
+            "ARM buses: CAN1 is a CAN FD bus; a board with firmware has the classic",
+        ),
+        (
+            "data_bit_rate = 2_000_000",
+            "data_bit_rate = 250_000",
+            "buses CAN1: data_bit_rate 250000 is below bit_rate 500000",
+        ),
+        ("data_bit_rate = 2_000_000", "data_rate = 2", "buses 'CAN1': needs exactly channel and bit_rate"),
+        ("f32[12]", "f32[16]", r"ARM_ANGLES type: is 'f32\[16\]', and a variable of several values has 2 ... 15"),
+        ("f32[12]", "f64[12]", r"ARM_ANGLES type: is 'f64\[12\]', not one of f32, i32, u32"),
+        (
+            ", data_bit_rate = 2_000_000",
+            "",
+            r"ARM_ANGLES type: is 'f32\[12\]': several values need a CAN FD bus, and CAN1 is",
+        ),
+    ],
+)
+def test_what_a_can_fd_bus_cannot_have_is_refused_by_name(tmp_path, old, new, rule):
+    boards, rows = FD_BOARDS.replace(old, new), FD_ROWS.replace(old, new)
+    assert (boards, rows) != (FD_BOARDS, FD_ROWS)
     with pytest.raises(TableError, match=rule):
         table(tmp_path, boards, rows)

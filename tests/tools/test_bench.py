@@ -144,7 +144,7 @@ def test_an_answer_later_than_its_bound_is_exit_code_1(capsys, monkeypatch):
     from ranger_sim.can_bus import bound_check
 
     assert reported(capsys, "bounds", "--sets", "3")[0] == 0
-    monkeypatch.setattr(bound_check, "random_sets", lambda count: {"sets": count, "exceeded": 1})
+    monkeypatch.setattr(bound_check, "random_sets", lambda count, fd: {"sets": count, "exceeded": 1, "fd": fd})
     assert reported(capsys, "bounds", "--sets", "3")[0] == 1
 
 

@@ -63,7 +63,7 @@ def bounds(options: argparse.Namespace, report: Callable[[str], None]) -> dict:
     """Random message sets against their bounds."""
     from ranger_sim.can_bus import bound_check
 
-    figures = bound_check.random_sets(options.sets)
+    figures = bound_check.random_sets(options.sets, fd=options.fd)
     for name, value in figures.items():
         report(f"{name:28} {value:.4g}" if isinstance(value, float) else f"{name:28} {value}")
     return figures
@@ -108,6 +108,7 @@ def register(commands: Any) -> None:
         "--frames", type=whole_number(3), default=1_000_000, metavar="N", help="of interfaces (default 1000000)"
     )
     command.add_argument("--sets", type=whole_number(1), default=10_000, metavar="N", help="of bounds (default 10000)")
+    command.add_argument("--fd", action="store_true", help="of bounds: buses of CAN FD, with two bit rates")
     command.add_argument("--json", metavar="FILE|-", help="everything as JSON; - prints it and nothing else")
     command.set_defaults(run=run, refuse=command.error)
 

@@ -36,14 +36,18 @@ def register(commands: Any) -> None:
     )
     what.add_argument("--dbc", metavar="FILE", help="messages of a DBC file that have a cycle time (GenMsgCycleTime)")
     command.add_argument("--bit-rate", type=whole_number(1000), metavar="BIT/S", help="bit rate of the DBC file's bus")
+    command.add_argument(
+        "--data-bit-rate", type=whole_number(1000), metavar="BIT/S", help="data bit rate of the DBC file's CAN FD bus"
+    )
     command.add_argument("--json", metavar="FILE|-", help="the bounds as JSON; - prints them and nothing else")
     command.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Analyse, print; 0 when every deadline is met, 1 otherwise."""
-    if options.bit_rate is not None and options.dbc is None:
-        raise UserError("--bit-rate goes with --dbc; a profile and the robot have their own")
+    for name, value in (("--bit-rate", options.bit_rate), ("--data-bit-rate", options.data_bit_rate)):
+        if value is not None and options.dbc is None:
+            raise UserError(f"{name} goes with --dbc; a profile and the robot have their own")
     json_file = json_target(options.json)
     buses = of_dbc(options) if options.dbc else of_profile(options)
     met = all(frame["met"] for bus in buses for frame in bus["frames"])
@@ -87,13 +91,13 @@ def of_dbc(options: argparse.Namespace) -> list[dict]:
     from ranger_sim.can_bus.edge.dbc import read_messages
 
     path = pathlib.Path(options.dbc)
-    messages, bit_rate, silent = read_messages(path, options.bit_rate)
-    if not messages:
+    found = read_messages(path, options.bit_rate, options.data_bit_rate)
+    if not found.messages:
         raise UserError(f"{path}: no message has a cycle time (GenMsgCycleTime), so there is nothing to bound")
-    bounds = tuple(response_times(messages, bit_rate))
-    notes = [f"without GenMsgCycleTime, left out: {', '.join(silent)}"] if silent else []
+    bounds = tuple(response_times(found.messages, found.bit_rate, data_bit_rate=found.data_bit_rate))
+    notes = [f"without GenMsgCycleTime, left out: {', '.join(found.silent)}"] if found.silent else []
     frames = [facts(bound, "", [bound.message.name]) for bound in bounds]
-    return [report(path.name, bit_rate, "", bounds, frames, {}, notes)]
+    return [report(path.name, found.bit_rate, "", bounds, frames, {}, notes, found.data_bit_rate)]
 
 
 def facts(bound: Bound, board: str, variables: list[str]) -> dict:
@@ -105,6 +109,7 @@ def facts(bound: Bound, board: str, variables: list[str]) -> dict:
         "variables": variables,
         "identifier": one.key >> 21 if not one.key & 0x180000 else (one.key >> 21) << 18 | one.key >> 1 & 0x3FFFF,
         "bits": one.bits,
+        "data_bits": one.data_bits,
         "period_ms": one.period_ns / 1e6,
         "jitter_ms": one.jitter_ns / 1e6,
         "deadline_ms": one.deadline_ns / 1e6,
@@ -123,13 +128,15 @@ def report(
     frames: list[dict],
     waiting: Mapping[str, int | None],
     notes: list[str],
+    data_bit_rate: int = 0,
 ) -> dict:
     """One bus as plain values."""
     return {
         "bus": name,
         "bit_rate": bit_rate,
+        "data_bit_rate": data_bit_rate,
         "schedule": schedule,
-        "utilisation": float(utilisation((bound.message for bound in bounds), bit_rate)),
+        "utilisation": float(utilisation((bound.message for bound in bounds), bit_rate, data_bit_rate)),
         "most_waiting": dict(waiting),
         "notes": notes,
         "frames": sorted(frames, key=lambda frame: frame["identifier"]),
@@ -142,7 +149,8 @@ def show(bus: dict, console: Console) -> None:
     schedule = f", schedule {bus['schedule']}" if bus["schedule"] else ""
     used = f"at most {100 * bus['utilisation']:.1f} % used"
     verdict = f"{missed} can miss their deadlines" if missed else "every deadline met"
-    heading = f"{bus['bus']}: {bus['bit_rate'] / 1e6:g} Mbit/s{schedule}, {used}, {verdict}"
+    data = f" and {bus['data_bit_rate'] / 1e6:g}" if bus["data_bit_rate"] else ""
+    heading = f"{bus['bus']}: {bus['bit_rate'] / 1e6:g}{data} Mbit/s{schedule}, {used}, {verdict}"
     table = Table(box=None, pad_edge=False)
     for column in ("id", "frame", "from", *TIMES_MS, ""):
         left = column in ("frame", "from", "")

@@ -6,6 +6,7 @@ from types import SimpleNamespace as Made
 import numpy as np
 import pytest
 
+from ranger_sim.can_bus.frame_log import SENDER_SHIFT, TIMES_BUFFER_SHIFT
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim import activity
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
@@ -173,7 +174,8 @@ def test_frames_of_one_exchange_of_the_link_are_one_slice():
 def frames(*rows, bitrate=3_000_000):
     """Rows (start, asked, end, identifier, sender, buffer, flags, low, high)."""
     packed = [
-        (a, b, c, i, (node + 1) << 16 | buffer << 8 | flags, lo, hi) for a, b, c, i, node, buffer, flags, lo, hi in rows
+        (a, b, c, i, (node + 1) << SENDER_SHIFT | buffer << TIMES_BUFFER_SHIFT | flags, lo, hi)
+        for a, b, c, i, node, buffer, flags, lo, hi in rows
     ]
     bus = Made(name="can1", bitrate=bitrate, nodes=[Made(name="A"), Made(name="B")])
     return BusFrames(bus, np.array(packed, dtype=np.int64), 1000)

@@ -48,8 +48,8 @@ def printed(capsys, *arguments):
 @pytest.mark.parametrize(("reported", "rate"), [(10, 10_000), (125, 125_000), (9_999, 9_999_000), (10_000, 10_000)])
 def test_a_bit_rate_below_any_bus_s_is_in_kbit_s(dbc, reported, rate):
     dbc.write_text(DBC.replace('BA_ "Baudrate" 125;', f'BA_ "Baudrate" {reported};'), encoding="utf-8")
-    assert read_messages(dbc, None)[1] == rate
-    assert read_messages(dbc, 500_000)[1] == 500_000  # what is asked for comes first
+    assert read_messages(dbc, None).bit_rate == rate
+    assert read_messages(dbc, 500_000).bit_rate == 500_000  # what is asked for comes first
 
 
 @pytest.mark.parametrize("reported", [0, -1])
@@ -60,13 +60,13 @@ def test_a_bit_rate_of_nothing_is_none(dbc, reported):
 
 
 def test_messages_without_a_cycle_time_are_distinguished(dbc):
-    messages, _, silent = read_messages(dbc, None)
-    assert [(one.name, one.period_ns, one.deadline_ns) for one in messages] == [
+    found = read_messages(dbc, None)
+    assert [(one.name, one.period_ns, one.deadline_ns) for one in found.messages] == [
         ("First", 4_000_000, 4_000_000),
         ("Second", 6_000_000, 6_000_000),
         ("Third", 20_000_000, 20_000_000),
     ]
-    assert silent == ["Silent"]
+    assert found.silent == ["Silent"]
 
 
 def test_the_robots_own_buses_meet_their_bounds_and_are_printed_as_tables(capsys):
@@ -95,7 +95,8 @@ def test_a_profile_that_is_too_slow_leaves_with_1_and_says_what_is_late(capsys, 
 
 
 def test_a_dbc_file_gives_its_messages_rate_and_what_it_lacks(dbc):
-    messages, rate, silent = read_messages(dbc, None)
+    found = read_messages(dbc, None)
+    messages, rate, silent = found.messages, found.bit_rate, found.silent
     assert (rate, silent) == (125_000, ["Silent"])
     assert [(m.name, m.period_ns, m.bits) for m in messages] == [
         ("First", 4_000_000, 125),
@@ -120,7 +121,7 @@ def test_a_dbc_file_on_the_command_line(capsys, dbc, tmp_path):
     [
         ("nonsense", "not a DBC file"),
         (DBC.replace('BA_ "Baudrate" 125;', ""), "--bit-rate"),
-        (DBC.replace("Second: 7", "Second: 64"), "Second has 64 bytes"),
+        (DBC.replace("Second: 7", "Second: 64"), "message Second is of CAN FD"),
         ('VERSION ""\nBU_: A\nBO_ 4 Silent: 8 A\n', "--bit-rate"),
         ("\0\0\0", "not a DBC file"),
     ],
@@ -194,3 +195,61 @@ def test_the_commands_are_in_the_help(capsys):
         cli.main(["--help"])
     text = capsys.readouterr().out
     assert "can-bounds" in text and "check-bus" in text
+
+
+FD_DBC = """VERSION ""
+NS_ :
+BS_:
+BU_: A
+BO_ 1 Fast: 64 A
+BO_ 2 Slow: 12 A
+BO_ 3 Plain: 8 A
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 100000;
+BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","StandardCAN_FD","ExtendedCAN_FD";
+BA_DEF_ BO_ "CANFD_BRS" ENUM "0","1";
+BA_DEF_ "Baudrate" INT 0 10000000;
+BA_DEF_ "BaudrateCANFD" INT 0 10000000;
+BA_DEF_DEF_ "GenMsgCycleTime" 10;
+BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
+BA_DEF_DEF_ "CANFD_BRS" "1";
+BA_DEF_DEF_ "Baudrate" 500;
+BA_DEF_DEF_ "BaudrateCANFD" 2000;
+BA_ "VFrameFormat" BO_ 1 2;
+BA_ "VFrameFormat" BO_ 2 2;
+BA_ "CANFD_BRS" BO_ 2 0;
+BA_ "Baudrate" 500;
+BA_ "BaudrateCANFD" 2000;
+"""
+
+
+def test_a_dbc_file_with_can_fd_messages_is_analysed_with_both_rates(capsys, tmp_path):
+    """Lengths as in tests/can_bus/test_bounds.py: 32 nominal and 680 data bits of the frame of 64 bytes."""
+    path = tmp_path / "fd.dbc"
+    path.write_text(FD_DBC, encoding="utf-8")
+    found = read_messages(path, None)
+    assert (found.bit_rate, found.data_bit_rate) == (500_000, 2_000_000)
+    fast, slow, plain = found.messages
+    assert (fast.bits, fast.data_bits, slow.data_bits, plain.bits, plain.data_bits) == (32, 680, 0, 135, 0)
+    code, text = printed(capsys, "can-bounds", "--dbc", path)
+    assert code == 0 and "fd.dbc: 0.5 and 2 Mbit/s" in text
+    assert read_messages(path, None, 4_000_000).data_bit_rate == 4_000_000
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('BA_ "BaudrateCANFD" 2000;', "", "message Fast is of CAN FD, and the file has no data bit rate"),
+        ('BA_ "BaudrateCANFD" 2000;', 'BA_ "BaudrateCANFD" 250;', "data bit rate 250000 bit/s is below the bit rate"),
+        ("Fast: 64", "Fast: 65", "message Fast has 65 bytes; a CAN FD frame has at most 64"),
+    ],
+)
+def test_can_fd_messages_that_cannot_be_are_refused_by_name(tmp_path, old, new, words):
+    path = tmp_path / "fd.dbc"
+    path.write_text(FD_DBC.replace(old, new), encoding="utf-8")
+    with pytest.raises(UserError, match=rf"fd.dbc: {words}"):
+        read_messages(path, None)
+
+
+def test_a_data_bit_rate_goes_with_a_dbc_file(capsys):
+    assert main(["can-bounds", "--data-bit-rate", "2000000"]) == 2
+    assert "--data-bit-rate goes with --dbc" in capsys.readouterr().err

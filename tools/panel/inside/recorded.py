@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ranger_sim.foundation import json_text
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.ranger.assembly import BUS_BIT_RATE
 from ranger_sim.sysid.dataset import Dataset
@@ -108,10 +108,14 @@ class Decoded:
         self.first_ns: int | None = None  # of the frames that may be messages
         self.buses: list[Bus] = []
         self.errors = ErrorList()
+        self.fd_frames = 0
 
     def take(self, frame: frames.Frame) -> None:
         """Keep the next frame of the recording."""
         bus, time_ns, identifier, flags, low, high = frame
+        if flags & FLAG_FD:
+            self.fd_frames += 1
+            return
         if self.first_ns is None and not flags & (FLAG_ERROR | FLAG_REMOTE):
             self.first_ns = time_ns
         words = self.words.setdefault(bus or self.path.stem, array.array("q"))
@@ -151,7 +155,9 @@ class Decoded:
 
     def note(self) -> str:
         """What is missing, as text."""
-        return self.missing
+        return self.missing + (
+            f" CAN FD frames ({self.fd_frames}) are shown as channels only." if self.fd_frames else ""
+        )
 
 
 def profile_of(folder: pathlib.Path) -> str | None:
