@@ -226,7 +226,11 @@ class RemoteBoard(Board):
         """Ask the board for its counters; `counters` returns them from then on."""
         counters = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
         if not self.gone:
-            self.counted = from_dict(type(self.uncounted), json.loads(counters))
+            try:
+                self.counted = from_dict(type(self.uncounted), json.loads(counters))
+            except (ValueError, TypeError, AttributeError, RecursionError):  # its program wrote over its memory
+                self.from_board.damaged += 1
+                self.from_board.last_damage = f"channel from {self.name}: its counters are not readable"
 
     def notes_of(self, command, what) -> bytes:
         """Run one turn with `command`; returns the bytes of the board's notes of the kind `what`."""
