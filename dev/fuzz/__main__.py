@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
         "--seed", type=whole_number(0), default=1, metavar="S", help="the same seed gives the same cases (default 1)"
     )
     command.add_argument(
-        "--state", type=pathlib.Path, metavar="FILE", help="firmware: keep the counts there after each case, and go on there"
+        "--state", type=pathlib.Path, metavar="FILE", help="firmware: keep the counts in FILE, and go on there"
     )
     command.add_argument("--json", metavar="FILE|-", help="what was counted, as JSON; - prints it and nothing else")
     return command
@@ -79,7 +79,8 @@ def run(options: argparse.Namespace) -> int:
     for name in dict.fromkeys(options.target or TARGETS):
         fuzzer = importlib.import_module(f"dev.fuzz.{name}")
         try:
-            counted = found[name] = fuzzer.run(options.cases, options.seed, *([options.state] if options.state is not None else []))
+            more = [options.state] if options.state is not None else []
+            counted = found[name] = fuzzer.run(options.cases, options.seed, *more)
         except Finding as finding:
             print(f"{COMMAND}: {name}, seed {options.seed}: {finding}", file=sys.stderr)
             return EXIT_FOUND

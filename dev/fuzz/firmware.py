@@ -2,8 +2,9 @@
 
 A case is a program of one to three hostile pieces (signals, exits, descriptors, memory, stack, control flow, tables,
 calls, output) at places where a program runs: a constructor, the start, a task, an interrupt. Every sixth case is an
-image: random instructions, or ELF and HEX files with pieces exchanged. `walk` runs in a forked process. After it: it has ended in time with a code that agrees with its summary, a lost board has a cause, a refusal
-is one line, standard output is JSON and nothing else, and no process, file or shared memory is left.
+image: random instructions, or ELF files with pieces exchanged. `walk` runs in a forked process. After it: it has
+ended in time with a code that agrees with its summary, a lost board has a cause, a refusal is one line, standard output
+is JSON and nothing else, and no process, file or shared memory is left.
 
 `--state FILE` keeps the counts after each case; a later run of the same seed goes on there.
 """
@@ -99,7 +100,8 @@ PIECES = {
     "signals blocked, asleep": "sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); for (;;) pause();",
     "signals ignored": "for (int each = 1; each < 65; each++) signal(each, SIG_IGN); for (;;) sink++;",
     "signals handled": "for (int each = 1; each < 65; each++) signal(each, again); *(volatile int *)8 = 1;",
-    "timer off": "struct itimerval none; memset(&none, 0, sizeof none); setitimer(ITIMER_PROF, &none, 0); for (;;) sink++;",
+    "timer off": "struct itimerval none; memset(&none, 0, sizeof none); "
+    "setitimer(ITIMER_PROF, &none, 0); for (;;) sink++;",
     "alarm": "alarm(1);",
     "handlers default": "for (int each = 1; each < 32; each++) signal(each, SIG_DFL); *(volatile int *)%(n)d = 1;",
     "exit": "exit(%(n)d);",
@@ -111,13 +113,14 @@ PIECES = {
     "exit of the thread": "syscall(SYS_exit, %(n)d);",
     "descriptors closed": "for (int each = 0; each < 1024; each++) close(each);",
     "one descriptor closed": "close(%(d)d);",
-    "descriptors reused": "int it = open(\"/dev/null\", O_RDWR); for (int each = 0; each < 40; each++) dup2(it, each);",
-    "one descriptor reused": "int it = open(\"/dev/zero\", O_RDONLY); dup2(it, %(d)d);",
-    "descriptors written": "for (int each = 0; each < 40; each++) { uint64_t one = 1; if (write(each, &one, 8) < 0) sink++; }",
+    "descriptors reused": 'int it = open("/dev/null", O_RDWR); for (int each = 0; each < 40; each++) dup2(it, each);',
+    "one descriptor reused": 'int it = open("/dev/zero", O_RDONLY); dup2(it, %(d)d);',
+    "descriptors written": "for (int each = 0; each < 40; each++) { uint64_t one = 1; "
+    "if (write(each, &one, 8) < 0) sink++; }",
     "descriptors read": "for (int each = 0; each < 40; each++) { char some[64]; fcntl(each, F_SETFL, O_NONBLOCK); "
     "if (read(each, some, 64) < 0) sink++; }",
     "read for ever": "char some[64]; for (;;) if (read(%(d)d, some, 64) < 0) sink++;",
-    "descriptors used up": "while (open(\"/dev/null\", O_RDONLY) >= 0) sink++;",
+    "descriptors used up": 'while (open("/dev/null", O_RDONLY) >= 0) sink++;',
     "block filled": "over_shared(0, %(w)dull);",
     "block zeroed": "over_shared(0, 0);",
     "block scribbled": "srand(%(w)d); over_shared(1, 0);",
@@ -130,8 +133,9 @@ PIECES = {
     "calls exchanged": "fw_calls[%(n)d] = fw_calls[%(n)d + 3];",
     "calls removed": "for (int each = 0; each < 40; each++) fw_calls[each] = 0;",
     "threads": "pthread_t it; for (int each = 0; each < 8; each++) sink += pthread_create(&it, 0, thread, 0);",
-    "forks": "for (int each = 0; each < 4; each++) if (fork() == 0) for (int turn = 0; turn < 100; turn++) usleep(10000);",
-    "another program": "char *none[] = {0}; execve(\"/bin/true\", none, none);",
+    "forks": "for (int each = 0; each < 4; each++) if (fork() == 0) "
+    "for (int turn = 0; turn < 100; turn++) usleep(10000);",
+    "another program": 'char *none[] = {0}; execve("/bin/true", none, none);',
     "traced": "syscall(SYS_ptrace, 0, 0, 0, 0); raise(SIGSTOP);",
     "outlives its parent": "prctl(PR_SET_PDEATHSIG, 0); prctl(PR_SET_DUMPABLE, 0);",
     "sockets": "sink += socket(AF_INET, SOCK_STREAM, 0); sink += socket(AF_UNIX, SOCK_STREAM, 0);",
@@ -158,9 +162,9 @@ PIECES = {
     "fw_can_transmit(each %% 5, each, &it);",
     "time": "fw_spend(%(w)du); fw_idle();",
     "interrupts": "fw_request(%(n)d, %(w)d); fw_detach(%(n)d, 0);",
-    "output": "for (int each = 0; each < 20000; each++) printf(\"%%d {\\\"a\\\": [\", each);",
-    "bytes": "for (int each = 0; each < 4096; each++) putchar(each); fputs(\"\\033[2J\\033]0;x\\007\", stderr);",
-    "output for ever": "for (;;) if (write(1, \"0123456789abcdef\", 16) < 0) sink++;",
+    "output": 'for (int each = 0; each < 20000; each++) printf("%%d {\\"a\\": [", each);',
+    "bytes": 'for (int each = 0; each < 4096; each++) putchar(each); fputs("\\033[2J\\033]0;x\\007", stderr);',
+    "output for ever": 'for (;;) if (write(1, "0123456789abcdef", 16) < 0) sink++;',
 }
 PLACES = ("task", "start", "constructor", "handler", "schedule")
 OFTEN = 3  # of five cases, a task
@@ -248,7 +252,8 @@ class Fuzz:
         place = "task" if self.number(5) < OFTEN else self.one_of(PLACES)
         names = [self.one_of(sorted(PIECES)) for _ in range(1 + self.number(3))]
         values = {"n": self.number(9), "s": 1 + self.number(64), "w": self.number(1 << 31), "d": self.number(12)}
-        pieces = "".join(PROGRAM % {"name": f"piece{i}", "pieces": PIECES[name] % values} for i, name in enumerate(names))
+        functions = [{"name": f"piece{i}", "pieces": PIECES[name] % values} for i, name in enumerate(names)]
+        pieces = "".join(PROGRAM % each for each in functions)
         calls = " ".join(f"piece{i}();" for i in range(len(names)))
         parts = {"task": "", "start": "", "handler": "", "before": "", "constructor": ""}
         parts.update(schedule=GOOD, which="&schedule", version="RANGER_TABLE_VERSION")
@@ -391,9 +396,7 @@ def processes_of(group: int) -> set[int]:
 
 def elf(content: bytes) -> bytes:
     """An executable for the chip with one segment at the beginning of the flash."""
-    head = struct.pack(
-        "<16sHHIIIIIHHHHHH", b"\x7fELF\x01\x01\x01", 2, 40, 1, 0, 52, 0, 0x05000000, 52, 32, 1, 40, 0, 0
-    )
+    head = struct.pack("<16sHHIIIIIHHHHHH", b"\x7fELF\x01\x01\x01", 2, 40, 1, 0, 52, 0, 0x05000000, 52, 32, 1, 40, 0, 0)
     return head + struct.pack("<8I", 1, 84, 0, 0, len(content), len(content), 5, 4) + content
 
 

@@ -64,8 +64,8 @@ def tried(
     """Load a library in a forked process, then call `start(record)` there. UserError, which begins with `what`, when
     the program ends that process or does not return in time; a UserError of `start` is raised here as well.
 
-    record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet; what it
-    prints is dropped then, because it is loaded again from there.
+    record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet;
+    what it prints is dropped then, because it is loaded again from there.
     """
     importlib.import_module("cffi")  # a missing library is not the program's fault
     record = record_words()

@@ -126,7 +126,7 @@ WRONG = {
     "edge": (elf(((0, 0x0003FFF8, CODE),)), "16 bytes at 0x0003fff8 are outside the chip's flash"),
     "twice": (elf(((0, 0x100, CODE), (0, 0x108, CODE))), "two segments overlap at 0x00000108"),
     "nothing": (elf(()), "it has no data for flash or RAM"),
-    "segment in memory": (changed(72, 0xFFFFFFFF), "a segment takes 4294967295 bytes at 0x00000100, outside the chip's"),
+    "segment in memory": (changed(72, 0xFFFFFFFF), "a segment takes 4294967295 bytes at 0x00000100, outside"),
     "segment in the file": (changed(68, 0xFFFFFFFF), "truncated: a segment of 4294967295 bytes"),
     "symbols": (changed(len(elf()) - 60, 0xFFFFFFF0), "truncated: section 1 of 4294967280 bytes ends at byte"),
     "no size of a symbol": (changed(len(elf()) - 44, 0), "damaged or truncated ELF file"),
