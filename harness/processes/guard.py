@@ -9,7 +9,7 @@ import dataclasses
 import os
 import signal
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors
@@ -17,15 +17,31 @@ from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.settings import DEADLINE_S
 
 CHECKS = 10  # checks in a deadline, each after a wait: a suspended machine costs one of them
+MOST_SLICES = 1000  # of a processor in one turn: it takes microseconds, and a slice some milliseconds. Chosen by us
 TRACED = "t"  # state of a process that a debugger holds
 STOPPED = ("T", TRACED)
 
 
-def is_starved(process: int, since_s: float, limit_s: float) -> bool:
-    """Whether a process is ready to run, but the machine is busy with others: it has had less than half of `limit_s`
-    since it had used `since_s` of processor time.
+class Use(NamedTuple):
+    """What a process has had of the processors: time (s), and how often it got one."""
+
+    time_s: float = 0.0
+    slices: int = 0
+
+
+def use_of(process: int) -> Use:
+    """Its use up to now."""
+    return Use(kernel.processor_time_s(process), kernel.slices_of(process))
+
+
+def is_starved(process: int, since: Use, limit_s: float) -> bool:
+    """Whether a process is ready to run, but the machine is busy with others: since then it has had less than half of
+    `limit_s`, and few slices. One that gives the processor away again and again has had many.
     """
-    return kernel.state_of(process) == "R" and kernel.processor_time_s(process) - since_s < limit_s / 2
+    if kernel.state_of(process) != "R":
+        return False
+    now = use_of(process)
+    return now.time_s - since.time_s < limit_s / 2 and now.slices - since.slices < MOST_SLICES
 
 
 def cause(block: Any, process: int, waited_s: float, used_s: float) -> str:
@@ -44,14 +60,14 @@ def cause(block: Any, process: int, waited_s: float, used_s: float) -> str:
 
 @dataclasses.dataclass
 class Watched:
-    """The last state of a board's process: its turn, for how many checks, its and the waiting process's processor time
-    then.
+    """The last state of a board's process: its turn, for how many checks, its and the waiting process's use of
+    processors then.
     """
 
     turn: int = -1
     checks: int = 0
-    used_s: float = 0.0
-    used_by_waiter_s: float = 0.0
+    use: Use = Use()
+    use_of_waiter: Use = Use()
     was_asked: bool = False
 
 
@@ -94,19 +110,18 @@ class Guard:
         seen, block, process, waiter = self.seen[name], self.blocks[name], self.numbers[name], os.getppid()
         turn = block.private[places.WAITS]
         if turn != seen.turn or not block.private[places.AWAITED]:
-            used_s, used_by_waiter_s = kernel.processor_time_s(process), kernel.processor_time_s(waiter)
-            self.seen[name] = Watched(turn, used_s=used_s, used_by_waiter_s=used_by_waiter_s)
+            self.seen[name] = Watched(turn, use=use_of(process), use_of_waiter=use_of(waiter))
             return
         limit_s = self.deadline_s
         if kernel.state_of(process) == TRACED or (
-            is_starved(process, seen.used_s, limit_s) or is_starved(waiter, seen.used_by_waiter_s, limit_s)
+            is_starved(process, seen.use, limit_s) or is_starved(waiter, seen.use_of_waiter, limit_s)
         ):
             return
         seen.checks += 1
         if seen.checks < CHECKS:
             return
         if not seen.was_asked:
-            block.leave_fault(cause(block, process, limit_s, kernel.processor_time_s(process) - seen.used_s))
+            block.leave_fault(cause(block, process, limit_s, use_of(process).time_s - seen.use.time_s))
         if seen.was_asked or name not in self.in_c or block.words[places.ASKED] == block.words[places.ANSWERED]:
             os.kill(process, signal.SIGKILL)
         else:

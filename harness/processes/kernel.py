@@ -97,6 +97,15 @@ def processor_time_s(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") if fields else 0.0
 
 
+def slices_of(process: int) -> int:
+    """How often a process got a processor; 0 where the kernel does not count it."""
+    try:
+        with open(f"/proc/{process}/schedstat", encoding="ascii") as file:
+            return int(file.read().split()[2])
+    except (OSError, IndexError):
+        return 0
+
+
 def state_of(process: int) -> str:
     """Letter of the state (R, S, D, T, t, Z), empty when it is gone; proc(5)."""
     fields = _stat(process)

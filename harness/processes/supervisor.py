@@ -25,7 +25,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
-from ranger_sim.harness.processes.guard import cause, is_starved
+from ranger_sim.harness.processes.guard import Use, cause, is_starved, use_of
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.settings import DEADLINE_S, ON_FAILURE, Settings
 from ranger_sim.harness.stop_rule import StopRule
@@ -65,8 +65,8 @@ class Child:
     state: str = RUNNING
     turn: int = -1
     turn_since_s: float = 0.0
-    turn_cpu_s: float = 0.0
-    turn_cpu_of_plant_s: float = 0.0
+    turn_use: Use = Use()
+    turn_use_of_plant: Use = Use()
     stopped_s: float = 0.0
     was_asked: bool = False  # for its position while it keeps its turn: a program in C reports it when it ends
 
@@ -448,8 +448,8 @@ class Supervisor:
             turn, awaited = block.private[places.WAITS], block.private[places.AWAITED]
             if not awaited or turn != child.turn:
                 child.turn, child.turn_since_s = turn, now
-                child.turn_cpu_s = kernel.processor_time_s(child.process) if awaited else 0.0
-                child.turn_cpu_of_plant_s = self.plant_cpu_s() if awaited else 0.0
+                child.turn_use = use_of(child.process) if awaited else Use()
+                child.turn_use_of_plant = self.use_of_plant() if awaited else Use()
                 continue
             if self.is_held(name, block.words):
                 child.turn_since_s = now
@@ -458,11 +458,11 @@ class Supervisor:
             if held_s < HANG_S or kernel.state_of(child.process) in ("T", "t", "Z", ""):
                 continue
             plant = self.children.get(PLANT)
-            if is_starved(child.process, child.turn_cpu_s, HANG_S) or (
-                plant is not None and is_starved(plant.process, child.turn_cpu_of_plant_s, HANG_S)
+            if is_starved(child.process, child.turn_use, HANG_S) or (
+                plant is not None and is_starved(plant.process, child.turn_use_of_plant, HANG_S)
             ):
                 continue
-            used_s = kernel.processor_time_s(child.process) - child.turn_cpu_s
+            used_s = use_of(child.process).time_s - child.turn_use.time_s
             why = cause(block, child.process, held_s, used_s)
             if not child.was_asked:
                 block.leave_fault(why)
@@ -478,9 +478,9 @@ class Supervisor:
         if not self.ending:
             self.view.show(self.state())
 
-    def plant_cpu_s(self) -> float:
-        """Processor time that the plant's process has used."""
-        return kernel.processor_time_s(self.children[PLANT].process) if PLANT in self.children else 0.0
+    def use_of_plant(self) -> Use:
+        """What the plant's process has had of the processors."""
+        return use_of(self.children[PLANT].process) if PLANT in self.children else Use()
 
     def check_stopped(self, child: Child, passed_s: float) -> None:
         """End the run when a process that is stopped has owed a reply for the deadline.

@@ -473,6 +473,7 @@ class Owing:
     used_s: float = 0.0
     state_of_the_waiter: str = "S"
     files: tuple = (kernel.EVENTFD,)
+    slices: int = 0
 
 
 @pytest.fixture
@@ -484,6 +485,7 @@ def owing(monkeypatch):
         guard.kernel, "state_of", lambda process: made.state if process == 2**22 else made.state_of_the_waiter
     )
     monkeypatch.setattr(guard.kernel, "processor_time_s", lambda process: made.used_s)
+    monkeypatch.setattr(guard.kernel, "slices_of", lambda process: made.slices)
     monkeypatch.setattr(guard.kernel, "open_files", lambda process: made.files)
     monkeypatch.setattr(guard.kernel, "waiting_in", lambda process: " (pause)")
     block.words[places.ASKED], block.words[places.ANSWERED] = 5, 4
@@ -545,6 +547,13 @@ def test_a_board_that_is_not_waited_for_is_left_alone(owing):
     owing.state_of_the_waiter = "R"
     looks(owing, 10 * guard.CHECKS)  # its answer may be there, and is read when the machine has time
     assert owing.sent == []
+
+
+def test_a_board_that_gives_the_processor_away_again_and_again_is_not_waited_for(owing):
+    looks(owing, 1)
+    owing.state, owing.slices = "R", guard.MOST_SLICES
+    looks(owing, guard.CHECKS)
+    assert owing.sent == [crash.ASKED, signal.SIGCONT]
 
 
 def test_a_program_that_writes_answers_into_its_memory_gains_no_time(owing):

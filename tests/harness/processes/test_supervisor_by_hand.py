@@ -11,6 +11,7 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import guard, kernel, places, supervisor
+from ranger_sim.harness.processes.guard import MOST_SLICES
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import GONE, HANG_S, PLANT, RESTARTING, RUNNING, STOPPED, Child, Supervisor
 from ranger_sim.harness.stop_rule import StopRule
@@ -48,12 +49,13 @@ def alone(robot, monkeypatch):
     settings = Settings(None, name=f"by-hand-{os.getpid()}", real_time=False)
     with contextlib.closing(Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())) as made:
         made.clock = Made(now=100.0)
-        made.states, made.used, made.killed, made.answers = {}, {}, [], []
+        made.states, made.used, made.slices, made.killed, made.answers = {}, {}, {}, [], []
         monkeypatch.setattr(supervisor, "wallclock", Made(monotonic_s=lambda: made.clock.now))
         listed = Made(
             EVENTFD=kernel.EVENTFD,
             state_of=lambda process: made.states.get(process, "S"),
             processor_time_s=lambda process: made.used.get(process, 0.0),
+            slices_of=lambda process: made.slices.get(process, 0),
             open_files=lambda process: [kernel.EVENTFD],
             waiting_in=lambda process: " (pause)",
         )
@@ -189,6 +191,8 @@ def test_a_stopped_board_that_owes_no_reply_or_goes_on_does_not_end_the_run(alon
         ({"kernel": "R"}, False),  # it would like to run, and has not had the processor
         ({"kernel": "R", "used": HANG_S / 2}, True),
         ({"kernel": "R", "used": HANG_S / 2 - 0.01}, False),
+        ({"kernel": "R", "slices": MOST_SLICES - 1}, False),
+        ({"kernel": "R", "slices": MOST_SLICES}, True),  # it has, again and again, and gave it away
         ({"plant": "R"}, False),  # the one that waits has not had the processor
         ({"held": 1}, False),
     ],
@@ -203,6 +207,7 @@ def test_a_board_hangs_only_when_it_has_its_turn_and_could_run(alone, change, ki
     words[places.ANSWERED] = change.get("answered", 6)
     words[places.HELD] = change.get("held", 0)
     alone.states[50] = change.get("plant", "S")
+    alone.slices[41] = change.get("slices", 0)
     child.state = change.get("state", RUNNING)
     alone.states[41], alone.used[41] = change.get("kernel", "S"), change.get("used", 0.0)
     alone.clock.now += HANG_S
