@@ -67,6 +67,15 @@ class FirmwareError(UserError):
     """Firmware: its schedule, its chip, its source in C or its image."""
 
 
+class BoardFailure(FirmwareError):  # noqa: N818  (the board's, not the user's)
+    """The program of `board` cannot go on. A machine of boards goes on without it."""
+
+    def __init__(self, board: str, text: str) -> None:
+        super().__init__(f"{board}: {text}")
+        self.board = board
+        self.text = text
+
+
 class RequestError(UserError):
     """A request to a running robot."""
 

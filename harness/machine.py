@@ -22,13 +22,14 @@ from ranger_sim.can_bus.bus import Bus
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import NEVER, STAGE_BUS
 from ranger_sim.foundation.quantities import Duration, duration_ns, duration_text
-from ranger_sim.foundation.user_error import UserError, unknown
+from ranger_sim.foundation.user_error import BoardFailure, UserError, unknown
 from ranger_sim.harness import lockstep, waiting
 from ranger_sim.harness.faults import network_places
 from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.faults.error_rows import ErrorRows, StateWord
 from ranger_sim.harness.faults.fault import Fault, Place
 from ranger_sim.harness.names import Names
+from ranger_sim.harness.outside.machine import leave_out
 from ranger_sim.harness.processes.modes import InProcess
 from ranger_sim.harness.records.logbook import Logbook
 from ranger_sim.harness.records.recorder import Recorder
@@ -50,7 +51,7 @@ class Machine:
     `Names.of(load_table(folder))` has them; without, frames have only numbers. places: where faults can be.
     mode: where its boards run.
 
-    `deaths`: of each board whose process has ended by itself, in order: {"board", "time_s", "how" its process ended,
+    `deaths`: of each board whose process or program has ended by itself, in order: {"board", "time_s", "how" it ended,
     "why"}, the last as far as its program or its records report it.
     """
 
@@ -203,7 +204,7 @@ class Machine:
                 end = min(end, self.pace.release(loop.time))
             if self.polled:
                 end = min(end, self._poll())
-            reason = loop.run(min(end, until))
+            reason = self._pass_time(min(end, until))
         self.cpu_s += wallclock.process_cpu_s() - cpu
         self.wall_s += wallclock.monotonic_s() - wall
         if reason == lockstep.FELL:
@@ -211,6 +212,17 @@ class Machine:
         elif reason != lockstep.REACHED_TIME or loop.time >= limit:
             return True
         return bool(self.ended)
+
+    def _pass_time(self, until: int) -> int:
+        """Run the loop; a board whose program cannot go on loses its power, and the rest goes on."""
+        while True:
+            try:
+                return int(self.loop.run(until))
+            except BoardFailure as failure:
+                leave_out(self, failure.board)
+                self.deaths.append(
+                    {"board": failure.board, "time_s": self.time_s, "how": "stopped", "why": failure.text}
+                )
 
     def run_for(self, duration: Duration) -> None:
         """Pass this much virtual time ("20 ms", or a number of seconds), or less when the machine can go no further."""

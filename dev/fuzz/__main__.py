@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import pathlib
 import sys
 
 from dev.fuzz import Finding
@@ -19,6 +20,7 @@ CASES = 10_000
 TARGETS = {
     "can": "frames of every kind, and bytes that are none, from outside onto the buses of a walking robot",
     "channel": "damaged messages in the channel between a board's process and the body's",
+    "firmware": "hostile programs in C and images in the place of a board of a walk",
     "gdb": "hostile debuggers at the gdb port of a board that runs machine code",
     "interfaces": "hostile programs at every endpoint: requests, connections, floods, unread answers; without a robot",
     "panel": "hostile programs at the panel's HTTP and WebSocket",
@@ -47,6 +49,9 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--seed", type=whole_number(0), default=1, metavar="S", help="the same seed gives the same cases (default 1)"
     )
+    command.add_argument(
+        "--state", type=pathlib.Path, metavar="FILE", help="firmware: keep the counts in FILE, and go on there"
+    )
     command.add_argument("--json", metavar="FILE|-", help="what was counted, as JSON; - prints it and nothing else")
     return command
 
@@ -58,6 +63,8 @@ def main(arguments: list[str] | None = None) -> int:
     for name in options.target:
         if name not in TARGETS:
             command.error(f"unknown target {name!r} (available: {', '.join(TARGETS)})")
+    if options.state is not None and options.target != ["firmware"]:
+        command.error("--state is for the target firmware alone")
     try:
         return run(options)
     except UserError as mistake:
@@ -72,7 +79,8 @@ def run(options: argparse.Namespace) -> int:
     for name in dict.fromkeys(options.target or TARGETS):
         fuzzer = importlib.import_module(f"dev.fuzz.{name}")
         try:
-            counted = found[name] = fuzzer.run(options.cases, options.seed)
+            more = [options.state] if options.state is not None else []
+            counted = found[name] = fuzzer.run(options.cases, options.seed, *more)
         except Finding as finding:
             print(f"{COMMAND}: {name}, seed {options.seed}: {finding}", file=sys.stderr)
             return EXIT_FOUND

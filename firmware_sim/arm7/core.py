@@ -28,7 +28,9 @@ polls its endpoint periodically. It stops between two instructions, for as long 
 and everything not changed by hand goes on as without it.
 
 An access to an unmapped address raises `BusFault` with address and program counter. With `takes_aborts` the program
-gets its data or prefetch abort instead, as on the chip, and `fault_address` keeps the address.
+gets its data or prefetch abort instead, as on the chip, and `fault_address` keeps the address. With `needs_handlers`
+an abort or an undefined instruction raises `BoardFailure` where the vector leads to no handler: to nothing, or to a
+branch to itself. `place_of(address)` then names functions.
 """
 
 import array
@@ -36,7 +38,7 @@ from typing import Final
 
 import cython
 
-from ranger_sim.foundation.user_error import FirmwareError, UserError
+from ranger_sim.foundation.user_error import BoardFailure, FirmwareError, UserError
 
 WRITTEN_BITS: Final = 8
 # modes: low five bits of the CPSR
@@ -55,6 +57,8 @@ POLL_CYCLES: Final = 60_000  # between two polls of a debugger's endpoint; chose
 
 # C variables when compiled: Cython makes a Python object of every literal above 31 bits.
 _MASK: cython.longlong = 4294967295
+NOTHING = 0xFFFFFFFF  # what erased flash holds
+ENDLESS = 0xEAFFFFFE  # b to itself: what start-up files have in place of a handler
 _SIGN: cython.longlong = 2147483648
 _STATUS: cython.longlong = 4026532095
 
@@ -107,6 +111,12 @@ class Device:
         """A store."""
         raise LookupError(address)
 
+    @cython.ccall
+    @cython.exceptval(check=True)
+    def answers(self, address: cython.longlong) -> cython.bint:
+        """Whether an address below the bridge is a device's; an access to another one is aborted."""
+        return True
+
 
 @cython.final
 @cython.cclass
@@ -154,6 +164,8 @@ class Core:
     ram_open: cython.longlong
     flash_open: cython.longlong
     takes_aborts: cython.bint
+    needs_handlers: cython.bint
+    place_of: object
     armed: cython.bint
     debugger: object
     hit: object
@@ -197,6 +209,8 @@ class Core:
         self.ready = array.array("q", [0, 0])  # and the cycle at which that one is there
         self.cycles_per_instruction = 0
         self.takes_aborts = False
+        self.needs_handlers = False
+        self.place_of: object = None
         self.fault_address = -1
         self.ram_open = ram_size  # as far as loads and stores need no second check: none of it while data are watched
         self.flash_open = flash_size
@@ -359,7 +373,29 @@ class Core:
     @cython.cfunc
     def undefined(self) -> cython.int:
         self.cycles += 1
+        if self.needs_handlers and not self.has_handler(4):
+            self.fail("undefined instruction", 4, self.pc)
         return self.enter(UNDEFINED, 4, self.following)
+
+    def has_handler(self, vector) -> bool:
+        """Whether the instruction at a vector leads to more than nothing, or than a branch to itself."""
+        op = self.flash[vector >> 2]
+        target = vector
+        if op >> 24 == 0xEA:  # b
+            offset = (op & 0xFFFFFF) - (0x1000000 if op & 0x800000 else 0)
+            target = vector + 8 + 4 * offset & _MASK
+        elif op & 0xFFFFF000 == 0xE59FF000:  # ldr pc, [pc, #offset]
+            place = vector + 8 + (op & 0xFFF)
+            target = self.flash[place >> 2] if place < self.flash_size else NOTHING
+        if not self.is_memory(target):
+            return False
+        return self.peek(target & ~3) not in (0, NOTHING, ENDLESS) or bool(target & 3)
+
+    def fail(self, what, vector, address) -> None:
+        """End the program: the exception, the function in which it occurred, and that it has no handler."""
+        name = self.place_of(address) if self.place_of is not None else ""
+        where = f" in {name}" if name else ""
+        raise BoardFailure(self.name, f"{what} at pc {self.pc:#010x}{where}, without a handler at {vector:#010x}")
 
     # ---- memory
 
@@ -446,7 +482,9 @@ class Core:
             if address >= self.bridge_base:
                 self.cycles += self.device_waits
             if self.bridge is not None:
-                return self.bridge.read(address, size)
+                if address >= self.bridge_base or self.bridge.answers(address):
+                    return self.bridge.read(address, size)
+                return self.nothing(address, size, False)
             try:
                 return self.device.read(address, size)
             except LookupError:
@@ -487,7 +525,9 @@ class Core:
                 self.cycles += self.device_waits
             value = value if size == 4 else value & (0xFF if size == 1 else 0xFFFF)
             if self.bridge is not None:
-                return self.bridge.write(address, size, value)
+                if address >= self.bridge_base or self.bridge.answers(address):
+                    return self.bridge.write(address, size, value)
+                return self.nothing(address, size, True)
             try:
                 self.device.write(address, size, value)
                 return 0
@@ -828,6 +868,8 @@ class Core:
             else:
                 self.nothing(pc, 2 if self.control & 0x20 else 4, False)
                 self.faulted = 0
+                if self.needs_handlers and not self.has_handler(0x0C):
+                    self.fail("prefetch abort: no memory", 0x0C, self.r[14])
                 self.enter(ABORT, 0x0C, pc + 4)
                 self.pc = self.following
                 return 0
@@ -845,6 +887,8 @@ class Core:
         if self.faulted:
             self.faulted = 0
             self.cycles += 1
+            if self.needs_handlers and not self.has_handler(0x10):
+                self.fail(f"data abort: no memory for an access to {self.fault_address:#010x}", 0x10, pc)
             self.enter(ABORT, 0x10, pc + 8)
         self.pc = self.following
         return 0

@@ -91,6 +91,10 @@ class AddressMap(Device):
         """All of them, by address."""
         return [self.fast_gpio, *(block for block in self.places if block is not None), self.vic]
 
+    def answers(self, address: cython.longlong) -> cython.bint:
+        """Whether an address below the peripheral bus is a device's."""
+        return self.find(address) is not None
+
     @cython.ccall
     def find(self, address: cython.longlong) -> Block:
         """The block that an address belongs to, or None."""

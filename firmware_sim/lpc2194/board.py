@@ -118,6 +118,8 @@ class ImageBoard(AddressedBoard):
         self.now = self.input_time = phase_ns
         self.clocks = Clocks(self.crystal.nominal_hz)
         self.core = Core(name=name)
+        self.core.takes_aborts = self.core.needs_handlers = True
+        self.core.place_of = image.place_of
         self._build(hardware)
         for address, content in image.segments:
             self.core.place(address, content)
@@ -299,7 +301,8 @@ class ImageBoard(AddressedBoard):
     def advance(self, until: cython.longlong) -> cython.longlong:
         """Run everything due before `until` (ns), or before `horizon` where an output brought that nearer.
 
-        Returns `next_time`. NotModelledAccess, a UserError, for an access that no device here models.
+        Returns `next_time`. NotModelledAccess, a UserError, for an access that no device here models; BoardFailure
+        for an abort or an undefined instruction that the program does not handle.
         """
         core: Core = self.core
         inbox: EventQueue = self.inbox

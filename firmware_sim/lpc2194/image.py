@@ -16,6 +16,7 @@ from ranger_sim.foundation.user_error import FirmwareError
 # LPC2194 user manual, memory map
 FLASH = (0x00000000, 0x40000)
 RAM = (0x40000000, 0x4000)
+LARGEST_FILE = 256 << 20  # bytes; debug information of a program for 16 KB of RAM takes a few megabytes. Chosen by us
 
 # Addenda to the ABI for the Arm architecture 2023Q3, 3.3.5.2: Tag_CPU_arch, from 0 on
 ARCHITECTURES = (
@@ -73,6 +74,9 @@ def read(path: str | os.PathLike) -> Image:
     """The image in a file. UserError, one line, for a file that is not an image for this chip."""
     path = pathlib.Path(path)
     try:
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise FirmwareError(f"{path}: the file has {size} bytes, at most {LARGEST_FILE} are read")
         content = path.read_bytes()
     except OSError as error:
         raise FirmwareError(f"{path}: {error.strerror or error}") from None
@@ -127,8 +131,7 @@ def _checked(path: pathlib.Path, pieces: list[tuple[int, bytes]]) -> tuple[tuple
 
 def _from_elf(path: pathlib.Path, content: bytes) -> Image:
     """Segments are loaded where their physical address says: initialised data lie in flash behind the code."""
-    from elftools.common.exceptions import ELFError  # only here: files of Intel HEX need none of it
-    from elftools.elf import elffile
+    from elftools.elf import elffile  # only here: files of Intel HEX need none of it
 
     try:
         elf = elffile.ELFFile(io.BytesIO(content))
@@ -140,6 +143,17 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
                 f"{path}: an ELF file for {elf.elfclass} bit, {order}-endian {machine.removeprefix('EM_')}; "
                 "the LPC2194 is a 32 bit, little-endian ARM"
             )
+        if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
+            raise FirmwareError(
+                f"{path}: truncated: the file has {len(content)} bytes, its section table ends beyond them"
+            )
+        for number, section in enumerate(elf.iter_sections()):
+            end = section["sh_offset"] + section["sh_size"]
+            if section["sh_type"] != "SHT_NOBITS" and end > len(content):
+                raise FirmwareError(
+                    f"{path}: truncated: section {number} of {section['sh_size']} bytes ends at byte {end}, the file "
+                    f"has {len(content)}"
+                )
         if built_for := _newer_architecture(elf):
             raise FirmwareError(
                 f"{path}: built for {built_for}, by its build attributes; the LPC2194 is an ARM7TDMI-S, "
@@ -154,14 +168,18 @@ def _from_elf(path: pathlib.Path, content: bytes) -> Image:
                 raise FirmwareError(
                     f"{path}: truncated: a segment of {size} bytes begins at byte {start}, the file has {len(content)}"
                 )
+            in_memory, address = segment["p_memsz"], segment["p_vaddr"]
+            if not any(base <= address and address + in_memory <= base + length for base, length in (FLASH, RAM)):
+                raise FirmwareError(
+                    f"{path}: a segment takes {in_memory} bytes at {address:#010x}, outside the chip's flash "
+                    f"({FLASH[0]:#010x}, {FLASH[1]} bytes) and RAM ({RAM[0]:#010x}, {RAM[1]} bytes)"
+                )
             if size:
                 pieces.append((segment["p_paddr"], content[start : start + size]))
-        if elf["e_shoff"] + elf["e_shnum"] * elf["e_shentsize"] > len(content):
-            raise FirmwareError(
-                f"{path}: truncated: the file has {len(content)} bytes, its section table ends beyond them"
-            )
         symbols = _symbols(elf)
-    except (ELFError, ValueError, KeyError, AssertionError, UnicodeDecodeError) as error:
+    except FirmwareError:
+        raise
+    except Exception as error:  # noqa: BLE001  (of a damaged file the library raises exceptions of any kind)
         reason = str(error) or type(error).__name__
         raise FirmwareError(f"{path}: a damaged or truncated ELF file: {reason}") from None
     return Image(path, _checked(path, pieces), symbols)

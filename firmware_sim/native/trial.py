@@ -7,6 +7,7 @@ so the code proves nothing, and it can write to the pipe: nothing in the descrip
 
 import contextlib
 import dataclasses
+import functools
 import importlib
 import json
 import mmap
@@ -63,7 +64,8 @@ def tried(
     """Load a library in a forked process, then call `start(record)` there. UserError, which begins with `what`, when
     the program ends that process or does not return in time; a UserError of `start` is raised here as well.
 
-    record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet.
+    record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet;
+    what it prints is dropped then, because it is loaded again from there.
     """
     importlib.import_module("cffi")  # a missing library is not the program's fault
     record = record_words()
@@ -76,7 +78,8 @@ def tried(
         process = os.fork()
     if process == 0:
         os.close(reading)
-        _be_the_trial(lambda reached: _load_and_start(library, start, made, record, reached), writing, needs)
+        work = functools.partial(_load_and_start, library, start, made, record)
+        _be_the_trial(work, writing, needs, is_silent=made is not None)
     os.close(writing)
     output = _all_of(reading)
     os.close(reading)
@@ -147,10 +150,17 @@ def _end_of(process: int, is_over: bool) -> int | None:
     return None
 
 
-def _be_the_trial(work: Callable[[Callable[[bytes], object]], Any], writing: int, needs: confinement.Needs) -> None:
+def _be_the_trial(
+    work: Callable[[Callable[[bytes], object]], Any], writing: int, needs: confinement.Needs, is_silent: bool
+) -> None:
     """Run the trial in the forked process, which exits here."""
     from ranger_sim.firmware_sim.native import library
 
+    if is_silent:
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        for output in (1, 2):
+            os.dup2(nothing, output)
+        os.close(nothing)
     os.environ[IN_TRIAL] = "1"
     library.runs_one_program = True
     try:

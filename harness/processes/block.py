@@ -10,13 +10,14 @@ import os
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, printable
 from ranger_sim.harness.processes.channel import SLOT_WORDS, VERSION
 from ranger_sim.harness.processes.places import (
     FAULT_TEXT,
     FAULT_WORDS,
     MAGIC_WORD,
     PLACE_WORD,
+    PRIVATE_WORDS,
     RING,
     RING_ROW,
     ROW_SIZE,
@@ -33,7 +34,7 @@ MAGIC = 0x52414E4745523031  # "RANGER01"
 
 
 class Block:
-    """The shared words of one board, and the eventfds of its two bells."""
+    """The shared words of one board, those that its own process does not have, and the eventfds of its two bells."""
 
     def __init__(self, name: str, place: int, table_words: int) -> None:
         self.name = name
@@ -43,6 +44,8 @@ class Block:
         self.size = self.ring_first + RING * RING_ROW
         self.memory = mmap.mmap(-1, 8 * self.size)
         self.words = memoryview(self.memory).cast("q")
+        self.private_memory = mmap.mmap(-1, 8 * PRIVATE_WORDS)
+        self.private = memoryview(self.private_memory).cast("q")
         self.table_words = table_words
         header = {
             MAGIC_WORD: MAGIC,
@@ -56,9 +59,10 @@ class Block:
         self.ask_descriptor = os.eventfd(0, os.EFD_CLOEXEC)
         self.answer_descriptor = os.eventfd(0, os.EFD_CLOEXEC)
 
-    def is_forked(self, wanted: bool) -> None:
+    def is_forked(self, shared: bool, private: bool) -> None:
         """Whether processes that this one forks from now on have its memory."""
-        self.memory.madvise(mmap.MADV_DOFORK if wanted else mmap.MADV_DONTFORK)
+        for memory, wanted in ((self.memory, shared), (self.private_memory, private)):
+            memory.madvise(mmap.MADV_DOFORK if wanted else mmap.MADV_DONTFORK)
 
     def close(self) -> None:
         """Close this process's ends of the bells; none of them may be rung or waited for after this."""
@@ -88,7 +92,7 @@ class Block:
         """The board process's message about its end."""
         length = max(0, min(self.words[FAULT_TEXT], 8 * (FAULT_WORDS - 1)))
         text = self.words[FAULT_TEXT + 1 : FAULT_TEXT + FAULT_WORDS].tobytes()[:length]
-        return text.decode("utf-8", "replace")
+        return printable(text.decode("utf-8", "replace"))
 
     def leave_fault(self, text: str) -> None:
         """Write it, cut to what fits."""
@@ -100,15 +104,15 @@ class Block:
 
 @contextlib.contextmanager
 def alone(block: Block, blocks: Iterable[Block]) -> Iterator[None]:
-    """Within it, a forked process has the memory of `block` and none of the others."""
-    others = [each for each in blocks if each is not block]
-    for each in others:
-        each.is_forked(False)
+    """Within it, a forked process has the shared memory of `block` and no other."""
+    every = list(blocks)
+    for each in every:
+        each.is_forked(shared=each is block, private=False)
     try:
         yield
     finally:
-        for each in others:
-            each.is_forked(True)
+        for each in every:
+            each.is_forked(shared=True, private=True)
 
 
 def words_shown(board: Any) -> int:

@@ -10,6 +10,7 @@ from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import confinement, coverage
 from ranger_sim.firmware_sim.native.trial import needs_of
 from ranger_sim.foundation import wallclock
+from ranger_sim.foundation.user_error import BoardFailure
 from ranger_sim.harness.firmware.fresh_board import connected, first_outputs, fresh_board, pass_on, take_edges
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
@@ -124,6 +125,7 @@ def serve(
     except BaseException as error:  # noqa: BLE001  (the supervisor reports any error of a board's program)
         where = traceback.extract_tb(error.__traceback__)[-1:]
         place_text = f" ({os.path.basename(where[0].filename)}:{where[0].lineno})" if where else ""
-        block.leave_fault(f"{type(error).__name__}: {error}{place_text}")
+        text = error.text if isinstance(error, BoardFailure) else f"{type(error).__name__}: {error}{place_text}"
+        block.leave_fault(text)
         return FAILED
     return 0

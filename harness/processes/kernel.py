@@ -1,5 +1,6 @@
 """What the processes ask of Linux: a signal when the parent dies, memory that stays, real-time scheduling."""
 
+import contextlib
 import ctypes
 import os
 import signal
@@ -10,6 +11,7 @@ PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_TIMERSLACK = 1, 15, 29  # linux/prctl.h
 ADDR_NO_RANDOMIZE = 0x0040000  # sys/personality.h
 MCL_CURRENT, MCL_FUTURE = 1, 2  # sys/mman.h
 FIFO_PRIORITY = 20  # of 99: above all ordinary processes, below those that the machine needs; chosen by us
+EVENTFD = "anon_inode:[eventfd]"  # in the list of a process's descriptors
 PARENT_GONE = 3  # exit code of a child whose parent was dead before it could ask for the signal
 
 
@@ -95,10 +97,43 @@ def processor_time_s(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") if fields else 0.0
 
 
+def slices_of(process: int) -> int:
+    """How often a process got a processor; 0 where the kernel does not count it."""
+    try:
+        with open(f"/proc/{process}/schedstat", encoding="ascii") as file:
+            return int(file.read().split()[2])
+    except (OSError, IndexError):
+        return 0
+
+
 def state_of(process: int) -> str:
     """Letter of the state (R, S, D, T, t, Z), empty when it is gone; proc(5)."""
     fields = _stat(process)
     return fields[0] if fields else ""
+
+
+def open_files(process: int) -> list[str]:
+    """What the descriptors of a process lead to, as /proc lists it; those that may not be read are left out."""
+    found = []
+    folder = f"/proc/{process}/fd"
+    try:
+        numbers = os.listdir(folder)
+    except OSError:
+        return [EVENTFD]  # not listed for this user: nothing is known about it
+    for number in numbers:
+        with contextlib.suppress(OSError):
+            found.append(os.readlink(f"{folder}/{number}"))
+    return found
+
+
+def waiting_in(process: int) -> str:
+    """` (function)` of the kernel in which a process waits; empty where the kernel does not report it."""
+    try:
+        with open(f"/proc/{process}/wchan", encoding="ascii", errors="replace") as file:
+            name = file.read()
+    except OSError:
+        return ""
+    return f" ({name})" if name.isidentifier() else ""
 
 
 def _stat(process: int) -> list[str]:

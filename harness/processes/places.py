@@ -47,9 +47,6 @@ HELD: Final = 50  # 1 while a debugger has the board, or is awaited: it keeps it
 RING_ROWS: Final = 51  # slots that were written into the ring so far; the latest may not have ended yet
 # the supervisor's words
 LET_GO: Final = 55  # 1: the run is to end, debuggers have to let the board go
-FATE: Final = 56  # ALIVE or GONE: no process will answer
-ALIVE: Final = 0
-GONE: Final = 1
 # where a program in C was when a signal ended its process: firmware_sim/native/crash.py
 CRASH: Final = 57
 CRASH_WORDS: Final = 7
@@ -74,6 +71,14 @@ COMMAND_STOP: Final = 4
 COMMAND_ACTIVITY: Final = 5
 RESULT_DONE: Final = 0
 RESULT_MORE: Final = 1
+
+# --- a board's private words: memory that its own process does not have, so that no program can feign an answer
+FATE: Final = 0  # ALIVE or GONE: no process will answer
+ALIVE: Final = 0
+GONE: Final = 1
+AWAITED: Final = 1  # 1 while the process that passes time waits for the board's answer
+WAITS: Final = 2  # how often it has waited for one
+PRIVATE_WORDS: Final = 3
 
 # --- the stage: header, pace, then a ring of rows, one per step of the plant
 STAGE_ROWS: Final = 2  # rows written so far

@@ -29,6 +29,7 @@ from ranger_sim.harness.processes.places import (
     ANSWERED,
     ASK_USED,
     ASKED,
+    AWAITED,
     BOARD_SLEEPS,
     COMMAND,
     COMMAND_ADVANCE,
@@ -49,6 +50,7 @@ from ranger_sim.harness.processes.places import (
     SLOTS,
     UNTIL,
     URGENT,
+    WAITS,
     WATCHED,
 )
 from ranger_sim.harness.processes.shared_words import load
@@ -70,6 +72,7 @@ class RemoteBoard(Board):
     """
 
     block: cython.longlong[::1]
+    private: cython.longlong[::1]
     ask: Bell
     answer: Bell
     to_board: Mailbox
@@ -106,6 +109,7 @@ class RemoteBoard(Board):
         self.log = RemoteActivity(self, shared.words, built.scheduler.log)
         self.uncounted = built.counters()
         self.block = shared.words
+        self.private = shared.private
         self.ring_first = shared.ring_first
         self.ask = Bell(shared.words, ASKED, BOARD_SLEEPS, shared.ask_descriptor)
         self.answer = Bell(shared.words, ANSWERED, PLANT_SLEEPS, shared.answer_descriptor)
@@ -222,7 +226,11 @@ class RemoteBoard(Board):
         """Ask the board for its counters; `counters` returns them from then on."""
         counters = self.notes_of(COMMAND_COUNTERS, NOTE_COUNTERS)
         if not self.gone:
-            self.counted = from_dict(type(self.uncounted), json.loads(counters))
+            try:
+                self.counted = from_dict(type(self.uncounted), json.loads(counters))
+            except (ValueError, TypeError, AttributeError, RecursionError):  # its program wrote over its memory
+                self.from_board.damaged += 1
+                self.from_board.last_damage = f"channel from {self.name}: its counters are not readable"
 
     def notes_of(self, command, what) -> bytes:
         """Run one turn with `command`; returns the bytes of the board's notes of the kind `what`."""
@@ -323,9 +331,12 @@ class RemoteBoard(Board):
         """Wait for the answer and read it; False when the board is gone."""
         more: cython.bint = True
         self.posted = False
+        self.private[WAITS] += 1
+        self.private[AWAITED] = 1
         while more:
             while True:
-                if load(self.block, FATE) != ALIVE:  # checked before every sleep, because its ring wakes only once
+                if load(self.private, FATE) != ALIVE:  # checked before every sleep, because its ring wakes only once
+                    self.private[AWAITED] = 0
                     self.gone = True
                     self.inbox.clear()
                     return False
@@ -340,6 +351,7 @@ class RemoteBoard(Board):
                 self.block[COMMAND] = COMMAND_MORE
                 self.block[ASK_USED] = 0
                 self.ask.ring()
+        self.private[AWAITED] = 0
         self.next_time = self.block[NEXT_TIME]
         self.silent_until = self.block[NEXT_OUTPUT]
         self.urgent = self.block[URGENT]

@@ -25,7 +25,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
 from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
 from ranger_sim.harness.processes.control import ControlServer
-from ranger_sim.harness.processes.guard import is_awaited
+from ranger_sim.harness.processes.guard import Use, cause, is_starved, use_of
 from ranger_sim.harness.processes.lateness import figures
 from ranger_sim.harness.processes.settings import DEADLINE_S, ON_FAILURE, Settings
 from ranger_sim.harness.stop_rule import StopRule
@@ -65,7 +65,8 @@ class Child:
     state: str = RUNNING
     turn: int = -1
     turn_since_s: float = 0.0
-    turn_cpu_s: float = 0.0
+    turn_use: Use = Use()
+    turn_use_of_plant: Use = Use()
     stopped_s: float = 0.0
     was_asked: bool = False  # for its position while it keeps its turn: a program in C reports it when it ends
 
@@ -164,7 +165,7 @@ class Supervisor:
             self.close_servers()
             return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh, server)
 
-        block.words[places.FATE] = 0
+        block.private[places.FATE] = places.ALIVE
         block.words[places.FAULT_TEXT] = 0
         block.words[places.CRASH] = 0
         block.words[places.HELD] = 0
@@ -394,12 +395,11 @@ class Supervisor:
             return
         if self.ending and code == 0:
             return
-        words = self.blocks[child.name].words
         how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
         why = self.why_ended(child.name)
         if before != RESTARTING:
             self.view.say(f"{child.name} (process {child.process}) {how}{': ' + why if why else ''}")
-        words[places.FATE] = 1
+        self.blocks[child.name].private[places.FATE] = places.GONE
         os.eventfd_write(self.blocks[child.name].answer_descriptor, 1)
         if self.ending or self.interrupts or self.has_given_up:
             return
@@ -445,26 +445,28 @@ class Supervisor:
             child = self.children.get(name)
             if child is None or child.state != RUNNING:
                 continue
-            words = block.words
-            turn = words[places.ASKED]
-            awaited = is_awaited(block)
+            turn, awaited = block.private[places.WAITS], block.private[places.AWAITED]
             if not awaited or turn != child.turn:
                 child.turn, child.turn_since_s = turn, now
-                child.turn_cpu_s = kernel.processor_time_s(child.process) if awaited else 0.0
+                child.turn_use = use_of(child.process) if awaited else Use()
+                child.turn_use_of_plant = self.use_of_plant() if awaited else Use()
                 continue
-            if self.is_held(name, words):
+            if self.is_held(name, block.words):
                 child.turn_since_s = now
                 continue
             held_s = now - child.turn_since_s
             if held_s < HANG_S or kernel.state_of(child.process) in ("T", "t", "Z", ""):
                 continue
-            used_s = kernel.processor_time_s(child.process) - child.turn_cpu_s
-            if kernel.state_of(child.process) == "R" and used_s < HANG_S / 2:
-                continue  # it is ready to run, but the machine is busy with other processes
-            self.view.say(
-                f"{name} (process {child.process}) hangs: no answer for {held_s:.1f} s, "
-                f"{used_s:.1f} s of them computing; it is killed"
-            )
+            plant = self.children.get(PLANT)
+            if is_starved(child.process, child.turn_use, HANG_S) or (
+                plant is not None and is_starved(plant.process, child.turn_use_of_plant, HANG_S)
+            ):
+                continue
+            used_s = use_of(child.process).time_s - child.turn_use.time_s
+            why = cause(block, child.process, held_s, used_s)
+            if not child.was_asked:
+                block.leave_fault(why)
+            self.view.say(f"{name} (process {child.process}) hangs: {why}; it is killed")
             reports_place = name in self.robot.firmware and not child.was_asked
             os.kill(child.process, crash.ASKED if reports_place else signal.SIGKILL)
             child.was_asked = True
@@ -476,13 +478,17 @@ class Supervisor:
         if not self.ending:
             self.view.show(self.state())
 
+    def use_of_plant(self) -> Use:
+        """What the plant's process has had of the processors."""
+        return use_of(self.children[PLANT].process) if PLANT in self.children else Use()
+
     def check_stopped(self, child: Child, passed_s: float) -> None:
         """End the run when a process that is stopped has owed a reply for the deadline.
 
         The body's process finishes the files; when it is itself the stopped one, none are finished.
         """
         block = self.blocks.get(child.name)
-        if child.state != STOPPED or (block is not None and not is_awaited(block)):
+        if child.state != STOPPED or (block is not None and not block.private[places.AWAITED]):
             child.stopped_s = 0.0
             return
         child.stopped_s += passed_s
@@ -501,7 +507,7 @@ class Supervisor:
 
     def is_held(self, name: str, words: Any) -> bool:
         """Whether a debugger has the board, or is awaited; reported when that begins."""
-        if not words[places.HELD]:
+        if not words[places.HELD] or name in self.robot.firmware:  # in C: it has no endpoint, but can write the word
             self.held.discard(name)
             return False
         if name not in self.held:
@@ -523,9 +529,7 @@ class Supervisor:
     def check_plant(self, plant: Child, now: float) -> None:
         """Report the plant's process when it makes no progress although no board delays it."""
         progress = self.stage[0][places.HEARTBEAT_NS]
-        waits = any(
-            words[places.ASKED] != words[places.ANSWERED] for words in (each.words for each in self.blocks.values())
-        )
+        waits = any(block.private[places.AWAITED] for block in self.blocks.values())
         if progress != self.plant_seen[0] or waits:
             self.plant_seen = (progress, now)
             plant.turn = 0

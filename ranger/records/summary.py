@@ -29,8 +29,7 @@ def of(robot: Any) -> dict:
     total = None if motor_power is None else motor_power + electronics_power
     weight_N = plant.parameters.total_mass_kg * plant.parameters.gravity_m_per_s2
     counters: dict[str, RangerCounters] = robot.counters()
-    here = {name: board for name, board in counters.items() if not isinstance(robot.loop.board(name), Elsewhere)}
-    failed = [name for name, board in here.items() if not alive(robot, board)]
+    failed = [name for name, board in counters.items() if has_failed(robot, name, board)]
     return {
         "steps": plant.steps,
         "fell": bool(plant.fell),
@@ -70,6 +69,7 @@ def of(robot: Any) -> dict:
         "floor_roughness_m": robot.scenario.floor_roughness_m,
         "electronics_off": list(robot.scenario.electronics_off),
         "firmware": {name: firmware(robot, name) for name in robot.firmware},
+        "images": {name: image(robot, name) for name in robot.images},
         "faults": [fault.summary() for fault in robot.faults],
         "trace_digest": robot.trace_digest(),
     }
@@ -172,6 +172,25 @@ def firmware(robot: Any, board: str) -> dict:
         "why": cause_of(death) if death is not None else None,
         "findings": [dataclasses.asdict(each) for each in found_in(robot, board)],
         "coverage": ran(made, is_whole=death is None or bool(death["why"])),
+    }
+
+
+def has_failed(robot: Any, name: str, counters: RangerCounters) -> bool:
+    """Whether a board that runs here was lost, or no longer does its slots' work."""
+    board = robot.loop.board(name)
+    is_lost = any(death["board"] == name for death in robot.deaths)
+    if isinstance(board, Elsewhere):
+        return is_lost
+    return (is_lost and getattr(board, "gone", False)) or not alive(robot, counters)
+
+
+def image(robot: Any, board: str) -> dict:
+    """The firmware image of a board, and its end."""
+    death = next((each for each in robot.deaths if each["board"] == board), None)
+    return {
+        "file": str(robot.images[board].path),
+        "lost_s": death["time_s"] if death is not None else None,
+        "why": cause_of(death) if death is not None else None,
     }
 
 

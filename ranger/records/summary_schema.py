@@ -176,6 +176,10 @@ FIGURES = (
     Figure("command", TEXT, "", "walks the same again: equal digest, unless anything arrived from outside"),
     Figure("complete", FLAG, "", "every file of the run's folder is whole"),
     Figure("files.{file}", TEXT, "", "`complete`, or `incomplete` and why: then it has `.partial` in its name"),
+    # firmware images
+    Figure("images.{board}.file", TEXT, "", "the firmware image that this board ran, as asked for"),
+    Figure("images.{board}.lost_s", REAL, "s", "when its program could not go on, since power-up", "it could"),
+    Figure("images.{board}.why", TEXT, "", "the exception without a handler, its address and function", "it went on"),
     # programs in C
     Figure("firmware.{board}.name", TEXT, "", "of the program in C that this board ran"),
     Figure("firmware.{board}.folder", TEXT, "", "where its sources are, as asked for"),

@@ -1,7 +1,6 @@
 """Binary files that a library reads: MATLAB, Parquet, ULog, MCAP, HDF5 and TDMS. A missing library is one line."""
 
 import importlib
-import json
 import math
 import pathlib
 from collections.abc import Iterator, Mapping
@@ -9,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import DataError, UserError
 from ranger_sim.sysid.dataset import Dataset, Finding, Loss
 from ranger_sim.sysid.readers import arrays, columns, hdf5, tdms
@@ -178,7 +178,7 @@ def _mcap(dataset: Dataset, library: Any, path: pathlib.Path) -> Iterator[Column
             if count > MOST_MESSAGES:
                 raise DataError(f"{path}: more than {MOST_MESSAGES} messages")
             if channel.message_encoding == "json":
-                content: Any = json.loads(message.data)
+                content: Any = json_text.loads(message.data, f"{path}: message {count}")
             elif channel.message_encoding == "protobuf" and schema is not None:
                 if schema.id not in classes:
                     classes[schema.id] = _message_class(schema)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.plant import body_files
 from ranger_sim.sysid.dataset import Array
@@ -81,7 +82,7 @@ def read(path: pathlib.Path) -> TwinFile:
     """The file at a path. UserError for one that is not of twins."""
     try:
         with zipfile.ZipFile(path) as archive:
-            made_of = json.loads(archive.read(MADE_OF))
+            made_of = json_text.loads(archive.read(MADE_OF), f"{path}: {MADE_OF}")
             names = sorted({each.partition("/")[0] for each in archive.namelist() if "/" in each})
             views = {name: _view(archive, name) for name in names}
     except (OSError, zipfile.BadZipFile, KeyError, ValueError) as error:
@@ -90,7 +91,8 @@ def read(path: pathlib.Path) -> TwinFile:
 
 
 def _view(archive: zipfile.ZipFile, name: str) -> View:
-    texts = json.loads(archive.read(f"{name}/directions.json"))
+    place = f"{name}/directions.json"
+    texts = json_text.loads(archive.read(place), f"{archive.filename}: {place}")
 
     def array(part: str) -> Array:
         return np.load(io.BytesIO(archive.read(f"{name}/{part}.npy")), allow_pickle=False).astype(np.float64)

@@ -50,6 +50,56 @@ def test_a_program_that_reaches_for_nothing_ends_the_run_with_its_place():
             robot.run_for(0.05)
 
 
+VECTORS = [0xEA000006, *[0xEAFFFFFE] * 7]  # b 0x20, then branches to themselves
+TO_NOWHERE = {
+    #                    mov r1, #0x60000000; ldr r2, [r1]
+    "a load": ([0xE3A01206, 0xE5912000], "data abort: no memory for an access to 0x60000000 at pc 0x00000024", 0x10),
+    #                    mov r1, #0x60000000; bx r1
+    "a jump": ([0xE3A01206, 0xE12FFF11], "prefetch abort: no memory at pc 0x60000000", 0x0C),
+    "an instruction": ([0xE7F000F0], "undefined instruction at pc 0x00000020", 0x04),
+}
+
+
+@pytest.mark.parametrize("name", TO_NOWHERE)
+def test_an_image_without_a_handler_loses_its_power_and_the_robot_goes_on(name):
+    words, reported, vector = TO_NOWHERE[name]
+    with robot_with("MCH", VECTORS + words) as robot:
+        robot.run_for(0.05)
+        summary = robot.summary()
+        assert summary["images"]["MCH"]["why"] == f"{reported}, without a handler at {vector:#010x}"
+        assert summary["images"]["MCH"]["lost_s"] < 0.01
+        assert summary["failed_boards"] == ["MCH"]
+        assert summary["time_s"] == pytest.approx(0.05)
+        digest = robot.trace_digest()
+    with robot_with("MCH", VECTORS + words) as robot:
+        for piece in (0.0003, 0.0204, 0.0293):
+            robot.run_for(piece)
+        assert robot.trace_digest() == digest
+
+
+@pytest.mark.parametrize(
+    ("vector", "words", "back", "mode"),
+    [
+        (4, [0xE7F000F0], 0x24, 0x1B),
+        (3, [0xE3A01206, 0xE12FFF11], 0x60000004, 0x17),
+        (2, [0xE3A01206, 0xE5912000], 0x2C, 0x17),
+    ],
+    ids=["undefined", "prefetch abort", "data abort"],
+)
+def test_a_handler_of_the_image_gets_the_exception_as_on_the_chip(vector, words, back, mode):
+    """LR is pc + 4 of the one that failed (data abort: pc + 8), SPSR the status of before: ARM7TDMI data sheet, 3.9."""
+    vectors = [*VECTORS]
+    place = {4: 1, 3: 3, 2: 4}[vector]
+    vectors[place] = 0xEA000000 | (0x40 - 4 * place - 8) // 4
+    padding = [0xE1A00000] * (8 - len(words))
+    with robot_with("MCH", [*vectors, *words, *padding, 0xE3A05001, 0xEAFFFFFE]) as robot:  # mov r5, #1; b .
+        robot.run_for(0.01)
+        core = robot.boards["MCH"].core
+        assert robot.deaths == []
+        assert (core.r[5], core.r[14], core.cpsr() & 0x1F, core.spsr() & 0x1F) == (1, back, mode, 0x13)
+        assert core.cpsr() & 0x80  # interrupts are off
+
+
 def test_a_reset_begins_the_program_anew():
     with robot_with("MCH", words_of("ticker")) as robot:
         wire = robot.wire("can1")

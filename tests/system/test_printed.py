@@ -78,6 +78,16 @@ def test_what_a_program_printed_before_it_broke_is_kept(command, tmp_path):
     assert "MCH was lost" in done.stderr
 
 
+def test_what_a_constructor_prints_does_not_reach_the_json(command, tmp_path):
+    hip = firmware(tmp_path / "hip")
+    source = hip / "small.c"
+    early = '__attribute__((constructor)) static void early(void) { printf("loaded\\n"); fflush(stdout); }\n'
+    source.write_text(source.read_text() + early)
+    done = command("walk", "--firmware", f"MCH={hip}", "--time", "20ms", "--json", "-")  # it is compiled, then loaded
+    assert json.loads(done.stdout)["failed_boards"] == []
+    assert "MCH: loaded" in done.stderr
+
+
 def test_what_a_program_prints_that_does_not_start_is_shown(command, tmp_path):
     hip = firmware(tmp_path / "hip")
     source = hip / "small.c"

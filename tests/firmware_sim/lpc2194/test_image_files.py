@@ -50,6 +50,13 @@ def record(kind, address, data):
 END = record(1, 0, b"")
 
 
+def changed(place, word):
+    """The ELF file above with another word at a byte."""
+    data = bytearray(elf())
+    data[place : place + 4] = struct.pack("<I", word)
+    return bytes(data)
+
+
 def written(folder, data, name="program"):
     path = folder / name
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
@@ -119,6 +126,10 @@ WRONG = {
     "edge": (elf(((0, 0x0003FFF8, CODE),)), "16 bytes at 0x0003fff8 are outside the chip's flash"),
     "twice": (elf(((0, 0x100, CODE), (0, 0x108, CODE))), "two segments overlap at 0x00000108"),
     "nothing": (elf(()), "it has no data for flash or RAM"),
+    "segment in memory": (changed(72, 0xFFFFFFFF), "a segment takes 4294967295 bytes at 0x00000100, outside"),
+    "segment in the file": (changed(68, 0xFFFFFFFF), "truncated: a segment of 4294967295 bytes"),
+    "symbols": (changed(len(elf()) - 60, 0xFFFFFFF0), "truncated: section 1 of 4294967280 bytes ends at byte"),
+    "no size of a symbol": (changed(len(elf()) - 44, 0), "damaged or truncated ELF file"),
     "checksum": (":0400000001020304F3\n" + END, r"program:1: checksum 0xf3 is wrong: the record's bytes ask for 0xf2"),
     "short": (":0400000001020304\n" + END, "program:1: not a complete record"),
     "letters": (":04000000010203ZZF2\n" + END, "program:1: not a complete record"),

@@ -38,7 +38,7 @@ class Child:
 
     def _look_after(self):
         descriptors.wait([self.watch], [], PATIENCE_S)
-        self.block.words[places.FATE] = 1
+        self.block.private[places.FATE] = places.GONE
         os.eventfd_write(self.block.answer_descriptor, 1)
         return 0
 
@@ -54,7 +54,7 @@ class Child:
     def answered(self, bell, turn):
         """Wait until it has rung `turn` times; fails when it has ended instead or hangs."""
         while not bell.wait(turn):
-            assert self.block.words[places.FATE] == 0, f"no answer in turn {turn}: {self._fate()}"
+            assert self.block.private[places.FATE] == places.ALIVE, f"no answer in turn {turn}: {self._fate()}"
 
     def ended(self):
         """Wait for its end; how it ended, as os.waitid has it. Fails when it hangs."""

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from ranger_sim.firmware_sim.native import crash, trial
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import guard, places, supervisor
+from ranger_sim.harness.processes import guard, kernel, places, supervisor
 from ranger_sim.harness.processes.block import Block
 from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.lone_board import LoneBoard
@@ -413,7 +413,7 @@ def test_a_board_that_nothing_watches_yet_does_not_end_its_process_with_success(
 
 HANGS = {
     "raise(SIGSTOP);": r"its process was stopped (SIGSTOP) for 1 s: its program let no time pass in ",
-    "pause();": "no answer for 1 s: its program let no time pass in break_down() at small.c:",
+    "pause();": "no answer for 1 s, waiting in the kernel",
     "sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); for (;;) pause();": "no answer for 1 s",
     "for (int each = 3; each < 1024; each++) close(each);": "its answers no longer arrive (descriptors of its process",
 }
@@ -429,6 +429,8 @@ def test_a_walk_waits_for_no_board_without_a_sign_of_life_and_says_why_it_was_lo
     done, found = walked(folder_with(tmp_path / "fw", source, MANIFEST), "--board-deadline", "1s")
     assert (done.returncode, found["failed_boards"]) == (1, ["MCH"])
     assert found["firmware"]["MCH"]["why"].startswith(HANGS[end])
+    if end == "pause();":
+        assert ": its program let no time pass in break_down() at small.c:" in found["firmware"]["MCH"]["why"]
     assert found["time_s"] == pytest.approx(0.2)
 
 
@@ -437,7 +439,7 @@ def test_in_up_a_board_that_closes_its_descriptors_is_killed_too(tmp_path):
     function = "static void break_down(void) { for (int each = 3; each < 1024; each++) close(each); }"
     folder = folder_with(tmp_path / "fw", "#include <unistd.h>\n" + program(function, slots=100)[0], MANIFEST)
     done = up(folder, tmp_path / "summary.json")
-    assert re.search(r"MCH \(process \d+\) hangs: no answer for", done.stderr)
+    assert re.search(r"MCH \(process \d+\) hangs: its answers no longer arrive \(descriptors of its", done.stderr)
     assert done.returncode == 1
     assert "MCH" in json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["failed_boards"]
 
@@ -469,6 +471,9 @@ class Owing:
     sent: list
     state: str = "S"
     used_s: float = 0.0
+    state_of_the_waiter: str = "S"
+    files: tuple = (kernel.EVENTFD,)
+    slices: int = 0
 
 
 @pytest.fixture
@@ -476,9 +481,15 @@ def owing(monkeypatch):
     block = Block("MCH", 0, 0)
     made = Owing(Guard({"MCH": block}, {"MCH": 2**22}, {}, frozenset({"MCH"}), 10.0), block, [])
     monkeypatch.setattr(guard.os, "kill", lambda process, number: made.sent.append(number))
-    monkeypatch.setattr(guard.kernel, "state_of", lambda process: made.state)
+    monkeypatch.setattr(
+        guard.kernel, "state_of", lambda process: made.state if process == 2**22 else made.state_of_the_waiter
+    )
     monkeypatch.setattr(guard.kernel, "processor_time_s", lambda process: made.used_s)
+    monkeypatch.setattr(guard.kernel, "slices_of", lambda process: made.slices)
+    monkeypatch.setattr(guard.kernel, "open_files", lambda process: made.files)
+    monkeypatch.setattr(guard.kernel, "waiting_in", lambda process: " (pause)")
     block.words[places.ASKED], block.words[places.ANSWERED] = 5, 4
+    block.private[places.AWAITED], block.private[places.WAITS] = 1, 5
     yield made
     block.close()
 
@@ -495,13 +506,29 @@ def test_a_board_without_an_answer_is_asked_where_it_is_after_the_deadline_and_t
     assert owing.sent == [crash.ASKED, signal.SIGCONT]
     looks(owing, 1)
     assert owing.sent == [crash.ASKED, signal.SIGCONT, signal.SIGKILL]
-    assert owing.block.fault() == "no answer for 10 s"
+    assert owing.block.fault() == "no answer for 10 s, waiting in the kernel (pause)"
+
+
+@pytest.mark.parametrize(
+    ("change", "reported"),
+    [
+        ({"state": "T"}, "its process was stopped (SIGSTOP) for 10 s"),
+        ({"used_s": 9.0}, "no answer for 10 s, 9.0 s of them computing"),
+        ({"files": ("/dev/null",)}, "its answers no longer arrive (descriptors of its process are closed) for 10 s"),
+    ],
+)
+def test_the_cause_is_what_the_system_lists_about_the_process(owing, change, reported):
+    looks(owing, 1)
+    for name, value in change.items():
+        setattr(owing, name, value)
+    looks(owing, guard.CHECKS)
+    assert owing.block.fault() == reported
 
 
 def test_every_answer_is_a_sign_of_life(owing):
     for turn in range(6, 40):
         looks(owing, guard.CHECKS)
-        owing.block.words[places.ASKED], owing.block.words[places.ANSWERED] = turn, turn - 1
+        owing.block.private[places.WAITS] = turn
     assert owing.sent == []
 
 
@@ -513,17 +540,31 @@ def test_a_board_that_cannot_answer_yet_is_waited_for(owing, state, used_s):
     assert owing.sent == []
 
 
-def test_a_board_whose_answer_is_there_or_is_not_waited_for_is_left_alone(owing):
-    owing.block.words[places.ANSWERED] = 5
-    looks(owing, 10 * guard.CHECKS)  # nothing waits
-    owing.block.words[places.PLANT_SLEEPS] = 1
-    os.eventfd_write(owing.block.answer_descriptor, 1)
-    looks(owing, 10 * guard.CHECKS)  # its answer arrived, and is read when the machine has time
+def test_a_board_that_is_not_waited_for_is_left_alone(owing):
+    owing.block.private[places.AWAITED] = 0
+    looks(owing, 10 * guard.CHECKS)
+    owing.block.private[places.AWAITED] = 1
+    owing.state_of_the_waiter = "R"
+    looks(owing, 10 * guard.CHECKS)  # its answer may be there, and is read when the machine has time
     assert owing.sent == []
-    os.eventfd_read(owing.block.answer_descriptor)
+
+
+def test_a_board_that_gives_the_processor_away_again_and_again_is_not_waited_for(owing):
+    looks(owing, 1)
+    owing.state, owing.slices = "R", guard.MOST_SLICES
     looks(owing, guard.CHECKS)
-    assert owing.sent == [signal.SIGKILL]
-    assert owing.block.fault().startswith("its answers no longer arrive (descriptors of its process are closed)")
+    assert owing.sent == [crash.ASKED, signal.SIGCONT]
+
+
+def test_a_program_that_writes_answers_into_its_memory_gains_no_time(owing):
+    for turn in range(5, 5 + guard.CHECKS + 1):
+        owing.block.words[places.ANSWERED] = turn
+        os.eventfd_write(owing.block.answer_descriptor, 1)
+        looks(owing, 1)
+    assert crash.ASKED in owing.sent
+    owing.block.words[places.ANSWERED] = 5
+    looks(owing, 1)
+    assert owing.sent[-1] == signal.SIGKILL
 
 
 def up(folder, summary):
@@ -620,7 +661,7 @@ def hung(monkeypatch):
         settings = Settings(None, name=f"test-{os.getpid()}", real_time=False)
         with contextlib.closing(Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())) as watched:
             watched.children["MCH"] = supervisor.Child("MCH", 2**22)
-            watched.blocks["MCH"].words[places.ASKED] = 5
+            watched.blocks["MCH"].private[places.AWAITED] = 1
             yield made, watched
             del watched.children["MCH"]
 

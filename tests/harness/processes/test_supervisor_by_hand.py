@@ -10,7 +10,8 @@ from types import SimpleNamespace as Made
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.processes import places, supervisor
+from ranger_sim.harness.processes import guard, kernel, places, supervisor
+from ranger_sim.harness.processes.guard import MOST_SLICES
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import GONE, HANG_S, PLANT, RESTARTING, RUNNING, STOPPED, Child, Supervisor
 from ranger_sim.harness.stop_rule import StopRule
@@ -48,19 +49,29 @@ def alone(robot, monkeypatch):
     settings = Settings(None, name=f"by-hand-{os.getpid()}", real_time=False)
     with contextlib.closing(Supervisor(robot, settings, StopRule(time_s=1.0), lambda *_: 0, Said())) as made:
         made.clock = Made(now=100.0)
-        made.states, made.used, made.killed, made.answers = {}, {}, [], []
+        made.states, made.used, made.slices, made.killed, made.answers = {}, {}, {}, [], []
         monkeypatch.setattr(supervisor, "wallclock", Made(monotonic_s=lambda: made.clock.now))
-        monkeypatch.setattr(
-            supervisor,
-            "kernel",
-            Made(
-                state_of=lambda process: made.states.get(process, "S"),
-                processor_time_s=lambda process: made.used.get(process, 0.0),
-            ),
+        listed = Made(
+            EVENTFD=kernel.EVENTFD,
+            state_of=lambda process: made.states.get(process, "S"),
+            processor_time_s=lambda process: made.used.get(process, 0.0),
+            slices_of=lambda process: made.slices.get(process, 0),
+            open_files=lambda process: [kernel.EVENTFD],
+            waiting_in=lambda process: " (pause)",
         )
+        for module in (supervisor, guard):
+            monkeypatch.setattr(module, "kernel", listed)
         monkeypatch.setattr(supervisor.os, "kill", lambda *what: made.killed.append(what))
         monkeypatch.setattr(made.control, "answer", lambda *what: made.answers.append(what))
         yield made
+
+
+def awaits(alone, name="MCH"):
+    """The plant's process waits for an answer of the board."""
+    block = alone.blocks[name]
+    block.words[places.ASKED], block.words[places.ANSWERED] = 7, 6
+    block.private[places.AWAITED], block.private[places.WAITS] = 1, 7
+    return block
 
 
 def plants(alone):
@@ -82,8 +93,7 @@ def tells(alone, **news):
 
 def test_a_board_that_keeps_its_turn_too_long_is_killed_and_reported(alone):
     alone.children["MCH"] = Child("MCH", 41)
-    words = alone.blocks["MCH"].words
-    words[places.ASKED], words[places.ANSWERED] = 7, 6
+    awaits(alone)
     alone.used[41] = 3.0
     alone.check()
     alone.clock.now += HANG_S - 0.001
@@ -94,7 +104,7 @@ def test_a_board_that_keeps_its_turn_too_long_is_killed_and_reported(alone):
     alone.check()
     assert alone.killed == [(41, signal.SIGKILL)]
     assert alone.view.received() == [
-        f"MCH (process 41) hangs: no answer for {HANG_S:.1f} s, 1.2 s of them computing; it is killed"
+        f"MCH (process 41) hangs: no answer for {HANG_S:g} s, 1.2 s of them computing; it is killed"
     ]
     alone.clock.now += HANG_S / 2
     alone.check()
@@ -106,8 +116,7 @@ def stopped(alone, name="MCH", process=41):
     """A child that is stopped while its reply is awaited."""
     child = alone.children[name] = Child(name, process, state=STOPPED)
     if name != PLANT:
-        words = alone.blocks[name].words
-        words[places.ASKED], words[places.ANSWERED] = 7, 6
+        awaits(alone, name)
     return child
 
 
@@ -162,7 +171,7 @@ def test_a_stopped_board_that_owes_no_reply_or_goes_on_does_not_end_the_run(alon
     alone.check()
     child.state = STOPPED
     pass_time(alone, 9.0)
-    alone.blocks["MCH"].words[places.ANSWERED] = 7  # the robot is paused
+    alone.blocks["MCH"].private[places.AWAITED] = 0  # the robot is paused
     pass_time(alone, 60.0)
     assert alone.killed == []
 
@@ -171,8 +180,9 @@ def test_a_stopped_board_that_owes_no_reply_or_goes_on_does_not_end_the_run(alon
     ("change", "killed"),
     [
         ({}, True),
-        ({"answered": 7}, False),
-        ({"asked": 8}, False),
+        ({"answered": 7}, True),  # its memory: the program may have written it
+        ({"awaited": 0}, False),
+        ({"waits": 8}, False),
         ({"state": STOPPED}, False),
         ({"kernel": "T"}, False),
         ({"kernel": "t"}, False),
@@ -181,17 +191,23 @@ def test_a_stopped_board_that_owes_no_reply_or_goes_on_does_not_end_the_run(alon
         ({"kernel": "R"}, False),  # it would like to run, and has not had the processor
         ({"kernel": "R", "used": HANG_S / 2}, True),
         ({"kernel": "R", "used": HANG_S / 2 - 0.01}, False),
+        ({"kernel": "R", "slices": MOST_SLICES - 1}, False),
+        ({"kernel": "R", "slices": MOST_SLICES}, True),  # it has, again and again, and gave it away
+        ({"plant": "R"}, False),  # the one that waits has not had the processor
         ({"held": 1}, False),
     ],
 )
 def test_a_board_hangs_only_when_it_has_its_turn_and_could_run(alone, change, killed):
     child = alone.children["MCH"] = Child("MCH", 41)
-    words = alone.blocks["MCH"].words
-    words[places.ASKED], words[places.ANSWERED] = 7, 6
+    alone.children[PLANT] = Child(PLANT, 50)
+    block = awaits(alone)
+    words = block.words
     alone.check()
-    words[places.ASKED] = change.get("asked", 7)
+    block.private[places.AWAITED], block.private[places.WAITS] = change.get("awaited", 1), change.get("waits", 7)
     words[places.ANSWERED] = change.get("answered", 6)
     words[places.HELD] = change.get("held", 0)
+    alone.states[50] = change.get("plant", "S")
+    alone.slices[41] = change.get("slices", 0)
     child.state = change.get("state", RUNNING)
     alone.states[41], alone.used[41] = change.get("kernel", "S"), change.get("used", 0.0)
     alone.clock.now += HANG_S
@@ -230,10 +246,10 @@ def test_a_plant_without_progress_is_named_once_until_it_goes_on(alone):
     alone.check()
     assert plant.turn == 0
     alone.clock.now += HANG_S + 0.1
-    alone.blocks["MCH"].words[places.ASKED] = 1  # a board keeps it waiting
+    alone.blocks["MCH"].private[places.AWAITED] = 1  # a board keeps it waiting
     alone.check()
     assert alone.view.received() == []
-    alone.blocks["MCH"].words[places.ANSWERED] = 1
+    alone.blocks["MCH"].private[places.AWAITED] = 0
     alone.clock.now += HANG_S + 0.1
     alone.check()
     assert len(alone.view.received()) == 1
@@ -258,7 +274,7 @@ def test_a_board_that_ended_is_reported_with_its_reason_and_waited_for_no_longer
         alone.blocks["MCH"].leave_fault("broken")
     alone.ended(child, code)
     assert alone.view.received() == [reported] and child.state == GONE
-    assert alone.blocks["MCH"].words[places.FATE] == 1 and plants(alone) == []
+    assert alone.blocks["MCH"].private[places.FATE] == places.GONE and plants(alone) == []
     assert os.eventfd_read(alone.blocks["MCH"].answer_descriptor) == 1
 
 
