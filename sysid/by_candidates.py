@@ -151,7 +151,7 @@ def diagnose(
         errors=errors,
         floors=floors(extended),
         by_candidates=True,
-        left_over=left_over.look(machine, extended, recordings, seed) if found.named else None,
+        left_over=_left_over(machine, found, skews, recordings, seed) if found.named else None,
         stretches={each.equation: float(each.stretches) for each in after},
         numerics=floor,
         below_numerics=small,
@@ -159,6 +159,19 @@ def diagnose(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def _left_over(
+    machine: Machine, found: likelihood.Selection, fixed: Sequence[Named], recordings: Sequence[Recording], seed: int
+) -> left_over.LeftOver | None:
+    """What the named causes leave that goes with one signal. Further harmonics of a periodic cause are the same cause."""
+    named = list(found.named)
+    for each in found.named:
+        for shape in each.effect.shapes if each.effect.phase_is_free else ():
+            if shape != each.shape:
+                place = f"{each.effect.at}, {', '.join(f'{number:g}' for number in shape.values())}"
+                named.append(dataclasses.replace(each, effect=dataclasses.replace(each.effect, at=place), shape=shape))
+    return left_over.look(machine, naming.refit(found.base, named, [*fixed, *named]), recordings, seed)
 
 
 def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]) -> Recording:
