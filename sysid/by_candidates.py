@@ -164,7 +164,7 @@ def diagnose(
 def _left_over(
     machine: Machine, found: likelihood.Selection, fixed: Sequence[Named], recordings: Sequence[Recording], seed: int
 ) -> left_over.LeftOver | None:
-    """What the named causes leave that goes with one signal. Further harmonics of a periodic cause are the same cause."""
+    """What the named causes leave that goes with one signal; further harmonics of a periodic cause belong to it."""
     named = list(found.named)
     for each in found.named:
         for shape in each.effect.shapes if each.effect.phase_is_free else ():

@@ -22,8 +22,8 @@ EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not na
 # The same of what can be predicted in the data that the causes were chosen on. A bump of torque that a leg has and the
 # catalogue has not is explained to 0.71 and 0.72 by a bend of its spring; true causes explain 0.98 and more there.
 EXPLAINED_IN_TRAINING = 0.8
-# Of what names and the largest table over one signal take together. Iron that saturates is explained to 0.83 to 0.89 by a
-# scale of the current, a load cell that creeps to 0.6 to 0.75; hidden true causes leave nothing, or are above 0.91.
+# Of what names and the largest table over one signal take together. Iron that saturates is explained to 0.83 to 0.89
+# by a scale of the current, a load cell that creeps to 0.6 to 0.75; true causes leave nothing, or are above 0.91.
 EXPLAINED_BY_NAMES = 0.88
 
 
