@@ -24,19 +24,31 @@ RANK = 1e-4  # of the largest direction of a table
 
 @dataclasses.dataclass(frozen=True)
 class LeftOver:
-    """The table that explains most beyond chance. chi2: less what chance explains; p: of all tables together."""
+    """The features that explain most beyond chance. chi2: less what chance explains; p: of all features together."""
 
     equation: str
-    signal: str
+    features: str
     chi2: float
     p: float
 
 
 def look(machine: Machine, regression: Regression, recordings: Sequence[Recording], seed: int) -> LeftOver | None:
     """The largest part of a regression's residual that goes with one signal; None where no table can be made."""
+    return _most(regression, misfit.over_one_signal(machine, recordings), seed)
+
+
+def look_at_all(
+    machine: Machine, regression: Regression, recordings: Sequence[Recording], seed: int
+) -> LeftOver | None:
+    """The same with pairs of signals and slopes of the past: for rows at which no sampling of a corner shows."""
+    return _most(regression, misfit.general_features(machine, recordings), seed)
+
+
+def _most(regression: Regression, general: misfit.General, seed: int) -> LeftOver | None:
+    """Of all groups of features the one that explains most, among those that explain more than any by chance."""
     drawn = likelihood.surrogates(regression, seed)
     by_chance, found = [], []
-    for equation, signal, columns in misfit.over_one_signal(machine, recordings):
+    for equation, group, columns in general:
         white = regression.whitened(columns)
         turn, inflation = _directions(regression, white)
         if not len(turn):
@@ -48,14 +60,16 @@ def look(machine: Machine, regression: Regression, recordings: Sequence[Recordin
         mean, variance = float(np.mean(chance)), float(np.var(chance))
         scores = stats.chi2.logsf(explained * (2.0 * mean / variance), 2.0 * mean**2 / variance)
         by_chance.append(scores[1:])
-        found.append((float(scores[0]), float(explained[0]) - mean, equation, signal))
+        found.append((float(scores[0]), float(explained[0]) - mean, equation, group))
     if not found:
         return None
     least = np.min(by_chance, axis=0)
-    beyond = [each for each in found if np.count_nonzero(least <= each[0]) == 0] or [min(found)]
-    score, chi2, equation, signal = max(beyond, key=lambda each: each[1])
-    p = (1.0 + float(np.count_nonzero(least <= score))) / (1.0 + len(least))
-    return LeftOver(equation, signal, chi2, p)
+    beyond = [each for each in found if each[0] < np.min(least)] or [min(found)]
+    _, chi2, equation, group = max(beyond, key=lambda each: each[1])
+    best = min(found)[0]
+    # beyond all surrogates the chance of the least falls as that of each group does
+    p = (1.0 + float(np.count_nonzero(least <= best))) / (1.0 + len(least))
+    return LeftOver(equation, group, chi2, p * float(np.exp(min(0.0, best - np.min(least)))))
 
 
 def _directions(regression: Regression, white: dict[str, Array]) -> tuple[Array, float]:

@@ -71,16 +71,17 @@ def indicator(number: np.ndarray) -> Array:
 
 
 def tables(signals: Mapping[str, Array]) -> dict[str, Array]:
-    """(n, k) cells of each signal alone, by signal."""
+    """(n, k) cells of each signal alone."""
     return {
-        name: indicator(cells(signal, TIME_CELLS if name == "t" else SINGLE_CELLS)) for name, signal in signals.items()
+        f"over {name}": indicator(cells(signal, TIME_CELLS if name == "t" else SINGLE_CELLS))
+        for name, signal in signals.items()
     }
 
 
 def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Array]:
     """Groups of features (n, k) over an equation's general signals; lags: samples back at which slopes are used."""
     names = list(signals)
-    groups = {f"over {name}": table for name, table in tables(signals).items()}
+    groups = tables(signals)
     for first, one in enumerate(names):
         for other in names[first + 1 :]:
             a, b = cells(signals[one], PAIR_CELLS), cells(signals[other], PAIR_CELLS)
@@ -104,7 +105,7 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
 
 
 def over_one_signal(machine: Machine, recordings: Sequence[Recording]) -> General:
-    """Tables over each signal alone, by its name, of all equations, and of entries by what passes through them."""
+    """Tables over each signal alone, of all equations, and of entries by what passes through them."""
     places = dict.fromkeys(name for recording in recordings for name in (*recording.equations, *recording.entries))
     return _groups(machine, recordings, list(places), tables)
 
