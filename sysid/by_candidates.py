@@ -18,6 +18,7 @@ from ranger_sim.sysid import (
     gain,
     held_out,
     intervals,
+    left_over,
     likelihood,
     misfit,
     naming,
@@ -42,6 +43,7 @@ BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most 
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
 FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say nothing
+FURTHER = 5.0  # times, general features by chance: they come in addition to the predictor
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
@@ -61,6 +63,7 @@ def diagnose(
     """All findings but the printed answer. find: a known effect among the machine's."""
     progress("band", 0.1)
     band, predictor = _band(machine, [unclipped(machine, each) for each in recordings], seed)
+    whole = recordings
     recordings = [unclipped(machine, band.of(each)) for each in recordings]
     held = [unclipped(machine, band.of(machine.prepare(table))) for table in holdout]
     effects = machine.effects(recordings)
@@ -141,7 +144,7 @@ def diagnose(
         list(known),
         found.named,
         known_to,
-        _misfit(before, machine, found.base),
+        _with_general(_misfit(before, machine, found.base), machine, found, whole, skews, seed),
         _misfit(after, machine, extended),
         plausibility.look(machine, extended, found.named, by_candidates=True, base=found.base),
         level=LEVEL,
@@ -150,6 +153,7 @@ def diagnose(
         errors=errors,
         floors=floors(extended),
         by_candidates=True,
+        left_over=_left_over(machine, found, skews, recordings, seed) if found.named else None,
         stretches={each.equation: float(each.stretches) for each in after},
         numerics=floor,
         below_numerics=small,
@@ -157,6 +161,19 @@ def diagnose(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def _left_over(
+    machine: Machine, found: likelihood.Selection, fixed: Sequence[Named], recordings: Sequence[Recording], seed: int
+) -> left_over.LeftOver | None:
+    """What the named causes leave that goes with one signal; further harmonics of a periodic cause belong to it."""
+    named = list(found.named)
+    for each in found.named:
+        for shape in each.effect.shapes if each.effect.phase_is_free else ():
+            if shape != each.shape:
+                place = f"{each.effect.at}, {', '.join(f'{number:g}' for number in shape.values())}"
+                named.append(dataclasses.replace(each, effect=dataclasses.replace(each.effect, at=place), shape=shape))
+    return left_over.look(machine, naming.refit(found.base, named, [*fixed, *named]), recordings, seed)
 
 
 def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]) -> Recording:
@@ -377,6 +394,30 @@ def _misfit(tests: Sequence[predictability.Predicted], machine: Machine, regress
             made.append(line)
             chances.append(chance)
     return misfit.Misfit(made, min([1.0, *chances]), max((each.share for each in made), default=0.0))
+
+
+def _with_general(
+    made: misfit.Misfit,
+    machine: Machine,
+    found: likelihood.Selection,
+    whole: Sequence[Recording],
+    fixed: Sequence[Named],
+    seed: int,
+) -> misfit.Misfit:
+    """The tests, where they and the causes show nothing, with general features and with lines above the band."""
+    if found.named or made.p < LEVEL or not all(each.firm for each in whole):
+        return made
+    tests, chances = list(made.tests), [made.p]
+    most = left_over.look_at_all(machine, found.base, found.base.recordings, seed)
+    if most is not None:
+        share = most.chi2 / max(1, int(np.count_nonzero(found.base.good[most.equation])))
+        tests.append(misfit.Test(most.equation, most.features, most.chi2, 1, most.p, share))
+        chances.append(most.p * FURTHER)
+    full = naming.refit(bands.plain(whole), fixed)
+    lines = [misfit.line(name, full) for name in _with_lines(full)]
+    chances += [each.p * len(lines) * RARER for each in lines]
+    tests += [each for each in lines if each.p * len(lines) * RARER <= LEVEL]
+    return misfit.Misfit(tests, min(1.0, *chances), max((each.share for each in tests), default=0.0))
 
 
 def _with_lines(regression: Regression) -> list[str]:

@@ -7,7 +7,7 @@ fires without a cause at the requested level.
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy import ndimage, stats
@@ -70,13 +70,18 @@ def indicator(number: np.ndarray) -> Array:
     return out
 
 
+def tables(signals: Mapping[str, Array]) -> dict[str, Array]:
+    """(n, k) cells of each signal alone."""
+    return {
+        f"over {name}": indicator(cells(signal, TIME_CELLS if name == "t" else SINGLE_CELLS))
+        for name, signal in signals.items()
+    }
+
+
 def features(signals: Mapping[str, Array], lags: Sequence[int]) -> dict[str, Array]:
     """Groups of features (n, k) over an equation's general signals; lags: samples back at which slopes are used."""
     names = list(signals)
-    groups: dict[str, Array] = {}
-    for name in names:
-        kind = TIME_CELLS if name == "t" else SINGLE_CELLS
-        groups[f"over {name}"] = indicator(cells(signals[name], kind))
+    groups = tables(signals)
     for first, one in enumerate(names):
         for other in names[first + 1 :]:
             a, b = cells(signals[one], PAIR_CELLS), cells(signals[other], PAIR_CELLS)
@@ -95,11 +100,28 @@ General = list[tuple[str, str, list[Columns]]]  # (equation, group, one {equatio
 
 def general_features(machine: Machine, recordings: Sequence[Recording]) -> General:
     """All groups of features of all equations."""
+    places = dict.fromkeys(name for recording in recordings for name in recording.equations)
+    return _groups(machine, recordings, list(places), lambda signals: features(signals, recordings[0].lags))
+
+
+def over_one_signal(machine: Machine, recordings: Sequence[Recording]) -> General:
+    """Tables over each signal alone, of all equations, and of entries by what passes through them."""
+    places = dict.fromkeys(name for recording in recordings for name in (*recording.equations, *recording.entries))
+    return _groups(machine, recordings, list(places), tables)
+
+
+def _groups(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    places: Sequence[str],
+    made: Callable[[Mapping[str, Array]], dict[str, Array]],
+) -> General:
+    """Groups of features of these equations and entries; cells are the same in all recordings."""
     found: General = []
     looked_over = [machine.generic(recording) for recording in recordings]
-    for equation in dict.fromkeys(name for r in recordings for name in r.equations):
+    for place in places:
         signals = [
-            each.get(equation, {}) if equation in recording.equations else {}
+            each.get(place, {}) if place in recording.equations or place in recording.entries else {}
             for recording, each in zip(recordings, looked_over, strict=True)
         ]
         together = {
@@ -111,14 +133,18 @@ def general_features(machine: Machine, recordings: Sequence[Recording]) -> Gener
         ends = np.cumsum(
             [0, *(len(recording.table) if each else 0 for recording, each in zip(recordings, signals, strict=True))]
         )
-        groups = features(together, recordings[0].lags)
-        for group, matrix in groups.items():
+        for group, matrix in made(together).items():
             columns = [
-                {equation: matrix[start:stop]} if stop > start else {}
-                for start, stop in zip(ends[:-1], ends[1:], strict=True)
+                _seen(recording, place, matrix[start:stop]) if stop > start else {}
+                for recording, start, stop in zip(recordings, ends[:-1], ends[1:], strict=True)
             ]
-            found.append((equation, group, columns))
+            found.append((place, group, columns))
     return found
+
+
+def _seen(recording: Recording, place: str, columns: Array) -> Columns:
+    """Columns (n, k) at an equation, or what the equations show of them at an entry."""
+    return recording.entries[place].respond(columns) if place in recording.entries else {place: columns}
 
 
 def look(regression: Regression, general: General) -> Misfit:

@@ -11,7 +11,21 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.machines.motor_bench import MotorBench, stand_ins
-from tests.sysid.books import COUNT, STEP_S, TIME_S, Row, behind, bend, hold, noise, positive, summed, table, waves
+from tests.sysid.books import (
+    COUNT,
+    RUNS,
+    STEP_S,
+    TIME_S,
+    Row,
+    behind,
+    bend,
+    hold,
+    noise,
+    positive,
+    summed,
+    table,
+    waves,
+)
 
 NAMES = ("V", "I", "w", "angle", "sgn_I", "sgn_w", "I_by_torque", "V_by_torque", "w_by_voltage", "dI", "dw", "dT", "dV",
          "warmth")  # fmt: skip
@@ -53,6 +67,23 @@ def electric(make):
 
 def mechanical(make):
     return lambda shape: {"mechanical": make(shape)}
+
+
+def calm(values, width):
+    """Under a Gaussian, run by run."""
+    return np.concatenate([ndimage.gaussian_filter1d(values[run], width, mode="nearest") for run in RUNS])
+
+
+def late(values):
+    """How far a filter of two samples is behind, over its time: by the solution for a straight line in each sample."""
+    tau, shown, seen = 2.0 * STEP_S, np.empty(COUNT), calm(values, 1.0)
+    for run in RUNS:
+        shown[run.start] = seen[run.start]
+        for k in range(run.start + 1, run.stop):
+            slope = (seen[k] - seen[k - 1]) / STEP_S
+            apart = shown[k - 1] - seen[k - 1] + slope * tau
+            shown[k] = seen[k] - slope * tau + apart * math.exp(-STEP_S / tau)
+    return (seen - shown) / tau
 
 
 def electrical(warm):
@@ -119,7 +150,7 @@ def sensors():
                        "mechanical": offset * np.tanh(s["V"] / near)}),
         Row("sensor_lag", "voltage_V", S, ("time_constant_s",), electric(lambda p: -s["dV"])),
         Row("sensor_lag", "current_A", S, ("time_constant_s",),
-            lambda p: {"electric": R * s["dI"], "mechanical": K * s["dI"]}),
+            lambda p: {"electric": R * late(s["I"]), "mechanical": K * late(s["I"])}),
         Row("sensor_lag", "speed_rad_per_s", S, ("time_constant_s",),
             lambda p: {"electric": K * s["dw"], "mechanical": -C_1 * s["dw"], T: s["dw"]}),
         Row("sensor_lag", "torque_Nm", S, ("time_constant_s",), mechanical(lambda p: -s["dT"])),
@@ -190,14 +221,14 @@ def transmission():
     pulls = K * s["I"] - MU_K * s["sgn_w"] * abs(s["I"]) - C_0 * s["sgn_w"] - C_1 * s["w"]
 
     def play(p):
-        load = pulls - p["share_of_inertia"] * J * s["dw"]
+        load = calm(pulls - p["share_of_inertia"] * J * s["dw"], 2.0)
         flank = behind(np.tanh(load / p["torque_Nm"]), p["crossing_s"])
         rate = np.gradient(flank, STEP_S)
         return {"electric": K * rate, "mechanical": -C_1 * rate - J * np.gradient(rate, STEP_S), T: rate}
 
     plays = [
-        {"share_of_inertia": a / 4.0, "torque_Nm": b, "crossing_s": c}
-        for a in range(5) for b in (0.02, 0.05) for c in (0.002, 0.004, 0.008)
+        {"share_of_inertia": a / 5.0, "torque_Nm": b, "crossing_s": c}
+        for a in range(6) for b in (0.02, 0.05) for c in (0.002, 0.004, 0.008)
     ]  # fmt: skip
     return [
         Row("cable_stiffening", T, T, ("rad_per_Nm",), lambda p: {T: s["dT"]}),

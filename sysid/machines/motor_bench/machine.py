@@ -174,7 +174,7 @@ class MotorBench:
                 "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, no_kink, lines=False
             )
         regimes = _regimes(s, firm_w)
-        return Recording(table, s, equations, regimes)
+        return Recording(table, s, equations, regimes, firm=True)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is examined without a cause in mind."""

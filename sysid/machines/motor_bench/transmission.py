@@ -7,6 +7,9 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
 from ranger_sim.sysid.machines.forms import Shape, column, one
 
+CALM = 2.0  # samples; Gaussian of the load: its noise would turn the flank to and fro
+SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of the inertia, before the gap
+
 
 def _torque(r: Recording, v: Values, share_of_inertia: float = 1.0) -> Array:
     """Torque behind the gearbox by the model, with so much of the rotor's inertia before it; the load cell's noise is
@@ -22,7 +25,7 @@ def transmission() -> list[Effect]:
 
     def play(r: Recording, shape: Shape, v: Values) -> Columns:
         """The output lies against the flank that carries the load, and crosses the gap in some milliseconds."""
-        load = _torque(r, v, shape["share_of_inertia"])
+        load = signals.smooth(r.table, _torque(r, v, shape["share_of_inertia"]), CALM)
         flank = signals.lagged(r.table, np.tanh(load / shape["torque_Nm"]), shape["crossing_s"])
         rate = np.gradient(flank, r.table.step_s)
         jerk = np.gradient(rate, r.table.step_s)
@@ -34,7 +37,7 @@ def transmission() -> list[Effect]:
 
     plays = [
         {"share_of_inertia": share, "torque_Nm": load, "crossing_s": time_s}
-        for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+        for share in SHARES
         for load in (0.02, 0.05)
         for time_s in (0.002, 0.004, 0.008)
     ]
