@@ -121,10 +121,13 @@ class HeldOutError:
 
 @dataclasses.dataclass(frozen=True)
 class NoiseFloor:
-    """left: rms of what an equation leaves; channel: its channel's own noise, a lower bound. In the equation's unit."""
+    """left: rms of what an equation leaves; channel: its channels' own noise, a lower bound; both in `unit`. held_out:
+    of the held-out data. Of a simulated machine one step ahead or in free simulation, whichever is farther above."""
 
     left: float
     channel: float
+    unit: str
+    held_out: bool
 
 
 @dataclasses.dataclass(frozen=True)
