@@ -115,9 +115,7 @@ class Recording:
     # parameter -> (value, standard deviation) of sound machines: equivalent to a measurement of it
     priors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests use slopes
-    own_noise: dict[str, float] = dataclasses.field(
-        default_factory=dict
-    )  # by equation, where the channel does not show it
+    own_noise: dict[str, float] = dataclasses.field(default_factory=dict)  # by equation that does not show it
     findings: list[Finding] = dataclasses.field(default_factory=list)  # the machine's own findings about the data
     # True: noise is what all candidates leave (sysid/by_candidates.py). False, for an ankle and a walk: it is estimated
     # from repeats or above the machine's band, and general tests are chi-squares over cells of the signals

@@ -31,7 +31,7 @@ def far(floor: NoiseFloor) -> bool:
 def by_channels(
     regression: Regression, sizes: Mapping[str, float] | None = None, held_out: bool = False
 ) -> dict[str, NoiseFloor]:
-    """By equation, in its band. sizes: of what was measured; where given, an error below a part of it is at the floor."""
+    """By equation, in its band. sizes: of what was measured; an error below a part of it is at the floor."""
     found = {}
     for name, (left, _) in _left(regression).items():
         own = [_own(each, name) for each in regression.recordings if name in each.equations]

@@ -34,6 +34,7 @@ PATIENCE, FALLS, WANDERING = 5, 0.9, 10.0
 FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
+CARRIED = 2  # rounds in which covariances go from one stretch to the next
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 
 
@@ -292,9 +293,30 @@ class TrajectoryFit:
         self.noise_y = np.clip(left, 1e-9 * np.ptp(self.y, axis=0), LOUDER * self.shown_y)
 
     def settle(self, rounds: int = ROUNDS, follow: bool = False) -> None:
-        """Rounds until nothing moves any more. follow: the measurement, where they end far off."""
-        if (not self._settled(rounds) or self.cost > FAR_OFF) and follow:
-            self._follow()
+        """Rounds until nothing moves any more. follow: the measurement, where they end far off, if that is likelier."""
+        if (self._settled(rounds) and self.cost <= FAR_OFF) or not follow:
+            return
+        ended, reached = self._end(), self._surprise_here()
+        self._follow()
+        if not self._surprise_here() <= reached:
+            self.x, self.u, self.p, self.noise_y, self.predictor = ended
+
+    def _end(self) -> tuple[Array, Array, Array, Array, Predictor | None]:
+        return self.x, self.u, self.p, self.noise_y, self.predictor
+
+    def _surprise_here(self) -> float:
+        """`surprise` where the fit is; infinite where the simulator runs away. Nothing moves."""
+        here = self._end()
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                for _ in range(CARRIED):
+                    self.x, self.u, self.p = here[:3]
+                    self.round()
+            found = self.surprise
+        except (UserError, np.linalg.LinAlgError):
+            found = np.inf
+        self.x, self.u, self.p, self.noise_y, self.predictor = here
+        return found if np.isfinite(found) else np.inf
 
     def _settled(self, rounds: int) -> bool:
         """False when parameters still move after these rounds, or go far and lead nowhere."""

@@ -1,10 +1,11 @@
-"""Nothing is called sound that leaves far more than its channels' noise: which number says so, and the command's code."""
+"""Nothing is called sound that leaves far more than its channels' noise: the number for it, and the command's code."""
 
 import json
 
 import numpy as np
 import pytest
 
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import noise_floor
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.free_simulation import Joint, Output, SimulatedMachine, runge_kutta
@@ -42,8 +43,8 @@ class Disc(SimulatedMachine):
 
 
 def spun(seed, load=0.0, rows=1500):
-    """A disc on a voltage that is held for 0.4 s at a time, in closed form; a hand brakes it from 5 to 8 s by `load`."""
-    random = np.random.default_rng(seed)
+    """A disc on a voltage held for 0.4 s at a time, in closed form; a hand brakes it from 5 to 8 s by `load`."""
+    random = generator(seed, "noise floor")
     voltage = np.repeat(random.uniform(-6.0, 6.0, rows // 40 + 1), 40)[:rows]
     time_s = STEP_s * np.arange(rows)
     pushed = 5.0 * voltage - load * ((time_s >= 5.0) & (time_s < 8.0))
@@ -95,18 +96,17 @@ def recorded(residual, **more):
 
 
 def test_repeats_give_the_noise_however_large_the_model_s_error():
-    random = np.random.default_rng(4)
+    random = generator(4, "noise floor")
     stride = np.tile(np.sin(2.0 * np.pi * np.arange(50) / 50.0), 40)  # rms 0.707 in every stride
-    made = recorded(
-        stride + 0.1 * random.normal(size=2000), whitened=False, repeats={"legs": np.tile(np.arange(50), 40)}
-    )
+    places = np.tile(np.arange(50), 40)
+    made = recorded(stride + 0.1 * random.normal(size=2000), whitened=False, repeats={"legs": places})
     floor = noise_floor.by_band_or_repeats(Regression([made]))["legs"]
     assert floor.left == pytest.approx(np.hypot(np.sqrt(0.5), 0.1), rel=0.02)
     assert floor.channel == pytest.approx(0.1, rel=0.05) and noise_floor.far(floor)
 
 
 def test_the_band_above_the_machine_s_motion_gives_the_noise_below_it_too():
-    random = np.random.default_rng(5)
+    random = generator(5, "noise floor")
     slow = np.sin(2.0 * np.pi * 0.004 * np.arange(4000))
     made = recorded(slow + 0.1 * random.normal(size=4000), noise_above=0.1)
     floor = noise_floor.by_band_or_repeats(Regression([made]))["legs"]
@@ -114,5 +114,5 @@ def test_the_band_above_the_machine_s_motion_gives_the_noise_below_it_too():
 
 
 def test_nothing_is_concluded_where_no_noise_is_known():
-    made = recorded(np.random.default_rng(6).normal(size=2000), whitened=False)
+    made = recorded(generator(6, "noise floor").normal(size=2000), whitened=False)
     assert noise_floor.by_band_or_repeats(Regression([made])) == {}
