@@ -1,4 +1,4 @@
-"""A pendulum that swings up, as a user's simulator without gravity: gravity is named, and no absurd inertia is fitted."""
+"""A pendulum that swings up, as a user's simulator without gravity: gravity is named, no absurd inertia is fitted."""
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ class Pendulum(SimulatedMachine):
     """I a = torque - b w - c sgn w, and no gravity."""
 
     name = "pendulum"
+    weight_Nm = 0.0
     quantities = (
         Quantity("position_rad", "rad", "from hanging"),
         Quantity("velocity_rad_per_s", "rad/s", "of the pendulum"),
@@ -45,7 +46,8 @@ class Pendulum(SimulatedMachine):
 
     def rates(self, x, u, p):
         rubs = p["viscous_Nms"] * x["rate"] + p["coulomb_Nm"] * np.tanh(x["rate"] / 0.05)
-        return {"angle": x["rate"], "rate": (u["torque"] - rubs) / p["inertia_kg_m2"]}
+        pulls = self.weight_Nm * np.sin(x["angle"])
+        return {"angle": x["rate"], "rate": (u["torque"] - rubs - pulls) / p["inertia_kg_m2"]}
 
     def step(self, x, u, p, step_s):
         return runge_kutta(self.rates, x, u, p, step_s)
@@ -57,18 +59,18 @@ class Pendulum(SimulatedMachine):
         return {"rate": standing(x["rate"], p["coulomb_Nm"], 0.05, step_s) / p["inertia_kg_m2"]}
 
 
-def swung_up(seed, weight):
-    """A torque that pumps energy in until the pendulum is near the top, 0.25 ms steps, 4 ms rows, counts of 1.5 mrad."""
+def swung_up(seed):
+    """A torque that pumps energy in until it is near the top; 0.25 ms steps, 4 ms rows, counts of 1.5 mrad."""
     random = generator(seed, "swing up")
     angle, rate, rows = 0.0, 0.0, np.zeros((ROWS, 3))
     torque = 0.0
     for k in range(ROWS * FINER):
         if k % FINER == 0:
-            energy = 0.5 * INERTIA * rate**2 - weight * np.cos(angle)
-            torque = 1.0 * np.sign(rate or 1.0) if energy < 0.8 * weight else -0.5 * np.sign(rate)
+            energy = 0.5 * INERTIA * rate**2 - WEIGHT * np.cos(angle)
+            torque = 1.0 * np.sign(rate or 1.0) if energy < 0.8 * WEIGHT else -0.5 * np.sign(rate)
             torque += 0.2 * random.normal()
             rows[k // FINER] = angle, rate, torque
-        drive = torque - VISCOUS * rate - weight * np.sin(angle)
+        drive = torque - VISCOUS * rate - WEIGHT * np.sin(angle)
         following = rate + (drive - COULOMB * np.sign(rate)) / INERTIA * STEP_s / FINER
         rate = 0.0 if rate * following < 0.0 and abs(drive) < COULOMB else following
         angle += rate * STEP_s / FINER
@@ -91,7 +93,9 @@ def test_a_fit_along_the_measurement_that_ends_less_likely_is_not_kept(monkeypat
     def absurd(self):
         self.p = np.array([503.0, 0.05, 426.0])
 
-    fit = TrajectoryFit(Pendulum(), swung_up(1, 0.0))
+    machine = Pendulum()
+    machine.weight_Nm = WEIGHT
+    fit = TrajectoryFit(machine, swung_up(1))
     monkeypatch.setattr(TrajectoryFit, "_settled", never_done)
     monkeypatch.setattr(TrajectoryFit, "_follow", absurd)
     fit.settle(follow=True)
@@ -99,7 +103,7 @@ def test_a_fit_along_the_measurement_that_ends_less_likely_is_not_kept(monkeypat
 
 
 def test_gravity_that_the_model_lacks_is_named_in_a_swing_up():
-    found = diagnose(Pendulum(), [swung_up(1, WEIGHT)], [swung_up(2, WEIGHT)]).result
+    found = diagnose(Pendulum(), [swung_up(1)], [swung_up(2)]).result
     assert [each.name for each in found.causes][:1] == ["once_per_turn"]
     value = found.causes[0].parameters["sine_torque"].value
     assert value == pytest.approx(-WEIGHT, rel=0.1)
