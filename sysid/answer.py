@@ -106,6 +106,7 @@ def _evidence(found: Diagnosis, held: Held | None, term: LearnedTerm | None) -> 
         refused_by_holdout=tuple(each.effect.name for each in held.refused) if held is not None else None,
         holdout_excites_it=held.tells if held is not None else None,
         noise_floor=found.floors or None,
+        between_rows={each.table.name: each.between_rows for each in found.recordings if each.between_rows} or None,
         above_noise_floor=tuple(name for name, each in found.floors.items() if noise_floor.far(each)),
     )
 

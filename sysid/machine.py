@@ -120,6 +120,7 @@ class Recording:
     # True: noise is what all candidates leave (sysid/by_candidates.py). False, for an ankle and a walk: it is estimated
     # from repeats or above the machine's band, and general tests are chi-squares over cells of the signals
     noise_by_candidates: bool = True
+    between_rows: dict[str, str] = dataclasses.field(default_factory=dict)  # by input of a simulator, in words
     left_over: bool = False  # responses are a simulation's errors, not measurements
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
 

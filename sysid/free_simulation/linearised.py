@@ -83,7 +83,7 @@ def free(fit: TrajectoryFit) -> LinearisedRecording:
     """
     window = max(SHORTEST_WINDOW, round(fit.machine.window_s / fit.step_s))
     starts = np.array([k for run in fit.table.runs for k in range(run.start, run.stop, window)])
-    predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.noise_y, fit.loose(), starts,
+    predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.noise_y, fit.open_steps(), starts,
                           AWAY * fit.size_x, stretch=window)  # fmt: skip
     missed = predictor.white(predictor.errors(fit.state[:, :, None], fit.output[:, :, None]))[:, :, 0]
     columns = predictor.white(predictor.errors(fit.lin.f_p, fit.lin.h_p))
@@ -100,7 +100,7 @@ def _by_noise(fit: TrajectoryFit, predictor: Predictor) -> Array:
         return random.normal(size=(len(fit.x), deviations.shape[-1], DRAWS)) * deviations[..., None]
 
     inputs = drawn(fit.noise_u)
-    state = fit.lin.f_u @ inputs + drawn(fit.loose())
+    state = fit.lin.f_u @ inputs + drawn(fit.open_steps())
     left = predictor.white(predictor.errors(state, fit.lin.h_u @ inputs + drawn(fit.noise_y)))
     return np.asarray(np.sqrt(np.mean(left**2, axis=(0, 2))))
 
@@ -123,6 +123,7 @@ def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Arra
         along,
         equations,
         own_noise={each.channel: float(one) for each, one in zip(machine.outputs, noise, strict=True)},
+        between_rows={name: fit.simulator.numerics.way(name) for name in fit.simulator.inputs},
         lags=tuple(round(time_s / fit.step_s) for time_s in LAGS_S),
         fitted=dict(zip(names, (float(each) for each in fit.p_at), strict=False)),
         linear=fit.lin,

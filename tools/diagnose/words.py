@@ -95,6 +95,14 @@ def unseen(answer: dict[str, Any]) -> list[str]:
     return lines
 
 
+def between_rows(answer: dict[str, Any]) -> list[str]:
+    """How a simulated machine's inputs go from a row to the next, a recording a line."""
+    return [
+        f"between rows of {recording}: {', '.join(f'{name} {way}' for name, way in ways.items())}"
+        for recording, ways in answer["evidence"].get("between_rows", {}).items()
+    ]
+
+
 def numerics(answer: dict[str, Any]) -> list[str]:
     """What the simulator's own numerics move, a cause a line, and what is not named because of them."""
     lines = []
