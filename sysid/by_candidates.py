@@ -22,6 +22,7 @@ from ranger_sim.sysid import (
     misfit,
     naming,
     noise_floor,
+    own_model,
     plausibility,
     predictability,
     signals,
@@ -69,6 +70,8 @@ def diagnose(
     progress("misfit", 0.2)
     if hasattr(machine, "about_all"):
         recordings, held = ([_about_all(machine, each, effects, had) for each in some] for some in (recordings, held))
+    if any(each.entries for each in recordings):
+        own_model.determined(machine, bands.plain(recordings))  # before anything is concluded
     skews = list(had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
@@ -148,7 +151,14 @@ def diagnose(
         known_to,
         _misfit(before, machine, found.base),
         _misfit(after, machine, extended),
-        plausibility.look(machine, extended, found.named, by_candidates=True, base=found.base),
+        plausibility.look(
+            machine,
+            extended,
+            found.named,
+            by_candidates=True,
+            base=found.base,
+            more=own_model.of(machine, recordings, found.base),
+        ),
         level=LEVEL,
         band_hz=band.edge_hz,
         refused=found.refused,
