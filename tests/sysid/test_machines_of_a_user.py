@@ -64,4 +64,4 @@ def test_the_page_s_machine_of_twenty_lines_has_its_candidates_without_a_port_or
     result = diagnose(made["Disc"](), [run]).result
     assert [(each.name, each.at) for each in result.causes] == [("drag", "speed")]
     assert result.causes[0].parameters["quadratic_acceleration_s2"].value == pytest.approx(0.05, rel=0.03)
-    assert "sensor_scale at speed_rad_s" in result.evidence.cannot_be_seen
+    assert "sensor_scale at speed_rad_per_s" in result.evidence.cannot_be_seen
