@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ranger_sim.sysid import by_candidates, model_file, predicted_ties, repairs
+from ranger_sim.sysid import by_candidates, model_file, noise_floor, predicted_ties, repairs
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.held_out import Held
 from ranger_sim.sysid.machine import Recording
@@ -105,6 +105,9 @@ def _evidence(found: Diagnosis, held: Held | None, term: LearnedTerm | None) -> 
         residual_term=term,
         refused_by_holdout=tuple(each.effect.name for each in held.refused) if held is not None else None,
         holdout_excites_it=held.tells if held is not None else None,
+        noise_floor=found.floors or None,
+        between_rows={each.table.name: each.between_rows for each in found.recordings if each.between_rows} or None,
+        above_noise_floor=tuple(name for name, each in found.floors.items() if noise_floor.far(each)),
     )
 
 

@@ -22,6 +22,8 @@ from ranger_sim.sysid import (
     likelihood,
     misfit,
     naming,
+    noise_floor,
+    own_model,
     plausibility,
     predictability,
     signals,
@@ -31,7 +33,7 @@ from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
-from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError, NoiseFloor
+from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError
 from ranger_sim.sysid.three_numbers import Held, gained
 
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
@@ -45,7 +47,6 @@ LEVEL = 0.01  # chance of a predictable residual in any equation of a sound reco
 FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say nothing
 FURTHER = 5.0  # times, general features by chance: they come in addition to the predictor
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
-FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
 Z95 = 1.96  # standard errors on each side of a 95 % interval
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
@@ -72,6 +73,8 @@ def diagnose(
     progress("misfit", 0.2)
     if hasattr(machine, "about_all"):
         recordings, held = ([_about_all(machine, each, effects, had) for each in some] for some in (recordings, held))
+    if any(each.entries for each in recordings):
+        own_model.determined(machine, bands.plain(recordings))  # before anything is concluded
     skews = list(had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
@@ -129,11 +132,16 @@ def diagnose(
     after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
+    floors = noise_floor.by_channels(extended)
+    judged = held or (recordings if hasattr(machine, "free") else [])
+    if hasattr(machine, "free"):
+        judged = [machine.free(each) for each in judged]
+    if judged and not found.named:
+        judge = Held(judged, skews, found.base.values)
+        floors = noise_floor.farther(floors, noise_floor.by_channels(judge.base, judge.sizes, bool(held)))
     if held:
-        if hasattr(machine, "free"):
-            held = [machine.free(each) for each in held]
         lasting = predictability.predictor(machine, recordings, seed, without=("t",))  # another run has its own time
-        errors = Held(held, skews, found.base.values).errors(found.named, extended, found.base, lasting, seed)
+        errors = Held(judged, skews, found.base.values).errors(found.named, extended, found.base, lasting, seed)
     return Diagnosis(
         machine,
         list(recordings),
@@ -146,12 +154,19 @@ def diagnose(
         known_to,
         _with_general(_misfit(before, machine, found.base), machine, found, whole, skews, seed),
         _misfit(after, machine, extended),
-        plausibility.look(machine, extended, found.named, by_candidates=True, base=found.base),
+        plausibility.look(
+            machine,
+            extended,
+            found.named,
+            by_candidates=True,
+            base=found.base,
+            more=own_model.of(machine, recordings, found.base),
+        ),
         level=LEVEL,
         band_hz=band.edge_hz,
         refused=found.refused,
         errors=errors,
-        floors=floors(extended),
+        floors=floors,
         by_candidates=True,
         left_over=_left_over(machine, found, skews, recordings, seed) if found.named else None,
         stretches={each.equation: float(each.stretches) for each in after},
@@ -461,32 +476,6 @@ def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping
             regression.covariance[number, number] += (moved / Z95) ** 2
 
 
-def floors(regression: Regression) -> dict[str, tuple[float, float]]:
-    """By equation (rms of the residual, noise of the channel itself), both in the band and in the equation's unit.
-
-    The channel's own noise is what departs from a parabola over a tenth of a second: a lower bound of the noise.
-    """
-    out: dict[str, tuple[float, float]] = {}
-    values = np.array([regression.values[each] for each in regression.names])
-    for name, part in regression.parts.items():
-        good = regression.good[name]
-        if not np.any(good):
-            continue
-        left = float(np.sqrt(np.mean((part.response - part.measured @ values)[good] ** 2)))
-        own = [_own(each, name) for each in regression.recordings if name in each.equations]
-        out[name] = (left, float(np.sqrt(np.mean(np.square(own)))))
-    return out
-
-
-def _own(recording: Recording, name: str) -> float:
-    """Noise of what an equation responds with, in the recording's band."""
-    predictor = getattr(recording, "predictor", None)
-    if predictor is not None:
-        return float(predictor.unit[list(getattr(recording, "outputs", ())).index(name)])
-    alone = signals.roughness(recording.table, recording.equations[name].response)
-    return alone / math.sqrt(max(1.0, 2.0 * recording.width * math.sqrt(math.pi)))
-
-
 def smallest(effects: Sequence[Effect], regression: Regression, threshold: float) -> list[Visible]:
     """For each effect the smallest size that these data would have named, at the shape that they show best."""
     out = []
@@ -510,11 +499,6 @@ def smallest(effects: Sequence[Effect], regression: Regression, threshold: float
     return out
 
 
-def unexplained(found: Diagnosis) -> list[str]:
-    """Equations whose residual is far above the noise of their channel."""
-    return [name for name, (left, own) in found.floors.items() if left > FAR * own]
-
-
 def held(found: Diagnosis, holdout: Sequence[str]) -> held_out.Held | None:
     """The judgement by held-out data, for the result; None without any."""
     if found.errors is None:
@@ -530,8 +514,6 @@ def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
         made,
         band_hz=found.band_hz,
         held_out_errors=found.errors,
-        noise_floor={name: NoiseFloor(left, own) for name, (left, own) in found.floors.items()},
-        above_noise_floor=tuple(unexplained(found)),
         smallest_visible={each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
         cannot_be_seen=tuple(each.effect.name for each in found.visible if each.sizes is None),
         too_short_s=_needed_s(found) or None,

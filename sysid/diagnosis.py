@@ -11,7 +11,7 @@ from ranger_sim.sysid.left_over import LeftOver
 from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
-from ranger_sim.sysid.results import DiagnosisResult, HeldOutError
+from ranger_sim.sysid.results import DiagnosisResult, HeldOutError, NoiseFloor
 from ranger_sim.sysid.three_numbers import gained
 
 # Of all general tests together. Chosen by us: their chi-squares are valid for many samples only, and 0.001 gave 1 alarm
@@ -66,7 +66,7 @@ class Diagnosis:
     band_hz: float | None = None  # edge of the band of the equations; None: as recorded
     refused: list[Named] = dataclasses.field(default_factory=list)  # by held-out data, while causes were sought
     errors: dict[str, HeldOutError] | None = None  # on held-out data, by equation
-    floors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    floors: dict[str, NoiseFloor] = dataclasses.field(default_factory=dict)  # by equation, where the noise is known
     visible: list[Visible] = dataclasses.field(default_factory=list)
     stretches: dict[str, float] = dataclasses.field(default_factory=dict)  # independent ones, by equation
     numerics: dict[str, tuple[float, ...]] = dataclasses.field(default_factory=dict)  # moves of coefficients, by effect

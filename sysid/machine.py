@@ -121,6 +121,7 @@ class Recording:
     # parameter -> (value, standard deviation) of sound machines: equivalent to a measurement of it
     priors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests use slopes
+    own_noise: dict[str, float] = dataclasses.field(default_factory=dict)  # by equation that does not show it
     findings: list[Finding] = dataclasses.field(default_factory=list)  # the machine's own findings about the data
     # True: noise is what all candidates leave (sysid/by_candidates.py). False, for an ankle and a walk: it is estimated
     # from repeats or above the machine's band, and general tests are chi-squares over cells of the signals
@@ -128,6 +129,7 @@ class Recording:
     # True where rows about corners (standstill, reversals, jumps) do not count and columns have stand-ins: whatever goes
     # with the signals is an error then. Elsewhere a corner between two samples, of a friction that sticks, is as well
     firm: bool = False
+    between_rows: dict[str, str] = dataclasses.field(default_factory=dict)  # by input of a simulator, in words
     left_over: bool = False  # responses are a simulation's errors, not measurements
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
 

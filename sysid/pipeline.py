@@ -18,6 +18,7 @@ from ranger_sim.sysid import (
     intervals,
     misfit,
     naming,
+    noise_floor,
     plausibility,
     residual_term,
 )
@@ -28,7 +29,7 @@ from ranger_sim.sysid.machine import Effect, Machine
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.preparation import Prepared
 from ranger_sim.sysid.regression import Regression
-from ranger_sim.sysid.results import LearnedTerm
+from ranger_sim.sysid.results import LearnedTerm, NoiseFloor
 
 NAMED_LEVEL = 0.005  # of the whole selection
 ROUNDS, MOST = 4, 5  # of naming; effects that are named
@@ -101,6 +102,9 @@ def diagnose(
     if holdout and found.detected:
         progress("gain", 0.85)
         final, held = _hold_out(found, holdout, seed)
+    elif not found.detected:
+        progress("noise floor", 0.85)
+        found.floors = _floors(found, holdout)
     final.result = answer.of(found, final, held, _learned(found, holdout), prepared)
     progress("done", 1.0)
     return final
@@ -115,6 +119,16 @@ def _hold_out(found: Diagnosis, holdout: Sequence[Table], seed: int) -> tuple[Di
     kept = [each for each in named if each not in held.refused]
     extended = naming.refit(found.plain, kept, [*found.skews, *kept], fresh=True)
     return dataclasses.replace(found, named=kept, extended=extended), held
+
+
+def _floors(found: Diagnosis, holdout: Sequence[Table]) -> dict[str, NoiseFloor]:
+    """What the equations leave next to their noise, also of held-out data."""
+    floors = noise_floor.by_band_or_repeats(found.extended)
+    if not holdout:
+        return floors
+    recordings = [found.machine.prepare(table) for table in holdout]
+    base = naming.refit(Regression(recordings, noise=found.plain), found.skews, values=found.plain.values)
+    return noise_floor.farther(floors, noise_floor.by_band_or_repeats(base, held_out=True))
 
 
 def _name(

@@ -35,7 +35,10 @@ MOST = 5  # causes at once: where everything seems wrong, it is another machine,
 LARGEST_SCALE = 0.5  # largest change of a sensor's scale: beyond it, the channel shows another signal or another unit
 UNIT_TOLERANCE = 0.05  # of a factor that is reported as a unit's: friction and noise move it by per cents
 # kinds of findings that forbid naming a cause
-FORBID = ("impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal", "other_machine")
+FORBID = (
+    "impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal", "other_machine", "at_limit",
+    "too_coarse",
+)  # fmt: skip
 # small compared with the rest, or of an instrument: a model error moves them by any factor
 MAY_BE_ANY = ("friction", "inductance", "lag", "filter", "gates", "zero", "offset", "bias")
 # {unit of a channel: {other unit that its numbers may have: how many of them make one of ours}}
@@ -64,14 +67,15 @@ def look(
     named: Sequence[Named] = (),
     by_candidates: bool = False,
     base: Regression | None = None,
+    more: Sequence[Finding] = (),
 ) -> Doubts:
     """Implausible values of a fit. regression: with every named cause in it.
 
     by_candidates: the noise is what all candidates leave. Then a slow residual is what a model error looks like, and a
     start value only starts: neither forbids a name. base: without the named causes; a scale of a channel could hide
-    that its equations contradict each other.
+    that its equations contradict each other. more: findings about the model itself (own_model.py).
     """
-    findings: list[Finding] = []
+    findings: list[Finding] = [*more]
     if len(named) >= MOST and not by_candidates:
         text = f"{len(named)} causes at once explain it: where everything is wrong it is another machine, or other data"
         findings.append(_finding("", "too_many", len(named), "", text))

@@ -121,10 +121,13 @@ class HeldOutError:
 
 @dataclasses.dataclass(frozen=True)
 class NoiseFloor:
-    """left: rms of what an equation leaves; channel: its channel's own noise, a lower bound. In the equation's unit."""
+    """left: rms of what an equation leaves; channel: its channels' own noise, a lower bound; both in `unit`. held_out:
+    of the held-out data. Of a simulated machine one step ahead or in free simulation, whichever is farther above."""
 
     left: float
     channel: float
+    unit: str
+    held_out: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -229,7 +232,8 @@ class DiagnosisEvidence:
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
     the machine's own parameters explain in these data; too_short_s, by equation whose noise is too slow for these
     recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than
-    what numerics move them by. Only of a walk: twins, the comparison with emulated walks.
+    what numerics move them by. Only of a simulated machine: between_rows, by recording and input its way from a row to
+    the next. Only of a walk: twins, the comparison with emulated walks.
     """
 
     p_general: float
@@ -252,6 +256,7 @@ class DiagnosisEvidence:
     smallest_visible: Mapping[str, Mapping[str, float]] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     cannot_be_seen: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     too_short_s: Mapping[str, float] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    between_rows: Mapping[str, Mapping[str, str]] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     below_numerics: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     twins: TwinsEvidence | None = dataclasses.field(default=None, metadata=OPTIONAL)
 

@@ -169,6 +169,18 @@ def near_jumps(table: Table, column: Array) -> np.ndarray:
     return out
 
 
+def jumps(table: Table, column: Array) -> Array:
+    """(n,) sizes of the jumps in the steps from each row to the next, as `near_jumps` finds them, 0 elsewhere.
+
+    A mean over a sample has a jump in two steps; each of them has the size of both.
+    """
+    change = np.abs(np.diff(column, append=column[-1:]))
+    near = near_jumps(table, column)
+    for run in table.runs:
+        change[run.stop - 1] = 0.0
+    return np.where(near, ndimage.maximum_filter1d(change, 3, mode="constant"), 0.0)
+
+
 def roughness(table: Table, column: Array) -> float:
     """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps."""
     size = max(7, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)

@@ -15,7 +15,7 @@ from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.simulator import Simulator
-from ranger_sim.sysid.free_simulation.terms import Acting, sensed
+from ranger_sim.sysid.free_simulation.terms import Acting, into, sensed
 from ranger_sim.sysid.machine import Values
 
 ROUNDS = 30  # of Gauss and Newton, at most
@@ -34,6 +34,9 @@ PATIENCE, FALLS, WANDERING = 5, 0.9, 10.0
 FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
+CARRIED = 2  # rounds in which covariances go from one stretch to the next
+UNKNOWN_PLACE = 0.29  # of a jump: deviation of a step's mean where its place is anywhere in the step, 1 / sqrt(12)
+CHOSEN = 20.0  # of -2 log likelihood: by so much another way between samples is the likelier one
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 
 
@@ -140,7 +143,7 @@ class TrajectoryFit:
         along = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         along |= simulator.inputs | {name: self.u[:, i] for i, name in enumerate(simulator.noisy)}
         along |= {each.channel: self.lin.output[:, i] for i, each in enumerate(machine.outputs)}
-        entering = self._entering()
+        entering = self.entering()
         for number, each in enumerate(machine.outputs, len(machine.ports)):
             along[sensed(each.channel)] = along[each.channel] - entering[:, number]
         along["t"] = self.table.time_s - self.table.time_s[0]
@@ -152,7 +155,7 @@ class TrajectoryFit:
         ends = np.cumsum([self.count, *(len(each.coefficients) for each in self.acting)])
         return [self.p[a:b] for a, b in itertools.pairwise(ends)]
 
-    def _entering(self) -> Array:
+    def entering(self) -> Array:
         """(n, ports): what acts puts into the ports."""
         coefficients = self._coefficients() if self.enter else []
         return effects.total(self.enter, coefficients, len(self.x), len(self.simulator.ports))
@@ -165,7 +168,7 @@ class TrajectoryFit:
         """
         for _ in range(CLOSING):
             if self.enter:
-                driven = self.simulator.driven(self.u, self._entering())
+                driven = self.simulator.driven(self.u, self.entering())
                 shown = self.simulator.at(self.x, self.p, driven)[1]
                 self.lin = dataclasses.replace(self.lin, output=0.5 * (self.lin.output + shown))
             seen, before = self.seen(), self.enter
@@ -179,10 +182,10 @@ class TrajectoryFit:
         simulator, states = self.simulator, self.machine.states
         values = dict(zip(simulator.names, self.p, strict=False))
         seen = self._closed(values) if self.acting else None
-        there = sorted({number for each in self.enter for number in each})
+        there = sorted({number for each in self.enter for number in each} | set(self._unsure()))
         sizes = self.size_x, self.size_u, self.size_p[: self.count]
         lin = simulator.linearised(
-            self.x, self.u, self.p, self._entering(), sizes, range(len(simulator.ports)) if every_port else there
+            self.x, self.u, self.p, self.entering(), sizes, range(len(simulator.ports)) if every_port else there
         )
         back = np.zeros((len(self.x), len(simulator.ports), len(states)))
         for each, enter, own in zip(self.acting, self.enter, self._coefficients(), strict=True):
@@ -208,7 +211,7 @@ class TrajectoryFit:
         states = {name: self.x[:, i] for i, name in enumerate(machine.states)}
         values = {name: np.full(len(self.x), self.p[i]) for i, name in enumerate(simulator.names)}
         given = simulator.inputs | {name: self.u[:, i] for i, name in enumerate(simulator.noisy)}
-        entering = self._entering()
+        entering = self.entering()
         given |= {each.name: entering[:, i] for i, each in enumerate(simulator.ports)}
         found = machine.loose(states, given, values, self.step_s)
         nothing = np.zeros(len(self.x))
@@ -219,11 +222,61 @@ class TrajectoryFit:
             + self.slack
         )
 
+    def _unsure(self) -> dict[int, str]:
+        """Inputs whose jumps are somewhere inside a step, by number of their port."""
+        names = {into(name): name for name in self.simulator.numerics.unsure}
+        return {number: names[port.name] for number, port in enumerate(self.simulator.ports) if port.name in names}
+
+    def open_steps(self) -> Array:
+        """(n, s) deviations of each step: what the law leaves open, and inputs' jumps at an unknown place inside it."""
+        square = self.loose() ** 2
+        for number, name in self._unsure().items():
+            square = square + (UNKNOWN_PLACE * self.lin.f_q[:, :, number] * self.simulator.jumps[name][:, None]) ** 2
+        return np.asarray(np.sqrt(square))
+
+    def choose_way(self) -> bool:
+        """Take the likeliest way of the inputs between samples, to first order about the fit; True when it is another.
+
+        Its gain counts in units of what the fit leaves, so that an error of the model does not choose.
+        """
+        ways = self.simulator.ways()
+        if len(ways) == 1:
+            return False
+        here = self._end()
+        self.round(every_port=True)
+        assert self.predictor is not None
+        first, now = self.predictor, self.simulator
+        self.x, self.u, self.p, self.noise_y, self.predictor = here
+        driven, found = now.driven(self.u, self.entering()), []
+        f = now.at(self.x, self.p, driven)[0]
+        for way in ways:
+            self.simulator = now.stepping(way)
+            moved = self.simulator.at(self.x, self.p, self.simulator.driven(self.u, self.entering()))[0] - f
+            moved[self.ends] = 0.0
+            wide = first
+            if way.unsure != now.numerics.unsure:
+                wide = Predictor(self.lin, self.noise_u, self.noise_y, self.open_steps(), self.starts,
+                                 AWAY * self.size_x, first)  # fmt: skip
+            missed = np.concatenate(((self.state - moved)[:, :, None], self.lin.f_p), axis=2)
+            shown = np.concatenate((self.output[:, :, None], self.lin.h_p), axis=2)
+            white = (wide.white(wide.errors(missed, shown)) / wide.unit[None, :, None]).reshape(-1, 1 + len(self.p))
+            a, b = white[:, 1:], white[:, 0]
+            left = b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]
+            diagonal = wide.spread[:, np.arange(wide.o), np.arange(wide.o)]
+            found.append((float(left @ left), 2.0 * float(np.sum(np.log(diagonal)))))
+        inflated = max(1.0, min(square for square, _ in found) / len(left))
+        scores = [square / inflated + spread for square, spread in found]
+        best = int(np.argmin(scores))
+        if best and scores[0] - scores[best] < CHOSEN:
+            best = 0
+        self.simulator = now.stepping(ways[best])
+        return best > 0
+
     def round(self, every_port: bool = False) -> float:
         """One round; returns the largest step of a parameter in its standard errors."""
         self.lin = lin = self.linearise(every_port)
         self.predictor = Predictor(
-            lin, self.noise_u, self.noise_y, self.loose(), self.starts, AWAY * self.size_x, self.predictor
+            lin, self.noise_u, self.noise_y, self.open_steps(), self.starts, AWAY * self.size_x, self.predictor
         )
         wide = self.predictor
         assert wide is not None
@@ -292,9 +345,30 @@ class TrajectoryFit:
         self.noise_y = np.clip(left, 1e-9 * np.ptp(self.y, axis=0), LOUDER * self.shown_y)
 
     def settle(self, rounds: int = ROUNDS, follow: bool = False) -> None:
-        """Rounds until nothing moves any more. follow: the measurement, where they end far off."""
-        if (not self._settled(rounds) or self.cost > FAR_OFF) and follow:
-            self._follow()
+        """Rounds until nothing moves any more. follow: the measurement, where they end far off, if that is likelier."""
+        if (self._settled(rounds) and self.cost <= FAR_OFF) or not follow:
+            return
+        ended, reached = self._end(), self._surprise_here()
+        self._follow()
+        if not self._surprise_here() <= reached:
+            self.x, self.u, self.p, self.noise_y, self.predictor = ended
+
+    def _end(self) -> tuple[Array, Array, Array, Array, Predictor | None]:
+        return self.x, self.u, self.p, self.noise_y, self.predictor
+
+    def _surprise_here(self) -> float:
+        """`surprise` where the fit is; infinite where the simulator runs away. Nothing moves."""
+        here = self._end()
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                for _ in range(CARRIED):
+                    self.x, self.u, self.p = here[:3]
+                    self.round()
+            found = self.surprise
+        except (UserError, np.linalg.LinAlgError):
+            found = np.inf
+        self.x, self.u, self.p, self.noise_y, self.predictor = here
+        return found if np.isfinite(found) else np.inf
 
     def _settled(self, rounds: int) -> bool:
         """False when parameters still move after these rounds, or go far and lead nowhere."""

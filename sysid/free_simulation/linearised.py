@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.free_simulation.fit import AWAY, TrajectoryFit
 from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
@@ -14,6 +15,7 @@ from ranger_sim.sysid.machine import Columns, Entry, Equation
 
 LAGS_S = (0.0, 0.01, 0.03, 0.1)  # lags at which the general tests use slopes
 SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
+DRAWS = 8  # of noise, from which its part in free simulation is known to a tenth
 TOGETHER = 24  # responses that are computed side by side
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
@@ -71,7 +73,7 @@ def one_step_ahead(fit: TrajectoryFit) -> LinearisedRecording:
     """The equations as white errors of a prediction by one sample."""
     fit.round_again()
     assert fit.predictor is not None
-    return _made(fit, fit.predictor, fit.response, fit.columns)
+    return _made(fit, fit.predictor, fit.response, fit.columns, fit.predictor.unit)
 
 
 def free(fit: TrajectoryFit) -> LinearisedRecording:
@@ -81,17 +83,30 @@ def free(fit: TrajectoryFit) -> LinearisedRecording:
     """
     window = max(SHORTEST_WINDOW, round(fit.machine.window_s / fit.step_s))
     starts = np.array([k for run in fit.table.runs for k in range(run.start, run.stop, window)])
-    predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.noise_y, fit.loose(), starts,
+    predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.noise_y, fit.open_steps(), starts,
                           AWAY * fit.size_x, stretch=window)  # fmt: skip
     missed = predictor.white(predictor.errors(fit.state[:, :, None], fit.output[:, :, None]))[:, :, 0]
     columns = predictor.white(predictor.errors(fit.lin.f_p, fit.lin.h_p))
-    made = _made(fit, predictor, missed, columns)
+    made = _made(fit, predictor, missed, columns, _by_noise(fit, predictor))
     made.whitened = False
     return made
 
 
-def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Array) -> LinearisedRecording:
-    """The recording whose equations are a predictor's errors, (n, o), with columns (n, o, parameters)."""
+def _by_noise(fit: TrajectoryFit, predictor: Predictor) -> Array:
+    """(outputs,) rms of the errors that the noise of inputs and sensors, and an open law, leave in free simulation."""
+    random = generator(0, "noise in free simulation")
+
+    def drawn(deviations: Array) -> Array:
+        return random.normal(size=(len(fit.x), deviations.shape[-1], DRAWS)) * deviations[..., None]
+
+    inputs = drawn(fit.noise_u)
+    state = fit.lin.f_u @ inputs + drawn(fit.open_steps())
+    left = predictor.white(predictor.errors(state, fit.lin.h_u @ inputs + drawn(fit.noise_y)))
+    return np.asarray(np.sqrt(np.mean(left**2, axis=(0, 2))))
+
+
+def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Array, noise: Array) -> LinearisedRecording:
+    """The recording whose equations are a predictor's errors, (n, o), with columns (n, o, parameters). noise: (o,)."""
     machine, table, names = fit.machine, fit.table, fit.simulator.names
     along = fit.seen().signals
     counts = machine.counts(along, table)
@@ -107,6 +122,8 @@ def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Arra
         table,
         along,
         equations,
+        own_noise={each.channel: float(one) for each, one in zip(machine.outputs, noise, strict=True)},
+        between_rows={name: fit.simulator.numerics.way(name) for name in fit.simulator.inputs},
         lags=tuple(round(time_s / fit.step_s) for time_s in LAGS_S),
         fitted=dict(zip(names, (float(each) for each in fit.p_at), strict=False)),
         linear=fit.lin,

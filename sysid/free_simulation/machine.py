@@ -40,6 +40,7 @@ class SimulatedMachine(DeclaredMachine):
             )
         fit = TrajectoryFit(self, table, -(-len(table) // MOST_ROWS))
         fit.settle(follow=True)
+        _chosen(fit)
         return linearised.one_step_ahead(fit)
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:
@@ -102,6 +103,7 @@ class SimulatedMachine(DeclaredMachine):
         ]
         fit = _fit(recording).acted_on(acting, fixed)
         fit.settle(AGAIN)
+        _chosen(fit)
         return linearised.one_step_ahead(fit)
 
     def about_all(self, recording: Recording, effects: Sequence[tuple[Effect, Shape]]) -> Recording:
@@ -116,6 +118,7 @@ class SimulatedMachine(DeclaredMachine):
         fit = _fit(recording)
         tried = fit.with_all(acting)
         tried.settle(follow=True)
+        _chosen(tried)
         made = linearised.one_step_ahead(tried)
         return made if tried.surprise < fit.surprise else recording
 
@@ -135,6 +138,14 @@ class SimulatedMachine(DeclaredMachine):
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """The signals of `looked_over`."""
         return self.looked_over(cast(LinearisedRecording, recording))
+
+
+def _chosen(fit: TrajectoryFit) -> None:
+    """Settle the fit on the likeliest way of its inputs between samples, an input at a time."""
+    for _ in fit.simulator.open_ways:
+        if not fit.choose_way():
+            break
+        fit.settle(AGAIN)
 
 
 def _fit(recording: Recording) -> TrajectoryFit:

@@ -25,10 +25,10 @@ def moved(fit: TrajectoryFit) -> Array:
 
 def _otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
     """Fits that continue from here with other numerics: half the step; inputs on straight lines instead of cubics, or
-    on straight lines instead of held; a quarter of what is open at standstill."""
+    on straight lines instead of held where they seem to stay; a quarter of what is open at standstill."""
     now = fit.simulator.numerics
     variants = [dataclasses.replace(now, parts=2 * now.parts)]
-    straight = dataclasses.replace(now, curved=frozenset(), held=frozenset(fit.machine.held_inputs))
+    straight = dataclasses.replace(now, curved=frozenset(), held=now.held - fit.simulator.staying)
     if straight != now:
         variants.append(straight)
     if np.any(fit.loose() > OPEN * fit.size_x):

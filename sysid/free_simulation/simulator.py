@@ -18,18 +18,26 @@ NUDGE = 1e-6  # of a quantity's size: step of a central difference
 
 @dataclasses.dataclass(frozen=True)
 class Numerics:
-    """How a simulator steps: parts of a sample; inputs that are held, and on cubics; share of what is open at
-    standstill."""
+    """How a simulator steps: parts of a sample; inputs that are held, on cubics, and means of the step that ends at
+    their row; inputs of which it is not known where in a step they jump; share of what is open at standstill."""
 
     parts: int
     held: frozenset[str]
     curved: frozenset[str]
+    means: frozenset[str] = frozenset()
+    unsure: frozenset[str] = frozenset()
     open_share: float = 1.0
 
     @property
     def held_ports(self) -> frozenset[str]:
         """Ports of the inputs that are held."""
         return frozenset(into(name) for name in self.held)
+
+    def way(self, name: str) -> str:
+        """How an input goes from a row to the next, in words."""
+        ways = ((self.held, "held"), (self.means, "mean of the step before the row"), (self.curved, "cubic"))
+        found = next((words for names, words in ways if name in names), "straight line")
+        return found + (", jumps anywhere inside a step" if name in self.unsure else "")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,12 +60,15 @@ class Simulator:
         """inputs: (n,) by name."""
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = inputs
-        held = {*machine.held_inputs, *(name for name in inputs if signals.stays(table, inputs[name]))}
+        self.staying = {name for name in inputs if signals.stays(table, inputs[name])} - {*machine.held_inputs}
+        held = {*machine.held_inputs, *self.staying}
         curved = {name for name in inputs if name not in held and signals.is_smooth(table, inputs[name])}
         self.numerics = Numerics(machine.parts, frozenset(held), frozenset(curved))
+        self.open_ways = [name for name in inputs if name not in held and name not in curved]
         self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
         for run in table.runs:
             self.inside[run.start + 1 : run.stop - 2] = 1.0
+        self.jumps = {name: signals.jumps(table, inputs[name]) for name in inputs}
         self.names = [known.name for known in machine.parameters]
         self.noisy = list(machine.noisy_inputs)
         self.ports = (*machine.ports, *_own_ports(machine, list(inputs)))
@@ -73,6 +84,24 @@ class Simulator:
         """Numbers of the ports of the inputs that are held."""
         names = self.numerics.held_ports
         return frozenset(number for number, port in enumerate(self.ports) if port.name in names)
+
+    def ways(self) -> list[Numerics]:
+        """This way between samples first, and others for each input of which the data do not show it.
+
+        Known are inputs that the machine holds, those that stay at a value and jump, and smooth ones. Of the others the
+        row may be a point of straight lines, held until the next row, or the mean of the step that ends there; where
+        they jump, the place of the jump inside a step may be open.
+        """
+        now, made = self.numerics, [self.numerics]
+        for name in self.open_ways:
+            alone = frozenset({name})
+            lines = dataclasses.replace(now, held=now.held - alone, means=now.means - alone, unsure=now.unsure - alone)
+            some = [lines, dataclasses.replace(lines, held=lines.held | alone)]
+            some.append(dataclasses.replace(lines, means=lines.means | alone))
+            if np.any(self.jumps[name]):
+                some += [dataclasses.replace(each, unsure=lines.unsure | alone) for each in some]
+            made += [each for each in some if each != now]
+        return made
 
     def driven(self, u: Array, ports: Array) -> Driven:
         """Inputs and ports. u: (n, i), ports: (n, q)."""
@@ -119,6 +148,8 @@ class Simulator:
         if name in self.numerics.held or name in self.numerics.held_ports:
             return lambda share: c
         after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
+        if name in self.numerics.means:
+            return lambda share: after
         rise = after - c
         if name not in self.numerics.curved:
             return lambda share: c + share * rise

@@ -63,8 +63,8 @@ def test_the_page_s_machine_of_twenty_lines_has_its_candidates_without_a_port_or
         return (6.0 * v - 1.2 * x[0] - 0.05 * x[0] * abs(x[0]),)
 
     speed = integrated(rates, [0.0], volts.tolist(), 0.01)[:, 0]
-    run = table("disc", fine_s[:-1:8], voltage_V=volts[:-1:8], speed_rad_s=speed + 0.02 * draw.normal(size=1500))
+    run = table("disc", fine_s[:-1:8], voltage_V=volts[:-1:8], speed_rad_per_s=speed + 0.02 * draw.normal(size=1500))
     result = diagnose(made["Disc"](), [run]).result
     assert [(each.name, each.at) for each in result.causes] == [("drag", "speed")]
     assert result.causes[0].parameters["quadratic_acceleration_s2"].value == pytest.approx(0.05, rel=0.03)
-    assert "sensor_scale at speed_rad_s" in result.evidence.cannot_be_seen
+    assert "sensor_scale at speed_rad_per_s" in result.evidence.cannot_be_seen

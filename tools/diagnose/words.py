@@ -44,19 +44,28 @@ def nothing(answer: dict[str, Any]) -> str:
             f"than 20 independent stretches of it, and nothing is concluded; {needed_s:g} s like these would be enough"
         )
     if above := evidence.get("above_noise_floor"):
-        each = evidence["noise_floor"][above[0]]
         return (
-            f"no cause was found, and the {above[0]} equation leaves {each['left'] / max(each['channel'], 1e-300):.3g} "
-            "times its channel's own noise: something may be missing that these data do not show"
+            f"no cause was found, and {'; '.join(_left(evidence, name) for name in above)}: something may be missing "
+            "that no candidate explains"
         )
     if evidence["impossible"]:
         return (
             "no cause was found, and the equations fit only with values that no machine has: the model lacks "
             "something, or a channel is not what its name says"
         )
-    if evidence.get("noise_floor"):
+    if "smallest_visible" in evidence:  # in the noise of all candidates, where p is that of its own tests
         return "nothing that these data could show is missing from the equations"
     return f"nothing that these data could show is missing from the equations (p {evidence['p_general']:.2g})"
+
+
+def _left(evidence: dict[str, Any], name: str) -> str:
+    """What an equation leaves and its noise, in words."""
+    each = evidence["noise_floor"][name]
+    where = " of the held-out data" if each["held_out"] else ""
+    return (
+        f"the {name} equation leaves {each['left']:.3g} {each['unit']}{where}, "
+        f"{each['left'] / max(each['channel'], 1e-300):.3g} times its channels' own noise of {each['channel']:.3g}"
+    )
 
 
 def held_out(answer: dict[str, Any]) -> list[str]:
@@ -84,6 +93,14 @@ def unseen(answer: dict[str, Any]) -> list[str]:
     if evidence["cannot_be_seen"]:
         lines.append(f"not distinguishable from the machine's own parameters: {', '.join(evidence['cannot_be_seen'])}")
     return lines
+
+
+def between_rows(answer: dict[str, Any]) -> list[str]:
+    """How a simulated machine's inputs go from a row to the next, a recording a line."""
+    return [
+        f"between rows of {recording}: {', '.join(f'{name} {way}' for name, way in ways.items())}"
+        for recording, ways in answer["evidence"].get("between_rows", {}).items()
+    ]
 
 
 def numerics(answer: dict[str, Any]) -> list[str]:
@@ -127,6 +144,8 @@ def verdict(answer: dict[str, Any]) -> tuple[str, str]:
     """(class, headline) for the page."""
     if answer["evidence"].get("too_short_s"):
         return "unknown", "Too short for this noise"
+    if not answer["detected"] and answer["evidence"].get("above_noise_floor"):
+        return "unknown", "Nothing found, and far more is left than noise"
     if not answer["detected"]:
         return "sound", "Nothing found"
     if doubts(answer):

@@ -154,7 +154,13 @@ def _show(found: Diagnosis, console: Console) -> None:
             for name, value in each["parameters"].items()
         )
         console.print(f"known: {each['name']} at {each['at']}: {values}", highlight=False, soft_wrap=True)
-    for line in [*words.held_out(told), *words.numerics(told), *words.unseen(told), *twin_words.lines(told)]:
+    for line in [
+        *words.held_out(told),
+        *words.between_rows(told),
+        *words.numerics(told),
+        *words.unseen(told),
+        *twin_words.lines(told),
+    ]:
         console.print(line, highlight=False, soft_wrap=True)
     if not told["detected"]:
         return
