@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from ranger_sim.firmware_sim.native.hardware import Hardware
+from ranger_sim.firmware_sim.native.hardware import DEFAULT_HZ, Hardware
 
 
 @dataclasses.dataclass(frozen=True)
@@ -14,6 +14,7 @@ class BoardHardware(Hardware):
     the least time from one exchange to the next. `hz` is what the PLL makes of the crystal; the program sets it itself.
     """
 
+    hz: int = DEFAULT_HZ
     pulled_up: tuple[int, ...] = ()
     segment_interval_ns: int = 0
     slot_timer: int = 1
