@@ -126,6 +126,7 @@ class Fuzz:
         self.look()
         if not self.server.held:
             self.board.core.takes_aborts = True  # independent of the registers that were written
+            self.board.core.needs_handlers = False
             self.board.core.run(self.board.core.cycles + CYCLES)
         if self.cases % CASES_TO_CHECK == 0:
             self.well_behaved()

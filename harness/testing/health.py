@@ -171,7 +171,9 @@ class Health:
         return found
 
     def _dead(self, now: Seen) -> dict[str, int]:
-        return {name: 0 if vital_signs.alive(self.robot, board) else 1 for name, board in now.boards.items()}
+        lost = {death["board"] for death in self.robot.deaths}
+        alive = vital_signs.alive
+        return {name: int(name in lost or not alive(self.robot, board)) for name, board in now.boards.items()}
 
     def _idle(self) -> dict[str, int]:
         """How many faults injected since then have not acted, by place; without cancelled ones."""

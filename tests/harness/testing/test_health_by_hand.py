@@ -28,6 +28,7 @@ class Robot:
         }.items():
             object.__setattr__(self.names, name, value)
         self.start_ns = 1000 * MS
+        self.deaths = []
         self.loop = Made(time=self.start_ns + time_ms * MS)
         self.totals = {"A": [0] * 5, "B": [0] * 5}
         self.slots = {
