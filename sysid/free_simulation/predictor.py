@@ -151,8 +151,11 @@ def _divided(a: Array, by: Array) -> Array:
         return np.asarray(a / by)
     if by.shape[1] == 2:
         one, both, two = by[:, :1, 0], by[:, :1, 1], by[:, 1:, 1]
-        turned = np.stack((a[:, :, 0] * two - a[:, :, 1] * both, a[:, :, 1] * one - a[:, :, 0] * both), axis=2)
-        return np.asarray(turned / (one * two - both * both)[:, :, None])
+        share = 1.0 / (one * two - both * both)
+        out = np.empty_like(a)
+        out[:, :, 0] = (a[:, :, 0] * two - a[:, :, 1] * both) * share
+        out[:, :, 1] = (a[:, :, 1] * one - a[:, :, 0] * both) * share
+        return out
     return np.asarray(np.linalg.solve(by, a.swapaxes(1, 2)).swapaxes(1, 2))
 
 
