@@ -21,7 +21,7 @@ TOO_COARSE = 1.0  # the same, from which on no cause is named
 
 
 def determined(machine: Machine, regression: Regression) -> list[Finding]:
-    """Pairs of parameters that only a combination of is known of. UserError where some have no value of their own."""
+    """Pairs of parameters of which little more than a combination is known. UserError where some are undetermined."""
     own = [known.name for known in machine.parameters if known.name in regression.names]
     columns = regression.measured[:, [regression.names.index(name) for name in own]]
     length = np.linalg.norm(columns, axis=0)

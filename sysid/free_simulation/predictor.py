@@ -44,10 +44,6 @@ class Predictor:
         o = lin.output.shape[1]
         self.n, self.s, self.o = n, s, o
         self.h_x = lin.h_x
-        self.ends: Array  # (stretches, s, s) covariances at the end of each stretch
-        self.gain = np.empty((n, s, o))
-        self.spread = np.empty((n, o, o))  # Cholesky factor of the prediction error's covariance
-        self.covariance = np.empty((n, s, s))
         variance = noise_u**2
         state_noise = (lin.f_u * variance) @ lin.f_u.transpose(0, 2, 1)
         state_noise[:, np.arange(s), np.arange(s)] += loose**2
@@ -63,22 +59,38 @@ class Predictor:
         P: Array = np.tile(free, (-(-n // length), 1, 1))
         if before is not None:
             P[1:] = before.ends[:-1]
-        self.ends = P.copy()
+
+        def side_by_side(rows: Array) -> Array:
+            """(length, stretches, ...) of (n, ...); what the last stretch lacks is its last row again."""
+            lacking = len(P) * length - n
+            whole = np.concatenate((rows, np.repeat(rows[-1:], lacking, axis=0))) if lacking else rows
+            return np.ascontiguousarray(whole.reshape(len(P), length, *rows.shape[1:]).swapaxes(0, 1))
+
+        def in_turn(rows: Array) -> Array:
+            return np.ascontiguousarray(rows.swapaxes(0, 1).reshape(-1, *rows.shape[2:])[:n])
+
+        A_all, C_all, Q_all, R_all, S_all, begins = (
+            side_by_side(each) for each in (lin.f_x, lin.h_x, state_noise, output_noise, both_noise, is_start)
+        )
+        begin = np.any(begins, axis=1).tolist()
+        C_turned = np.ascontiguousarray(C_all.swapaxes(2, 3))
+        covariance, gain, spread = (np.empty((length, len(P), *shape)) for shape in ((s, s), (s, o), (o, o)))
         for k in range(length):
-            at = np.arange(k, n, length)
-            P = P[: len(at)]
-            P[is_start[at]] = free
-            A, C = lin.f_x[at], lin.h_x[at]
-            PC = P @ C.transpose(0, 2, 1)
-            error = C @ PC + output_noise[at]
-            K = np.linalg.solve(error, (A @ PC + both_noise[at]).transpose(0, 2, 1)).transpose(0, 2, 1)
-            self.covariance[at], self.gain[at], self.spread[at] = P, K, error
+            if begin[k]:
+                P[begins[k]] = free
+            A, C, S = A_all[k], C_all[k], S_all[k]
+            PC = P @ C_turned[k]
+            error = C @ PC + R_all[k]
+            K = _divided(A @ PC + S, error)
+            covariance[k], gain[k], spread[k] = P, K, error
             # Joseph's form: a sum of squares, which stays positive where the sensors' noise is next to nothing
-            inner, K_turned, shared = A - K @ C, K.transpose(0, 2, 1), both_noise[at] @ K.transpose(0, 2, 1)
-            P = inner @ P @ inner.transpose(0, 2, 1) + K @ output_noise[at] @ K_turned
-            P += state_noise[at] - shared - shared.transpose(0, 2, 1)
-            P[:] = 0.5 * (P + P.transpose(0, 2, 1))
-            self.ends[: len(at)] = P
+            inner, K_turned = A - K @ C, K.swapaxes(1, 2)
+            less = S @ K_turned
+            P = inner @ P @ inner.swapaxes(1, 2) + K @ R_all[k] @ K_turned + Q_all[k] - less - less.swapaxes(1, 2)
+            P = 0.5 * (P + P.swapaxes(1, 2))
+        self.ends: Array = P  # (stretches, s, s) covariances at the end of each stretch but the last
+        self.covariance, self.gain = in_turn(covariance), in_turn(gain)
+        self.spread = in_turn(spread)  # Cholesky factor of the prediction error's covariance
         self.spread = np.asarray(np.linalg.cholesky(self.spread), dtype=float)
         self.unspread = np.linalg.inv(self.spread)
         self.inner = lin.f_x - self.gain @ lin.h_x
@@ -131,6 +143,20 @@ class Predictor:
         weighed_less = weighed - self.gain.transpose(0, 2, 1) @ after
         inputs = h_u.transpose(0, 2, 1) @ weighed_less + f_u.transpose(0, 2, 1) @ after
         return states[:, :, 0], noise_u**2 * inputs[:, :, 0]
+
+
+def _divided(a: Array, by: Array) -> Array:
+    """a (m, s, o) times the inverses of symmetric positive matrices (m, o, o)."""
+    if by.shape[1] == 1:
+        return np.asarray(a / by)
+    if by.shape[1] == 2:
+        one, both, two = by[:, :1, 0], by[:, :1, 1], by[:, 1:, 1]
+        share = 1.0 / (one * two - both * both)
+        out = np.empty_like(a)
+        out[:, :, 0] = (a[:, :, 0] * two - a[:, :, 1] * both) * share
+        out[:, :, 1] = (a[:, :, 1] * one - a[:, :, 0] * both) * share
+        return out
+    return np.asarray(np.linalg.solve(by, a.swapaxes(1, 2)).swapaxes(1, 2))
 
 
 def between(column: Array) -> Array:
