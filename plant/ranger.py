@@ -399,7 +399,7 @@ class RangerPlant(Plant):
         s: Steering = self.steering
         V: cython.double = self.electrics.battery.voltage_V
         place: cython.longlong
-        values = (
+        values: cython.double[36] = [
             b.hip_x,
             b.hip_y,
             o.foot_angle,
@@ -436,8 +436,8 @@ class RangerPlant(Plant):
             s.path_y,
             b.mode,
             self.steps,
-        )
-        for place in range(len(values)):
+        ]
+        for place in range(36):
             row[place] = values[place]
         return None
 

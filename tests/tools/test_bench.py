@@ -67,14 +67,16 @@ def test_a_case_is_timed_in_its_own_process(monkeypatch):
 
 @pytest.mark.parametrize("name", [name for name, case in cases.CASES.items() if not case.interpreted])
 def test_every_case_does_something(name):
+    if name.startswith("fmu"):
+        pytest.importorskip("pythonfmu3")
     done = cases.CASES[name].measure(0.05)
     assert done["figure"] > 0.0
     assert done.get("lost", 0) == done.get("out_of_order", 0) == 0
 
 
 def test_every_case_belongs_to_a_part():
-    named = [case for part in command.PARTS.values() for case in part.cases]
-    assert sorted([*named, cases.YARDSTICK]) == sorted(cases.CASES)
+    named = {case for part in command.PARTS.values() for case in part.cases}
+    assert {*named, cases.YARDSTICK} == set(cases.CASES)
 
 
 def test_a_users_control_law_replaces_the_firmwares(monkeypatch):

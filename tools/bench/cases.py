@@ -97,6 +97,13 @@ def virtual(seconds: float) -> dict:
     return {"figure": done["frames_per_s"], "frames": done["frames"], "lost": done["lost"]}
 
 
+def fmu(seconds: float, plant_steps: int = 4, exchanged: bool = True) -> dict:
+    """The body, held, motors off, as a unit for co-simulation; `exchanged`: every input set and every output read."""
+    from ranger_sim.tools.bench import co_simulation
+
+    return co_simulation.measure(seconds, plant_steps, exchanged)
+
+
 CASES = {
     "robot": Case("whole robot, trace hashed, nothing kept", SIMULATED, robot),
     "robot-longer": Case("whole robot, four times as long", SIMULATED, lambda s: robot(4 * s)),
@@ -104,6 +111,9 @@ CASES = {
     "robot-full": Case("whole robot, everything kept", SIMULATED, lambda s: robot(s, log="full")),
     "robot-swapped": Case("hip control law by a user's function", SIMULATED, lambda s: robot(s, swap=True)),
     "plant": Case("body alone", SIMULATED, plant),
+    "fmu": Case("body as FMU, 1 ms, 102 values exchanged", SIMULATED, fmu),
+    "fmu-fine": Case("body as FMU, 250 us, 102 values", SIMULATED, lambda s: fmu(s / 4, 1)),
+    "fmu-steps": Case("body as FMU, 1 ms, steps only", SIMULATED, lambda s: fmu(s, 4, False)),
     "bus": Case("four buses, every buffer always full", FRAMES, bus),
     "bus-quarter": Case("four buses at 25 % load", FRAMES, lambda s: bus(s, 0.25)),
     "bus-eight": Case("four buses of eight boards, 75 % load", FRAMES, lambda s: bus(s, 0.75, 8)),

@@ -36,6 +36,7 @@ class Part:
     line: str
     cases: tuple[str, ...] = ()
     alone: Callable[[argparse.Namespace, Callable[[str], None]], Any] | None = None
+    only_named: bool = False  # needs more than the package itself
 
 
 def interfaces(options: argparse.Namespace, report: Callable[[str], None]) -> list[dict]:
@@ -74,6 +75,11 @@ PARTS = {
     "robot-with-log": Part("the same with a log: the last 10 s, and everything", ("robot-window", "robot-full")),
     "user-function": Part("the same with a control law by a user's Python function", ("robot-swapped",)),
     "plant": Part("the body alone", ("plant",)),
+    "fmu": Part(
+        "the body alone, and as a unit for co-simulation through its C interface",
+        ("plant", "fmu", "fmu-fine", "fmu-steps"),
+        only_named=True,
+    ),
     "bus": Part("four CAN buses alone: full, a quarter full, of eight boards", ("bus", "bus-quarter", "bus-eight")),
     "interpreted": Part(
         "robot, body and buses from the plain sources", ("robot-interpreted", "plant-interpreted", "bus-interpreted")
@@ -85,7 +91,7 @@ PARTS = {
     "walks": Part("how far the parameter sets walk, over seeds and floors (minutes)", alone=walks),
     "bounds": Part("--sets of random messages on the bus against their response-time bounds (minutes)", alone=bounds),
 }
-TOGETHER = tuple(name for name, part in PARTS.items() if part.cases)
+TOGETHER = tuple(name for name, part in PARTS.items() if part.cases and not part.only_named)
 
 
 def register(commands: Any) -> None:
@@ -93,7 +99,7 @@ def register(commands: Any) -> None:
     command = commands.add_parser(
         "bench",
         description=f"Measurements by name. Without a name:\n{', '.join(TOGETHER)}.\n"
-        "These are timed together; the others run alone, when they are named.",
+        "These are timed together; the others only when they are named.",
         epilog="parts:\n" + named_lines({name: part.line for name, part in PARTS.items()}, 15),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -8,7 +8,6 @@ plant (250 us) is the grid: inputs written before a step act from its begin, as 
 
 from __future__ import annotations
 
-import array
 import dataclasses
 import math
 from typing import Any
@@ -18,21 +17,12 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files
 from ranger_sim.plant.mechanics.parameters import BodyParameters, fault_of
 from ranger_sim.plant.ranger import SAMPLES, STEP_NS, RangerPlant
-from ranger_sim.plant.sensors.imu import (
-    HEADER_ANGLES_AND_RATES,
-    HEADER_RATES,
-    SET_MODE,
-    SET_MODE_SECOND,
-    SET_MODE_THIRD,
-    SILENT,
-)
+from ranger_sim.plant.sensors.imu import HEADER_ANGLES_AND_RATES, HEADER_RATES, SILENT
 from ranger_sim.plant.wiring_points import ANALOG_NAMES, ENCODER_NAMES, MOTOR_NAMES, WORD_NAMES
 from ranger_sim.ranger.scenario import Scenario
+from ranger_sim.tools.fmu import stepper
+from ranger_sim.tools.fmu.stepper import PERIOD_COUNTS, STEP_S
 
-STEP_S = STEP_NS * 1e-9
-# How far a time may lie from the grid: far above the rounding of a day's seconds, far below a step. Chosen by us.
-NEAR_S = 1e-7
-PERIOD_COUNTS = 600  # of the PWM: 100 kHz at 60 MHz (robot.md N4.4)
 IMU_MODES = (SILENT, HEADER_RATES, HEADER_ANGLES_AND_RATES)
 INTEGER_SAMPLES = ("mode", "steps")
 STANCES = ("outer", "inner")
@@ -41,6 +31,7 @@ LARGEST_SEED = 2**63 - 1
 PARAMETER, INPUT, OUTPUT = "parameter", "input", "output"
 REAL, INTEGER, TRUTH, TEXT = "real", "integer", "truth", "text"
 KINDS = {bool: TRUTH, float: REAL, str: TEXT, int: INTEGER}
+NUMBERS = {REAL: stepper.REAL, INTEGER: stepper.INTEGER, TRUTH: stepper.TRUTH}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,19 +147,35 @@ def given_of(scenario: Scenario) -> dict[str, Any]:
 
 
 class ExportedBody:
-    """The body behind the interface: `values` by name; `begin` builds it, `advance` moves it."""
+    """The body behind the interface: `set` and `get` by name; `begin` builds it, `advance` moves it.
+
+    `stepper` has the same inputs and outputs as an array, for many at once.
+    """
 
     def __init__(self, given: dict[str, Any]) -> None:
         self.quantities = {each.name: each for each in quantities(given)}
-        self.values: dict[str, Any] = {each.name: each.start for each in self.quantities.values()}
+        self.parameters = {each.name: each.start for each in self.quantities.values() if each.causality == PARAMETER}
+        moving = [each for each in self.quantities.values() if each.causality != PARAMETER]
+        self.places = {each.name: place for place, each in enumerate(moving)}
+        limits = [each.limits or (-math.inf, math.inf) for each in moving]
+        low, high = zip(*limits, strict=True)
+        self.stepper = stepper.Stepper([NUMBERS[each.kind] for each in moving], low, high)
+        for each in moving:
+            if each.causality == INPUT:
+                self.stepper.set_value(self.places[each.name], each.start)
         self.plant: RangerPlant | None = None
         self.changed = False  # parameters, since it was built
-        self.steps = 0  # of the plant, since it began
-        self.holding = True
-        self.imu_mode = SILENT
-        self.written: list[tuple[int, ...]] = []
-        self.samples = array.array("d", [0.0]) * len(SAMPLES)
         self.begin()  # outputs have values from the start, and an impossible parameter of the file is reported at once
+
+    @property
+    def steps(self) -> int:
+        """Steps of the plant since it began."""
+        return self.stepper.steps
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The present values of all variables, by name."""
+        return {name: self.get(name) for name in self.quantities}
 
     def set(self, name: str, value: Any) -> None:
         """Set a parameter before `begin`, or an input. UserError for a number beyond its limits, or anything else."""
@@ -178,21 +185,31 @@ class ExportedBody:
         if each.limits is not None and not each.limits[0] <= value <= each.limits[1]:
             low, high = each.limits
             raise UserError(f"{name} is {value!r}, allowed are {low:g} to {high:g}{each.unit and ' ' + each.unit}")
-        if each.causality == PARAMETER:
-            if self.steps:
-                raise UserError(f"{name} is fixed once the body has moved")
-            self.changed = self.changed or value != self.values[name]
-        self.values[name] = value
+        if each.kind == INTEGER and value != int(value):
+            raise UserError(f"{name} is {value!r}, a whole number is expected")
+        if each.causality == INPUT:
+            self.stepper.set_value(self.places[name], value)
+            return
+        if each.causality == OUTPUT:
+            raise UserError(f"{name} is an output: it cannot be set")
+        if self.steps:
+            raise UserError(f"{name} is fixed once the body has moved")
+        self.changed = self.changed or value != self.parameters[name]
+        self.parameters[name] = value
 
     def get(self, name: str) -> Any:
         """The value of a variable now. UserError when the parameters do not describe a possible body."""
+        self.begin_if_changed()
+        return self.parameters[name] if name in self.parameters else self.stepper.value(self.places[name])
+
+    def begin_if_changed(self) -> None:
+        """Begin again if a parameter has changed since the body was built."""
         if self.changed:
             self.begin()
-        return self.values[name]
 
     def begin(self) -> None:
         """Put the body in its pose at time 0, by the parameters. UserError for impossible parameters."""
-        values = self.values
+        values = self.parameters
         of_body = {key: values[f"body.{key}"] for key in body_files.keys()}
         faults = [fault for key, value in of_body.items() if (fault := fault_of(body_files.keys()[key], value))]
         if values["held.stance"] not in STANCES:
@@ -226,19 +243,15 @@ class ExportedBody:
             inner_ankle_rad=values["held.inner_ankle_rad"],
         )
         self.changed = False
-        self.steps = 0
-        self.holding = True
-        self.imu_mode = SILENT
-        self.written = [(0, 0, PERIOD_COUNTS, True, True)] * len(MOTOR_NAMES)  # as a bridge is at power-up
-        self._observe()
+        self.stepper.begin(self.plant, values["held.release_rate_rad_s"])
 
     def steps_in(self, time_s: float, length_s: float, start_s: float) -> int:
         """Steps of the plant from `time_s` on. UserError if not whole, or if the body is at another time."""
-        here = start_s + self.steps * STEP_S
-        if not abs(time_s - here) <= NEAR_S:  # also true of NaN
-            raise UserError(f"a step from {time_s:.9g} s is asked for, the body is at {here:.9g} s")
-        count = round(length_s / STEP_S) if math.isfinite(length_s) else 0
-        if count < 1 or abs(length_s - count * STEP_S) > NEAR_S:
+        count: int = self.stepper.whole_steps(time_s - start_s, length_s)
+        if count < 0:
+            here_s = start_s + self.steps * STEP_S
+            raise UserError(f"a step from {time_s:.9g} s is asked for, the body is at {here_s:.9g} s")
+        if count == 0:
             raise UserError(
                 f"a communication step of {length_s * 1e6:.9g} us: the body moves in steps of {STEP_NS // 1000} us, "
                 "so whole multiples of that are possible"
@@ -247,54 +260,5 @@ class ExportedBody:
 
     def advance(self, count: int) -> bool:
         """Advance by `count` steps with the present inputs; False, and no further motion, when the body has fallen."""
-        if self.changed:
-            self.begin()
-        plant = self.plant
-        assert plant is not None
-        for _ in range(count):
-            if plant.fell:
-                break
-            self._act(plant)
-            plant.step()
-            self.steps += 1
-        self._observe()
-        return not plant.fell
-
-    def _act(self, plant: RangerPlant) -> None:
-        """Apply the inputs at the begin of a step."""
-        values, now = self.values, plant.time_ns
-        if self.holding and not values["held.now"]:
-            self.holding = False
-            plant.release(values["held.release_rate_rad_s"])
-        for place, motor in enumerate(MOTOR_NAMES):
-            bridge = plant.bridges[place]
-            wanted = tuple(values[f"{motor}.{name}"] for name in ("match_2", "match_6", "period"))
-            sides = (values[f"{motor}.low_side_2"], values[f"{motor}.low_side_6"])
-            before = self.written[place]
-            if wanted != before[:3]:
-                bridge.write_pwm(now + round(1e9 * values[f"{motor}.delay_s"]), *wanted)
-            if sides != before[3:]:
-                bridge.low_side(now, *sides)
-            self.written[place] = wanted + sides
-            if values[f"{motor}.watchdog"]:
-                bridge.watchdog_edge(now + round(1e9 * values[f"{motor}.watchdog_delay_s"]))
-        if values["imu.mode"] != self.imu_mode:
-            self.imu_mode = values["imu.mode"]
-            for byte in (SET_MODE, SET_MODE_SECOND, SET_MODE_THIRD, self.imu_mode):
-                plant.imu.receive_byte(now, byte)
-
-    def _observe(self) -> None:
-        """Read the sensors and the body's state."""
-        plant, values = self.plant, self.values
-        assert plant is not None
-        for name, volts in zip(ANALOG_NAMES, plant.analog_end, strict=True):
-            values[f"sensor.{name}_V"] = volts
-        for name, word in zip(WORD_NAMES, plant.words, strict=True):
-            values[f"sensor.{name}"] = word
-        for name, encoder in zip(ENCODER_NAMES, plant.encoders, strict=True):
-            values[f"sensor.{name}_edges"] = encoder.cell
-        values["sensor.imu_roll_rad"], values["sensor.imu_rate_x_rad_s"] = plant.imu.roll, plant.imu.rate_x
-        plant.fill_sample(self.samples)
-        for name, number in zip(SAMPLES, self.samples, strict=True):
-            values[f"state.{name}"] = int(number) if name in INTEGER_SAMPLES else number
-        values["state.distance_m"], values["state.fell"] = plant.distance_m, plant.fell
+        self.begin_if_changed()
+        return self.stepper.advance(count)

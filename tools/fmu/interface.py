@@ -6,6 +6,7 @@ import functools
 import hashlib
 import json
 import sys
+from collections.abc import Callable
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -13,7 +14,8 @@ from pythonfmu3 import Boolean, DefaultExperiment, Float64, Fmi3Causality, Fmi3V
 
 from ranger_sim import __version__
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.tools.fmu.body import INTEGER, OUTPUT, PARAMETER, REAL, STEP_S, TEXT, TRUTH, ExportedBody, Quantity
+from ranger_sim.tools.fmu.body import INTEGER, NUMBERS, OUTPUT, PARAMETER, REAL, TEXT, TRUTH, ExportedBody, Quantity
+from ranger_sim.tools.fmu.stepper import STEP_S
 from ranger_sim.tools.fmu.units import exponents
 
 KINDS = {REAL: Float64, INTEGER: Int64, TRUTH: Boolean, TEXT: String}
@@ -56,11 +58,45 @@ def connect(slave: Any, text: str) -> None:
     )
     for each in body.quantities.values():
         slave.register_variable(variable(body, each))
+    exchange_arrays(slave, body)
     for name in sorted({"s", *(each.unit for each in body.quantities.values() if each.unit)}):
         found, factor = exponents(name)
         slave.register_units([Unit(name, factor=factor, **found)])
     # same body, same token: an importer of the unit already sees that
     slave.guid = hashlib.blake2b(f"{__version__}\n{text}".encode(), digest_size=16).hexdigest()
+
+
+def exchange_arrays(slave: Any, body: ExportedBody) -> None:
+    """Let `slave` move inputs and outputs as arrays; pythonfmu3 itself calls a function for each variable.
+
+    Parameters, the time, and numbers beyond their limits still go through pythonfmu3, which reports what is wrong.
+    """
+    first = 1 + len(body.parameters)  # references count from 0, and the time has that one
+
+    def getter(name: str, kind: int) -> Callable[[list[int]], list]:
+        by_variable = getattr(slave, name)
+        get_all = body.stepper.get_all
+
+        def get(references: list[int]) -> list:
+            body.begin_if_changed()
+            found = get_all(references, first, kind)
+            return by_variable(references) if found is None else found
+
+        return get
+
+    def setter(name: str, kind: int) -> Callable[[list[int], list], None]:
+        by_variable = getattr(slave, name)
+        set_all = body.stepper.set_all
+
+        def put(references: list[int], values: list) -> None:
+            if not set_all(references, values, first, kind):
+                by_variable(references, values)
+
+        return put
+
+    for kind, name in ((REAL, "float64"), (INTEGER, "int64"), (TRUTH, "boolean")):
+        setattr(slave, f"get_{name}", getter(f"get_{name}", NUMBERS[kind]))
+        setattr(slave, f"set_{name}", setter(f"set_{name}", NUMBERS[kind]))
 
 
 def variable(body: ExportedBody, each: Quantity) -> Any:

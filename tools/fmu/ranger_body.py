@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 from pythonfmu3 import Fmi3Slave, Fmi3Status, Fmi3StepResult
 
 GIVEN = "given.json"
+GOING, FALLEN = Fmi3StepResult(), Fmi3StepResult(terminateSimulation=True)
 
 
 class _Unusable(dict):
@@ -36,9 +37,12 @@ class RangerBody(Fmi3Slave):  # type: ignore[misc]  # from a library without typ
         self.start_s = 0.0
         self.fault = ""
         self.body: Any = None
+        self.refusal: type[Exception] = Exception
         try:
+            from ranger_sim.foundation.user_error import UserError
             from ranger_sim.tools.fmu.interface import connect
 
+            self.refusal = UserError
             connect(self, (pathlib.Path(self.resources) / GIVEN).read_text(encoding="utf-8"))
         except ImportError as error:
             self.fault = f"this unit needs ranger-sim installed for the Python in {sys.prefix}: {error}"
@@ -70,11 +74,9 @@ class RangerBody(Fmi3Slave):  # type: ignore[misc]  # from a library without typ
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """Whole steps of the plant. After a fall nothing moves, and the simulator is asked to end."""
-        from ranger_sim.foundation.user_error import UserError
-
         try:
             count = self.body.steps_in(current_time, step_size, self.start_s)
-        except UserError as refused:
+        except self.refusal as refused:
             self.log(str(refused), Fmi3Status.error)
             return Fmi3StepResult(status=Fmi3Status.error)
-        return Fmi3StepResult(terminateSimulation=not self.body.advance(count))
+        return GOING if self.body.advance(count) else FALLEN

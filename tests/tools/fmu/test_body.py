@@ -6,8 +6,9 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import body_files
+from ranger_sim.plant.bridge import Bridge
 from ranger_sim.ranger.scenario import Scenario
-from ranger_sim.tools.fmu.body import ExportedBody, given_of
+from ranger_sim.tools.fmu.body import NUMBERS, ExportedBody, given_of
 from ranger_sim.tools.fmu.units import exponents
 from tests.tools.fmu.recording import recorded
 
@@ -59,34 +60,70 @@ def test_the_inputs_start_as_a_bridge_does_at_power_up():
 
 
 def test_a_bridge_gets_only_what_has_changed():
-    body = body_of(SCENARIO)
     reported = []
 
-    class Bridge:
-        def __getattr__(self, name):
-            return lambda *values: reported.append((name, *values))
+    class Listed(Bridge):
+        def write_pwm(self, *values):
+            reported.append(("write_pwm", *values))
 
-    plant = body.plant
+        def low_side(self, *values):
+            reported.append(("low_side", *values))
+
+        def watchdog_edge(self, *values):
+            reported.append(("watchdog_edge", *values))
+
+    body = body_of(SCENARIO)
+    body.plant.bridges[:] = [Listed() for _ in range(4)]
     body.set("hip.match_2", 7)
     body.set("hip.delay_s", 3e-6)
-
-    class Plant:
-        time_ns = 1_000_000
-        bridges = [Bridge() for _ in range(4)]
-        imu = plant.imu
-
-    body._act(Plant)
-    body._act(Plant)
+    body.advance(2)
     body.set("hip.low_side_6", False)
     body.set("hip.watchdog", True)
     body.set("hip.watchdog_delay_s", -5e-6)
-    body._act(Plant)
+    body.advance(2)
     assert reported == [
-        ("write_pwm", 1_003_000, 7, 0, 600),
-        ("low_side", 1_000_000, True, False),
-        ("watchdog_edge", 995_000),
+        ("write_pwm", 3_000, 7, 0, 600),
+        ("low_side", 500_000, True, False),
+        ("watchdog_edge", 495_000),
+        ("watchdog_edge", 745_000),
     ]
-    assert plant.imu.mode == 207
+    assert body.plant.imu.mode == 207
+
+
+def test_many_values_at_once_are_those_one_by_one():
+    body, one_by_one = body_of(SCENARIO), body_of(SCENARIO)
+    first = 1000  # a reference for the first input: any
+    by_kind = {}
+    for name, place in body.places.items():
+        by_kind.setdefault(body.quantities[name].kind, []).append((name, first + place))
+    wanted = {"hip.match_2": 200, "hip.watchdog": True, "hip.delay_s": 2e-6, "held.now": False}
+    for name, value in wanted.items():
+        one_by_one.set(name, value)
+        kind = NUMBERS[body.quantities[name].kind]
+        assert body.stepper.set_all([first + body.places[name]], [value], first, kind)
+    assert body.advance(40) and one_by_one.advance(40)
+    for kind, members in by_kind.items():
+        found = body.stepper.get_all([reference for _, reference in members], first, NUMBERS[kind])
+        expected = [one_by_one.get(name) for name, _ in members]
+        assert found == expected and [type(each) for each in found] == [type(each) for each in expected]
+
+
+@pytest.mark.parametrize(
+    ("names", "values"),
+    [
+        (["hip.match_2", "outer_ankle.match_2"], [5, -1]),  # beyond its limits
+        (["hip.match_2", "imu.mode"], [5, 1]),  # not a mode
+        (["hip.match_2", "sensor.hip_absolute"], [5, 1]),  # an output
+        (["hip.match_2", "held.now"], [5, 1]),  # of another kind
+    ],
+)
+def test_of_many_values_none_is_set_when_one_cannot_be(names, values):
+    body = body_of(SCENARIO)
+    references = [body.places[name] for name in names]
+    assert not body.stepper.set_all(references, values, 0, NUMBERS["integer"])
+    assert not body.stepper.set_all([-1], [5], 0, NUMBERS["integer"])
+    assert body.get("hip.match_2") == 0 and body.get("imu.mode") == 207
+    assert body.stepper.get_all([0, -1], 0, NUMBERS["integer"]) is None
 
 
 def test_a_body_that_begins_again_is_as_new():
@@ -97,7 +134,7 @@ def test_a_body_that_begins_again_is_as_new():
     body.set("held.now", False)
     assert body.advance(3) and body.steps == 3 and body.steps_in(0.00075, 0.00025, 0.0) == 1
     body.begin()
-    assert body.steps == 0 and body.holding and body.values == {**first, "held.now": False}
+    assert body.steps == 0 and body.stepper.holding and body.values == {**first, "held.now": False}
 
 
 def test_a_parameter_acts_and_is_fixed_once_the_body_has_moved():
@@ -180,6 +217,8 @@ def test_another_step_or_another_time_is_refused(time_s, length_s, reported):
         ("hip.delay_s", 0.00025, "hip.delay_s"),
         ("imu.mode", 1, "allowed are 0, 194, 207"),
         ("seed", -1, "seed is -1"),
+        ("hip.match_2", 7.5, "hip.match_2 is 7.5, a whole number is expected"),
+        ("state.hip_A", 1.0, "state.hip_A is an output"),
     ],
 )
 def test_a_number_beyond_its_limits_is_refused(name, value, reported):
