@@ -119,7 +119,7 @@ class Recording:
     # True: noise is what all candidates leave (sysid/by_candidates.py). False, for an ankle and a walk: it is estimated
     # from repeats or above the machine's band, and general tests are chi-squares over cells of the signals
     noise_by_candidates: bool = True
-    # True where rows about corners (standstill, reversals, jumps) do not count and columns have stand-ins: whatever goes
+    # True where rows about corners (standstill, reversals, jumps) do not count and columns have stand-ins: what goes
     # with the signals is an error then. Elsewhere a corner between two samples, of a friction that sticks, is as well
     firm: bool = False
     left_over: bool = False  # responses are a simulation's errors, not measurements
