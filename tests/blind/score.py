@@ -191,8 +191,13 @@ class Answer:
             return self._per_kelvin(cause, given)
         parts = [_value(given[part]) for part in COMPONENTS.get(name, ()) if part in given]
         if len(parts) == 2 and all(parts):
-            return float(np.hypot(parts[0][0], parts[1][0])), None
+            return float(np.hypot(parts[0][0], parts[1][0])), self._of_amplitude(cause, COMPONENTS[name][0])
         return None
+
+    def _of_amplitude(self, cause, cosine):
+        """The interval of an amplitude, which an answer gives next to the components; None without one."""
+        waves = next((entry.get("waves") or {} for entry in self.causes if entry["name"] == cause), {})
+        return waves.get("amplitude" + cosine.removeprefix("cosine"), {}).get("ci95")
 
     def _per_kelvin(self, cause, given):
         """A slope over its base parameter, whose own error (of tenths of a per cent) is negligible for the slope."""

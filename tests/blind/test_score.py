@@ -141,6 +141,14 @@ def test_other_words_for_a_size_are_understood(cause, true, given, error, cases)
     assert found["coverage of 95 % intervals"].value in (1.0, None)
 
 
+def test_the_interval_of_an_amplitude_is_that_of_the_answers_wave():
+    truth = hidden("cogging", parameters={"amplitude_Nm": 0.05})
+    for high, value in ((0.06, 1.0), (0.049, 0.0)):
+        answer = named(("cogging", (), {"cosine_Nm": (0.03, 0, 1), "sine_Nm": (-0.04, -1, 0)}))
+        answer["causes"][0]["waves"] = {"amplitude_Nm": {"value": 0.05, "ci95": [0.04, high]}}
+        assert figures([(truth, answer)])["coverage of 95 % intervals"].value == value
+
+
 def test_what_sits_in_a_sensor_may_be_named():
     found = figures([(hidden("sensor_offset", balance="E"), named(("sensor_offset", ()), subsystem="sensor"))])
     assert found["right subsystem"].value == 1.0
