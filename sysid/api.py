@@ -39,6 +39,7 @@ def diagnose(
     rate_hz: float | None = None,
     seed: int = 0,
     progress: pipeline.Progress = lambda what, share: None,
+    emulator: evidence.Emulator | None = None,
 ) -> DiagnosisResult:
     """The errors of a machine's equations by measured data: whether there are any, their causes, and the gain.
 
@@ -49,7 +50,9 @@ def diagnose(
     gear: of the motor bench's gearbox (14). repair: channels that drive the machine and are repaired all the same.
     accept_loss: share of a channel's samples that may be lost, 0 to 1. mapping: {column of the files: channel};
     time_unit: of a time column without one; rate_hz: of the samples of a file without a time. seed: of the
-    bootstrap. progress: is called with (present step, finished share).
+    bootstrap. progress: is called with (present step, finished share). emulator: makes walks with the likeliest causes,
+    by which the comparison of a walk with its twins is confirmed: `ranger_sim.tools.twins.emulation.emulate`, as the
+    command does.
 
     The same arguments give the same result. UserError for a mistake, and for data from which nothing can be concluded.
     """
@@ -67,6 +70,7 @@ def diagnose(
         rate_hz,
         seed,
         progress,
+        emulator,
     ).result
 
 
@@ -84,6 +88,7 @@ def diagnosis(
     rate_hz: float | None = None,
     seed: int = 0,
     progress: pipeline.Progress = lambda what, share: None,
+    emulator: evidence.Emulator | None = None,
 ) -> Diagnosis:
     """The result of `diagnose` with its workings, of which the report is drawn."""
     if not 0.0 <= accept_loss <= 1.0:
@@ -111,7 +116,7 @@ def diagnosis(
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
     if _is_walk(machine):
-        twins, _ = evidence.of(read[0], read[1], holdout_part)
+        twins, _ = evidence.of(read[0], read[1], holdout_part, emulator)
         found.result = evidence.combined(found.result, twins)
     if wrong := _not_finite(found.answer):
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")

@@ -6,8 +6,9 @@ import pytest
 
 from ranger_sim.sysid.results import TwinsEvidence
 from ranger_sim.sysid.twins import evidence
+from ranger_sim.tools.twins.emulation import emulate
 from studies.hidden_walks import score
-from studies.hidden_walks.draw import Hidden, as_row, recorded, scenario_of
+from studies.hidden_walks.draw import Hidden, as_row, deviations, recorded, scenario_of, tolerance_of
 from studies.hidden_walks.kinds import KINDS
 
 BY_NAME = {kind.name: kind for kind in KINDS}
@@ -56,6 +57,20 @@ def test_a_hidden_cause_is_named_first(name, size, at):
     assert f"{found.named.name} at {found.named.at}" == case.kind.right
     low, high = found.named.parameters[case.kind.parameter].ci95
     assert low <= size <= high
+
+
+def test_a_zero_four_times_beyond_the_sizes_of_twins_has_an_interval_that_holds():
+    case = hidden("inner ankle's zero", 0.07)
+    found, _ = evidence.of([recorded(case)], emulator=emulate)
+    assert f"{found.named.name} at {found.named.at}" == case.kind.right and found.emulations > 0
+    low, high = found.named.parameters["offset_rad"].ci95
+    assert low <= 0.07 <= high < 0.09
+
+
+def test_the_size_asked_for_includes_what_the_body_has_within_its_tolerance():
+    loose = hidden("hip spring", -1.14, loose=True)
+    (other,) = {tolerance_of(loose)} - {0.0}
+    assert deviations(loose)["hip_spring_Nm_per_rad"] == other and tolerance_of(hidden("hip spring", -1.14)) == 0.0
 
 
 def test_a_sound_walk_is_silent_at_every_rate():

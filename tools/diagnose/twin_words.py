@@ -45,6 +45,10 @@ def lines(answer: dict[str, Any]) -> list[str]:
     else:
         since = f", from step {found['since_step']} of the recording on" if found["since_step"] else ""
         out.append(f"twins: {cause(found['named'])}{since}")
+    if found["emulations"]:
+        out.append(f"twins: confirmed by {found['emulations']} emulations of causes at the sizes found")
+    elif found["unconfirmed"]:
+        out.append(f"twins: not confirmed by walks at the sizes found: {found['unconfirmed']}")
     if found["ties"]:
         out.append(f"twins: explains these steps as well: {shortened(found['ties'])}")
     if found["never_distinguished"]:
