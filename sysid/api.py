@@ -13,7 +13,7 @@ from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.fit import Parameter
 from ranger_sim.sysid.identification import run
 from ranger_sim.sysid.identification.motor import GEAR
-from ranger_sim.sysid.machine import Machine
+from ranger_sim.sysid.machine import Machine, NoEquationError
 from ranger_sim.sysid.machines import is_ours, machine_of
 from ranger_sim.sysid.preparation import Prepared, parted, prepared
 from ranger_sim.sysid.reading import open_recording
@@ -109,14 +109,21 @@ def diagnosis(
         ready = data
     tables = [each.table for each in data]
     names = ", ".join(table.name for table in tables)
+    without = ""
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an overflow ends as a value that is not finite, see below
             found = pipeline.diagnose(machine, tables, _judging(machine, held), seed, ready, known, progress)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
+    except NoEquationError as error:
+        if not _is_walk(machine):
+            raise
+        without, found = str(error), pipeline.without_equations(machine, tables, ready)
     if _is_walk(machine):
         twins, _ = evidence.of(read[0], read[1], holdout_part, emulator)
+        if without and twins.note:
+            raise NoEquationError(f"{without}; and its twins cannot judge it: {twins.note}")
         found.result = evidence.combined(found.result, twins)
     if wrong := _not_finite(found.answer):
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")

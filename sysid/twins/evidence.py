@@ -18,6 +18,7 @@ from ranger_sim.sysid.twins.twin_file import TwinFile
 STANDARD = "record-2011"  # of a log without the controller's parameters
 FALLING = 3  # steps before a fall that do not count
 LAUNCH = 2  # steps after the robot is let go that do not count
+FEWEST = 4  # steps of a recording
 SHOWN = 8  # unusual features and other causes that an answer lists
 SAME = 1e-6  # relative, of a parameter's two values
 SUBSYSTEMS = {
@@ -46,14 +47,19 @@ class Walked:
     end_s: Array
 
 
+def fell(dataset: Dataset) -> bool:
+    """Whether a recording ends with a fall."""
+    return any(each.kind == "fell" for each in dataset.findings)
+
+
 def walked(dataset: Dataset) -> Walked | None:
-    """The steps of a recording; None when it does not show where steps end."""
+    """The steps of a recording; None when it does not show where steps end, or has too few."""
     cut = steps.of_dataset(dataset)
-    if cut is None or cut.count < 4:
+    if cut is None or cut.count < FEWEST:
         return None
     found = features.of(cut)
     usable = steps.usual(cut)
-    if any(each.kind == "fell" for each in dataset.findings):
+    if fell(dataset):
         usable[-FALLING:] = False
     number = dataset["E_STEP_COUNT"].value if "E_STEP_COUNT" in dataset else None
     if number is None or not len(number) or number[0] < LAUNCH:
@@ -128,10 +134,8 @@ def of(
     controller, changed = controller_of(datasets)
     file = twin_file.of_controller(controller)
     if file is None or not walks:
-        why = f"no twins of {controller} are here: `ranger-sim twins {controller}` makes them" if file is None else (
-            "these recordings do not show where steps end (FSM_LEG, walk_state or E_STEP_COUNT, and the hip's angle)"
-        )  # fmt: skip
-        return TwinsEvidence(controller, note=why), None
+        why = f"no twins of {controller} are here: `ranger-sim twins {controller}` makes them"
+        return TwinsEvidence(controller, note=why if file is None else _without_steps(datasets)), None
     rate, view = view_of(file, walks)
     view = dataclasses.replace(
         view, directions=tuple(each for each in view.directions if _is_open(each, file, datasets))
@@ -146,7 +150,7 @@ def of(
         verdict = judgement.judge(view, found, step_map.outcomes(view.few), spread, emulate)
     if verdict is None:
         note = f"{int(found.inside.sum())} steps that can be compared are too few"
-        return TwinsEvidence(controller, note=note), None
+        return TwinsEvidence(controller, note=note + _fallen(datasets)), None
     held = [each for each in map(walked, holdout) if each is not None]
     later = rest_of(view, held) if held else None
     if holdout_part is not None:
@@ -189,6 +193,19 @@ def _emulate(emulator: Emulator, file: TwinFile, rate: str, view: View, voltage_
         return judgement.Walks(mean, step_map.roughness(together, view.few))
 
     return emulate
+
+
+def _without_steps(datasets: Sequence[Dataset]) -> str:
+    """Why recordings have no steps to compare."""
+    counts = [cut.count for each in datasets if (cut := steps.of_dataset(each)) is not None]
+    if counts:
+        return f"{sum(counts)} steps are too few{_fallen(datasets)}"
+    return "these recordings do not show where steps end (FSM_LEG, walk_state or E_STEP_COUNT, and the hip's angle)"
+
+
+def _fallen(datasets: Sequence[Dataset]) -> str:
+    found = [each.start_s for data in datasets for each in data.findings if each.kind == "fell"]
+    return f": the robot falls after {min(found):.3g} s" if found else ""
 
 
 def is_old(file: TwinFile) -> bool:

@@ -16,6 +16,7 @@ GRID = 61  # sizes of either sign
 EMULATIONS = 10  # of a cause at a size, at most, for one log
 FIRST, NEAR_BEST = 3, 0.5  # of the likeliest causes, and the share of the best one's gain, that are confirmed
 CLOSE = 0.05  # of a size: nearer to an emulated one it is not emulated again
+MOST_NOISE = 0.5  # of a direction's squared length, that its noise may have added
 AT_KNOT = 0.1  # the same where the cause was emulated for the log
 FARTHEST = 2.5  # times the largest size that was made
 FURTHER = 1.6  # times the largest size that was emulated for the log
@@ -24,10 +25,12 @@ BELOW_FALL = 0.8  # of a size with which the robot falls at once
 TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
 ALIKE = 0.95  # cosine of directions above which they never are
 ALARM = 0.98  # quantile of sound walks
-SIZE_ERROR = 0.15  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
+SIZE_ERROR = 0.2  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
 HOLDS = 3.84  # of twice the log-likelihood: 95 %
 ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, before the first, after the last
-ONSET_PAYS, ONSET_LEAST_GAIN = 1.25, 20.0  # times the gain of all steps, and more, that a later begin must reach
+# A later begin must gain so many times what all steps do and the limit of a sound walk: chosen by us, looking at false
+# alarms on 1 mm of roughness, of which most were begins.
+ONSET_PAYS, ONSET_LIMITS = 1.25, 3.0
 UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
 
 
@@ -136,6 +139,8 @@ class Space:
         whole = [self.of(terms.T, nominal).T for terms in vectors]
         self.lengths = [terms @ terms.T for terms in whole]
         self.steps = sum(mean.steps)
+        # squared length of a nominal robot's noise: what the noise of a direction adds to its own
+        self.noise = float(np.sum(linalg.solve_triangular(self.lower, nominal, lower=True) ** 2))
 
     def _lower(self, covariance: Array) -> Array:
         part = covariance[np.ix_(self.there, self.there)]
@@ -171,21 +176,29 @@ class Space:
 
     def unsure(self, number: int, powers: Array) -> Array:
         """(m,) variance of a walk with a cause over that of a sound walk: the direction's error and its curvature."""
-        each = self.directions[number]
         length = np.einsum("mi,ij,mj->m", powers, self.lengths[number], powers)
-        error = np.einsum("mi,ij,mj->m", powers[:, :3], each.unsure, powers[:, :3])
         allowed = np.full(len(powers), CURVATURE**2)
-        for place, knot in enumerate(_emulated(each)):  # at a knot its walks count, not the terms
-            share = np.minimum(powers[:, 3 + place], 1.0)
-            error = (1.0 - share) * error + share * powers[:, 3 + place] ** 2 / knot.steps
+        for place in range(3, powers.shape[1]):  # at a knot its walks count, not the terms
+            share = np.minimum(powers[:, place], 1.0)
             allowed = (1.0 - share) * allowed + share * AT_KNOT**2
-        return np.asarray(1.0 + self.steps * error + allowed * length / self.freedom)
+        return np.asarray(1.0 + self.error(number, powers) + allowed * length / self.freedom)
+
+    def error(self, number: int, powers: Array) -> Array:
+        """(m,) variance of a direction over that of a sound walk."""
+        each = self.directions[number]
+        found = np.einsum("mi,ij,mj->m", powers[:, :3], each.unsure, powers[:, :3])
+        for place, knot in enumerate(_emulated(each), 3):
+            share = np.minimum(powers[:, place], 1.0)
+            found = (1.0 - share) * found + share * powers[:, place] ** 2 / knot.steps
+        return np.asarray(self.steps * found)
 
     def profile(self, number: int, sizes: Array) -> Array:
-        """What each size takes of the squared distance."""
+        """What each size takes of the squared distance. A direction's noise makes it longer, and would make every size
+        too small: that part of its length does not count."""
         powers, terms = self._powers(number, sizes), self.terms[number]
-        gained = 2.0 * powers @ (terms @ self.value) - np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
-        return np.asarray(gained)
+        length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        length -= np.minimum(self.noise * self.error(number, powers), MOST_NOISE * length)
+        return np.asarray(2.0 * powers @ (terms @ self.value) - length)
 
     def fit(self, number: int) -> Fit:
         """The best size of a cause with its interval, which carries the error of the direction."""
@@ -260,7 +273,8 @@ def judge(
     fits, since = space.fits(), 0
     if not fits:
         return None
-    pays = ONSET_PAYS * fits[0].gain + ONSET_LEAST_GAIN
+    gain_limit, distance_limit = limits_of(view, weights)
+    pays = ONSET_PAYS * fits[0].gain + ONSET_LIMITS * gain_limit  # the search has many tries: a bump of the floor must not pay
     for onset in _onsets(found):
         part = mean_of(found, found.step >= onset)
         if part is None:
@@ -269,7 +283,6 @@ def judge(
         tried = later.fits()
         if tried and tried[0].gain > pays and _begins(view, found, onset, weights, tried[0]):
             fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
-    gain_limit, distance_limit = limits_of(view, weights)
     distance = float(space.value @ space.value) / space.freedom
     visible, unusual = _visible(space, gain_limit), _unusual(view, mean, weights, names)
     if emulate is not None and (fits[0].gain > gain_limit or distance > distance_limit):

@@ -19,11 +19,13 @@ def lines(answer: dict[str, Any]) -> list[str]:
         return []
     if found["note"]:
         return [f"twins: no comparison: {found['note']}"]
+    alone = "twins: no equation can be made of these recordings: the twins alone judge them"
     floor_mm, (gain, distance) = 1e3 * found["floor_roughness_m"], found["limits"]
     out = [
+        *([] if answer["misfit"] else [alone]),
         f"twins: {found['steps']} steps {RATES[found['rate']]} against sound walks of {found['controller']} on a floor "
         f"of {floor_mm:.1f} mm: distance {found['distance']:.2f} (sound below {distance:.2f}), likeliest cause gains "
-        f"{found['gain']:.0f} (sound below {gain:.0f})"
+        f"{found['gain']:.0f} (sound below {gain:.0f})",
     ]
     if found["other_parameters"]:
         names = shortened(found["other_parameters"])

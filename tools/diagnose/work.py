@@ -170,7 +170,8 @@ def _show(found: Diagnosis, console: Console) -> None:
                 f"{each['noise']:.3g}",
                 f"{each['repeatable_fraction']:.1%}",
             )
-    console.print(table)
+    if told["misfit"]:
+        console.print(table)
     for cause in told["causes"]:
         values = ", ".join(
             f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])})"
