@@ -274,7 +274,7 @@ def judge(
     if not fits:
         return None
     gain_limit, distance_limit = limits_of(view, weights)
-    pays = ONSET_PAYS * fits[0].gain + ONSET_LIMITS * gain_limit  # the search has many tries: a bump of the floor must not pay
+    pays = ONSET_PAYS * fits[0].gain + ONSET_LIMITS * gain_limit  # the search has many tries: a bump must not pay
     for onset in _onsets(found):
         part = mean_of(found, found.step >= onset)
         if part is None:
