@@ -15,6 +15,7 @@ CURVATURE = 0.18
 GRID = 61  # sizes of either sign
 EMULATIONS = 10  # of a cause at a size, at most, for one log
 FIRST, NEAR_BEST = 3, 0.5  # of the likeliest causes, and the share of the best one's gain, that are confirmed
+AMONG_TWINS = 0.3  # of the largest size of a cause's twins: between it and the largest they count themselves
 CLOSE = 0.05  # of a size: nearer to an emulated one it is not emulated again
 MOST_NOISE = 0.5  # of a direction's squared length, that its noise may have added
 AT_KNOT = 0.1  # the same where the cause was emulated for the log
@@ -285,12 +286,12 @@ def judge(
             fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
     distance = float(space.value @ space.value) / space.freedom
     visible, unusual = _visible(space, gain_limit), _unusual(view, mean, weights, names)
-    if emulate is not None and (fits[0].gain > gain_limit or distance > distance_limit):
+    detected = fits[0].gain > gain_limit or distance > distance_limit
+    if emulate is not None and detected:
         view = confirmed(view, mean, weights, spread, emulate)
         space = Space(view, mean, weights)
         fits = space.fits()
     best = fits[0]
-    detected = best.gain > gain_limit or distance > distance_limit
     named = None
     if detected and best.gain > gain_limit and best.left < sound_distance(view):
         named = _sized(view, mean, weights, best)
@@ -324,9 +325,9 @@ def confirmed(view: View, mean: Mean, weights: Array, spread: float, emulate: Em
         numbers = range(len(view.directions))  # what is not known from the twins becomes so by its own walks
         likely = sorted(((space.potential(number), space.fit(number)) for number in numbers), key=lambda each: -each[0])
         best = max((fit for _, fit in likely), key=lambda fit: fit.gain)
-        if _is_confirmed(best) and best.left < sound:
+        if _is_confirmed(best, sound) and best.left < sound:
             likely = [each for each in likely[:FIRST] if each[0] > NEAR_BEST * best.gain]
-        wanted = [fit for _, fit in likely if not _is_confirmed(fit)]
+        wanted = [fit for _, fit in likely if not _is_confirmed(fit, sound)]
         if not wanted:
             break
         direction, size = wanted[0].direction, wanted[0].size
@@ -343,7 +344,12 @@ def confirmed(view: View, mean: Mean, weights: Array, spread: float, emulate: Em
     return view
 
 
-def _is_confirmed(fit: Fit) -> bool:
+def _is_confirmed(fit: Fit, sound: float) -> bool:
+    """Whether a cause was emulated near its size, or has a size among those of its twins, which are more walks."""
+    each = fit.direction
+    share = fit.size / (each.high if fit.size > 0.0 else each.low)
+    if not each.knots and AMONG_TWINS <= share <= 1.0 and fit.left < sound:
+        return True
     return any(abs(fit.size - knot.size) < CLOSE * abs(knot.size) for knot in fit.direction.knots)
 
 
