@@ -61,16 +61,38 @@ def of(
         model_file=None,
         data_findings=tuple(_findings(found, prepared)),
         evidence=evidence,
-        data_repairs=tuple(
-            RecordingRepair(**dataclasses.asdict(repair), recording=each.table.name)
-            for each in prepared
-            for repair in each.repairs
-            if repair.kind in repairs.KINDS
-        ),
+        data_repairs=_repairs(prepared),
         data_ledger={each.table.name: each.ledger for each in prepared if each.ledger},
         extended_model=model_file.model_text(final, evidence)
         if (final.named or evidence.known) and not abstained
         else "",
+    )
+
+
+def without_equations(found: Diagnosis, prepared: Sequence[Prepared]) -> DiagnosisResult:
+    """The result about recordings of which no equation can be made, before another judgement is added."""
+    return DiagnosisResult(
+        detected=False,
+        misfit=(),
+        subsystem=None,
+        causes=(),
+        abstained=False,
+        gain=None,
+        next_experiment=(),
+        model_file=None,
+        data_findings=tuple(_findings(found, prepared)),
+        evidence=DiagnosisEvidence(1.0, 1.0, 0.0, (), {}, True, (), {}, (), None),
+        data_repairs=_repairs(prepared),
+        data_ledger={each.table.name: each.ledger for each in prepared if each.ledger},
+    )
+
+
+def _repairs(prepared: Sequence[Prepared]) -> tuple[RecordingRepair, ...]:
+    return tuple(
+        RecordingRepair(**dataclasses.asdict(repair), recording=each.table.name)
+        for each in prepared
+        for repair in each.repairs
+        if repair.kind in repairs.KINDS
     )
 
 

@@ -13,7 +13,7 @@ from ranger_sim.sysid.diagnosis import Diagnosis
 from ranger_sim.sysid.fit import Parameter
 from ranger_sim.sysid.identification import run
 from ranger_sim.sysid.identification.motor import GEAR
-from ranger_sim.sysid.machine import Machine
+from ranger_sim.sysid.machine import Machine, NoEquationError
 from ranger_sim.sysid.machines import is_ours, machine_of
 from ranger_sim.sysid.preparation import Prepared, parted, prepared
 from ranger_sim.sysid.reading import open_recording
@@ -39,6 +39,7 @@ def diagnose(
     rate_hz: float | None = None,
     seed: int = 0,
     progress: pipeline.Progress = lambda what, share: None,
+    emulator: evidence.Emulator | None = None,
 ) -> DiagnosisResult:
     """The errors of a machine's equations by measured data: whether there are any, their causes, and the gain.
 
@@ -49,7 +50,9 @@ def diagnose(
     gear: of the motor bench's gearbox (14). repair: channels that drive the machine and are repaired all the same.
     accept_loss: share of a channel's samples that may be lost, 0 to 1. mapping: {column of the files: channel};
     time_unit: of a time column without one; rate_hz: of the samples of a file without a time. seed: of the
-    bootstrap. progress: is called with (present step, finished share).
+    bootstrap. progress: is called with (present step, finished share). emulator: makes walks with the likeliest causes,
+    by which the comparison of a walk with its twins is confirmed: `ranger_sim.tools.twins.emulation.emulate`, as the
+    command does.
 
     The same arguments give the same result. UserError for a mistake, and for data from which nothing can be concluded.
     """
@@ -67,6 +70,7 @@ def diagnose(
         rate_hz,
         seed,
         progress,
+        emulator,
     ).result
 
 
@@ -84,6 +88,7 @@ def diagnosis(
     rate_hz: float | None = None,
     seed: int = 0,
     progress: pipeline.Progress = lambda what, share: None,
+    emulator: evidence.Emulator | None = None,
 ) -> Diagnosis:
     """The result of `diagnose` with its workings, of which the report is drawn."""
     if not 0.0 <= accept_loss <= 1.0:
@@ -104,14 +109,21 @@ def diagnosis(
         ready = data
     tables = [each.table for each in data]
     names = ", ".join(table.name for table in tables)
+    without = ""
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an overflow ends as a value that is not finite, see below
             found = pipeline.diagnose(machine, tables, _judging(machine, held), seed, ready, known, progress)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
+    except NoEquationError as error:
+        if not _is_walk(machine):
+            raise
+        without, found = str(error), pipeline.without_equations(machine, tables, ready)
     if _is_walk(machine):
-        twins, _ = evidence.of(read[0], read[1], holdout_part)
+        twins, _ = evidence.of(read[0], read[1], holdout_part, emulator)
+        if without and twins.note:
+            raise NoEquationError(f"{without}; and its twins cannot judge it: {twins.note}")
         found.result = evidence.combined(found.result, twins)
     if wrong := _not_finite(found.answer):
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")

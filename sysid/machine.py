@@ -15,6 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid.dataset import Array, Finding, Table
 
 DRIVING = ("command", "cmd", "target", "reference", "setpoint", "input")  # words in the names of inputs
@@ -132,6 +133,10 @@ class Recording:
     between_rows: dict[str, str] = dataclasses.field(default_factory=dict)  # by input of a simulator, in words
     left_over: bool = False  # responses are a simulation's errors, not measurements
     entries: dict[str, Entry] = dataclasses.field(default_factory=dict)  # none where equations are instantaneous
+
+
+class NoEquationError(ModelError):
+    """No equation of the machine can be made of a recording."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,10 +25,10 @@ from ranger_sim.sysid import (
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.held_out import Held, simulated_again
-from ranger_sim.sysid.machine import Effect, Machine
+from ranger_sim.sysid.machine import Effect, Machine, Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.preparation import Prepared
-from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.regression import NoEquations, Regression
 from ranger_sim.sysid.results import LearnedTerm, NoiseFloor
 
 NAMED_LEVEL = 0.005  # of the whole selection
@@ -37,6 +37,16 @@ AGAIN = 2  # times that the named effects are simulated and the whole naming is 
 SKEW = 0.5  # samples: usual difference between two channels' stamps in any log
 
 Progress = Callable[[str, float], None]  # (present step, finished share of the work)
+
+
+def without_equations(machine: Machine, tables: Sequence[Table], prepared: Sequence[Prepared]) -> Diagnosis:
+    """The frame of a diagnosis whose recordings give no equation: a walk that its twins alone judge."""
+    silent, sound = misfit.Misfit([], 1.0, 0.0), plausibility.Doubts([], False)
+    recordings = [Recording(table, {}, {}) for table in tables]
+    nothing = NoEquations()
+    found = Diagnosis(machine, recordings, nothing, nothing, [], [], [], [], {}, silent, silent, sound)
+    found.result = answer.without_equations(found, prepared)
+    return found
 
 
 def diagnose(

@@ -568,3 +568,11 @@ def explained(gram: Array, product: Array) -> tuple[float, int]:
     strong = values > 1e-6
     projected = (vectors[:, strong].T @ (product[kept] / lengths[kept])) ** 2 / values[strong]
     return float(projected.sum()), int(np.count_nonzero(strong))
+
+
+class NoEquations(Regression):
+    """Of recordings that give no equation, which something else judges: a walk's twins."""
+
+    def __init__(self) -> None:
+        self.recordings, self.equations, self.names, self.count = [], [], [], 0
+        self.parts, self.whitening, self.shared, self.values = {}, {}, {}, {}

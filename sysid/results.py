@@ -193,7 +193,9 @@ class TwinsEvidence:
     would have been detected; cannot_be_seen: causes that these channels do not show; other_parameters: of the
     controller,
     whose values in the recording are others; other_body: the body has other numbers now than the twins had; held_out:
-    distance of held-out steps without and with the cause; note: why there is no comparison, "" where there is one.
+    distance of held-out steps without and with the cause; emulations: by which the answer is confirmed, each some walks
+    of a cause at a size; unconfirmed: why there are none, "" otherwise; note: why there is no comparison, "" where
+    there is one.
     """
 
     controller: str
@@ -216,6 +218,8 @@ class TwinsEvidence:
     other_parameters: tuple[str, ...] = ()
     other_body: bool = False
     held_out: Interval | None = None
+    emulations: int = 0
+    unconfirmed: str = ""
     note: str = ""
 
 

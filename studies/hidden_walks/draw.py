@@ -48,10 +48,8 @@ def scenario_of(hidden: Hidden, folder: pathlib.Path) -> Scenario:
     kind = hidden.kind
     changed: dict[str, float] = {}
     tuned: dict[str, float] = {}
-    if hidden.loose:
-        draw = generator(hidden.seed, "body of a hidden walk")
-        for key, deviation in TOLERANCES.items():
-            changed[key] = body[key] + deviation * float(draw.standard_normal())
+    for key, deviation in deviations(hidden).items():
+        changed[key] = body[key] + deviation
     made: dict[str, Any] = {}
     if kind is not None:
         for values, additions, out in ((body, kind.body, changed), (gains, kind.controller, tuned)):
@@ -75,6 +73,24 @@ def scenario_of(hidden: Hidden, folder: pathlib.Path) -> Scenario:
     else:
         made["controller"] = hidden.controller
     return Scenario(seed=hidden.seed, floor_roughness_m=hidden.floor_m, battery_charge=hidden.charge, **made)
+
+
+def deviations(hidden: Hidden) -> dict[str, float]:
+    """What the body of a walk differs by within its tolerances, by key of a body file."""
+    if not hidden.loose:
+        return {}
+    draw = generator(hidden.seed, "body of a hidden walk")
+    return {key: deviation * float(draw.standard_normal()) for key, deviation in TOLERANCES.items()}
+
+
+def tolerance_of(hidden: Hidden) -> float:
+    """What the tolerances add to the hidden size, in its unit."""
+    kind = hidden.kind
+    if kind is None or kind.relative:
+        return 0.0
+    drawn = deviations(hidden)
+    parts = [drawn[key] / weight for key, weight in kind.body.items() if key in drawn]
+    return sum(parts) / len(parts) if parts else 0.0
 
 
 def recorded(hidden: Hidden) -> Dataset:

@@ -8,7 +8,8 @@ from typing import Any
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.results import TwinsEvidence
 from ranger_sim.sysid.twins import evidence
-from studies.hidden_walks.draw import Hidden, as_row, recorded
+from ranger_sim.tools.twins.emulation import emulate
+from studies.hidden_walks.draw import Hidden, as_row, recorded, tolerance_of
 from studies.hidden_walks.kinds import KINDS, Kind
 
 MULTIPLES = (2.0, 4.0, 8.0)  # of the smallest size that the method says it would detect
@@ -47,7 +48,7 @@ def visible(row: str, floor: str, seed: int) -> dict[str, float]:
 def sound(rows: Sequence[str], floor: str, seed: int, count: int) -> dict[str, list[TwinsEvidence]]:
     """Answers by row about sound walks: other seeds, batteries, bodies within tolerance."""
     walks = [recorded(each) for each in drawn_sound(floor, seed, count)]
-    return {row: [evidence.of([as_row(each, row)])[0] for each in walks] for row in rows}
+    return {row: [evidence.of([as_row(each, row)], emulator=emulate)[0] for each in walks] for row in rows}
 
 
 def drawn_sound(floor: str, seed: int, count: int) -> list[Hidden]:
@@ -72,7 +73,7 @@ def judged(hidden: Hidden, multiple: float, floor: str, rows: Sequence[str]) -> 
     assert hidden.kind is not None
     dataset = recorded(hidden)
     for row in rows:
-        yield case_of(hidden, multiple, floor, row, evidence.of([as_row(dataset, row)])[0])
+        yield case_of(hidden, multiple, floor, row, evidence.of([as_row(dataset, row)], emulator=emulate)[0])
 
 
 def case_of(hidden: Hidden, multiple: float, floor: str, row: str, found: TwinsEvidence) -> Case:
@@ -85,9 +86,10 @@ def case_of(hidden: Hidden, multiple: float, floor: str, row: str, found: TwinsE
     tied = kind.right in (*found.ties, *found.never_distinguished)
     value = next(iter(named.parameters.values())) if named else None
     low, high = value.ci95 if value else (0.0, 0.0)
+    whole = hidden.size + tolerance_of(hidden)  # what this body differs by, of which the size is found
     return Case(kind.name, multiple, floor, row, kind.right, hidden.size, found.steps, found.detected, text, right,
          tied,
-                bool(right and low <= hidden.size <= high), value.value if value else 0.0, low, high,
+                bool(right and low <= whole <= high), value.value if value else 0.0, low, high,
                      found.since_step)  # fmt: skip
 
 

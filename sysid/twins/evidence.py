@@ -1,7 +1,7 @@
 """The comparison with twins as a part of a walk's diagnosis, next to the equations."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -18,6 +18,7 @@ from ranger_sim.sysid.twins.twin_file import TwinFile
 STANDARD = "record-2011"  # of a log without the controller's parameters
 FALLING = 3  # steps before a fall that do not count
 LAUNCH = 2  # steps after the robot is let go that do not count
+FEWEST = 4  # steps of a recording
 SHOWN = 8  # unusual features and other causes that an answer lists
 SAME = 1e-6  # relative, of a parameter's two values
 SUBSYSTEMS = {
@@ -46,14 +47,19 @@ class Walked:
     end_s: Array
 
 
+def fell(dataset: Dataset) -> bool:
+    """Whether a recording ends with a fall."""
+    return any(each.kind == "fell" for each in dataset.findings)
+
+
 def walked(dataset: Dataset) -> Walked | None:
-    """The steps of a recording; None when it does not show where steps end."""
+    """The steps of a recording; None when it does not show where steps end, or has too few."""
     cut = steps.of_dataset(dataset)
-    if cut is None or cut.count < 4:
+    if cut is None or cut.count < FEWEST:
         return None
     found = features.of(cut)
     usable = steps.usual(cut)
-    if any(each.kind == "fell" for each in dataset.findings):
+    if fell(dataset):
         usable[-FALLING:] = False
     number = dataset["E_STEP_COUNT"].value if "E_STEP_COUNT" in dataset else None
     if number is None or not len(number) or number[0] < LAUNCH:
@@ -82,21 +88,54 @@ def rest_of(view: View, walks: Sequence[Walked], since_s: float = 0.0, part: tup
         share = each.end_s / each.end_s[-1]
         usable = each.usable & (share > part[0]) & (share <= part[1] + 1e-9) & (each.end_s >= since_s)
         made.append(step_map.rest(view.legs, each.leg, each.found, view.few, usable))
+    return joined(made)
+
+
+def joined(made: Sequence[Rest]) -> Rest:
+    """Steps of several walks in one."""
     return Rest(*(np.concatenate([getattr(each, field.name) for each in made]) for field in dataclasses.fields(Rest)))
 
 
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """Walks that a comparison asks for: of a controller and body, with a cause of a size, by floor and battery."""
+
+    controller: str
+    body: str
+    cause: str
+    at: str
+    parameter: str
+    size: float
+    floor_m: float
+    voltage_V: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Emulated:
+    """One emulated walk. leg: that swings (k,); full, link: (k, all features) by the table's rate and the link's."""
+
+    leg: np.ndarray
+    full: Array
+    link: Array
+
+
+Emulator = Callable[[Asked], Sequence[Emulated]]
+
+
 def of(
-    datasets: Sequence[Dataset], holdout: Sequence[Dataset] = (), holdout_part: float | None = None
+    datasets: Sequence[Dataset],
+    holdout: Sequence[Dataset] = (),
+    holdout_part: float | None = None,
+    emulator: Emulator | None = None,
 ) -> tuple[TwinsEvidence, Verdict | None]:
-    """The comparison of recordings with the twins of their controller."""
+    """The comparison of recordings with the twins of their controller. emulator: makes walks with the likeliest causes,
+    by which they are confirmed."""
     walks = [each for each in map(walked, datasets) if each is not None]
     controller, changed = controller_of(datasets)
     file = twin_file.of_controller(controller)
     if file is None or not walks:
-        why = f"no twins of {controller} are here: `ranger-sim twins {controller}` makes them" if file is None else (
-            "these recordings do not show where steps end (FSM_LEG, walk_state or E_STEP_COUNT, and the hip's angle)"
-        )  # fmt: skip
-        return TwinsEvidence(controller, note=why), None
+        why = f"no twins of {controller} are here: `ranger-sim twins {controller}` makes them"
+        return TwinsEvidence(controller, note=why if file is None else _without_steps(datasets)), None
     rate, view = view_of(file, walks)
     view = dataclasses.replace(
         view, directions=tuple(each for each in view.directions if _is_open(each, file, datasets))
@@ -104,16 +143,69 @@ def of(
     part = (0.0, 1.0 if holdout_part is None else 1.0 - holdout_part)
     found = rest_of(view, walks, part=part)
     spread = step_map.roughness(found, view.few)
+    emulate, why_not = None, unconfirmed(file, changed)
+    if emulator is not None and not why_not:
+        emulate = _emulate(emulator, file, rate, view, _voltage(walks))
     with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
-        verdict = judgement.judge(view, found, step_map.outcomes(view.few), spread)
+        verdict = judgement.judge(view, found, step_map.outcomes(view.few), spread, emulate)
     if verdict is None:
         note = f"{int(found.inside.sum())} steps that can be compared are too few"
-        return TwinsEvidence(controller, note=note), None
+        return TwinsEvidence(controller, note=note + _fallen(datasets)), None
     held = [each for each in map(walked, holdout) if each is not None]
     later = rest_of(view, held) if held else None
     if holdout_part is not None:
         later = rest_of(view, walks, part=(part[1], 1.0))
-    return _evidence(controller, rate, verdict, changed, _held_out(view, verdict, later, spread), is_old(file)), verdict
+    compared = _evidence(controller, rate, verdict, changed, _held_out(verdict, later, spread), is_old(file))
+    return dataclasses.replace(compared, unconfirmed=why_not if verdict.detected else ""), verdict
+
+
+def unconfirmed(file: TwinFile, changed: Sequence[str]) -> str:
+    """Why causes cannot be confirmed by walks of the recordings' robot; empty when they can."""
+    if is_old(file):
+        return "the body has other numbers now"
+    candidates = {each.at for each in next(iter(file.views.values())).directions if each.cause == "firmware_parameter"}
+    others = [name for name in changed if name not in candidates]
+    return f"the controller of these recordings is not known ({len(others)} other parameters)" if others else ""
+
+
+def _voltage(walks: Sequence[Walked]) -> float:
+    """Median of the battery's voltage in V; not a number where the recordings do not have it."""
+    found = np.concatenate([each.found[:, step_map.columns([step_map.VOLTAGE])[0]] for each in walks])
+    found = found[np.isfinite(found)]
+    return float(np.median(found)) if len(found) else float("nan")
+
+
+def _emulate(emulator: Emulator, file: TwinFile, rate: str, view: View, voltage_V: float) -> judgement.Emulate:
+    """Walks of a cause as a vector of the view."""
+
+    def emulate(direction: Direction, size: float, floor_m: float) -> judgement.Walks | None:
+        controller, body = file.made_of["controller"], file.made_of["body"]
+        asked = Asked(controller, body, direction.cause, direction.at, direction.parameter, size, floor_m, voltage_V)
+        rests = []
+        for each in emulator(asked):
+            found = each.full if rate == twin_file.FULL else each.link
+            count = min(len(each.leg), len(found))
+            rests.append(step_map.rest(view.legs, each.leg[:count], found[:count], view.few))
+        together = joined(rests) if rests else None
+        mean = mean_of(together) if together is not None else None
+        if together is None or mean is None:
+            return None
+        return judgement.Walks(mean, step_map.roughness(together, view.few))
+
+    return emulate
+
+
+def _without_steps(datasets: Sequence[Dataset]) -> str:
+    """Why recordings have no steps to compare."""
+    counts = [cut.count for each in datasets if (cut := steps.of_dataset(each)) is not None]
+    if counts:
+        return f"{sum(counts)} steps are too few{_fallen(datasets)}"
+    return "these recordings do not show where steps end (FSM_LEG, walk_state or E_STEP_COUNT, and the hip's angle)"
+
+
+def _fallen(datasets: Sequence[Dataset]) -> str:
+    found = [each.start_s for data in datasets for each in data.findings if each.kind == "fell"]
+    return f": the robot falls after {min(found):.3g} s" if found else ""
 
 
 def is_old(file: TwinFile) -> bool:
@@ -158,8 +250,9 @@ def _is_open(direction: Direction, file: TwinFile, datasets: Sequence[Dataset]) 
     return direction.at not in logged or not _same(logged[direction.at], file.made_of["parameters"][direction.at])
 
 
-def _held_out(view: View, verdict: Verdict, later: Rest | None, spread: float) -> tuple[float, float] | None:
+def _held_out(verdict: Verdict, later: Rest | None, spread: float) -> tuple[float, float] | None:
     """Distance of held-out steps without and with the named cause, over its degrees of freedom."""
+    view = verdict.view
     mean = mean_of(later) if later is not None else None
     if mean is None:
         return None
@@ -207,6 +300,7 @@ def _evidence(
         other_parameters=tuple(changed),
         other_body=other_body,
         held_out=held,
+        emulations=sum(len(each.knots) for each in verdict.view.directions),
         note="",
     )
 

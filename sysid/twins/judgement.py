@@ -1,27 +1,50 @@
 """Which cause moves a walk away from its sound twins, how far, and since which step."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import linalg
 
 from ranger_sim.sysid.dataset import Array
-from ranger_sim.sysid.twins.model import Direction, Mean, View, mean_of, scatter
+from ranger_sim.sysid.twins.model import Direction, Knot, Mean, View, mean_of, scatter
 from ranger_sim.sysid.twins.step_map import Rest
 
 # of an effect's length: what a line, a square and a cube leave of it. Chosen by us, looking at five hidden causes
 CURVATURE = 0.18
 GRID = 61  # sizes of either sign
+EMULATIONS = 10  # of a cause at a size, at most, for one log
+FIRST, NEAR_BEST = 3, 0.5  # of the likeliest causes, and the share of the best one's gain, that are confirmed
+AMONG_TWINS = 0.3  # of the largest size of a cause's twins: between it and the largest they count themselves
+CLOSE = 0.05  # of a size: nearer to an emulated one it is not emulated again
+MOST_NOISE = 0.5  # of a direction's squared length, that its noise may have added
+AT_KNOT = 0.1  # the same where the cause was emulated for the log
 FARTHEST = 2.5  # times the largest size that was made
+FURTHER = 1.6  # times the largest size that was emulated for the log
+BEYOND = 4.0  # times the sizes that are sought, to judge which cause is worth emulating
+BELOW_FALL = 0.8  # of a size with which the robot falls at once
 TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
 ALIKE = 0.95  # cosine of directions above which they never are
 ALARM = 0.98  # quantile of sound walks
-SIZE_ERROR = 0.15  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
+SIZE_ERROR = 0.2  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
 HOLDS = 3.84  # of twice the log-likelihood: 95 %
 ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, before the first, after the last
-ONSET_PAYS, ONSET_LEAST_GAIN = 1.25, 20.0  # times the gain of all steps, and more, that a later begin must reach
+# A later begin must gain so many times what all steps do and the limit of a sound walk: chosen by us, looking at false
+# alarms on 1 mm of roughness, of which most were begins.
+ONSET_PAYS, ONSET_LIMITS = 1.25, 3.0
 UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
+
+
+@dataclasses.dataclass(frozen=True)
+class Walks:
+    """Emulated walks as a vector. spread: of their footholds."""
+
+    mean: Mean
+    spread: float
+
+
+Emulate = Callable[[Direction, float, float], Walks | None]
+"""(cause, size, roughness of the floor in m) to emulated walks; None when the robot falls at once."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +67,7 @@ class Verdict:
     best first; ties, alike: names that explain as well, and that these channels can never distinguish from it; since:
     step from which on, 0 for all; distance: over its degrees of freedom; gain: of the best cause; limits: of both;
     visible: (cause, least size, unit) for every cause; unseen: causes without a size; floor_m; steps that counted;
-    unusual: (feature, deviations) of the largest.
+    unusual: (feature, deviations) of the largest; view: with the knots of what was emulated.
     """
 
     detected: bool
@@ -60,6 +83,46 @@ class Verdict:
     floor_m: float
     steps: int
     unusual: tuple[tuple[str, float], ...]
+    view: View
+
+
+def _polynomial(each: Direction, sizes: Array) -> Array:
+    """(m, 3) size, square and cube; beyond the sizes that were made a line."""
+    edge = np.where(sizes > 0.0, each.high, -each.low)
+    inside = np.minimum(np.abs(sizes), edge) * np.sign(sizes)
+    stretch = np.where(inside != 0.0, sizes / np.where(inside == 0.0, 1.0, inside), 1.0)
+    return np.asarray(np.stack((inside, inside**2, inside**3), axis=1) * stretch[:, None])
+
+
+def _emulated(each: Direction) -> list[Knot]:
+    """The knots in which the robot walked, by size."""
+    return sorted((knot for knot in each.knots if knot.steps), key=lambda knot: knot.size)
+
+
+def _shares(each: Direction, sizes: Array) -> Array:
+    """(m, k) share of each emulated knot at these sizes."""
+    knots = _emulated(each)
+    at = np.array([0.0, *(knot.size for knot in knots)])
+    order = np.argsort(at)
+    out = np.zeros((len(sizes), len(knots)))
+    for place, knot in enumerate(knots):
+        out[:, place] = np.interp(sizes, at[order], (at == knot.size)[order].astype(float))
+        if knot.size in (at.min(), at.max()):  # the outermost on its side
+            beyond = sizes / knot.size > 1.0
+            out[beyond, place] = sizes[beyond] / knot.size
+    return out
+
+
+def reach_of(each: Direction) -> tuple[float, float]:
+    """Sizes among which the best is sought: some times those that were made or emulated, below any at which it fell."""
+    low, high = FARTHEST * each.low, FARTHEST * each.high
+    for knot in _emulated(each):
+        low, high = min(low, FURTHER * knot.size), max(high, FURTHER * knot.size)
+    for knot in each.knots:
+        if not knot.steps:
+            low = max(low, BELOW_FALL * knot.size) if knot.size < 0.0 else low
+            high = min(high, BELOW_FALL * knot.size) if knot.size > 0.0 else high
+    return low, high
 
 
 class Space:
@@ -71,11 +134,14 @@ class Space:
         nominal = self._lower(scatter(view, weights, mean.steps, nominal=True))
         self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
         self.directions = view.directions
-        self.terms = [np.array([self.of(term) for term in each.terms]) for each in view.directions]
+        vectors = [np.vstack((each.terms, self._beyond_terms(each))) for each in view.directions]
+        self.terms = [self.of(terms.T).T for terms in vectors]
         # products of the terms where tolerances count nothing: a direction's error goes with its whole length
-        whole = [np.array([self.of(term, nominal) for term in each.terms]) for each in view.directions]
+        whole = [self.of(terms.T, nominal).T for terms in vectors]
         self.lengths = [terms @ terms.T for terms in whole]
         self.steps = sum(mean.steps)
+        # squared length of a nominal robot's noise: what the noise of a direction adds to its own
+        self.noise = float(np.sum(linalg.solve_triangular(self.lower, nominal, lower=True) ** 2))
 
     def _lower(self, covariance: Array) -> Array:
         part = covariance[np.ix_(self.there, self.there)]
@@ -87,7 +153,7 @@ class Space:
         return len(self.value)
 
     def of(self, vector: Array, lower: Array | None = None) -> Array:
-        """A vector of features in these coordinates, or in those of another covariance."""
+        """A vector of features (or columns of them) in these coordinates, or in those of another covariance."""
         lower = self.lower if lower is None else lower
         return np.asarray(linalg.solve_triangular(lower, vector[self.there], lower=True))
 
@@ -96,36 +162,57 @@ class Space:
         return np.asarray(self._powers(number, np.array([size]))[0] @ self.terms[number])
 
     def _powers(self, number: int, sizes: Array) -> Array:
-        """(m, 3) what the terms are multiplied by: size, square and cube; beyond the sizes that were made a line."""
+        """(m, 3 + k) what the terms are multiplied by: size, square and cube, beyond the sizes that were made a line;
+        and the share of each knot, in straight lines from 0 over the knots, beyond the last in proportion."""
         each = self.directions[number]
-        edge = np.where(sizes > 0.0, each.high, -each.low)
-        inside = np.minimum(np.abs(sizes), edge) * np.sign(sizes)
-        stretch = np.where(inside != 0.0, sizes / np.where(inside == 0.0, 1.0, inside), 1.0)
-        return np.asarray(np.stack((inside, inside**2, inside**3), axis=1) * stretch[:, None])
+        return np.hstack((_polynomial(each, sizes), _shares(each, sizes)))
+
+    def _beyond_terms(self, each: Direction) -> Array:
+        """(k, 2 p) what the terms leave of each knot."""
+        knots = _emulated(each)
+        if not knots:
+            return np.zeros((0, each.terms.shape[1]))
+        moved = np.array([knot.moved for knot in knots])
+        return np.asarray(moved - _polynomial(each, np.array([knot.size for knot in knots])) @ each.terms)
 
     def unsure(self, number: int, powers: Array) -> Array:
         """(m,) variance of a walk with a cause over that of a sound walk: the direction's error and its curvature."""
         length = np.einsum("mi,ij,mj->m", powers, self.lengths[number], powers)
-        error = np.einsum("mi,ij,mj->m", powers, self.directions[number].unsure, powers)
-        return np.asarray(1.0 + self.steps * error + CURVATURE**2 * length / self.freedom)
+        allowed = np.full(len(powers), CURVATURE**2)
+        for place in range(3, powers.shape[1]):  # at a knot its walks count, not the terms
+            share = np.minimum(powers[:, place], 1.0)
+            allowed = (1.0 - share) * allowed + share * AT_KNOT**2
+        return np.asarray(1.0 + self.error(number, powers) + allowed * length / self.freedom)
+
+    def error(self, number: int, powers: Array) -> Array:
+        """(m,) variance of a direction over that of a sound walk."""
+        each = self.directions[number]
+        found = np.einsum("mi,ij,mj->m", powers[:, :3], each.unsure, powers[:, :3])
+        for place, knot in enumerate(_emulated(each), 3):
+            share = np.minimum(powers[:, place], 1.0)
+            found = (1.0 - share) * found + share * powers[:, place] ** 2 / knot.steps
+        return np.asarray(self.steps * found)
 
     def profile(self, number: int, sizes: Array) -> Array:
-        """What each size takes of the squared distance."""
+        """What each size takes of the squared distance. A direction's noise makes it longer, and would make every size
+        too small: that part of its length does not count."""
         powers, terms = self._powers(number, sizes), self.terms[number]
-        gained = 2.0 * powers @ (terms @ self.value) - np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
-        return np.asarray(gained)
+        length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
+        length -= np.minimum(self.noise * self.error(number, powers), MOST_NOISE * length)
+        return np.asarray(2.0 * powers @ (terms @ self.value) - length)
 
     def fit(self, number: int) -> Fit:
         """The best size of a cause with its interval, which carries the error of the direction."""
         each = self.directions[number]
-        below = np.linspace(FARTHEST * each.low, 0.0, GRID)[:-1] if each.low < 0.0 else np.empty(0)
-        above = np.linspace(0.0, FARTHEST * each.high, GRID)[1:] if each.high > 0.0 else np.empty(0)
+        least, most = reach_of(each)
+        below = np.linspace(least, 0.0, GRID)[:-1] if least < 0.0 else np.empty(0)
+        above = np.linspace(0.0, most, GRID)[1:] if most > 0.0 else np.empty(0)
         sizes = np.concatenate((below, above))
         gains = self.profile(number, sizes)
         for _ in range(2):  # finer about the best
             best = int(np.argmax(gains))
             finer = sizes[best] + np.linspace(-1.0, 1.0, 41) * (sizes[1] - sizes[0])
-            finer = finer[(finer != 0.0) & (finer >= FARTHEST * each.low) & (finer <= FARTHEST * each.high)]
+            finer = finer[(finer != 0.0) & (finer >= least) & (finer <= most)]
             sizes = np.unique(np.concatenate((sizes, finer)))
             gains = self.profile(number, sizes)
         best = int(np.argmax(gains))
@@ -138,12 +225,19 @@ class Space:
         unsure = float(self.unsure(number, self._powers(number, np.array([size])))[0])
         return Fit(each, size, min(low, size), max(high, size), gain, left / unsure)
 
+    def potential(self, number: int) -> float:
+        """What a cause would gain if its present line held beyond the sizes that are sought."""
+        least, most = reach_of(self.directions[number])
+        return float(self.profile(number, BEYOND * np.linspace(least, most, 2 * GRID)).max())
+
     def is_known(self, number: int) -> bool:
-        """Whether a cause moves a walk by more than twice the error of its direction."""
+        """Whether a cause moves a walk by more than twice the error of its direction, or was emulated for the log."""
         each = self.directions[number]
+        if _emulated(each):
+            return True
         powers = self._powers(number, np.array([each.high or each.low]))
         length = float(np.sum((powers[0] @ self.terms[number]) ** 2))
-        error = self.steps * float(powers[0] @ each.unsure @ powers[0]) * self.freedom
+        error = self.steps * float(powers[0, :3] @ each.unsure @ powers[0, :3]) * self.freedom
         return length > 4.0 * error
 
     def fits(self) -> list[Fit]:
@@ -152,14 +246,26 @@ class Space:
         return sorted(found, key=lambda each: -each.gain)
 
 
-def limits_of(view: View) -> tuple[float, float]:
-    """Gain and distance that one sound walk in fifty exceeds."""
-    return float(np.quantile(view.alarms[:, 0], ALARM)), float(np.quantile(view.alarms[:, 1], ALARM))
+def limits_of(view: View, weights: Array) -> tuple[float, float]:
+    """Gain and distance that one sound walk in fifty exceeds on a floor: tails differ by floor."""
+    quantiles = [
+        np.quantile(view.alarms[view.alarms[:, 2] == floor, :2], ALARM, axis=0) for floor in np.flatnonzero(weights)
+    ]
+    gain, distance = weights[weights != 0.0] @ np.array(quantiles)
+    return float(gain), float(distance)
 
 
-def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdict | None:
-    """The verdict about what the map leaves of a walk. names: of the features; spread: of the footholds' heights, m.
-    None for a walk with too few steps."""
+def sound_distance(view: View) -> float:
+    """The distance up to which what a cause leaves is taken for a sound walk, on whichever floor."""
+    return UNEXPLAINED * float(np.quantile(view.alarms[:, 1], ALARM))
+
+
+def judge(
+    view: View, found: Rest, names: Sequence[str], spread: float, emulate: Emulate | None = None
+) -> Verdict | None:
+    """The verdict about what the map leaves of a walk. names: of the features; spread: of the footholds' heights, m;
+    emulate: walks of a cause at a size, by which the likeliest causes are confirmed. None for a walk with too few
+    steps."""
     mean = mean_of(found)
     if mean is None:
         return None
@@ -168,7 +274,8 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
     fits, since = space.fits(), 0
     if not fits:
         return None
-    pays = ONSET_PAYS * fits[0].gain + ONSET_LEAST_GAIN
+    gain_limit, distance_limit = limits_of(view, weights)
+    pays = ONSET_PAYS * fits[0].gain + ONSET_LIMITS * gain_limit  # the search has many tries: a bump must not pay
     for onset in _onsets(found):
         part = mean_of(found, found.step >= onset)
         if part is None:
@@ -177,12 +284,16 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
         tried = later.fits()
         if tried and tried[0].gain > pays and _begins(view, found, onset, weights, tried[0]):
             fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
-    gain_limit, distance_limit = limits_of(view)
     distance = float(space.value @ space.value) / space.freedom
+    visible, unusual = _visible(space, gain_limit), _unusual(view, mean, weights, names)
+    detected = fits[0].gain > gain_limit or distance > distance_limit
+    if emulate is not None and detected:
+        view = confirmed(view, mean, weights, spread, emulate)
+        space = Space(view, mean, weights)
+        fits = space.fits()
     best = fits[0]
-    detected = best.gain > gain_limit or distance > distance_limit
     named = None
-    if detected and best.gain > gain_limit and best.left < UNEXPLAINED * distance_limit:
+    if detected and best.gain > gain_limit and best.left < sound_distance(view):
         named = _sized(view, mean, weights, best)
     scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
     ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE * scale)
@@ -195,11 +306,51 @@ def judge(view: View, found: Rest, names: Sequence[str], spread: float) -> Verdi
         since,
         distance,
         (gain_limit, distance_limit),
-        *_visible(space, gain_limit),
+        *visible,
         floor_m,
         sum(mean.steps),
-        _unusual(view, mean, weights, names),
+        unusual,
+        view,
     )
+
+
+def confirmed(view: View, mean: Mean, weights: Array, spread: float, emulate: Emulate) -> View:
+    """The view with the likeliest causes emulated at the sizes found; what an emulation shows may bring another cause
+    or size to the front. It ends when the first ones have been emulated and the best explains the walk, or after too
+    many. spread: of the log's footholds, to which a cause adds: its walks are on a floor of what is left."""
+    middle, sound = weights @ view.middle, sound_distance(view)
+    own: dict[str, float] = {}
+    for _ in range(EMULATIONS):
+        space = Space(view, mean, weights)
+        numbers = range(len(view.directions))  # what is not known from the twins becomes so by its own walks
+        likely = sorted(((space.potential(number), space.fit(number)) for number in numbers), key=lambda each: -each[0])
+        best = max((fit for _, fit in likely), key=lambda fit: fit.gain)
+        if _is_confirmed(best, sound) and best.left < sound:
+            likely = [each for each in likely[:FIRST] if each[0] > NEAR_BEST * best.gain]
+        wanted = [fit for _, fit in likely if not _is_confirmed(fit, sound)]
+        if not wanted:
+            break
+        direction, size = wanted[0].direction, wanted[0].size
+        floor_m = view.roughness(spread**2 - own.get(direction.name, 0.0))
+        walked = emulate(direction, size, floor_m)
+        moved, steps = np.zeros_like(middle), 0
+        if walked is not None:
+            moved, steps = np.nan_to_num(walked.mean.value - middle), sum(walked.mean.steps)
+            own[direction.name] = max(walked.spread**2 - view.foothold(floor_m) ** 2, 0.0)
+        renewed = dataclasses.replace(direction, knots=(*direction.knots, Knot(size, moved, steps)))
+        view = dataclasses.replace(
+            view, directions=tuple(renewed if each is direction else each for each in view.directions)
+        )
+    return view
+
+
+def _is_confirmed(fit: Fit, sound: float) -> bool:
+    """Whether a cause was emulated near its size, or has a size among those of its twins, which are more walks."""
+    each = fit.direction
+    share = fit.size / (each.high if fit.size > 0.0 else each.low)
+    if not each.knots and AMONG_TWINS <= share <= 1.0 and fit.left < sound:
+        return True
+    return any(abs(fit.size - knot.size) < CLOSE * abs(knot.size) for knot in fit.direction.knots)
 
 
 def _begins(view: View, found: Rest, onset: int, weights: Array, later: Fit) -> bool:

@@ -131,7 +131,7 @@ def _scattered(
         for floor in range(count)
     ]
     view = View(few, legs, np.array(floors_m, dtype=float), np.array(spreads), middle, deviation, products,
-                np.zeros((0, 2 * p)), np.zeros((0, 2 * p)), (), np.zeros((0, 2)))  # fmt: skip
+                np.zeros((0, 2 * p)), np.zeros((0, 2 * p)), (), np.zeros((0, 3)))  # fmt: skip
     return dataclasses.replace(view, between=_between(view, means))
 
 
@@ -185,12 +185,12 @@ def _direction(view: View, cause: Cause, pairs: Sequence[tuple[Twinned, Rest]]) 
     return Direction(cause.cause, cause.at, cause.parameter, cause.form, low, high, cause.tolerance, terms, unsure)
 
 
-def _alarm(view: View, twin: Twinned, rest: Rest) -> tuple[float, float] | None:
-    """Best gain and distance of a sound walk."""
+def _alarm(view: View, twin: Twinned, rest: Rest) -> tuple[float, float, float] | None:
+    """Best gain and distance of a sound walk, and the number of its floor."""
     mean = mean_of(rest)
     if mean is None:
         return None
     weights = view.floor(step_map.roughness(rest, view.few))[1]
     space = judgement.Space(view, mean, weights)
     fits = space.fits()
-    return fits[0].gain if fits else 0.0, float(space.value @ space.value) / space.freedom
+    return fits[0].gain if fits else 0.0, float(space.value @ space.value) / space.freedom, float(twin.floor)

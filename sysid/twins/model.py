@@ -17,10 +17,20 @@ FEWEST = 3  # steps of either leg
 
 
 @dataclasses.dataclass(frozen=True)
+class Knot:
+    """Walks that were emulated for one log, with a cause of one size. moved: (2 p,) from a sound walk; steps: of them,
+    0 when the robot falls at once with it."""
+
+    size: float
+    moved: Array
+    steps: int
+
+
+@dataclasses.dataclass(frozen=True)
 class Direction:
     """How a cause moves the vector. terms: (3, 2 p) of its size, the square and the cube; unsure: (3, 3) covariance of
     these coefficients for a walk of one step; low, high: smallest and largest size that was made, which include 0;
-    tolerance: deviation of the size among sound robots."""
+    tolerance: deviation of the size among sound robots; knots: what was emulated for the log, by size."""
 
     cause: str
     at: str
@@ -31,6 +41,7 @@ class Direction:
     tolerance: float
     terms: Array
     unsure: Array
+    knots: tuple[Knot, ...] = ()
 
     @property
     def name(self) -> str:
@@ -44,8 +55,8 @@ class View:
 
     floors_m: (f,) roughness; footholds: (f,) what `step_map.roughness` gives there; middle: (f, 2 p); deviation:
     (f, 2 p) of one step; correlation: (2, p, p) of a leg's steps; between: (k, 2 p), in which walks differ as a whole;
-    loose: (k, 2 p), in which bodies within tolerances differ beyond the sum of these; alarms: (a, 2) gain of the best
-    cause and distance, of sound walks that had no part in the scatter.
+    loose: (k, 2 p), in which bodies within tolerances differ beyond the sum of these; alarms: (a, 3) gain of the best
+    cause, distance and floor's number, of sound walks that had no part in the scatter.
     """
 
     few: bool
@@ -69,6 +80,16 @@ class View:
         weights = np.zeros(len(self.footholds))
         weights[low], weights[low + 1] = low + 1 - place, place - low
         return float(weights @ self.floors_m), weights
+
+    def foothold(self, floor_m: float) -> float:
+        """The spread of a sound walk's footholds on a floor of this roughness."""
+        return float(np.sqrt(np.interp(floor_m**2, self.floors_m**2, self.footholds**2)))
+
+    def roughness(self, spread_square: float) -> float:
+        """The floor, in m, on which a sound walk's footholds have the square of a spread; 0 when it is not known."""
+        if not np.isfinite(spread_square):
+            return 0.0
+        return float(np.sqrt(np.interp(spread_square, self.footholds**2, self.floors_m**2)))
 
 
 @dataclasses.dataclass(frozen=True)

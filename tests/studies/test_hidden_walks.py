@@ -2,12 +2,18 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.api import diagnosis
+from ranger_sim.sysid.dataset import Channel, Dataset
 from ranger_sim.sysid.results import TwinsEvidence
 from ranger_sim.sysid.twins import evidence
+from ranger_sim.tools.diagnose import page, twin_words
+from ranger_sim.tools.twins.emulation import emulate
 from studies.hidden_walks import score
-from studies.hidden_walks.draw import Hidden, as_row, recorded, scenario_of
+from studies.hidden_walks.draw import Hidden, as_row, deviations, recorded, scenario_of, tolerance_of
 from studies.hidden_walks.kinds import KINDS
 
 BY_NAME = {kind.name: kind for kind in KINDS}
@@ -56,6 +62,61 @@ def test_a_hidden_cause_is_named_first(name, size, at):
     assert f"{found.named.name} at {found.named.at}" == case.kind.right
     low, high = found.named.parameters[case.kind.parameter].ci95
     assert low <= size <= high
+
+
+def test_a_zero_four_times_beyond_the_sizes_of_twins_has_an_interval_that_holds():
+    case = hidden("inner ankle's zero", 0.07)
+    found, _ = evidence.of([recorded(case)], emulator=emulate)
+    assert f"{found.named.name} at {found.named.at}" == case.kind.right and found.emulations > 0
+    low, high = found.named.parameters["offset_rad"].ci95
+    assert low <= 0.07 <= high < 0.09
+
+
+def test_the_size_asked_for_includes_what_the_body_has_within_its_tolerance():
+    loose = hidden("hip spring", -1.14, loose=True)
+    (other,) = {tolerance_of(loose)} - {0.0}
+    assert deviations(loose)["hip_spring_Nm_per_rad"] == other and tolerance_of(hidden("hip spring", -1.14)) == 0.0
+
+
+def three_channels(hidden_walk):
+    """The recording by hip angle, leg angle and state, under the names of the log of 2015."""
+    found = as_row(recorded(hidden_walk), "2015").channels
+    names = {"MCH_ANGLE": "hip_angle_rad", "E_LO_ANGLE": "outer_leg_abs_angle_gyro_rad", "FSM_LEG": "walk_fsm_state"}
+    stamps = found["MCH_ANGLE"].time_s
+    channels = {}
+    for variable, name in names.items():
+        each = found[variable]
+        if variable == "FSM_LEG":
+            rows = np.maximum(np.searchsorted(each.time_s, stamps, side="right") - 1, 0)
+            channels[name] = Channel(name, "", stamps, each.value[rows])
+        else:
+            channels[name] = Channel(name, "rad", stamps, np.interp(stamps, each.time_s, each.value))
+    return Dataset("three channels", channels)
+
+
+def test_twins_alone_judge_a_walk_that_gives_no_equation():
+    found = diagnosis(three_channels(hidden("hip spring", -1.8)), "walk", emulator=emulate)
+    (cause,) = found.result.causes
+    assert (cause.name, cause.at) == ("spring_value", "hip_spring") and found.result.misfit == ()
+    low, high = cause.parameters["stiffness_Nm_per_rad"].ci95
+    assert low <= -1.8 <= high
+    lines = twin_words.lines(found.answer)
+    assert lines[0] == "twins: no equation can be made of these recordings: the twins alone judge them"
+    assert "Compared with its twins" in page.render(found) and "Misfit by equation" not in page.render(found)
+
+
+def test_a_walk_that_neither_equations_nor_twins_can_judge_is_refused_with_both_reasons():
+    short = three_channels(hidden("hip spring", -1.8, steps=8))
+    with pytest.raises(
+        UserError, match=r"no equation of a walk .*; and its twins cannot judge it: . steps that can be"
+    ):
+        diagnosis(short, "walk", emulator=emulate)
+
+
+def test_a_walk_that_falls_at_once_is_refused_with_the_time_of_its_fall():
+    fallen = recorded(hidden("slope", -0.05))
+    with pytest.raises(UserError, match=r"steps are too few: the robot falls after [0-9.]+ s"):
+        diagnosis(fallen, "walk", emulator=emulate)
 
 
 def test_a_sound_walk_is_silent_at_every_rate():

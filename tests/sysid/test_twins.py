@@ -13,6 +13,7 @@ from ranger_sim.sysid.twins import evidence, features, judgement, learning, step
 from ranger_sim.sysid.twins.model import mean_of
 from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
 from ranger_sim.tools.twins.causes import TWINS
+from ranger_sim.tools.twins.emulation import WALKS, emulate
 
 STEP_ROWS = 300
 
@@ -190,6 +191,72 @@ def test_a_tolerance_of_sound_robots_hides_what_is_within_it(view):
     )
     leg, found = made_up(9700, moved=0.3)
     assert judged(loose, leg, found).fits[0].gain < 0.2 * judged(view, leg, found).fits[0].gain
+
+
+def bent(size):
+    """An effect that grows half as fast beyond the sizes of which twins were made."""
+    return size if abs(size) < 0.4 else np.sign(size) * (0.4 + 0.5 * (abs(size) - 0.4))
+
+
+def emulating(view, asked, falls_from=np.inf):
+    """Walks of the first cause, whose effect is bent, and of the other, whose effect is a line."""
+
+    def emulate(direction, size, floor_m):
+        asked.append((direction.cause, size))
+        if abs(size) >= falls_from:
+            return None
+        effect = {"moved": bent(size)} if direction.cause == "geometry" else {"other": size}
+        walked = [step_map.rest(view.legs, *made_up(9800 + seed, **effect), few=True) for seed in range(2)]
+        return judgement.Walks(mean_of(evidence.joined(walked)), float("nan"))
+
+    return emulate
+
+
+def confirmed(view, size, seed=9750, **more):
+    asked = []
+    rest = step_map.rest(view.legs, *made_up(seed, moved=bent(size)), few=True)
+    return judgement.judge(view, rest, FEW, float("nan"), emulating(view, asked, **more)), asked
+
+
+@pytest.mark.parametrize("size", [1.2, -1.8])
+def test_a_size_far_beyond_those_of_twins_is_found_by_emulating_it(view, size):
+    blind = judged(view, *made_up(9750, moved=bent(size))).fits[0]
+    assert not blind.low <= size <= blind.high
+    verdict, asked = confirmed(view, size)
+    assert verdict.named.direction.cause == "geometry"
+    assert verdict.named.low <= size <= verdict.named.high
+    assert len(asked) <= judgement.EMULATIONS
+
+
+def test_a_size_with_which_the_emulated_robot_falls_is_not_an_answer(view):
+    verdict, asked = confirmed(view, 1.8, falls_from=1.1)
+    assert max(abs(size) for _, size in asked) >= 1.1
+    assert all(abs(fit.size) < 1.1 for fit in verdict.fits if fit.direction.cause == "geometry")
+
+
+def test_a_sound_walk_asks_for_no_emulation(view):
+    verdict, asked = confirmed(view, 0.0, seed=9001)
+    assert not verdict.detected and asked == []
+
+
+def test_a_controller_with_other_parameters_than_candidates_is_not_emulated():
+    file = twin_file.of_controller("record-2011")
+    assert evidence.unconfirmed(file, ["C_F_ST_F_ANG"]) == ""
+    assert "is not known (2 other parameters)" in evidence.unconfirmed(file, ["C_H_X", "C_H_Y"])
+
+
+def test_walks_for_a_confirmation_are_the_same_each_time():
+    asked = evidence.Asked("record-2011", "ranger", "floor", "floor", "slope_rad", 0.004, 0.0, float("nan"))
+    first, again = emulate(asked), emulate(asked)
+    assert len(first) == WALKS and all(each.full.shape[0] == len(each.leg) for each in first)
+    for one, other in zip(first, again, strict=True):
+        assert np.array_equal(one.full, other.full, equal_nan=True)
+
+
+def test_a_robot_that_falls_at_once_or_cannot_be_made_has_no_walks():
+    asked = evidence.Asked("record-2011", "ranger", "floor", "floor", "slope_rad", -0.06, 0.0, 26.0)
+    assert emulate(asked) == []
+    assert emulate(dataclasses.replace(asked, cause="inertia", at="body", parameter="mass_kg", size=-20.0)) == []
 
 
 def inside_after(view, rows):

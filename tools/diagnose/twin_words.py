@@ -19,11 +19,13 @@ def lines(answer: dict[str, Any]) -> list[str]:
         return []
     if found["note"]:
         return [f"twins: no comparison: {found['note']}"]
+    alone = "twins: no equation can be made of these recordings: the twins alone judge them"
     floor_mm, (gain, distance) = 1e3 * found["floor_roughness_m"], found["limits"]
     out = [
+        *([] if answer["misfit"] else [alone]),
         f"twins: {found['steps']} steps {RATES[found['rate']]} against sound walks of {found['controller']} on a floor "
         f"of {floor_mm:.1f} mm: distance {found['distance']:.2f} (sound below {distance:.2f}), likeliest cause gains "
-        f"{found['gain']:.0f} (sound below {gain:.0f})"
+        f"{found['gain']:.0f} (sound below {gain:.0f})",
     ]
     if found["other_parameters"]:
         names = shortened(found["other_parameters"])
@@ -45,6 +47,10 @@ def lines(answer: dict[str, Any]) -> list[str]:
     else:
         since = f", from step {found['since_step']} of the recording on" if found["since_step"] else ""
         out.append(f"twins: {cause(found['named'])}{since}")
+    if found["emulations"]:
+        out.append(f"twins: confirmed by {found['emulations']} emulations of causes at the sizes found")
+    elif found["unconfirmed"]:
+        out.append(f"twins: not confirmed by walks at the sizes found: {found['unconfirmed']}")
     if found["ties"]:
         out.append(f"twins: explains these steps as well: {shortened(found['ties'])}")
     if found["never_distinguished"]:

@@ -26,6 +26,7 @@ from ranger_sim.tools.command_line import streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 from ranger_sim.tools.diagnose import twin_words, words
 from ranger_sim.tools.recordings import datasets
+from ranger_sim.tools.twins.emulation import emulate
 
 EXIT_CLEAN, EXIT_FOUND, EXIT_DOUBTFUL = 0, 1, 3  # 2 is a user's mistake
 MOST_GAPS = 4  # more of them are one line on a screen; report and JSON have all
@@ -98,6 +99,7 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
         accept_loss=options.accept_loss,
         seed=options.seed,
         progress=progress,
+        emulator=emulate,
     )
 
 
@@ -174,7 +176,8 @@ def _show(found: Diagnosis, console: Console) -> None:
                 f"{each['noise']:.3g}",
                 f"{each['repeatable_fraction']:.1%}",
             )
-    console.print(table)
+    if told["misfit"]:
+        console.print(table)
     for cause in told["causes"]:
         values = ", ".join(
             f"{name} {_figure(value['value'])} ({_figure(value['ci95'][0])} to {_figure(value['ci95'][1])})"

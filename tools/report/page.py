@@ -38,8 +38,9 @@ ROBOT = {
 }
 
 
-def render(robot: Any, summary: dict) -> str:
-    """The page as text. `robot`: a `ranger.robot.Ranger` that kept a log; `summary`: its summary."""
+def render(robot: Any, summary: dict, comparison: str = "") -> str:
+    """The page as text. `robot`: a `ranger.robot.Ranger` that kept a log; `summary`: its summary; comparison: the
+    command that compares the walk with its twins, empty where the run's folder does not have the variables."""
     walk = robot.recorded()
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
@@ -72,6 +73,7 @@ def render(robot: Any, summary: dict) -> str:
         walk=packed(json.dumps(data, allow_nan=False, separators=(",", ":"))),
         scripts=[Markup((HERE / name).read_text(encoding="utf-8")) for name in SCRIPTS],
         command=summary["command"],
+        comparison=comparison,
         table_hash=datatable.table_hash(),
     )
 

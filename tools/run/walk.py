@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import json
 import pathlib
+import shlex
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -256,6 +257,11 @@ def claimed(options: argparse.Namespace, stop: StopRule, console: Console) -> Ru
     return RunFolder(options.out, command_again(options, stop), report)
 
 
+def comparison(folder: str) -> str:
+    """The command that compares the walk of a run's folder with its twins."""
+    return shlex.join(["ranger-sim", "diagnose", folder, "--experiment", "walk", "--out", f"{folder}-twins"])
+
+
 def logs_of(robot: Ranger, options: argparse.Namespace, folder: RunFolder | None) -> RunLogs | None:
     """The logs of a folder; with --log full they are written from now on."""
     if folder is None or robot.logbook.mode == "none":
@@ -377,7 +383,7 @@ def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs |
                 console.print(without, highlight=False, soft_wrap=True)
             else:
                 with folder.file(REPORT) as path:
-                    path.write_text(page.render(robot, summary), encoding="utf-8")
+                    path.write_text(page.render(robot, summary, comparison(str(folder.path))), encoding="utf-8")
     folder.finish(summary)
 
 

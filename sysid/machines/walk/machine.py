@@ -19,10 +19,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy import ndimage
 
-from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import channels, signals
 from ranger_sim.sysid.dataset import Array, Dataset, Table
-from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
+from ranger_sim.sysid.machine import Effect, Equation, Known, NoEquationError, Quantity, Recording
 from ranger_sim.sysid.machines.walk import causes, mechanics, strikes
 from ranger_sim.sysid.machines.walk.base import PRIORS, TOLERATED, HIP_K_Nm_per_A
 from ranger_sim.sysid.machines.walk.mechanics import LEGS, Course, Left, Motion, Numbers
@@ -102,7 +101,7 @@ class Walk:
         rows += _encoder_rows(table, single, recording)
         recording.rows = [each for each in rows if len(each.where) >= each.fewest]
         if not recording.rows:
-            raise ModelError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
+            raise NoEquationError(_too_short(table, rows) if any(len(each.where) for each in rows) else _nothing(table))
         for each in recording.rows:
             recording.equations[each.name] = _equation(recording, each, self.numbers)
             if recording.places is not None and each.repeats:

@@ -124,6 +124,12 @@ def test_distance_in_kilometres_and_charge_in_per_cent_reach_the_robot(capsys):
     assert "--battery 0.65 --battery-capacity 493.0Wh --off left-outer-ankle" in summary["command"]
 
 
+def test_the_report_has_the_command_that_compares_the_walk_with_its_twins(tmp_path):
+    folder = tmp_path / "run"
+    assert cli.main(["walk", "--steps", "1", "--log", "full", "--out", str(folder)]) == 0
+    assert walk.comparison(str(folder)) in (folder / "report.html").read_text(encoding="utf-8")
+
+
 def test_the_walk_before_ctrl_c_is_reported(capsys, monkeypatch):
     monkeypatch.setattr(walk, "SLICE_S", 2.0)
 
