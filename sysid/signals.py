@@ -57,18 +57,6 @@ def lagged(table: Table, column: Array, time_constant_s: float) -> Array:
     return per_run(table, lambda part: lfilter([1.0 - keep], [1.0, -keep], part), column)
 
 
-def followed(table: Table, column: Array, time_constant_s: float) -> Array:
-    """Behind a first-order filter at rest at the first value, exact for straight lines between the samples."""
-    ratio = time_constant_s / table.step_s
-    keep = math.exp(-1.0 / ratio)
-    now, before = 1.0 - ratio * (1.0 - keep), ratio * (1.0 - keep) - keep
-
-    def filtered(part: Array) -> Array:
-        return part[0] + lfilter([now, before], [1.0, -keep], part - part[0])
-
-    return per_run(table, filtered, column)
-
-
 def integral(table: Table, column: Array) -> Array:
     """By trapezoids over the whole recording, 0 at its start; a gap counts as a straight line."""
     steps = np.diff(table.time_s, prepend=table.time_s[0])

@@ -74,18 +74,6 @@ def calm(values, width):
     return np.concatenate([ndimage.gaussian_filter1d(values[run], width, mode="nearest") for run in RUNS])
 
 
-def late(values):
-    """How far a filter of two samples is behind, over its time: by the solution for a straight line in each sample."""
-    tau, shown, seen = 2.0 * STEP_S, np.empty(COUNT), calm(values, 1.0)
-    for run in RUNS:
-        shown[run.start] = seen[run.start]
-        for k in range(run.start + 1, run.stop):
-            slope = (seen[k] - seen[k - 1]) / STEP_S
-            apart = shown[k - 1] - seen[k - 1] + slope * tau
-            shown[k] = seen[k] - slope * tau + apart * math.exp(-STEP_S / tau)
-    return (seen - shown) / tau
-
-
 def electrical(warm):
     s = SIGNALS
     current, volts, sign = s["I_by_torque"], s["V_by_torque"], s["sgn_I"]
@@ -150,7 +138,7 @@ def sensors():
                        "mechanical": offset * np.tanh(s["V"] / near)}),
         Row("sensor_lag", "voltage_V", S, ("time_constant_s",), electric(lambda p: -s["dV"])),
         Row("sensor_lag", "current_A", S, ("time_constant_s",),
-            lambda p: {"electric": R * late(s["I"]), "mechanical": K * late(s["I"])}),
+            lambda p: {"electric": R * s["dI"], "mechanical": K * s["dI"]}),
         Row("sensor_lag", "speed_rad_per_s", S, ("time_constant_s",),
             lambda p: {"electric": K * s["dw"], "mechanical": -C_1 * s["dw"], T: s["dw"]}),
         Row("sensor_lag", "torque_Nm", S, ("time_constant_s",), mechanical(lambda p: -s["dT"])),

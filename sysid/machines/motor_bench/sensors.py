@@ -4,28 +4,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
 from ranger_sim.sysid.machines.forms import Made, Shape, column, minus, one, ones, over
-
-LAG = 2.0  # samples; such lags are what an instrument's filter has
-CALM = 1.0  # samples; Gaussian of what lags
 
 
 def once_and_twice(angle: Array) -> tuple[Array, ...]:
     """Cosine and sine of an angle and of its double: what an encoder's disc off its centre, or bent, shows."""
     return np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)
-
-
-def _behind(r: Recording, values: Array) -> Array:
-    """How far a first-order filter of LAG samples is behind, a second of it: the slope, where nothing jumps.
-
-    A slope is over within a sample after a step of the voltage, and what the filter shows of it is not.
-    """
-    calm = signals.smooth(r.table, values, CALM)
-    time_constant_s = LAG * r.table.step_s
-    return (calm - signals.followed(r.table, calm, time_constant_s)) / time_constant_s
 
 
 def sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
@@ -56,10 +42,10 @@ def sensors(gear: float, top_w: float, top_V: float) -> list[Effect]:
         }
 
     def current_lag(r: Recording, _: Shape, v: Values) -> Columns:
-        behind = _behind(r, r.signals["I"])
+        s = r.signals
         return {
-            "electric": column(v["resistance_ohm"] * behind),
-            "mechanical": column(v["torque_constant_Nm_per_A"] * behind),
+            "electric": column(v["resistance_ohm"] * s["dI"]),
+            "mechanical": column(v["torque_constant_Nm_per_A"] * s["dI"]),
         }
 
     def speed_lag(r: Recording, _: Shape, v: Values) -> Columns:
