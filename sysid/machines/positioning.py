@@ -2,8 +2,8 @@
 
     force   F = M a + F_v v + F_c sgn v + F_0        F = the drive's gain times the voltage command
 
-Only the position is measured, and well: velocity and acceleration come from it, by the derivatives of the one filter
-that stands on both sides of the equation (the inverse dynamic model identified by least squares). Published for this
+Only the position is measured: the equation is in its weak form (`sysid/weak_form.py`), both sides under a triangle, and
+the voltage on straight lines or held between rows, as the recording shows. Published for this
 machine: M 95.1089 kg, F_v 203.50 N s/m, F_c 20.39 N, relative error of the force 4.08 % on run 1 and 5.98 % on run 2.
 The pulses of the second run come through the drive: the voltage has them already (added once more, or taken off, the
 error of that run rises from 4.6 to 6.6 %).
@@ -19,10 +19,13 @@ from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
 from ranger_sim.sysid.machines.forms import Made, bristles
+from ranger_sim.sysid.weak_form import WeakForm, way_between_rows
 
 FORCE_N_PER_V = 35.15065188  # the drive's gain, published with the data
-FINE_S = 0.0015  # Gaussian of the speed: -3 dB at 88 Hz, far above the controller's motion
+FINE_S = 0.0015  # Gaussian of the speed that finds the fastest one: -3 dB at 88 Hz, far above the controller's motion
+HALF_S = 0.0037  # of the triangle: as wide as that Gaussian
 NEAR_STANDSTILL = 0.01  # of the fastest speed: below it friction may be anything up to its limit
+DELAYS_S = (0.0, -0.1, -0.06, -0.04, -0.03, -0.02, -0.01, 0.01, 0.02, 0.03, 0.04, 0.06, 0.1)  # 0: small ones
 PITCHES_M = tuple(round(0.0005 * n, 4) for n in range(2, 61))
 
 Shape = Mapping[str, float]
@@ -57,28 +60,24 @@ class Positioning:
             )
         table = signals.uniform(table)
         q = table["position_m"]
-        force = self.force_N_per_V * table["voltage_V"]
-        v = signals.derivative(table, q, FINE_S / table.step_s)
-        s = {"x": q, "v": v, "F": force, "t": table.time_s - table.time_s[0], "a": np.gradient(v, table.step_s)}
-        s["dF"] = np.gradient(force, table.step_s)
-        top = float(np.quantile(np.abs(v), 0.98))
+        top = float(np.quantile(np.abs(signals.derivative(table, q, FINE_S / table.step_s)), 0.98))
         if top <= 0.0:
             raise ModelError(f"{table.name}: position_m does not move")
-        s["sgn_v"] = np.tanh(v / (0.25 * NEAR_STANDSTILL * top))
-        equation = Equation(
-            "force",
-            "M",
-            "mechanical",
-            "N",
-            force,
-            {
-                "mass_kg": s["a"],
-                "viscous_friction_Ns_per_m": v,
-                "coulomb_friction_N": s["sgn_v"],
-                "force_offset_N": np.ones_like(v),
-            },
-            np.abs(v) > NEAR_STANDSTILL * top,
-        )
+        weak = WeakForm(table, q, HALF_S)
+        v = weak.of_rate()
+        sign = weak.of_rate(lambda rate: np.tanh(rate / (0.25 * NEAR_STANDSTILL * top)))
+        s = {"x": q, "v": v, "t": table.time_s - table.time_s[0], "a": weak.acceleration, "sgn_v": sign}
+        columns = {
+            "mass_kg": s["a"],
+            "viscous_friction_Ns_per_m": v,
+            "coulomb_friction_N": sign,
+            "force_offset_N": np.ones_like(v),
+        }
+        valid = (np.abs(v) > NEAR_STANDSTILL * top) & weak.complete & ~weak.turning(v)
+        force = self.force_N_per_V * table["voltage_V"]
+        s["F"], way = way_between_rows(weak, force, np.column_stack(list(columns.values())), valid)
+        s["dF"] = signals.per_run(table, lambda part: np.gradient(part, table.step_s), s["F"])
+        equation = Equation("force", "M", "mechanical", "N", s["F"], columns, valid)
         fast = np.abs(v) > 0.2 * top
         regimes = {"forward": v > 0.0, "backward": v < 0.0, "low speed": ~fast, "fast": fast}
         return Recording(table, s, {"force": equation}, regimes)
@@ -102,6 +101,14 @@ class Positioning:
             angle = 2.0 * np.pi * s["x"] / p["pitch_m"]
             return np.cos(angle), np.sin(angle)
 
+        def late(r: Recording, p: Shape, _: Values) -> Columns:
+            """The force less itself by so much later, a second of it."""
+            if p["delay_s"] == 0.0:
+                return {"force": -r.signals["dF"][:, None]}
+            t = r.table.time_s
+            F = signals.per_run(r.table, lambda times, F: np.interp(times + p["delay_s"], times, F), t, r.signals["F"])
+            return {"force": (r.signals["F"] - F)[:, None] / p["delay_s"]}
+
         made: list[tuple[str, tuple[str, ...], list[dict[str, float]], Made]] = [
             ("direction_friction", ("viscous_Ns_per_m",), [{}], force(lambda s, p, _: (np.abs(s["v"]),))),
             ("drag", ("quadratic_Ns2_per_m2",), [{}], force(lambda s, p, _: (s["v"] * np.abs(s["v"]),))),
@@ -124,7 +131,7 @@ class Positioning:
                 speeds,
                 force(lambda s, p, _: (-s["sgn_v"] * np.exp(-((s["v"] / p["speed_m_per_s"]) ** 2)),)),
             ),
-            ("sensor_lag", ("time_constant_s",), [{}], force(lambda s, p, _: (-s["dF"],))),
+            ("sensor_lag", ("time_constant_s",), [{"delay_s": x} for x in DELAYS_S], late),
             ("once_per_turn", ("cosine_N", "sine_N"), [{"pitch_m": x} for x in PITCHES_M], force(waves)),
             (
                 "friction_warm_up",
