@@ -24,6 +24,7 @@ PRINTED = {
         r"^\[0.1 0.2 0.3 0.4 0.5\]$",
     ),
     "docs/how-to/can-tools.md": (r"ID: +123 .*'ranger'", r"^BusState\.ERROR$"),
+    "docs/explanation/can-fd.md": (r"^Timestamp: .* ID: +123 +S Rx +F BS +DL: 64 ",),
     "docs/slot-timing.md": (r"^3 7460 53% left$",),
     "docs/faults.md": (r"^True 100 counts True$",),
     # the longest wait of a frame on CAN1, µs

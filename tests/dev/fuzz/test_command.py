@@ -36,8 +36,8 @@ def test_a_target_that_there_is_not_gets_one_line(capsys):
         command.main(["walls"])
     assert left.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1] == (
-        "python -m dev.fuzz: error: unknown target 'walls' (available: can, channel, gdb, interfaces, panel, profiles, "
-        "requests, serial, xcp)"
+        "python -m dev.fuzz: error: unknown target 'walls' (available: can, channel, firmware, gdb, interfaces, panel, "
+        "profiles, requests, serial, xcp)"
     )
 
 
