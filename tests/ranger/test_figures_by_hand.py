@@ -73,6 +73,7 @@ def robot(walked_s=40.0, cpu_s=8.0, steps=20, length_sum=7.0, time_sum_s=10.0):
     )
     made = Made(
         deaths=[],
+        images={},
         plant=plant,
         scenario=scenario,
         time_s=60.0,
