@@ -236,8 +236,8 @@ class DiagnosisEvidence:
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
     the machine's own parameters explain in these data; too_short_s, by equation whose noise is too slow for these
     recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than
-    what numerics move them by. Only of a simulated machine: between_rows, by recording and input its way from a row to
-    the next. Only of a walk: twins, the comparison with emulated walks.
+    what numerics move them by. Only of a simulated or positioning machine: between_rows, by recording and input its
+    way from a row to the next. Only of a walk: twins, the comparison with emulated walks.
     """
 
     p_general: float

@@ -86,11 +86,11 @@ class WeakForm:
 
 
 def way_between_rows(weak: WeakForm, column: Array, others: Array, counts: Array) -> tuple[Array, str]:
-    """A channel's means, and "straight" or "held": the way with which the other columns, (n, k), leave less of it."""
-    ways = {"straight": weak.straight(column), "held": weak.held(column)}
+    """A channel's means, and its way, "straight line" or "held": with which the other columns, (n, k), leave less."""
+    ways = {"straight line": weak.straight(column), "held": weak.held(column)}
     left = {}
     for name, each in ways.items():
         size = np.linalg.lstsq(others[counts], each[counts], rcond=None)[0]
         left[name] = float(np.linalg.norm(each[counts] - others[counts] @ size))
-    name = "held" if left["held"] < CLEARLY * left["straight"] else "straight"
+    name = "held" if left["held"] < CLEARLY * left["straight line"] else "straight line"
     return ways[name], name

@@ -80,7 +80,7 @@ class Positioning:
         equation = Equation("force", "M", "mechanical", "N", s["F"], columns, valid)
         fast = np.abs(v) > 0.2 * top
         regimes = {"forward": v > 0.0, "backward": v < 0.0, "low speed": ~fast, "fast": fast}
-        return Recording(table, s, {"force": equation}, regimes)
+        return Recording(table, s, {"force": equation}, regimes, between_rows={"voltage_V": way})
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which the force is looked at without a cause in mind."""

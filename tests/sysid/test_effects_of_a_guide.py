@@ -95,6 +95,7 @@ def test_the_balance_of_a_guide_is_force_against_mass_and_friction():
     assert np.array_equal(made.regimes["forward"], v > 0.0) and np.array_equal(made.regimes["backward"], v < 0.0)
     assert np.array_equal(made.regimes["fast"], np.abs(viscous) > 0.2 * top)
     assert np.array_equal(made.regimes["low speed"], ~made.regimes["fast"])
+    assert made.between_rows == {"voltage_V": "straight line"}
     # the diagnosis chooses the band
     assert (made.width, made.every, made.noise_by_candidates) == (0.0, 1, True)
     halved = Positioning(0.5 * 35.15065188).prepare(run).equations["force"].response
@@ -124,7 +125,7 @@ def test_an_input_that_is_held_is_found_to_be():
     t = 0.01 * np.arange(2000)
     force = np.sin(2.0 * t) + np.sin(7.3 * t)
     weak = WeakForm(Table(t, {}, (slice(0, 2000),)), np.zeros(2000), 0.01)
-    for made, name in ((weak.held, "held"), (weak.straight, "straight")):
+    for made, name in ((weak.held, "held"), (weak.straight, "straight line")):
         response = made(force)
         found, way = way_between_rows(weak, force, np.column_stack([response]), weak.complete)
         assert way == name and np.array_equal(found, response)
