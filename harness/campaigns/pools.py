@@ -202,14 +202,15 @@ class DaskPool:
                     yield from done.result()
                 except self.distributed.KilledWorker as error:
                     raise CampaignError(f"campaign: Dask's workers died repeatedly: {error}") from None
-                except self.distributed.CancelledError:
+                except (self.distributed.CancelledError, self.distributed.comm.CommClosedError):
                     where = f" at {self.address}" if self.address else ""
                     raise CampaignError(
                         f"campaign: the Dask scheduler{where} ended; results are kept, and the same command continues"
                     ) from None
                 done.release()
         finally:
-            self.client.cancel([future for future in futures if not future.done()])
+            with contextlib.suppress(self.distributed.comm.CommClosedError):
+                self.client.cancel([future for future in futures if not future.done()])
 
     def close(self) -> None:
         """Leave the cluster; end it when it is our own."""
