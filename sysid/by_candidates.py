@@ -47,6 +47,7 @@ LEVEL = 0.01  # chance of a predictable residual in any equation of a sound reco
 FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say nothing
 FURTHER = 5.0  # times, general features by chance: they come in addition to the predictor
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
+ROWS_PER_COEFFICIENT = 12  # of base, names and further harmonics: with fewer rows further harmonics are left out
 MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
 Z95 = 1.96  # standard errors on each side of a 95 % interval
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
@@ -182,12 +183,16 @@ def _left_over(
     machine: Machine, found: likelihood.Selection, fixed: Sequence[Named], recordings: Sequence[Recording], seed: int
 ) -> left_over.LeftOver | None:
     """What the named causes leave that goes with one signal; further harmonics of a periodic cause belong to it."""
-    named = list(found.named)
+    harmonics = []
     for each in found.named:
         for shape in each.effect.shapes if each.effect.phase_is_free else ():
             if shape != each.shape:
                 place = f"{each.effect.at}, {', '.join(f'{number:g}' for number in shape.values())}"
-                named.append(dataclasses.replace(each, effect=dataclasses.replace(each.effect, at=place), shape=shape))
+                effect = dataclasses.replace(each.effect, at=place)
+                harmonics.append(dataclasses.replace(each, effect=effect, shape=shape))
+    count = found.base.count + sum(len(each.coefficients) for each in (*found.named, *harmonics))
+    few = count * ROWS_PER_COEFFICIENT > found.base.size
+    named = [*found.named, *([] if few else harmonics)]
     return left_over.look(machine, naming.refit(found.base, named, [*fixed, *named]), recordings, seed)
 
 

@@ -1,5 +1,7 @@
 """What a model leaves that goes with one signal, and what becomes of names that leave too much of it."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,8 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import api, left_over
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import Equation, Recording
+from ranger_sim.sysid.machines.positioning import FORCE_N_PER_V, Positioning
+from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.regression import Noise, Regression, Whitening
 from tests.blind.generator.motor_bench import MOTOR_BENCH
 
@@ -54,3 +58,26 @@ def test_a_load_cell_that_creeps_has_no_name_though_friction_under_load_explains
     )
     assert found.detected and found.abstained and not found.causes
     assert found.evidence.explained < 0.88
+
+
+class Screw(Positioning):
+    """A guide whose ripple has another phase in each run, so that further harmonics belong to it."""
+
+    def effects(self, recordings):
+        return [
+            dataclasses.replace(each, phase_is_free=each.cause == "once_per_turn")
+            for each in super().effects(recordings)
+        ]
+
+
+def test_a_ripple_in_few_rows_is_named_without_its_further_harmonics():
+    """900 rows for a base of four numbers, and 59 pitches that could be harmonics, of two numbers each."""
+    t = 0.01 * np.arange(900)
+    x = 0.05 * np.sin(1.1 * t) + 0.03 * np.sin(2.3 * t + 1.0)
+    v = 0.055 * np.cos(1.1 * t) + 0.069 * np.cos(2.3 * t + 1.0)
+    a = -0.0605 * np.sin(1.1 * t) - 0.1587 * np.sin(2.3 * t + 1.0)
+    force = 95.0 * a + 200.0 * v + 20.0 * np.sign(v) + 6.0 * np.cos(2.0 * np.pi * x / 0.02)
+    noise = generator(5, "a ripple in few rows").normal(size=900)
+    columns = {"position_m": x, "voltage_V": (force + 0.3 * noise) / FORCE_N_PER_V}
+    found = diagnose(Screw(), [Table(t, columns, (slice(0, 900),), "ripple")]).result
+    assert found.causes[0].name == "once_per_turn"
