@@ -9,6 +9,7 @@ held. Compared at the rows instead, a chirp that is logged at 100 Hz was a frict
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ranger_sim.sysid.dataset import Array, Table
@@ -68,7 +69,7 @@ class WeakForm:
             out[run] = self._mean(0.5 * (part + np.concatenate((part[:1], part[:-1]))))
         return out
 
-    def turning(self, rate: Array) -> Array:
+    def turning(self, rate: Array) -> NDArray[np.bool_]:
         """(n,) True where the rate's sign changes within the triangle."""
         out = np.zeros(len(self.table), dtype=bool)
         for run in self.table.runs:
@@ -78,14 +79,14 @@ class WeakForm:
         return out
 
     def _fine(self, count: int) -> Array:
-        return np.arange((count - 1) * PARTS + 1) * (self.table.step_s / PARTS)
+        return np.asarray(np.arange((count - 1) * PARTS + 1) * (self.table.step_s / PARTS), dtype=float)
 
     def _mean(self, fine: Array) -> Array:
         padded = np.pad(fine, self.rows * PARTS, mode="edge")
         return np.asarray(np.convolve(padded, self.weights, mode="valid")[::PARTS])
 
 
-def way_between_rows(weak: WeakForm, column: Array, others: Array, counts: Array) -> tuple[Array, str]:
+def way_between_rows(weak: WeakForm, column: Array, others: Array, counts: NDArray[np.bool_]) -> tuple[Array, str]:
     """A channel's means, and its way, "straight line" or "held": with which the other columns, (n, k), leave less."""
     ways = {"straight line": weak.straight(column), "held": weak.held(column)}
     left = {}
