@@ -26,6 +26,7 @@ from ranger_sim.sysid import (
     own_model,
     plausibility,
     predictability,
+    rivals,
     signals,
 )
 from ranger_sim.sysid.dataset import Table
@@ -37,7 +38,6 @@ from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError
 from ranger_sim.sysid.three_numbers import Held, gained
 
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
-CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 ABOVE_NUMERICS = 3.0  # times what numerics move it by: a named effect is at least so large
@@ -77,6 +77,7 @@ def diagnose(
     if any(each.entries for each in recordings):
         own_model.determined(machine, bands.plain(recordings))  # before anything is concluded
     skews = list(had)
+    simulations = rivals.Simulations(machine, had)
 
     def selected(recordings: Sequence[Recording], held: Sequence[Recording], begin: float) -> likelihood.Selection:
         rest = _others(effects, skews)
@@ -85,7 +86,7 @@ def diagnose(
         found = likelihood.select(
             recordings, rest, skews, seed, judge, progress=lambda share: progress("causes", begin + 0.2 * share)
         )
-        return _decided(machine, recordings, found, skews, had) if hasattr(machine, "surprise") else found
+        return simulations.decided(recordings, found, skews) if hasattr(machine, "surprise") else found
 
     found = selected(recordings, held, 0.25)
     stamps = _stamps(found)
@@ -99,15 +100,15 @@ def diagnose(
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
         previous = found
         effects = _finer(effects, found, skews)
-        recordings = held_out.simulated_again(machine, recordings, [*had, *found.named], found.with_named)
-        held = held_out.simulated_again(machine, held, [*had, *found.named], found.with_named)
+        recordings = simulations.again(recordings, found.named, found.with_named)
+        held = simulations.again(held, found.named, found.with_named)
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
         if [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]:
             if all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):
                 break
     if found.named and hasattr(machine, "numerical"):
         progress("numerics", 0.7)
-        recordings = held_out.simulated_again(machine, recordings, [*had, *found.named], found.with_named)
+        recordings = simulations.again(recordings, found.named, found.with_named)
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
         small = [each.effect.name for each in found.named if _below(floor, found, each.effect)]
         if small:
@@ -255,74 +256,6 @@ def _unmoved(found: likelihood.Selection, previous: likelihood.Selection, name: 
     number = found.with_named.names.index(name)
     error = math.sqrt(max(0.0, float(found.with_named.covariance[number, number])))
     return abs(found.with_named.values[name] - previous.with_named.values.get(name, math.inf)) <= MOVED * error
-
-
-def _decided(
-    machine: Machine,
-    recordings: Sequence[Recording],
-    found: likelihood.Selection,
-    fixed: Sequence[Named],
-    had: Sequence[Named],
-) -> likelihood.Selection:
-    """The selection with each cause held against its nearest rivals in the simulator itself.
-
-    First order cannot distinguish causes that differ by a small share of a large effect.
-    """
-    named = list(found.named)
-    for place, each in enumerate(found.named):
-        close = [rival for rival, behind in each.rivals if behind < max(CLOSE * each.chi2, naming.TIE)][:MOST_CLOSE]
-        others = [other for other in named if other.effect is not each.effect]
-        close = [rival for rival in close if all(rival is not other.effect for other in others)]
-        if not close:
-            continue
-        base = naming.refit(found.base, others, [*fixed, *others])
-        tried = (_at_best(rival, each, base) for rival in close)
-        options = [each, *(option for option in tried if option is not None)]
-        if len(options) == 1:
-            continue
-        scores = []
-        for option in options:
-            together = [*others, option]
-            extended = naming.refit(found.base, together, [*fixed, *together])
-            try:
-                simulated = held_out.simulated_again(machine, recordings, [*had, *together], extended)
-            except (UserError, np.linalg.LinAlgError):  # a rival with which the simulator runs away is none
-                scores.append(math.inf)
-                continue
-            free = len(option.effect.coefficients) + (option.effect.choices > 1)
-            scores.append(
-                sum(machine.surprise(one) for one in simulated)  # type: ignore[attr-defined]
-                + free * math.log(base.size) + 2.0 * math.log(option.effect.choices)
-            )  # fmt: skip
-        order = sorted(range(len(options)), key=lambda number: scores[number])
-        best, least = options[order[0]], scores[order[0]]
-        if not math.isfinite(least):
-            continue
-        behind = {id(options[n].effect): scores[n] - least for n in order if math.isfinite(scores[n])}
-        rivals = [(effect, behind.get(id(effect), far)) for effect, far in [(each.effect, 0.0), *each.rivals]
-                  if effect is not best.effect]  # fmt: skip
-        rivals.sort(key=lambda one: one[1])
-        named[place] = dataclasses.replace(
-            best,
-            tied=[options[number].effect for number in order[1:] if scores[number] - least < naming.TIE],
-            rivals=rivals,
-        )
-    if all(new is old for new, old in zip(named, found.named, strict=True)):
-        return found
-    return dataclasses.replace(
-        found, named=named, with_named=naming.refit(found.base, named, [*fixed, *named]) if named else found.base
-    )
-
-
-def _at_best(effect: Effect, instead_of: Named, base: Regression) -> Named | None:
-    """A rival as it would be named, at its best shape; None where a machine cannot have it so."""
-    ranked = likelihood.ranking(naming.trials([effect], base), base.size)
-    if not ranked or not naming.possible(ranked[0][3]):
-        return None
-    best = ranked[0]
-    return dataclasses.replace(
-        instead_of, effect=effect, shape=best[3].shape, chi2=best[1], freedom=best[2], bic=best[0]
-    )
 
 
 def unclipped(machine: Machine, recording: Recording) -> Recording:

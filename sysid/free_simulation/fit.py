@@ -86,6 +86,7 @@ class TrajectoryFit:
         self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
+        self.far_off = False  # the plain fit ended so: with candidates the fit follows the measurement from the start on
         self.acting: list[Acting] = []
         self.enter: list[effects.Entering] = []  # of what acts, along the trajectory of the last round
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
@@ -132,6 +133,7 @@ class TrajectoryFit:
         new = self.acted_on(acting, fixed=False)
         new.x, new.u, start = self.began
         new.p = np.concatenate((start[:count], np.zeros(len(new.p) - count)))
+        new.far_off = self.far_off
         new.damped = np.concatenate((np.zeros(count), np.full(len(new.p) - count, DAMPED)))
         new.came_from, new.predictor = (new.x, new.u, new.p), None
         new.noise_y = self.shown_y
@@ -346,8 +348,12 @@ class TrajectoryFit:
 
     def settle(self, rounds: int = ROUNDS, follow: bool = False) -> None:
         """Rounds until nothing moves any more. follow: the measurement, where they end far off, if that is likelier."""
+        if follow and self.far_off:
+            self._follow()
+            return
         if (self._settled(rounds) and self.cost <= FAR_OFF) or not follow:
             return
+        self.far_off = True
         ended, reached = self._end(), self._surprise_here()
         self._follow()
         if not self._surprise_here() <= reached:
@@ -404,7 +410,7 @@ class TrajectoryFit:
                 return False
             if step > STEADY:
                 continue
-            if renewed == RENEWED:
+            if renewed == RENEWED or np.any(self.slack):
                 return True
             self._renew_noise()
             renewed, best, before = renewed + 1, np.inf, np.inf
