@@ -76,9 +76,7 @@ class Simulations:
             found, named=named, with_named=naming.refit(found.base, named, [*fixed, *named]) if named else found.base
         )
 
-    def _options(
-        self, each: Named, named: Sequence[Named], found: Selection, fixed: Sequence[Named]
-    ) -> list[Named]:
+    def _options(self, each: Named, named: Sequence[Named], found: Selection, fixed: Sequence[Named]) -> list[Named]:
         """The cause and its near rivals that have not lost to it yet."""
         close = [rival for rival, behind in each.rivals if behind < max(CLOSE * each.chi2, naming.TIE)][:MOST_CLOSE]
         others = [other for other in named if other.effect is not each.effect]

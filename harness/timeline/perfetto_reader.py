@@ -3,16 +3,19 @@
 import dataclasses
 import importlib
 import pathlib
+import zlib
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.timeline.packing import index_packets
+from ranger_sim.harness.timeline.packing import PACKET_TAG, index_packets, varint
 from ranger_sim.harness.timeline.perfetto_file import library
 
 INSTANT_TYPE = b"\x48\x03"  # field 9 of a TrackEvent, its type: an instant
+COMPRESSED = b"\x92\x03"  # field 50 of a TracePacket: many packets, deflated
+INFLATED_BYTES = 1 << 26  # of one of them; the writer has a megabyte
 PACKETS_AT_ONCE = 1 << 22  # length of the packet index, 100 MB; a longer trace is indexed again
 
 
@@ -120,11 +123,30 @@ def take(path: pathlib.Path, reader: "Reader", schema: Any, packet: bytes) -> No
 
 
 def contents(path: pathlib.Path) -> bytes:
-    """The file's bytes."""
+    """The file's packets, inflated. UserError for a file that is not such a trace."""
     try:
-        return path.read_bytes()
+        data = path.read_bytes()
     except OSError as error:
         raise UserError(f"trace {path}: cannot be read: {error.strerror}") from None
+    schema, parts = library(), []
+    for begin, end, _ in index_of(path, data).tolist():
+        if data.startswith(COMPRESSED, begin):
+            inflate = zlib.decompressobj()
+            try:
+                packets = schema.TracePacket.FromString(data[begin:end]).compressed_packets
+                parts.append(inflate.decompress(packets, INFLATED_BYTES))
+            except zlib.error as error:
+                raise UserError(f"trace {path}: damaged at byte {begin}: {error}") from None
+            if not inflate.eof:
+                raise UserError(f"trace {path}: damaged at byte {begin}: packets end early or exceed 64 MiB")
+        else:
+            parts.append(framed(data[begin:end]))
+    return b"".join(parts)
+
+
+def framed(packet: bytes) -> bytes:
+    """A packet as a trace has it."""
+    return bytes((PACKET_TAG,)) + varint(len(packet)) + packet
 
 
 def index_of(path: pathlib.Path, data: Any) -> np.ndarray:

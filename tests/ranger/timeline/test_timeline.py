@@ -2,6 +2,7 @@
 
 import collections
 import contextlib
+import zlib
 
 import numpy as np
 import pytest
@@ -50,8 +51,14 @@ def run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def packets(run):
-    """The packets as the schema alone reads them."""
-    return perfetto_trace_pb2.Trace.FromString(run.file.read_bytes()).packet
+    """The packets as the schema and zlib alone read them."""
+    found = []
+    for packet in perfetto_trace_pb2.Trace.FromString(run.file.read_bytes()).packet:
+        if packet.HasField("compressed_packets"):
+            found += perfetto_trace_pb2.Trace.FromString(zlib.decompress(packet.compressed_packets)).packet
+        else:
+            found.append(packet)
+    return found
 
 
 # --- it is a trace ----------------------------------------------------------------------------------------
@@ -74,6 +81,26 @@ def test_begins_and_ends_of_slices_match_on_every_track(packets):
                 ended += 1
                 assert open_slices[track] >= 0, packet
     assert ended > 10_000 and set(open_slices.values()) == {0}
+
+
+def test_the_file_has_a_quarter_of_its_packets_bytes_at_most(run, packets):
+    assert run.file.stat().st_size < sum(packet.ByteSize() for packet in packets) / 4
+
+
+def test_a_trace_with_plain_packets_is_read_as_the_compressed_one(run, packets, tmp_path):
+    plain = tmp_path / "plain.pftrace"
+    plain.write_bytes(perfetto_trace_pb2.Trace(packet=packets).SerializeToString())
+    assert perfetto_reader.read(plain) == run.trace
+
+
+@pytest.mark.parametrize("packets", [b"not deflated", zlib.compress(bytes(1000))[:-3], zlib.compress(bytes(1 << 27))])
+def test_packets_that_do_not_inflate_or_never_end_are_an_error(packets, tmp_path):
+    damaged = tmp_path / "damaged.pftrace"
+    trace = perfetto_trace_pb2.Trace()
+    trace.packet.add().compressed_packets = packets
+    damaged.write_bytes(trace.SerializeToString())
+    with pytest.raises(UserError, match="damaged at byte"):
+        perfetto_reader.read(damaged)
 
 
 def test_every_packet_belongs_to_a_track_that_was_described_and_has_a_name(packets):
