@@ -86,9 +86,7 @@ class TrajectoryFit:
         self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
-        self.far_off = (
-            False  # the plain fit ended so: with candidates the fit follows the measurement from the start on
-        )
+        self.far_off = False  # the plain fit ended so: a fit with candidates follows the measurement at once
         self.acting: list[Acting] = []
         self.enter: list[effects.Entering] = []  # of what acts, along the trajectory of the last round
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
