@@ -49,6 +49,7 @@ FURTHER = 5.0  # times, general features by chance: they come in addition to the
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 ROWS_PER_COEFFICIENT = 12  # of base, names and further harmonics: with fewer rows further harmonics are left out
 MOST_CLIPPED = 0.2  # of the rows
+LEARNED = 0.7  # of the held-out error: a black box that leaves less has learned what the equation lacks. Chosen by us
 Z95 = 1.96  # standard errors on each side of a 95 % interval
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
 
@@ -521,6 +522,7 @@ def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
         smallest_visible={each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
         cannot_be_seen=tuple(each.effect.name for each in found.visible if each.sizes is None),
         too_short_s=_needed_s(found) or None,
+        learnable=_learnable(found) or None,
         below_numerics=tuple(found.below_numerics) or None,
     )
 
@@ -533,8 +535,19 @@ def _needed_s(found: Diagnosis) -> dict[str, float]:
     return {
         name: math.ceil(seconds * FEWEST_STRETCHES / number)
         for name, number in found.stretches.items()
-        if number < FEWEST_STRETCHES
+        if number < FEWEST_STRETCHES and name not in _learnable(found)
     }
+
+
+def _learnable(found: Diagnosis) -> tuple[str, ...]:
+    """Equations in which nothing was found, and of whose held-out error a black box explains a large part."""
+    if found.detected:
+        return ()
+    return tuple(
+        name
+        for name, each in (found.errors or {}).items()
+        if each.black_box is not None and each.before > noise_floor.LARGE and each.black_box < LEARNED * each.before
+    )
 
 
 def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:

@@ -76,9 +76,7 @@ class TrajectoryFit:
         steps = np.array([table.resolution.get(each.channel, 0.0) for each in machine.outputs])
         whole = np.zeros(len(table), dtype=bool)
         self.unmeasured = np.column_stack([table.unmeasured.get(each.channel, whole) for each in machine.outputs])
-        rough = np.array(
-            [signals.roughness(table, *each) for each in zip(self.y.T, self.unmeasured.T, strict=True)]
-        )
+        rough = np.array([signals.roughness(table, *each) for each in zip(self.y.T, self.unmeasured.T, strict=True)])
         self.noise_y = np.maximum(np.hypot(rough, steps / np.sqrt(12.0)), 1e-9 * np.ptp(self.y, axis=0))
         self.shown_y = self.noise_y
         self.u = np.column_stack([given[name] for name in noisy]) if noisy else np.zeros((len(table), 0))
