@@ -31,7 +31,7 @@ from ranger_sim.sysid import (
 )
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
-from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of
+from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of, simulated_outputs
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError
@@ -48,7 +48,8 @@ FEWEST_STRETCHES = 20.0  # correlation times of an equation's noise: fewer say n
 FURTHER = 5.0  # times, general features by chance: they come in addition to the predictor
 RARER = 100.0  # times, a line by chance: its law is that of noise that an autoregression has made white
 ROWS_PER_COEFFICIENT = 12  # of base, names and further harmonics: with fewer rows further harmonics are left out
-MOST_CLIPPED, MOST_CLIPPED_SIMULATED = 0.2, 0.01  # of the rows; a simulator's states follow what is measured
+MOST_CLIPPED = 0.2  # of the rows
+LEARNED = 0.7  # of the held-out error: a black box that leaves less has learned what the equation lacks. Chosen by us
 Z95 = 1.96  # standard errors on each side of a 95 % interval
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
 
@@ -260,20 +261,19 @@ def _unmoved(found: likelihood.Selection, previous: likelihood.Selection, name: 
 
 def unclipped(machine: Machine, recording: Recording) -> Recording:
     """The recording without the rows in which a measured channel is cut off, and those that the band's filter reaches
-    from there. UserError where it is a large part of them, or where a simulator would have to follow the channel."""
+    from there. UserError where it is a large part of them."""
     table = recording.table
     rows = np.zeros(len(table), dtype=bool)
-    most = MOST_CLIPPED_SIMULATED if recording.entries else MOST_CLIPPED
-    inputs = inputs_of(machine)
+    followed = inputs_of(machine) | simulated_outputs(machine)  # a simulator leaves out its outputs' rows itself
     for each in machine.quantities:
-        if each.name in inputs or each.name not in table:
+        if each.name in followed or each.name not in table:
             continue
         cut = signals.clipped(table, table[each.name])
         share = float(np.mean(cut))
-        if share > most:
+        if share > MOST_CLIPPED:
             raise UserError(
                 f"{table.name}: {each.name}: {share:.1%} of its values are cut off at its largest or smallest one, "
-                f"at most {most:.0%} may be; nothing is concluded from such data"
+                f"at most {MOST_CLIPPED:.0%} may be; nothing is concluded from such data"
             )
         rows |= cut
     if not np.any(rows):
@@ -455,6 +455,7 @@ def evidence(found: Diagnosis, made: DiagnosisEvidence) -> DiagnosisEvidence:
         smallest_visible={each.effect.name: each.sizes for each in found.visible if each.sizes is not None},
         cannot_be_seen=tuple(each.effect.name for each in found.visible if each.sizes is None),
         too_short_s=_needed_s(found) or None,
+        learnable=_learnable(found) or None,
         below_numerics=tuple(found.below_numerics) or None,
     )
 
@@ -467,8 +468,19 @@ def _needed_s(found: Diagnosis) -> dict[str, float]:
     return {
         name: math.ceil(seconds * FEWEST_STRETCHES / number)
         for name, number in found.stretches.items()
-        if number < FEWEST_STRETCHES
+        if number < FEWEST_STRETCHES and name not in _learnable(found)
     }
+
+
+def _learnable(found: Diagnosis) -> tuple[str, ...]:
+    """Equations in which nothing was found, and of whose held-out error a black box explains a large part."""
+    if found.detected:
+        return ()
+    return tuple(
+        name
+        for name, each in (found.errors or {}).items()
+        if each.black_box is not None and each.before > noise_floor.LARGE and each.black_box < LEARNED * each.before
+    )
 
 
 def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:

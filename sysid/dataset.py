@@ -11,7 +11,7 @@ A channel's name carries its unit as in the project's other boundaries: "hip_ang
 """
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,8 @@ LOSSES = {
     "bit_flip": "single values with a wrong bit",
 }
 CLIPPED = "clipped"  # of LOSSES
+UNMEASURED = (CLIPPED, "not_finite", "text")  # losses of which the stamp is known: rows without a measurement
+LACKING = 1.5  # median steps of a channel; one that is longer lacks a sample
 NOTHING_LOST = {
     "repeated": "repeated samples, stamp and value",
     "never_written": "samples of a variable before it was written",
@@ -144,13 +146,17 @@ class Repair:
 
 @dataclasses.dataclass
 class Table:
-    """Channels on one time base. time_s, each column: shape (n,); `runs`: stretches without a gap, in order."""
+    """Channels on one time base. time_s, each column: shape (n,); `runs`: stretches without a gap, in order.
+
+    unmeasured: by channel (n,), True where its value is a straight line over samples that it lacks.
+    """
 
     time_s: Array
     columns: dict[str, Array]
     runs: tuple[slice, ...]
     name: str = ""
     resolution: dict[str, float] = dataclasses.field(default_factory=dict)
+    unmeasured: dict[str, NDArray[np.bool_]] = dataclasses.field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
@@ -176,6 +182,7 @@ class Table:
             tuple(run for run in runs if run.stop > run.start),
             self.name,
             self.resolution,
+            {name: rows[which] for name, rows in self.unmeasured.items()},
         )
 
 
@@ -226,10 +233,11 @@ class Dataset:
             accounts[name] = {"read": channel.read, "kept": len(channel.value), "left_out": left_out}
         return accounts
 
-    def table(self, names: Iterable[str], longest_gap: float = 5.0) -> Table:
+    def table(self, names: Iterable[str], longest_gap: float = 5.0, outputs: Collection[str] = ()) -> Table:
         """These channels on the stamps of the densest of them, by straight lines, cut at gaps and at masked values.
 
-        longest_gap: in median steps of a channel; what is farther apart is not bridged.
+        longest_gap: in median steps of a channel; what is farther apart is not bridged. outputs: channels that a
+        simulator runs through: at samples that they lack the table goes on, with these rows in `unmeasured`.
         """
         chosen = [self[name] for name in names]
         if not chosen:
@@ -240,19 +248,26 @@ class Dataset:
         time_s = base.time_s
         inside = np.ones(len(time_s), dtype=bool)
         cuts = np.zeros(len(time_s), dtype=bool)  # a run ends before these
-        columns = {}
+        columns, unmeasured = {}, {}
         for channel in chosen:
             columns[channel.name] = np.interp(time_s, channel.time_s, channel.value)
             steps = np.diff(channel.time_s)
-            limit = longest_gap * float(np.median(steps)) if len(steps) else 0.0
+            goes_on = channel.name in outputs and channel is not base
+            limit = (LACKING if goes_on else longest_gap) * float(np.median(steps)) if len(steps) else 0.0
+            lacking = np.zeros(len(time_s), dtype=bool)
             inside &= (time_s >= channel.time_s[0]) & (time_s <= channel.time_s[-1])
             bridged = steps <= limit
             masked = np.searchsorted(channel.time_s, channel.masked_s) - 1  # the true values are beyond the limit
             bridged[masked[(masked >= 0) & (masked < len(bridged))]] = False
             for number in np.flatnonzero(~bridged):
                 low, high = channel.time_s[number], channel.time_s[number + 1]
-                inside &= ~((time_s > low) & (time_s < high))
-                cuts[min(np.searchsorted(time_s, high), len(time_s) - 1)] = True
+                lacking |= (time_s > low) & (time_s < high)
+                if not goes_on:
+                    cuts[min(np.searchsorted(time_s, high), len(time_s) - 1)] = True
+            if not goes_on:
+                inside &= ~lacking
+            elif np.any(lacking):
+                unmeasured[channel.name] = lacking
         kept = np.flatnonzero(inside)
         if len(kept) < 2:
             raise DataError(f"{self.name}: {', '.join(columns)} have no time in common")
@@ -266,4 +281,5 @@ class Dataset:
             tuple(slice(start, end) for start, end in zip(starts, ends, strict=True)),
             self.name,
             {channel.name: channel.resolution for channel in chosen},
+            {name: rows[kept] for name, rows in unmeasured.items()},
         )

@@ -1,16 +1,21 @@
 """The limit of what may be lost of a channel before anything is concluded from it."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from ranger_sim.foundation.user_error import DataError
-from ranger_sim.sysid.dataset import LOSSES, Dataset, Loss
+from ranger_sim.sysid.dataset import LOSSES, UNMEASURED, Dataset, Loss
 
 ACCEPTED = 0.01  # of a channel's samples; radio links lose less (docs/robot.md, C6.2)
 
 
-def stop_if_too_many(dataset: Dataset, names: Iterable[str], accepted: float = ACCEPTED) -> None:
-    """UserError for the first of these channels that lost more than the accepted share (0 to 1) of its samples."""
+def stop_if_too_many(
+    dataset: Dataset, names: Iterable[str], accepted: float = ACCEPTED, outputs: Collection[str] = ()
+) -> None:
+    """UserError for the first of these channels that lost more than the accepted share (0 to 1) of its samples.
+
+    outputs: channels that a simulator runs through; samples that are cut off or not a number are not counted there.
+    """
     lost = sum(loss.count for loss in dataset.losses if loss.reason in LOSSES)
     if lost > accepted * dataset.rows:
         _refuse(dataset, "", lost, dataset.rows, dataset.losses, accepted)
@@ -18,8 +23,9 @@ def stop_if_too_many(dataset: Dataset, names: Iterable[str], accepted: float = A
         if name not in dataset:
             raise DataError(f"{dataset.name}: {name}: too few sound samples are left; nothing is concluded without it")
         channel = dataset[name]
-        if channel.lost_share > accepted:
-            lost = sum(loss.count for loss in channel.losses if loss.reason in LOSSES)
+        unmeasured = UNMEASURED if name in outputs else ()
+        lost = sum(loss.count for loss in channel.losses if loss.reason in LOSSES and loss.reason not in unmeasured)
+        if lost > accepted * (len(channel.value) + lost):
             _refuse(dataset, name, lost, lost + len(channel.value), channel.losses, accepted)
 
 

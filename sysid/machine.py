@@ -48,8 +48,13 @@ class Quantity:
 
 def inputs_of(machine: "Machine") -> set[str]:
     """Names of the channels that drive the machine: not those of its outputs, unless their quantity says so."""
-    outputs = {each.channel for each in getattr(machine, "outputs", ())}
+    outputs = simulated_outputs(machine)
     return {each.name for each in machine.quantities if each.is_input and (each.drives or each.name not in outputs)}
+
+
+def simulated_outputs(machine: "Machine") -> set[str]:
+    """Names of the channels that a simulator shows; none of a machine without one."""
+    return {each.channel for each in getattr(machine, "outputs", ())}
 
 
 @dataclasses.dataclass(frozen=True)

@@ -91,11 +91,26 @@ def steps(fit: TrajectoryFit) -> list[Finding]:
     return found
 
 
+def unmeasured(fit: TrajectoryFit) -> list[Finding]:
+    """Outputs that lack measurements, with how many rows."""
+    found = []
+    for each, rows in zip(fit.machine.outputs, fit.unmeasured.T, strict=True):
+        places = np.flatnonzero(rows)
+        if len(places):
+            first, last = (float(fit.table.time_s[place]) for place in (places[0], places[-1]))
+            text = (
+                f"{len(places)} of {len(rows)} rows have no measurement of it (cut off, or not a number): the "
+                "simulator runs through them, and nothing is concluded from them"
+            )
+            found.append(Finding(each.channel, "unmeasured", first, last, float(len(places)), "rows", text, "note"))
+    return found
+
+
 def of(machine: Machine, recordings: Sequence[Recording], regression: Regression) -> list[Finding]:
     """All findings about a simulated machine as it is at the end of a diagnosis; none for another machine."""
     found: dict[tuple[str, str], Finding] = {}
     fits = [fit for each in recordings if (fit := getattr(each, "fit", None)) is not None]
     for fit in fits:
-        for one in (*limits(machine, fit), *steps(fit)):
+        for one in (*limits(machine, fit), *steps(fit), *unmeasured(fit)):
             found.setdefault((one.channel, one.kind), one)
     return [*found.values(), *(determined(machine, regression) if fits else [])]

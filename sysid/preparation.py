@@ -10,7 +10,7 @@ from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import losses, repairs, sanity
 from ranger_sim.sysid.channels import named_by, named_for
 from ranger_sim.sysid.dataset import Dataset, Finding, Repair, Table
-from ranger_sim.sysid.machine import Machine, inputs_of
+from ranger_sim.sysid.machine import Machine, inputs_of, simulated_outputs
 from ranger_sim.sysid.machines import is_ours
 
 LEAST_ROWS = 50  # below, filters are longer than the data; useful data have some hundreds
@@ -71,7 +71,8 @@ def prepared(
     inputs = inputs_of(machine) - set(asked)
     sanity.stop_if_input_is_clipped(dataset.name, findings, inputs)
     mended = repairs.mend(dataset, findings, inputs)
-    losses.stop_if_too_many(mended, names, accepted)
+    outputs = simulated_outputs(machine) - inputs
+    losses.stop_if_too_many(mended, names, accepted, outputs)
     needed = [each.name for each in machine.quantities if each.needed]
     for doubt in sanity.doubts(findings):
         if doubt.kind == "noise" and doubt.channel not in needed:
@@ -85,7 +86,7 @@ def prepared(
             if each.needed and np.ptp(mended[each.name].value) == 0.0:
                 raise DataError(f"{dataset.name}: {each.name}: one value all the time; nothing is concluded from that")
     own = getattr(machine, "table", None)  # of a machine whose channels come at rates of their own
-    table = own(mended, names) if own is not None else mended.table(names)
+    table = own(mended, names) if own is not None else mended.table(names, outputs=outputs)
     if len(table) < LEAST_ROWS:
         raise DataError(f"{dataset.name}: {len(table)} rows with all channels, at least {LEAST_ROWS} are needed")
     return Prepared(table, mended.findings, mended.repairs, mended.ledger())

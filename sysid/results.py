@@ -235,7 +235,8 @@ class DiagnosisEvidence:
     noise_floor, by equation; above_noise_floor, equations that leave far more than their channel's noise;
     smallest_visible, by effect and coefficient the least size that would have been named; cannot_be_seen, effects that
     the machine's own parameters explain in these data; too_short_s, by equation whose noise is too slow for these
-    recordings, the length in seconds that they would need; below_numerics, effects that are not clearly larger than
+    recordings, the length in seconds that they would need; learnable, equations without a finding in which a black box
+    of the training data leaves far less of the held-out data; below_numerics, effects that are not clearly larger than
     what numerics move them by. Only of a simulated or positioning machine: between_rows, by recording and input its
     way from a row to the next. Only of a walk: twins, the comparison with emulated walks.
     """
@@ -260,6 +261,7 @@ class DiagnosisEvidence:
     smallest_visible: Mapping[str, Mapping[str, float]] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     cannot_be_seen: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     too_short_s: Mapping[str, float] | None = dataclasses.field(default=None, metadata=OPTIONAL)
+    learnable: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     between_rows: Mapping[str, Mapping[str, str]] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     below_numerics: tuple[str, ...] | None = dataclasses.field(default=None, metadata=OPTIONAL)
     twins: TwinsEvidence | None = dataclasses.field(default=None, metadata=OPTIONAL)

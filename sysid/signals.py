@@ -9,10 +9,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.signal import lfilter, savgol_filter
 
 from ranger_sim.sysid.dataset import Array, Table
+
+Rows = NDArray[np.bool_]
 
 # Samples: no narrower is a Gaussian whose own derivative is taken; a slope is then right to a part in a thousand.
 NARROW = 0.75
@@ -71,6 +74,7 @@ def uniform(table: Table) -> Table:
         return table
     stamps: list[Array] = []
     columns: dict[str, list[Array]] = {name: [] for name in table.columns}
+    unmeasured: dict[str, list[Rows]] = {name: [] for name in table.unmeasured}
     runs: list[slice] = []
     start = 0
     for run in table.runs:
@@ -80,6 +84,8 @@ def uniform(table: Table) -> Table:
         stamps.append(even)
         for name, column in table.columns.items():
             columns[name].append(np.interp(even, time_s, column[run]))
+        for name, rows in table.unmeasured.items():
+            unmeasured[name].append(np.interp(even, time_s, rows[run]) > 0.0)
         runs.append(slice(start, start + len(even)))
         start += len(even)
     return Table(
@@ -88,6 +94,7 @@ def uniform(table: Table) -> Table:
         tuple(runs),
         table.name,
         table.resolution,
+        {name: np.concatenate(parts) for name, parts in unmeasured.items()},
     )
 
 
@@ -169,13 +176,18 @@ def jumps(table: Table, column: Array) -> Array:
     return np.where(near, ndimage.maximum_filter1d(change, 3, mode="constant"), 0.0)
 
 
-def roughness(table: Table, column: Array) -> float:
-    """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps."""
+def roughness(table: Table, column: Array, unmeasured: Rows | None = None) -> float:
+    """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps.
+
+    unmeasured: (n,) rows that do not count.
+    """
     size = max(7, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
     parts = [savgol_filter(column[run], size, 2) - column[run] for run in table.runs if run.stop - run.start > size]
     if not parts:
         return 0.0
     rest = np.concatenate(parts)
+    if unmeasured is not None:
+        rest = rest[~np.concatenate([unmeasured[run] for run in table.runs if run.stop - run.start > size])]
     # the parabola uses three of these degrees of freedom
     return float(np.median(np.abs(rest))) / 0.6745 * float(np.sqrt(size / (size - 3.0)))
 
@@ -209,6 +221,7 @@ def averaged(table: Table, count: int) -> Table:
     runs, start = [], 0
     stamps: list[Array] = []
     columns: dict[str, list[Array]] = {name: [] for name in table.columns}
+    unmeasured: dict[str, list[Rows]] = {name: [] for name in table.unmeasured}
     for run in table.runs:
         size = (run.stop - run.start) // count
         if not size:
@@ -217,6 +230,8 @@ def averaged(table: Table, count: int) -> Table:
         stamps.append(table.time_s[inside].reshape(size, count).mean(axis=1))
         for name, column in table.columns.items():
             columns[name].append(column[inside].reshape(size, count).mean(axis=1))
+        for name, rows in table.unmeasured.items():
+            unmeasured[name].append(rows[inside].reshape(size, count).any(axis=1))
         runs.append(slice(start, start + size))
         start += size
     return Table(
@@ -225,4 +240,5 @@ def averaged(table: Table, count: int) -> Table:
         tuple(runs),
         table.name,
         table.resolution,
+        {name: np.concatenate(parts) for name, parts in unmeasured.items()},
     )

@@ -37,6 +37,7 @@ FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the error
 CARRIED = 2  # rounds in which covariances go from one stretch to the next
 UNKNOWN_PLACE = 0.29  # of a jump: deviation of a step's mean where its place is anywhere in the step, 1 / sqrt(12)
 CHOSEN = 20.0  # of -2 log likelihood: by so much another way between samples is the likelier one
+MOST_UNMEASURED = 0.5  # of an output's rows: its noise is estimated from the rest. Chosen by us
 DAMPED = 0.01  # of its length: pull on a candidate of which a ten-thousandth of the square is its own
 
 
@@ -46,6 +47,7 @@ class TrajectoryFit:
 
     def __init__(self, machine: DeclaredMachine, table: Table, count: int = 1) -> None:
         """count: samples averaged into one, also for the machine's own signals."""
+        table = _marked(machine, table)
         given, guess = machine.inputs(table), machine.first_guess(table)
         if count > 1:
             whole = dataclasses.replace(table, columns=table.columns | given | {f"first {n}": guess[n] for n in guess})
@@ -72,7 +74,9 @@ class TrajectoryFit:
             ]
         )
         steps = np.array([table.resolution.get(each.channel, 0.0) for each in machine.outputs])
-        rough = np.array([signals.roughness(table, column) for column in self.y.T])
+        whole = np.zeros(len(table), dtype=bool)
+        self.unmeasured = np.column_stack([table.unmeasured.get(each.channel, whole) for each in machine.outputs])
+        rough = np.array([signals.roughness(table, *each) for each in zip(self.y.T, self.unmeasured.T, strict=True)])
         self.noise_y = np.maximum(np.hypot(rough, steps / np.sqrt(12.0)), 1e-9 * np.ptp(self.y, axis=0))
         self.shown_y = self.noise_y
         self.u = np.column_stack([given[name] for name in noisy]) if noisy else np.zeros((len(table), 0))
@@ -200,6 +204,8 @@ class TrajectoryFit:
         if np.any(back):
             after = np.concatenate((back[1:], back[-1:]))  # a step has the mean of its two ends
             lin.f_x, lin.h_x = lin.f_x + 0.5 * lin.f_q @ (back + after @ lin.f_x), lin.h_x + lin.h_q @ back
+        for each in (lin.h_x, lin.h_u, lin.h_p, lin.h_q):  # an output that is not measured shows nothing
+            each[self.unmeasured] = 0.0
         numbers = (lin.next_state, lin.output, lin.f_x, lin.h_x, lin.f_p, lin.h_p)
         if not all(np.all(np.isfinite(each)) for each in numbers):
             raise UserError(
@@ -287,6 +293,7 @@ class TrajectoryFit:
         gap[self.ends] = 0.0
         self.state = -(gap + (lin.f_u @ offset[:, :, None])[:, :, 0])
         self.output = self.y - lin.output - (lin.h_u @ offset[:, :, None])[:, :, 0]
+        self.output[self.unmeasured] = 0.0
         x, errors = wide.predicted(
             np.concatenate((self.state[:, :, None], lin.f_p), axis=2),
             np.concatenate((self.output[:, :, None], lin.h_p), axis=2),
@@ -294,7 +301,7 @@ class TrajectoryFit:
         white = wide.white(errors)
         self.response, self.columns = white[:, :, 0], white[:, :, 1:]
         n = self.response.size
-        self.cost = float(np.mean((self.response / wide.unit) ** 2))
+        self.cost = float(np.mean((self.response / wide.unit)[~self.unmeasured] ** 2))
         a = (self.columns / wide.unit[None, :, None]).reshape(n, len(self.p)) * (self.size_p * self.moves)
         b = (self.response / wide.unit).reshape(n)
         change, error = self._step(a, b)
@@ -343,7 +350,7 @@ class TrajectoryFit:
         Noise that the channels do not show themselves is the model's error: taken for noise, it would let a very wrong
         model pull the trajectory away from the measurement, and the fit would not return.
         """
-        left = np.median(np.abs(self.rest), axis=0) / 0.6745
+        left = np.nanmedian(np.where(self.unmeasured, np.nan, np.abs(self.rest)), axis=0) / 0.6745
         self.noise_y = np.clip(left, 1e-9 * np.ptp(self.y, axis=0), LOUDER * self.shown_y)
 
     def settle(self, rounds: int = ROUNDS, follow: bool = False) -> None:
@@ -448,3 +455,32 @@ class TrajectoryFit:
         x, u = self.x, self.u
         self.round(every_port=True)
         self.x, self.u = x, u
+
+
+def _marked(machine: DeclaredMachine, table: Table) -> Table:
+    """The table with all rows without a measurement of an output: cut off there, or lacking in the recording.
+
+    UserError where that is most of an output, or where the machine's inputs need it.
+    """
+    unmeasured, columns = {}, dict(table.columns)
+    for name in (each.channel for each in machine.outputs):
+        rows = signals.clipped(table, table[name]) | table.unmeasured.get(name, False)
+        if not np.any(rows):
+            continue
+        share = float(np.mean(rows))
+        if share > MOST_UNMEASURED:
+            raise UserError(
+                f"{table.name}: {name}: {share:.1%} of its values are cut off or are not numbers, at most "
+                f"{MOST_UNMEASURED:.0%} may be; nothing is concluded from such data"
+            )
+        unmeasured[name] = rows
+        columns[name] = np.where(rows, np.nan, table[name])
+    if unmeasured:
+        given = machine.inputs(dataclasses.replace(table, columns=columns))
+        spoilt = [name for name, column in given.items() if not np.all(np.isfinite(column))]
+        if spoilt:
+            raise UserError(
+                f"{table.name}: {', '.join(unmeasured)}: values are cut off or are not numbers, and {machine.name} "
+                f"makes its input {', '.join(spoilt)} of them; nothing is concluded from such data"
+            )
+    return dataclasses.replace(table, unmeasured=unmeasured)

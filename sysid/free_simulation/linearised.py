@@ -101,8 +101,10 @@ def _by_noise(fit: TrajectoryFit, predictor: Predictor) -> Array:
 
     inputs = drawn(fit.noise_u)
     state = fit.lin.f_u @ inputs + drawn(fit.open_steps())
-    left = predictor.white(predictor.errors(state, fit.lin.h_u @ inputs + drawn(fit.noise_y)))
-    return np.asarray(np.sqrt(np.mean(left**2, axis=(0, 2))))
+    shown = drawn(np.where(fit.unmeasured, 0.0, fit.noise_y))
+    left = predictor.white(predictor.errors(state, fit.lin.h_u @ inputs + shown))
+    measured = np.count_nonzero(~fit.unmeasured, axis=0)
+    return np.asarray(np.sqrt(np.sum(np.mean(left**2, axis=2), axis=0) / measured))
 
 
 def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Array, noise: Array) -> LinearisedRecording:
@@ -115,7 +117,7 @@ def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Arra
     for number, each in enumerate(machine.outputs):
         own = {name: columns[:, number, i] for i, name in enumerate(names)}
         own |= {name: column[:, number] for name, column in widths.items()}
-        valid = counts.get(each.channel, np.ones(len(table), dtype=bool))
+        valid = counts.get(each.channel, np.ones(len(table), dtype=bool)) & ~fit.unmeasured[:, number]
         response = missed[:, number] + columns[:, number] @ fit.p_at
         equations[each.channel] = Equation(each.channel, each.letter, each.subsystem, each.unit, response, own, valid)
     made = LinearisedRecording(

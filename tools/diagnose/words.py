@@ -37,6 +37,14 @@ def sentence(found: Diagnosis) -> str:
 def nothing(answer: dict[str, Any]) -> str:
     """The sentence for a diagnosis without a finding; a residual far above the noise does not prove a sound machine."""
     evidence = answer["evidence"]
+    if lacking := evidence.get("learnable"):
+        errors = evidence["held_out_errors"]
+        shares = "; ".join(
+            f"a black box of the training data leaves {errors[name]['black_box']:.2%} of the held-out {name}, where "
+            f"the equation leaves {errors[name]['before']:.2%}"
+            for name in lacking
+        )
+        return f"no shape of the catalogue explains what is missing: {shares}"
     if short := evidence.get("too_short_s"):
         name, needed_s = max(short.items(), key=lambda one: one[1])
         return (
@@ -142,6 +150,8 @@ def doubted(answer: dict[str, Any]) -> str:
 
 def verdict(answer: dict[str, Any]) -> tuple[str, str]:
     """(class, headline) for the page."""
+    if answer["evidence"].get("learnable"):
+        return "unknown", "Something is missing, and no shape of the catalogue explains it"
     if answer["evidence"].get("too_short_s"):
         return "unknown", "Too short for this noise"
     if not answer["detected"] and answer["evidence"].get("above_noise_floor"):

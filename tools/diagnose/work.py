@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     if found.result.detected:
         return EXIT_FOUND
     evidence = found.result.evidence
-    doubtful = evidence.above_noise_floor or evidence.too_short_s or evidence.impossible
+    doubtful = evidence.above_noise_floor or evidence.too_short_s or evidence.learnable or evidence.impossible
     return EXIT_DOUBTFUL if doubtful else EXIT_CLEAN
 
 
