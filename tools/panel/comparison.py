@@ -18,6 +18,7 @@ from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kernel
 from ranger_sim.sysid.twins import steps
+from ranger_sim.tools.diagnose import twin_words
 from ranger_sim.tools.panel import export
 from ranger_sim.tools.panel.source import Source
 
@@ -75,7 +76,7 @@ class Comparison:
                     data = [str(path)]
                 answer = await self._diagnosis(data, folder / "found")
                 self.report = (folder / "found" / "report.html").read_bytes()
-            self._show(at="", answer=summed_up(answer))
+            self._show(at="", answer=twin_words.summed_up(answer))
         except asyncio.CancelledError:
             self.content = {**NOTHING, "walk": self.content["walk"], "error": "stopped"}
             raise
@@ -146,19 +147,3 @@ def save(source: Source, path: pathlib.Path) -> None:
         elif channel.name.startswith(SETS):
             begins.append((number, end - SET_S))
     export.write_mf4(path, source, begins, end)
-
-
-def summed_up(answer: dict[str, Any]) -> dict[str, Any]:
-    """What a page shows of a diagnosis: verdict, causes by name and size, lines, unusual features in deviations."""
-    from ranger_sim.tools.diagnose import twin_figure, twin_words, words
-
-    kind, headline = words.verdict(answer)
-    twins = answer["evidence"]["twins"]
-    return {
-        "kind": kind,
-        "headline": headline,
-        "causes": [twin_words.cause(each) for each in answer["causes"]],
-        "lines": [line.removeprefix("twins: ") for line in twin_words.lines(answer)],
-        "unusual": twins["unusual"],
-        "usual": twin_figure.USUAL,
-    }

@@ -227,9 +227,7 @@ FILES = frozenset(path.name for path in PAGE.iterdir() if path.suffix in TYPES) 
 class Session:
     """One page: what it requests, and what it has shown."""
 
-    def __init__(
-        self, source: Source, socket: WebSocket, wants: Callable[[], None], comparison: Comparison
-    ) -> None:
+    def __init__(self, source: Source, socket: WebSocket, wants: Callable[[], None], comparison: Comparison) -> None:
         self.source = source
         self.comparison = comparison
         self.wants = wants  # called when the channels of its plots change
