@@ -36,7 +36,7 @@ def as_mf4(source: Source, channels: list[int], begin: float, end: float) -> byt
 
 
 def write_mf4(path: pathlib.Path, source: Source, begins: Iterable[tuple[int, float]], end: float) -> None:
-    """The same into a file, each channel from a begin of its own."""
+    """The same into a file; each channel has a separate begin."""
     from asammdf import MDF, Signal
 
     signals = []
