@@ -76,8 +76,8 @@ def boards(data: Sequence[Dataset]) -> str:
 
 def power(stage_values: dict[str, float], motor: MotorParameters | None, amps: float, volts: float) -> float:
     """Power of a stage that is held, W."""
-    one = [np.array([each]) for each in (0.0, amps, amps**2, volts)]
-    hold = Holds(*one, np.array([amps > 0.0]), np.array([amps]))
+    size, voltage = np.array([amps]), np.array([volts])
+    hold = Holds(np.zeros(1), size, size**2, voltage, size > 0.0, size)
     return float(motor_stage.law(hold, stage_values, motor)[0])
 
 
