@@ -19,7 +19,7 @@ from ranger_sim.sysid.preparation import Prepared, parted, prepared
 from ranger_sim.sysid.reading import open_recording
 from ranger_sim.sysid.regression import Regression
 from ranger_sim.sysid.results import DiagnosisResult, IdentificationResult
-from ranger_sim.sysid.twins import evidence
+from ranger_sim.sysid.twins import evidence, judgement
 
 File = str | pathlib.Path | Dataset
 
@@ -109,10 +109,10 @@ def diagnosis(
         ready = data
     tables = [each.table for each in data]
     names = ", ".join(table.name for table in tables)
-    without = ""
+    without, equations = "", _first_half(progress) if _is_walk(machine) else progress
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an overflow ends as a value that is not finite, see below
-            found = pipeline.diagnose(machine, tables, _judging(machine, held), seed, ready, known, progress)
+            found = pipeline.diagnose(machine, tables, _judging(machine, held), seed, ready, known, equations)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         text = f"{names}: no machine can be fitted to these numbers ({error}); nothing is concluded from such data"
         raise UserError(text) from None
@@ -121,13 +121,32 @@ def diagnosis(
             raise
         without, found = str(error), pipeline.without_equations(machine, tables, ready)
     if _is_walk(machine):
-        twins, _ = evidence.of(read[0], read[1], holdout_part, emulator)
+        progress("twins", 0.5)
+        twins, _ = evidence.of(read[0], read[1], holdout_part, emulator and _counted(emulator, progress))
         if without and twins.note:
             raise NoEquationError(f"{without}; and its twins cannot judge it: {twins.note}")
         found.result = evidence.combined(found.result, twins)
     if wrong := _not_finite(found.answer):
         raise UserError(f"{names}: {wrong} comes out as no number; nothing is concluded from such data")
     return found
+
+
+def _first_half(progress: pipeline.Progress) -> pipeline.Progress:
+    """Progress of the equations of a walk: its twins are the other half of the work."""
+    return lambda what, share: progress(what, 0.5 * share)
+
+
+def _counted(emulator: evidence.Emulator, progress: pipeline.Progress) -> evidence.Emulator:
+    """The emulator; each use is reported, of as many as a comparison may have."""
+    used = 0
+
+    def counted(asked: evidence.Asked) -> Sequence[evidence.Emulated]:
+        nonlocal used
+        used += 1
+        progress(f"twins with {asked.cause} walk", 0.5 + 0.5 * used / (judgement.EMULATIONS + 1))
+        return emulator(asked)
+
+    return counted
 
 
 def identify(

@@ -1,7 +1,7 @@
 """The pictures of the panel's page, one of each view: python -m studies.pictures.panel (needs Chromium; a minute).
 
 A robot walks in real time meanwhile, so two runs of this give two pictures of the same. The view Link is of its data
-link, with drop-outs.
+link, with drop-outs, and the view Twins of a recorded walk with a weak hip spring.
 """
 
 import base64
@@ -26,6 +26,10 @@ OF_A_ROBOT = {
     "faults": "panel-faults.png",
 }
 OF_A_LINK = {"link": "panel-link.png"}
+OF_A_WALK = {"twins": "panel-twins.png"}
+WEAK = (
+    'base = "ranger"\n[parameters]\nhip_spring_Nm_per_rad = 6.46\n[sources]\nhip_spring_Nm_per_rad = "for a picture"\n'
+)
 OPENED = (
     "for (const group of document.querySelectorAll('#parameter-groups details'))"
     " group.open = group.innerText.startsWith('P_H ')"
@@ -71,8 +75,12 @@ def picture_views(views, *arguments):
             if view == "faults":
                 page.value(ARMED)
                 page.until("window.rangerPanel.state().faults?.[0]?.cleared_s")
-            pictures = page.value("window.rangerPanel.shown()")
-            page.until(f"window.rangerPanel.shown() > {pictures} + 8")
+            if view == "twins":
+                page.value("document.querySelector('#twins-walks button').click()")
+                page.until("!document.getElementById('twins-answer').hidden")
+            else:
+                pictures = page.value("window.rangerPanel.shown()")
+                page.until(f"window.rangerPanel.shown() > {pictures} + 8")
             picture = page.call("Page.captureScreenshot", format="png")["data"]
             (DOCS / name).write_bytes(base64.b64decode(picture))
             print(DOCS / name)
@@ -82,6 +90,12 @@ def main():
     picture_views(OF_A_ROBOT, "--walk")
     with started("up", "--daq-port", "pty", "--daq-dropouts") as robot:
         picture_views(OF_A_LINK, "--port", said(robot, r"/dev/pts/\d+"))
+    with tempfile.TemporaryDirectory() as folder:
+        body, walk = pathlib.Path(folder) / "weak.toml", pathlib.Path(folder) / "walk"
+        body.write_text(WEAK)
+        command = ["walk", "--steps", "48", "--seed", "71", "--battery", "80%", "--log", "full", "--body", str(body)]
+        subprocess.run([sys.executable, "-m", "ranger_sim", *command, "--out", str(walk)], check=True)
+        picture_views(OF_A_WALK, str(walk))
 
 
 if __name__ == "__main__":

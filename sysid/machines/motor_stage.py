@@ -294,7 +294,8 @@ def holds(groups: Sequence[Samples], zero_A: float = 0.0) -> Holds:
         )
         cuts |= np.abs(np.diff(each.current[at])) > 0.3 * np.abs(each.current[at][1:]) + NO_CURRENT
         for run in np.split(at, np.flatnonzero(cuts) + 1):
-            amps = each.current[run] - zero_A
+            # where the motor carries none, what the sensor shows is noise, whose size is not a current's
+            amps = (each.current[run] - zero_A) * loaded[run[0]]
             rows.append(
                 (
                     float(np.median(each.power[run])),
@@ -314,26 +315,36 @@ def holds(groups: Sequence[Samples], zero_A: float = 0.0) -> Holds:
 
 @dataclasses.dataclass
 class Fit:
-    """Values (p,), their covariance (p, p), degrees of freedom, and weighted residuals (n,)."""
+    """Values (p,), their covariance (p, p), degrees of freedom, and weighted residuals (n,).
+
+    cautious: a covariance (p, p) that counts rows which decide a value by themselves for more. Intervals hold with
+    `covariance`; far out in its tails, where a value is named, they would not.
+    """
 
     values: Array
     covariance: Array
+    cautious: Array
     freedom: int
     left: Array
 
-    def half(self, number: int, level: float = 0.05) -> float:
-        """Half of the interval of a value."""
-        return float(
-            stats.t.ppf(1.0 - 0.5 * level, self.freedom) * math.sqrt(max(self.covariance[number, number], 0.0))
-        )
+    def half(self, number: int) -> float:
+        """Half of the 95 % interval of a value."""
+        return self._half(self.covariance, number, 0.05)
+
+    def named(self, number: int, level: float) -> float:
+        """How far a value may be from another at this level before it is named."""
+        return self._half(self.cautious, number, level)
+
+    def _half(self, covariance: Array, number: int, level: float) -> float:
+        return float(stats.t.ppf(1.0 - 0.5 * level, self.freedom) * math.sqrt(max(covariance[number, number], 0.0)))
 
 
 def fitted(
     columns: Array, response: Array, deviation: Array, groups: np.ndarray | None = None, least: float = 1.0
 ) -> Fit:
     """Weighted least squares with Huber's weights beyond 2.5 deviations; the covariance allows for each row's own
-    scatter (HC3, HC4 where that is more), or for that of groups of rows. least: deviations are not taken for smaller
-    than this part of themselves."""
+    scatter (HC3; cautious: HC4 where that is more), or for that of groups of rows. least: deviations are not taken for
+    smaller than this part of themselves."""
     weight = 1.0 / deviation
     for _ in range(20):
         a, y = columns * weight[:, None], response * weight
@@ -346,20 +357,16 @@ def fitted(
     rest = y - a @ values
     if groups is None:
         leverage = np.clip(np.einsum("ij,jk,ik->i", a, bread, a), 0.0, 0.95)
-        more = np.minimum(4.0, leverage * len(y) / columns.shape[1])
-        meat = (a * (rest**2 / (1.0 - leverage) ** np.maximum(more, 2.0))[:, None]).T @ a
+        more = np.maximum(2.0, np.minimum(4.0, leverage * len(y) / columns.shape[1]))
+        meats = [(a * (rest**2 / (1.0 - leverage) ** power)[:, None]).T @ a for power in (np.full(len(y), 2.0), more)]
         count = len(y)
     else:
         numbers = np.unique(groups)
         sums = np.array([a[groups == number].T @ rest[groups == number] for number in numbers])
         count = len(numbers)
-        meat = sums.T @ sums * count / max(count - 1, 1)
-    return Fit(
-        np.asarray(values, dtype=float),
-        np.asarray(bread @ meat @ bread, dtype=float),
-        max(1, count - columns.shape[1]),
-        left,
-    )
+        meats = [sums.T @ sums * count / max(count - 1, 1)] * 2
+    covariance, cautious = (np.asarray(bread @ meat @ bread, dtype=float) for meat in meats)
+    return Fit(np.asarray(values, dtype=float), covariance, cautious, max(1, count - columns.shape[1]), left)
 
 
 def simulated_of(motor: MotorParameters) -> dict[str, float]:
@@ -471,7 +478,7 @@ def stage(board: str, groups: Sequence[Samples], motor: MotorParameters | None, 
         power = kept.power - ripple(motor, kept.size * kept.loaded, kept.volts, *map(float, fit.values[1:3]))
         fit = fitted(_columns(kept, names), power, _deviation(kept.power))
     for number, name in enumerate(names):
-        add(name, float(fit.values[number]), fit.half(number), fit.half(number, level))
+        add(name, float(fit.values[number]), fit.half(number), fit.named(number, level))
     result.left_W = float(np.sqrt(np.mean((power - _columns(kept, names) @ fit.values) ** 2)))
     _note_changes(result, groups)
     _move(result, groups, zero, motor, fit, names, add, level)

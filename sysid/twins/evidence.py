@@ -142,12 +142,12 @@ def of(
     )
     part = (0.0, 1.0 if holdout_part is None else 1.0 - holdout_part)
     found = rest_of(view, walks, part=part)
-    spread = step_map.roughness(found, view.few)
+    floor_m = view.roughness(found)
     emulate, why_not = None, unconfirmed(file, changed)
     if emulator is not None and not why_not:
         emulate = _emulate(emulator, file, rate, view, _voltage(walks))
     with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
-        verdict = judgement.judge(view, found, step_map.outcomes(view.few), spread, emulate)
+        verdict = judgement.judge(view, found, step_map.outcomes(view.few), floor_m, emulate)
     if verdict is None:
         note = f"{int(found.inside.sum())} steps that can be compared are too few"
         return TwinsEvidence(controller, note=note + _fallen(datasets)), None
@@ -155,7 +155,7 @@ def of(
     later = rest_of(view, held) if held else None
     if holdout_part is not None:
         later = rest_of(view, walks, part=(part[1], 1.0))
-    compared = _evidence(controller, rate, verdict, changed, _held_out(verdict, later, spread), is_old(file))
+    compared = _evidence(controller, rate, verdict, changed, _held_out(verdict, later), is_old(file))
     return dataclasses.replace(compared, unconfirmed=why_not if verdict.detected else ""), verdict
 
 
@@ -190,7 +190,7 @@ def _emulate(emulator: Emulator, file: TwinFile, rate: str, view: View, voltage_
         mean = mean_of(together) if together is not None else None
         if together is None or mean is None:
             return None
-        return judgement.Walks(mean, step_map.roughness(together, view.few))
+        return judgement.Walks(mean, view.roughness(together))
 
     return emulate
 
@@ -250,13 +250,13 @@ def _is_open(direction: Direction, file: TwinFile, datasets: Sequence[Dataset]) 
     return direction.at not in logged or not _same(logged[direction.at], file.made_of["parameters"][direction.at])
 
 
-def _held_out(verdict: Verdict, later: Rest | None, spread: float) -> tuple[float, float] | None:
+def _held_out(verdict: Verdict, later: Rest | None) -> tuple[float, float] | None:
     """Distance of held-out steps without and with the named cause, over its degrees of freedom."""
     view = verdict.view
     mean = mean_of(later) if later is not None else None
     if mean is None:
         return None
-    space = judgement.Space(view, mean, view.floor(spread)[1])
+    space = judgement.Space(view, mean, view.weights(verdict.floor_m))
     before = float(space.value @ space.value) / space.freedom
     if verdict.named is None:
         return before, before

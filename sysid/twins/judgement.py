@@ -37,10 +37,10 @@ UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left un
 
 @dataclasses.dataclass(frozen=True)
 class Walks:
-    """Emulated walks as a vector. spread: of their footholds."""
+    """Emulated walks as a vector. floor_m: as rough as their steps look."""
 
     mean: Mean
-    spread: float
+    floor_m: float
 
 
 Emulate = Callable[[Direction, float, float], Walks | None]
@@ -261,15 +261,15 @@ def sound_distance(view: View) -> float:
 
 
 def judge(
-    view: View, found: Rest, names: Sequence[str], spread: float, emulate: Emulate | None = None
+    view: View, found: Rest, names: Sequence[str], floor_m: float, emulate: Emulate | None = None
 ) -> Verdict | None:
-    """The verdict about what the map leaves of a walk. names: of the features; spread: of the footholds' heights, m;
+    """The verdict about what the map leaves of a walk. names: of the features; floor_m: its roughness;
     emulate: walks of a cause at a size, by which the likeliest causes are confirmed. None for a walk with too few
     steps."""
     mean = mean_of(found)
     if mean is None:
         return None
-    floor_m, weights = view.floor(spread)
+    weights = view.weights(floor_m)
     space = Space(view, mean, weights)
     fits, since = space.fits(), 0
     if not fits:
@@ -288,7 +288,7 @@ def judge(
     visible, unusual = _visible(space, gain_limit), _unusual(view, mean, weights, names)
     detected = fits[0].gain > gain_limit or distance > distance_limit
     if emulate is not None and detected:
-        view = confirmed(view, mean, weights, spread, emulate)
+        view = confirmed(view, mean, weights, floor_m, emulate)
         space = Space(view, mean, weights)
         fits = space.fits()
     best = fits[0]
@@ -314,10 +314,11 @@ def judge(
     )
 
 
-def confirmed(view: View, mean: Mean, weights: Array, spread: float, emulate: Emulate) -> View:
+def confirmed(view: View, mean: Mean, weights: Array, looks_m: float, emulate: Emulate) -> View:
     """The view with the likeliest causes emulated at the sizes found; what an emulation shows may bring another cause
     or size to the front. It ends when the first ones have been emulated and the best explains the walk, or after too
-    many. spread: of the log's footholds, to which a cause adds: its walks are on a floor of what is left."""
+    many. looks_m: roughness of the log's floor by its steps, to whose scatter a cause adds: its walks are on a floor of
+    what is left."""
     middle, sound = weights @ view.middle, sound_distance(view)
     own: dict[str, float] = {}
     for _ in range(EMULATIONS):
@@ -331,12 +332,12 @@ def confirmed(view: View, mean: Mean, weights: Array, spread: float, emulate: Em
         if not wanted:
             break
         direction, size = wanted[0].direction, wanted[0].size
-        floor_m = view.roughness(spread**2 - own.get(direction.name, 0.0))
+        floor_m = float(np.sqrt(max(looks_m**2 - own.get(direction.name, 0.0), 0.0)))
         walked = emulate(direction, size, floor_m)
         moved, steps = np.zeros_like(middle), 0
         if walked is not None:
             moved, steps = np.nan_to_num(walked.mean.value - middle), sum(walked.mean.steps)
-            own[direction.name] = max(walked.spread**2 - view.foothold(floor_m) ** 2, 0.0)
+            own[direction.name] = max(walked.floor_m**2 - floor_m**2, 0.0)
         renewed = dataclasses.replace(direction, knots=(*direction.knots, Knot(size, moved, steps)))
         view = dataclasses.replace(
             view, directions=tuple(renewed if each is direction else each for each in view.directions)

@@ -8,13 +8,12 @@ import numpy as np
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins import judgement, step_map
 from ranger_sim.sysid.twins.features import NAMES
-from ranger_sim.sysid.twins.model import Direction, Mean, View, mean_of
+from ranger_sim.sysid.twins.model import RARE, Direction, Mean, View, mean_of
 from ranger_sim.sysid.twins.step_map import FOOTHOLD, VOLTAGE, LegMap, Rest
 from ranger_sim.sysid.twins.steps import INNER, OUTER
 
 FOLDS = 4  # of sound twins, for thresholds
 SHRUNK = 0.02  # of a correlation towards none
-RARE = 6.0  # deviations at which a sound step is cut
 LEAST = 1e-4  # of a feature's size: a scatter below it is a constant's
 SIDES = (OUTER, INNER)
 
@@ -126,11 +125,7 @@ def _scattered(
         products[side] = (1.0 - SHRUNK) * products[side] + SHRUNK * np.eye(p)
         scale = np.sqrt(np.diag(products[side]))
         products[side] /= np.outer(scale, scale)
-    spreads = [
-        float(np.median([step_map.roughness(rest, few) for twin, rest in pairs if twin.floor == floor]))
-        for floor in range(count)
-    ]
-    view = View(few, legs, np.array(floors_m, dtype=float), np.array(spreads), middle, deviation, products,
+    view = View(few, legs, np.array(floors_m, dtype=float), middle, deviation, products,
                 np.zeros((0, 2 * p)), np.zeros((0, 2 * p)), (), np.zeros((0, 3)))  # fmt: skip
     return dataclasses.replace(view, between=_between(view, means))
 
@@ -190,7 +185,7 @@ def _alarm(view: View, twin: Twinned, rest: Rest) -> tuple[float, float, float] 
     mean = mean_of(rest)
     if mean is None:
         return None
-    weights = view.floor(step_map.roughness(rest, view.few))[1]
+    weights = view.weights(view.roughness(rest))
     space = judgement.Space(view, mean, weights)
     fits = space.fits()
     return fits[0].gain if fits else 0.0, float(space.value @ space.value) / space.freedom, float(twin.floor)

@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import special
 
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins.step_map import LegMap, Rest
@@ -14,6 +15,9 @@ from ranger_sim.sysid.twins.steps import INNER, OUTER
 
 TRIM = 0.1  # of the steps at either end, which do not count
 FEWEST = 3  # steps of either leg
+RARE = 6.0  # deviations at which a sound step is cut
+TRIED = 41  # floors, from level to the roughest that was made
+SHOWN = 1.7  # times its variance on a level floor: a feature that has as much on the roughest one shows the floor
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,16 +57,15 @@ class Direction:
 class View:
     """Of one rate of the log. few: of the hip's and the leg's angle and the walk's state alone.
 
-    floors_m: (f,) roughness; footholds: (f,) what `step_map.roughness` gives there; middle: (f, 2 p); deviation:
-    (f, 2 p) of one step; correlation: (2, p, p) of a leg's steps; between: (k, 2 p), in which walks differ as a whole;
-    loose: (k, 2 p), in which bodies within tolerances differ beyond the sum of these; alarms: (a, 3) gain of the best
-    cause, distance and floor's number, of sound walks that had no part in the scatter.
+    floors_m: (f,) roughness, rising; middle: (f, 2 p); deviation: (f, 2 p) of one step; correlation: (2, p, p) of a
+    leg's steps; between: (k, 2 p), in which walks differ as a whole; loose: (k, 2 p), in which bodies within tolerances
+    differ beyond the sum of these; alarms: (a, 3) gain of the best cause, distance and floor's number, of sound walks
+    that had no part in the scatter.
     """
 
     few: bool
     legs: tuple[LegMap, LegMap]
     floors_m: Array
-    footholds: Array
     middle: Array
     deviation: Array
     correlation: Array
@@ -71,25 +74,41 @@ class View:
     directions: tuple[Direction, ...]
     alarms: Array
 
-    def floor(self, spread: float) -> tuple[float, Array]:
-        """(roughness in m, weights of the floors (f,)) of a walk by the spread of its footholds."""
-        if len(self.footholds) == 1 or not np.isfinite(spread):
-            return float(self.floors_m[0]), np.eye(len(self.footholds))[0]
-        place = float(np.interp(spread**2, self.footholds**2, np.arange(len(self.footholds))))
-        low = min(int(place), len(self.footholds) - 2)
-        weights = np.zeros(len(self.footholds))
-        weights[low], weights[low + 1] = low + 1 - place, place - low
-        return float(weights @ self.floors_m), weights
+    def weights(self, floor_m: float) -> Array:
+        """(f,) shares of the floors that were made in one of this roughness: variances go with its square."""
+        count = len(self.floors_m)
+        place = float(np.interp(floor_m**2, self.floors_m**2, np.arange(count)))
+        low = max(min(int(place), count - 2), 0)
+        weights = np.zeros(count)
+        weights[low] = low + 1 - place
+        if count > 1:
+            weights[low + 1] = place - low
+        return weights
 
-    def foothold(self, floor_m: float) -> float:
-        """The spread of a sound walk's footholds on a floor of this roughness."""
-        return float(np.sqrt(np.interp(floor_m**2, self.floors_m**2, self.footholds**2)))
+    def roughness(self, found: Rest) -> float:
+        """The roughness of the floor, in m, on which a sound robot's steps scatter as much as these.
 
-    def roughness(self, spread_square: float) -> float:
-        """The floor, in m, on which a sound walk's footholds have the square of a spread; 0 when it is not known."""
-        if not np.isfinite(spread_square):
+        A cause moves features; the floor scatters them. So each feature that shows the floor counts about its mean of
+        either leg, and the median of all decides: no single one, which a slow log may sample too coarsely.
+        """
+        tried = self.floors_m[-1] * np.linspace(0.0, 1.0, TRIED)
+        p = self.correlation.shape[1]
+        beyond = []  # (TRIED, features): logarithms of variances, over what sound steps have on each floor
+        for side in (OUTER, INNER):
+            left = found.left[found.inside & (found.leg == side)]
+            if len(left) < FEWEST:
+                continue
+            left = np.clip(left - np.median(left, 0), -RARE, RARE)
+            variance = left.var(0, ddof=1)
+            sound = np.array([self.weights(each) @ self.deviation[:, side * p : (side + 1) * p] ** 2 for each in tried])
+            shown = (sound[-1] > SHOWN * sound[0]) & np.isfinite(variance) & (variance > 0.0)
+            half = 0.5 * (len(left) - 1)
+            few = float(special.digamma(half)) - np.log(half)  # what the logarithm of a variance is too small by
+            beyond.append(np.log(variance[shown]) - few - np.log(sound[:, shown]))
+        together = np.hstack(beyond) if beyond else np.zeros((TRIED, 0))
+        if not together.shape[1]:
             return 0.0
-        return float(np.sqrt(np.interp(spread_square, self.footholds**2, self.floors_m**2)))
+        return float(np.interp(0.0, -np.median(together, axis=1), tried))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -97,17 +97,6 @@ class Rest:
     inside: np.ndarray
 
 
-def roughness(found: Rest, few: bool) -> float:
-    """Spread of what is left of the footholds' heights, in the deviations of the maps; not a number without heights."""
-    if few:
-        return float("nan")
-    left = found.left[found.inside, outcomes(few).index(FOOTHOLD)]
-    left = left[np.isfinite(left)]
-    if len(left) < 6:
-        return float("nan")
-    return float(np.subtract(*np.quantile(left, (0.84, 0.16))) / 2.0)
-
-
 def rest(legs: Sequence[LegMap], leg: np.ndarray, found: Array, few: bool, usable: np.ndarray | None = None) -> Rest:
     """What is left of each step but the first. leg: (k,); found: (k, all features); usable: (k,) steps that count."""
     names = starts(few)

@@ -1,7 +1,7 @@
 """A walk's log on an even clock, cut into steps."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -139,6 +139,15 @@ def of_dataset(dataset: Dataset) -> Steps | None:
     return of_columns(columns, every_s)
 
 
+def shows_steps(names: Collection[str]) -> bool:
+    """Whether channels of these names show where a walk's steps end."""
+
+    def has(variable: str) -> bool:
+        return variable in names or any(name in names for name, _ in _other_names(variable))
+
+    return has("MCH_ANGLE") and any(map(has, COUNTED))
+
+
 def in_table_units(variable: str, unit: str) -> float:
     """Factor from a recording's unit of a variable to the master table's; recordings have s where the table has ms."""
     return 1e3 if unit == "s" and UNITS[ID_OF[variable]] == "ms" else 1.0
@@ -149,15 +158,21 @@ def _channel(dataset: Dataset, variable: str) -> tuple[Array, Array] | None:
     if variable in dataset:
         channel = dataset[variable]
         return channel.time_s, channel.value * in_table_units(variable, channel.unit)
+    for name, sign in _other_names(variable):
+        if name in dataset:
+            return dataset[name].time_s, sign * dataset[name].value
+    return None
+
+
+def _other_names(variable: str) -> Iterator[tuple[str, float]]:
+    """Names of a variable in the experiment `walk`, each with its sign against the variable."""
     wanted = {"E_LO_ANGLE": "outer_leg_angle_rad"}.get(variable, "")
     for each in EXPERIMENTS["walk"].channels:
         signs = {other.removeprefix("-"): -1.0 if other.startswith("-") else 1.0 for other in each.also}
         if variable in signs or each.name == wanted:
             to_name = signs.get(variable, 1.0)  # the variable's sign against the experiment's name
             for name, sign in ((each.name, 1.0), *signs.items()):
-                if name in dataset:
-                    return dataset[name].time_s, to_name * sign * dataset[name].value
-    return None
+                yield name, to_name * sign
 
 
 def by_link(columns: Mapping[str, Array], every: int, phases: Sequence[int]) -> dict[str, Array]:

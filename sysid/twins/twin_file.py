@@ -23,7 +23,7 @@ FOLDER = pathlib.Path(__file__).parent / "files"
 FULL, LINK, FEW = "full", "link", "few"  # the table's rate, the data link's, and hip, leg and state alone
 MADE_OF = "made_of.json"
 SAME_TIME = (1980, 1, 1, 0, 0, 0)  # of every part of the file, so that its bytes say nothing but its numbers
-PARTS = ("floors_m", "footholds", "middle", "deviation", "correlation", "between", "loose", "alarms")
+PARTS = ("floors_m", "middle", "deviation", "correlation", "between", "loose", "alarms")
 OF_CAUSE = ("cause", "at", "parameter", "form", "low", "high", "tolerance")
 OF_LEG = ("start", "reach", "foothold", "weights", "deviation")
 

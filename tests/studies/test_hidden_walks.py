@@ -64,6 +64,16 @@ def test_a_hidden_cause_is_named_first(name, size, at):
     assert low <= size <= high
 
 
+@pytest.mark.parametrize(("name", "size", "row"), [("slope", 0.005, "link"), ("outer ankle's friction", 0.1, "2015")])
+def test_a_cause_that_moves_a_leg_is_not_taken_for_a_rough_floor_or_its_absence(name, size, row):
+    case = hidden(name, size)
+    found, _ = evidence.of([as_row(recorded(case), row)], emulator=emulate)
+    assert found.detected and found.named is not None and found.since_step == 0
+    assert f"{found.named.name} at {found.named.at}" == case.kind.right
+    low, high = found.named.parameters[case.kind.parameter].ci95
+    assert low <= size <= high
+
+
 def test_a_zero_four_times_beyond_the_sizes_of_twins_has_an_interval_that_holds():
     case = hidden("inner ankle's zero", 0.07)
     found, _ = evidence.of([recorded(case)], emulator=emulate)

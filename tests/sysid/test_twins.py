@@ -101,7 +101,7 @@ OTHER = generator(3, "effect of another cause").normal(size=(2, len(FEW)))
 NOISE = 0.3
 
 
-def made_up(seed, moved=0.0, other=0.0, count=40, since=0):
+def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE):
     """Steps whose outcomes are linear in the step before, plus noise and effects of this size from a step on."""
     draw = generator(seed, "made-up walk")
     found = np.full((count, len(features.NAMES)), np.nan)
@@ -109,7 +109,7 @@ def made_up(seed, moved=0.0, other=0.0, count=40, since=0):
     starts, outcomes = step_map.columns(FEW_START), step_map.columns(FEW)
     found[0] = draw.normal(size=found.shape[1])
     for row in range(1, count):
-        made = 0.15 * found[row - 1, starts] @ SLOPES + NOISE * draw.normal(size=len(FEW))
+        made = 0.15 * found[row - 1, starts] @ SLOPES + noise * draw.normal(size=len(FEW))
         if row >= since:
             made += moved * EFFECT[leg[row]] + other * OTHER[leg[row]]
         found[row] = draw.normal(size=found.shape[1])
@@ -137,7 +137,51 @@ def view():
 
 def judged(view, leg, found):
     rest = step_map.rest(view.legs, leg, found, few=True)
-    return judgement.judge(view, rest, FEW, float("nan"))
+    return judgement.judge(view, rest, FEW, 0.0)
+
+
+@pytest.fixture(scope="module")
+def on_two_floors():
+    """The view of a level floor and one of 1 mm, on which steps scatter twice as much."""
+    twins = [
+        learning.Twinned(floor, *made_up(500 + 100 * floor + seed, noise=noise))
+        for floor, noise in enumerate((NOISE, 2.0 * NOISE))
+        for seed in range(40)
+    ]
+    return learning.learned(twins, [], [0.0, 0.001], few=True)
+
+
+@pytest.mark.parametrize(
+    ("noise", "floor_m"), [(0.5, 0.0), (1.0, 0.0), (1.5, 0.001 * (1.25 / 3.0) ** 0.5), (2.0, 0.001), (4.0, 0.001)]
+)
+def test_a_floor_is_as_rough_as_the_scatter_of_all_features_says(on_two_floors, noise, floor_m):
+    view = on_two_floors
+    rest = step_map.rest(view.legs, *made_up(9100, count=400, noise=noise * NOISE), few=True)
+    # the variance of 200 steps of either leg is known to a tenth, which is 0.13 mm on a level floor
+    assert view.roughness(rest) == pytest.approx(floor_m, abs=0.13e-3)
+
+
+def test_a_cause_that_moves_each_leg_another_way_is_not_a_rougher_floor(on_two_floors):
+    view = on_two_floors
+    sound, moved = (
+        view.roughness(step_map.rest(view.legs, *made_up(9200, moved=size, noise=1.5 * NOISE), few=True))
+        for size in (0.0, 0.8)
+    )
+    assert 0.3e-3 < sound < 1e-3 and moved == pytest.approx(sound, abs=0.1e-3)
+
+
+def test_a_feature_that_wildly_scatters_alone_is_not_a_rougher_floor(on_two_floors):
+    view = on_two_floors
+    leg, found = made_up(9300)
+    before = view.roughness(step_map.rest(view.legs, leg, found, few=True))
+    found[:, features.NAMES.index("leg state 3")] *= 20.0
+    found[:, features.NAMES.index("hip angle early")] = np.nan  # nor one that is missing
+    assert view.roughness(step_map.rest(view.legs, leg, found, few=True)) == pytest.approx(before, abs=0.1e-3)
+
+
+def test_shares_of_floors_go_with_the_square_of_the_roughness(on_two_floors):
+    assert on_two_floors.weights(0.0005).tolist() == pytest.approx([0.75, 0.25])
+    assert on_two_floors.weights(0.0).tolist() == [1.0, 0.0] and on_two_floors.weights(0.003).tolist() == [0.0, 1.0]
 
 
 def test_a_sound_walk_is_silent_and_lists_what_it_would_have_shown(view):
@@ -207,7 +251,7 @@ def emulating(view, asked, falls_from=np.inf):
             return None
         effect = {"moved": bent(size)} if direction.cause == "geometry" else {"other": size}
         walked = [step_map.rest(view.legs, *made_up(9800 + seed, **effect), few=True) for seed in range(2)]
-        return judgement.Walks(mean_of(evidence.joined(walked)), float("nan"))
+        return judgement.Walks(mean_of(evidence.joined(walked)), 0.0)
 
     return emulate
 
@@ -215,7 +259,7 @@ def emulating(view, asked, falls_from=np.inf):
 def confirmed(view, size, seed=9750, **more):
     asked = []
     rest = step_map.rest(view.legs, *made_up(seed, moved=bent(size)), few=True)
-    return judgement.judge(view, rest, FEW, float("nan"), emulating(view, asked, **more)), asked
+    return judgement.judge(view, rest, FEW, 0.0, emulating(view, asked, **more)), asked
 
 
 @pytest.mark.parametrize("size", [1.2, -1.8])

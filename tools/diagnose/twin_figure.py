@@ -7,9 +7,8 @@ from typing import Any
 import plotly.graph_objects as go
 
 from ranger_sim.tools.diagnose.figures import AFTER, BEFORE, finished
+from ranger_sim.tools.diagnose.twin_words import USUAL
 from ranger_sim.tools.report.figures import Figure
-
-USUAL = 3.0  # deviations: a walk of a hundred features has few beyond it by chance
 
 
 def unusual(found: dict[str, Any] | None) -> Figure | None:

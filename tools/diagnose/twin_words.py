@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from ranger_sim.tools.diagnose import words
+
+USUAL = 3.0  # deviations: a walk of a hundred features has few beyond it by chance
 MOST = 6  # causes of a list that are in one line
 RATES = {
     "full": "at the table's rate",
@@ -59,6 +62,19 @@ def lines(answer: dict[str, Any]) -> list[str]:
         before, after = found["held_out"]
         out.append(f"twins: distance of the held-out steps {before:.2f}, with the cause {after:.2f}")
     return out
+
+
+def summed_up(answer: dict[str, Any]) -> dict[str, Any]:
+    """What other pages show of a walk's diagnosis: verdict, causes by name and size, lines, features in deviations."""
+    kind, headline = words.verdict(answer)
+    return {
+        "kind": kind,
+        "headline": headline,
+        "causes": [cause(each) for each in answer["causes"]],
+        "lines": [line.removeprefix("twins: ") for line in lines(answer)],
+        "unusual": answer["evidence"]["twins"]["unusual"],
+        "usual": USUAL,
+    }
 
 
 def cause(each: dict[str, Any]) -> str:

@@ -96,7 +96,8 @@ def source_of(options: argparse.Namespace, report: Any) -> Iterator[Any]:
 
         align = Event.typed(options.align) if options.align else None
         how = datasets.how_of(options)
-        with contextlib.closing(RecordingSource(options.recordings, how, options.shift, align)) as recording:
+        words = datasets.again(options)
+        with contextlib.closing(RecordingSource(options.recordings, how, options.shift, align, words)) as recording:
             yield recording
     elif options.port:
         from ranger_sim.tools.panel.link import LinkSource

@@ -6,7 +6,7 @@ import csv
 import io
 import pathlib
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -29,10 +29,18 @@ def as_csv(source: Source, channels: list[int], begin: float, end: float) -> byt
 
 def as_mf4(source: Source, channels: list[int], begin: float, end: float) -> bytes:
     """ASAM MDF 4: a group for each channel, with unit and meaning. UserError without samples."""
+    with tempfile.TemporaryDirectory(prefix="ranger-sim-") as folder:
+        path = pathlib.Path(folder) / "selection.mf4"
+        write_mf4(path, source, [(channel, begin) for channel in channels], end)
+        return path.read_bytes()
+
+
+def write_mf4(path: pathlib.Path, source: Source, begins: Iterable[tuple[int, float]], end: float) -> None:
+    """The same into a file; each channel has a separate begin."""
     from asammdf import MDF, Signal
 
     signals = []
-    for number in channels:
+    for number, begin in begins:
         channel = source.channels[number]
         times, values = source.samples(number, begin, end)
         if len(times):
@@ -42,12 +50,10 @@ def as_mf4(source: Source, channels: list[int], begin: float, end: float) -> byt
             )
     if not signals:
         raise UserError("export: there are no samples of these channels in this window")
-    with tempfile.TemporaryDirectory(prefix="ranger-sim-") as folder, MDF(version="4.10") as file:
+    with MDF(version="4.10") as file:
         for signal in signals:
             file.append([signal])
-        path = pathlib.Path(folder) / "selection.mf4"
         file.save(path)
-        return path.read_bytes()
 
 
 KINDS: dict[str, Callable[[Source, list[int], float, float], bytes]] = {"csv": as_csv, "mf4": as_mf4}

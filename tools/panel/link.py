@@ -116,7 +116,8 @@ class LinkSource(Source):
     """The data received over `port`. UserError when it cannot be opened."""
 
     late_s = 2.0  # the slow list comes round in a third of a second, and its lateness is known only later
-    can = frozenset({"live", "parameters", "errors", "link"})
+    can = frozenset({"live", "parameters", "errors", "link", "twins"})
+    walks = ("what the panel has received",)
 
     def __init__(self, port: str) -> None:
         super().__init__()

@@ -16,6 +16,7 @@ from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.sysid.dataset import Dataset
 from ranger_sim.sysid.readers import run_folder
 from ranger_sim.sysid.recipe import Recipe
+from ranger_sim.sysid.twins import steps
 from ranger_sim.tools.panel.channels import EMPTY, Channel, Times, Trace, Values, between, thinned
 from ranger_sim.tools.panel.inside.buses import Bus
 from ranger_sim.tools.panel.inside.recorded import NO_SLOTS, REPORTED_SLOTS, Decoded, RunLogs
@@ -60,7 +61,8 @@ class Event:
 class RecordingSource(Source):
     """One or two recordings, the second overlaid on the first: `shift_s` later, after aligning the events of `align`.
 
-    how: of `reading.open_recording`. UserError for an unreadable recording, or one in which the event never occurs.
+    how: of `reading.open_recording`; options: the same as a command line has them. UserError for an unreadable
+    recording, or one in which the event never occurs.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class RecordingSource(Source):
         how: Mapping[str, Any] | None = None,
         shift_s: float = 0.0,
         align: Event | None = None,
+        options: Sequence[str] = (),
     ) -> None:
         super().__init__()
         how = dict(how or {})
@@ -86,7 +89,7 @@ class RecordingSource(Source):
         self.data: list[tuple[np.ndarray, np.ndarray, float | None]] = []
         for number, (path, dataset) in enumerate(zip(paths, read_in, strict=True)):
             group = "" if number == 0 else f" ({pathlib.Path(path).name})"
-            steps = (pathlib.Path(path) / run_folder.VARIABLES).is_file()  # it keeps changes, not samples
+            by_changes = (pathlib.Path(path) / run_folder.VARIABLES).is_file()  # it keeps changes, not samples
             for name, channel in dataset.channels.items():
                 row = known.get(name)
                 whose = "body" if name.startswith(TRUTH) else row.publisher if row is not None else "recording"
@@ -95,7 +98,7 @@ class RecordingSource(Source):
                 states = known_states().get(name, {})
                 self.channels.append(Channel(shown, channel.unit, description, whose + group, states))
                 times = channel.time_s + (shift_s if number else 0.0)
-                period = None if steps or len(times) < 3 else float(np.median(np.diff(times))) or None
+                period = None if by_changes or len(times) < 3 else float(np.median(np.diff(times))) or None
                 self.data.append((times, channel.value.astype(np.float32), period))
         if not self.data:
             raise UserError(f"{paths[0]}: there is no channel in it")
@@ -106,7 +109,11 @@ class RecordingSource(Source):
         self.loads = [bus for part in self.inside for bus in part.buses if bus.load is not None]
         self.channels += [channel for bus in self.loads for channel in bus.channels()]
         errors = any(name in known and name.startswith("ERROR_") for dataset in read_in for name in dataset.channels)
-        self.can = frozenset({"play", "errors"} if errors else {"play"})
+        walks = [path for path, dataset in zip(paths, read_in, strict=True) if steps.shows_steps(dataset.channels)]
+        self.walks = tuple(pathlib.Path(path).name for path in walks)
+        self.recordings = [[path, *options] for path in walks]
+        offered = {"play": True, "errors": errors, "twins": bool(walks)}
+        self.can = frozenset(name for name, is_so in offered.items() if is_so)
         self.number = {channel.name: place for place, channel in reversed(list(enumerate(self.channels)))}
         legs_known = any(all(name in self.number for name in pair) for pair in LEGS)
         if all(name in self.number for name in TRUE_POSE):
@@ -120,6 +127,9 @@ class RecordingSource(Source):
         for part in self.inside:
             await part.run()
         self.is_coming = False
+
+    def recording(self, walk: int) -> list[str]:
+        return self.recordings[walk]
 
     def close(self) -> None:
         """Close the logs."""

@@ -17,7 +17,7 @@ from ranger_sim.harness.feed import records
 from ranger_sim.harness.processes import control
 from ranger_sim.harness.records.sampler import PERIOD_NS
 from ranger_sim.ranger.records.summary import JOULES_PER_WH
-from ranger_sim.tools.panel.channels import Channel, Memory, Times, Trace, Values, between
+from ranger_sim.tools.panel.channels import FINE_S, Channel, Memory, Times, Trace, Values, between
 from ranger_sim.tools.panel.inside.buses import Bus
 from ranger_sim.tools.panel.inside.errors import ERRORS, ON_NO_BUS, ErrorList, changes
 from ranger_sim.tools.panel.inside.frames import ERROR, RecentFrames, of_the_robot
@@ -34,7 +34,10 @@ REQUESTS = frozenset({"key", "set", "pause", "resume", "restart", "fault", "clea
 class RobotSource(Source):
     """The robot that runs under `name`. UserError for an unknown name or another protocol version."""
 
-    can = frozenset({"live", "keys", "parameters", "pace", "faults", "restart", "frames", "panel", "boards", "errors"})
+    can = frozenset(
+        {"live", "keys", "parameters", "pace", "faults", "restart", "frames", "panel", "boards", "errors", "twins"}
+    )
+    walks = (f"the last {FINE_S:.0f} s",)
 
     def __init__(self, name: str) -> None:
         super().__init__()

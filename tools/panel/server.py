@@ -28,6 +28,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel import export, messages
+from ranger_sim.tools.panel.comparison import Comparison
 from ranger_sim.tools.panel.connections import Connections
 from ranger_sim.tools.panel.source import Source
 
@@ -39,6 +40,7 @@ TYPES = {
     ".svg": "image/svg+xml",
 }
 COOKIE = "ranger-sim-panel"
+TWINS = "twins.html"
 
 # Limits on a page, chosen by us.
 PLACES = 16  # pages at a time: each costs a picture 30 times a second
@@ -81,10 +83,12 @@ class PanelServer:
         self.refused: Counter[str] = Counter()
         self.connections = Connections(lambda: {session.socket.client for session in self.sessions}, self.refuse)
         self.feeding: asyncio.Task[None] | None = None
+        self.comparison = Comparison(source, self.renew)
         self.app = Starlette(
             routes=[
                 Route("/", self.page),
                 Route("/export/{kind}", self.export),
+                Route(f"/{TWINS}", self.twins),
                 Route("/{name}", self.file),
                 WebSocketRoute("/socket", self.socket),
             ],
@@ -99,6 +103,7 @@ class PanelServer:
             yield
         finally:
             self.feeding.cancel()
+            await self.comparison.stop()
 
     # --- access ---------------------------------------------------------------------------------------------
 
@@ -160,6 +165,21 @@ class PanelServer:
         headers = {"Content-Disposition": f'attachment; filename="selection.{kind}"'}
         return Response(data, media_type="application/octet-stream", headers=headers)
 
+    async def twins(self, request: Request) -> Response:
+        """The report of the last comparison with twins: a page without links to anything."""
+        fault = self.fault_of(request)
+        if fault is not None:
+            return self.refusal(fault)
+        if not self.comparison.report:
+            return PlainTextResponse(f"{TWINS}: no walk has been compared yet\n", 404)
+        return Response(self.comparison.report, media_type=TYPES[".html"])
+
+    def renew(self) -> None:
+        """Send every page the state."""
+        for session in self.sessions:
+            session.next_state_s = 0.0
+            session.changed.set()
+
     def refusal(self, fault: str) -> Response:
         """Count a refused request and return the response."""
         self.refuse(fault)
@@ -188,7 +208,7 @@ class PanelServer:
                 await socket.close(CLOSE_FULL if "place" in fault else CLOSE_POLICY, fault)
             return
         await socket.accept()
-        session = Session(self.source, socket, self.want)
+        session = Session(self.source, socket, self.want, self.comparison)
         self.sessions.add(session)
         try:
             reason = await session.serve()
@@ -207,8 +227,9 @@ FILES = frozenset(path.name for path in PAGE.iterdir() if path.suffix in TYPES) 
 class Session:
     """One page: what it requests, and what it has shown."""
 
-    def __init__(self, source: Source, socket: WebSocket, wants: Callable[[], None]) -> None:
+    def __init__(self, source: Source, socket: WebSocket, wants: Callable[[], None], comparison: Comparison) -> None:
         self.source = source
+        self.comparison = comparison
         self.wants = wants  # called when the channels of its plots change
         self.socket = socket
         self.plots: dict[int, Plot] = {}
@@ -296,6 +317,12 @@ class Session:
         if what == "values":
             channels = channels_of(request.get("channels"), self.source)
             return {"values": self.source.values(channels, seconds(request.get("at"), "at"))}
+        if what == "compare":
+            self.comparison.start(request.get("walk"))
+            return {}
+        if what == "stop comparing":
+            await self.comparison.stop()
+            return {}
         return await self.source.request(request)
 
     def set_view(self, request: dict[str, Any]) -> None:
@@ -367,7 +394,8 @@ class Session:
             found.append(messages.text({"values": values, "at": self.at}))
         if now_s >= self.next_state_s or self.at is not None:
             self.next_state_s = now_s + STATE_S
-            found.append(messages.text({"state": self.source.state(self.at)}))
+            state = {**self.source.state(self.at), "twins": self.comparison.content}
+            found.append(messages.text({"state": state}))
         found.append(messages.text({"picture": self.source.span(), "lost": self.source.lost}))
         return found
 

@@ -30,13 +30,14 @@ class Source:
     """`channels`, and the supported operations: `can` names them, and the page shows no others.
 
     keys, parameters, pace, faults, restart: requests of these kinds are carried out. frames, panel, boards, errors: the
-    state has them. live: the source's time advances by itself.
+    state has them. live: the source's time advances by itself. twins: `walks` can be compared with their twins.
     """
 
     title = ""
     late_s = 0.25  # how much later than the newest data other data may arrive; a trigger also looks back this far
     can: frozenset[str] = frozenset()
     pose_names: tuple[str, ...] = ()
+    walks: tuple[str, ...] = ()  # by name
 
     def __init__(self) -> None:
         self.channels: list[Channel] = []
@@ -75,6 +76,10 @@ class Source:
         """State without channels: boards, buses, panel, errors, frames, faults; missing: why no slots or buses."""
         return {}
 
+    def recording(self, walk: int) -> list[str] | None:
+        """The arguments by which `ranger-sim diagnose` reads a walk; None for samples that only the panel has."""
+        return None
+
     async def request(self, request: dict[str, Any]) -> dict[str, Any]:
         """Carry out a request of the page to the robot. UserError with the reason if refused."""
         raise UserError("a recording takes no requests")
@@ -86,6 +91,7 @@ class Source:
             "title": self.title,
             "can": sorted(self.can),
             "channels": self.listed,
+            "walks": self.walks,
             "pose": list(self.pose_names),
             "geometry": self.geometry,
             "parameters": parameter_rows() if "parameters" in self.can else [],

@@ -11,7 +11,7 @@ from ranger_sim.sysid.readers.csv_file import Progress, no_progress
 from ranger_sim.sysid.reading import open_recording
 from ranger_sim.tools.command_line.units import RATES_HZ, SHARES, quantity
 
-__all__ = ["add_accept_loss", "add_options", "how_of", "open_recording", "open_with"]
+__all__ = ["add_accept_loss", "add_options", "again", "how_of", "open_recording", "open_with"]
 
 
 def add_options(command: Any) -> None:
@@ -77,3 +77,12 @@ def how_of(options: Any) -> dict[str, Any]:
         "assume": layout.assumptions(options.assume),
         "recipe": options.recipe,
     }
+
+
+def again(options: Any) -> list[str]:
+    """The options of `add_options` as words of a command line."""
+    several = {"--map": options.map, "--dbc": options.dbc, "--bus": options.bus, "--assume": options.assume}
+    words = [word for name, values in several.items() for value in values for word in (name, value)]
+    rate = None if options.rate is None else f"{options.rate!r}Hz"
+    single = {"--time-unit": options.time_unit, "--rate": rate, "--recipe": options.recipe}
+    return words + [word for name, value in single.items() if value is not None for word in (name, value)]

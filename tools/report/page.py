@@ -38,9 +38,10 @@ ROBOT = {
 }
 
 
-def render(robot: Any, summary: dict, comparison: str = "") -> str:
+def render(robot: Any, summary: dict, comparison: str = "", twins: dict[str, Any] | None = None) -> str:
     """The page as text. `robot`: a `ranger.robot.Ranger` that kept a log; `summary`: its summary; comparison: the
-    command that compares the walk with its twins, empty where the run's folder does not have the variables."""
+    command that compares the walk with its twins, empty where the run's folder does not have the variables; twins: what
+    it finds (`twins.compared`), where that was asked for."""
     walk = robot.recorded()
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
@@ -74,6 +75,7 @@ def render(robot: Any, summary: dict, comparison: str = "") -> str:
         scripts=[Markup((HERE / name).read_text(encoding="utf-8")) for name in SCRIPTS],
         command=summary["command"],
         comparison=comparison,
+        twins=twins,
         table_hash=datatable.table_hash(),
     )
 

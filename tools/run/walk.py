@@ -284,7 +284,7 @@ def finish(
     summary.update(complete=folder is None, files={})
     try:
         if folder is not None:
-            write_files(robot, summary, folder, logs, console)
+            write_files(robot, summary, folder, logs, console, options.twins)
     finally:  # even if the folder fails
         text = json.dumps(summary, indent=2)
         if options.json == "-":
@@ -366,13 +366,17 @@ def clock_text(seconds: float) -> str:
     return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
 
 
-def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs | None, console: Console) -> None:
-    """Write logs and report, if the run has data for them, then the summary."""
+def write_files(
+    robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs | None, console: Console, with_twins: bool
+) -> None:
+    """Write logs and report, if the run has data for them, then the summary. with_twins: the walk compared with its
+    twins is in the report."""
     if any(each.coverage for each in robot.firmware.values()):
         with folder.file(LCOV) as path:
             path.write_text(coverage.lcov(coverage.merged(each.ran() for each in robot.firmware.values())), "utf-8")
     if logs is not None:
-        with console.status("writing logs and report ..."):
+        done = "logs and report, twins compared" if with_twins else "logs and report"
+        with console.status(f"writing {done} ..."):
             logs.finish()
             try:
                 from ranger_sim.tools.report import page  # half a second of imports
@@ -382,8 +386,14 @@ def write_files(robot: Ranger, summary: dict, folder: RunFolder, logs: RunLogs |
                     raise
                 console.print(without, highlight=False, soft_wrap=True)
             else:
+                twins = None
+                if with_twins:
+                    from ranger_sim.tools.report.twins import compared  # the diagnosis's imports
+
+                    twins = compared(folder.path, summary)
                 with folder.file(REPORT) as path:
-                    path.write_text(page.render(robot, summary, comparison(str(folder.path))), encoding="utf-8")
+                    command = comparison(str(folder.path))
+                    path.write_text(page.render(robot, summary, command, twins), encoding="utf-8")
     folder.finish(summary)
 
 

@@ -5,6 +5,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.stop_rule import MOST_DISTANCE_M, MOST_STEPS, MOST_TIME_S, StopRule
 from ranger_sim.plant.electrics.electronics import SWITCHES
 from ranger_sim.ranger.scenario import LIMITS, Scenario
@@ -126,6 +127,12 @@ FILES = (
         "DIR",
         of_run=False,
     ),
+    Option(
+        "--twins",
+        "compare the walk with its twins, emulated walks of sound robots and of robots with one cause each, and draw "
+        "what is unusual in the report (about ten seconds)",
+        of_run=False,
+    ),
     Option("--json", "the summary as JSON; - prints it and nothing else", word("a file or -"), "FILE|-", of_run=False),
 )
 PROOF = Option(
@@ -134,7 +141,6 @@ PROOF = Option(
     "machines do (a second process walks that one; 2 MB a second in both)",
     of_run=False,
 )
-
 RUN = (*END, *SCENARIO, *FILES)  # of every command that lets the robot walk
 WALK = (
     *RUN,
@@ -179,9 +185,13 @@ def stop_of(given: argparse.Namespace) -> StopRule | None:
 def log_of(given: argparse.Namespace) -> str:
     """The contents of the robot's own log, for the report: the last seconds, or nothing without a folder for it.
 
-    The files of `--log full` take all rows at once, so that memory keeps none of them.
+    The files of `--log full` take all rows at once, so that memory keeps none of them. UserError for a comparison with
+    twins that no report would have.
     """
-    return "none" if not given.out or given.log == "none" else "window"
+    log = "none" if not given.out or given.log == "none" else "window"
+    if given.twins and log == "none":
+        raise UserError("--twins: the report has the comparison, and needs --out DIR and --log full or window")
+    return log
 
 
 def scenario_of(given: argparse.Namespace) -> Scenario:

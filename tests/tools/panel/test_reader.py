@@ -70,7 +70,7 @@ def test_axe_finds_nothing_in_any_view_of_a_robot_and_everything_has_a_name(page
     page.until("window.rangerPanel.span()[1] > 2")
     page.value("document.getElementById('pause').click()")  # it need not keep its pace beside this
     Hand(page).sees("state.pace.paused === true")
-    looked_through(page, ["plots", "parameters", "errors", "inside", "faults", "help"])
+    looked_through(page, ["plots", "parameters", "errors", "inside", "faults", "twins", "help"])
     for view in ("plots", "inside"):
         Hand(page).view(view)
         reported = named(page)

@@ -130,6 +130,29 @@ def test_the_report_has_the_command_that_compares_the_walk_with_its_twins(tmp_pa
     assert walk.comparison(str(folder)) in (folder / "report.html").read_text(encoding="utf-8")
 
 
+def test_the_report_has_the_comparison_with_twins_that_was_asked_for(tmp_path):
+    folder = tmp_path / "run"
+    assert cli.main(["walk", "--steps", "14", "--log", "full", "--twins", "--out", str(folder)]) == 0
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<h2>Compared with its twins</h2>" in text and "<p><b>Nothing found.</b></p>" in text
+    assert text.count('<div class="away') == 8
+    assert "10 steps at the table&#39;s rate against sound walks of record-2011" in text
+
+
+def test_a_walk_that_cannot_be_compared_with_its_twins_says_so_in_its_report(tmp_path):
+    folder = tmp_path / "run"
+    assert cli.main(["walk", "--steps", "2", "--twins", "--out", str(folder)]) == 0
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Compared with its twins" in text and "too few" in text and '<div class="away' not in text
+
+
+@pytest.mark.parametrize("words", [[], ["--log", "none", "--out", "run"]])
+def test_a_comparison_with_twins_that_no_report_would_have_is_refused(tmp_path, monkeypatch, capsys, words):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["walk", "--steps", "1", "--twins", *words]) == 2
+    assert "--twins: the report has the comparison, and needs --out DIR" in capsys.readouterr().err
+
+
 def test_the_walk_before_ctrl_c_is_reported(capsys, monkeypatch):
     monkeypatch.setattr(walk, "SLICE_S", 2.0)
 

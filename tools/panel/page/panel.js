@@ -25,6 +25,7 @@ import { initial, updates } from "./state.js";
 import { makeStore } from "./store.js";
 import { makeTabs } from "./tabs.js";
 import { makeTrigger } from "./trigger.js";
+import { makeTwins } from "./twins.js";
 
 const store = makeStore({ ...initial, newest_ms: performance.now() }, updates), { state, update } = store;
 
@@ -55,6 +56,7 @@ makeErrors(store);
 makeInside(store, requests);
 makeLink(store);
 makeFaults(store, requests);
+makeTwins(store, requests);
 makeMessage(store);
 makeAnnouncer(store, plots);
 makeAddress(store);

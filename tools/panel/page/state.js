@@ -4,7 +4,7 @@
 const SHORTEST_S = 1e-3, LONGEST_S = 36_000;   // a plot's window
 const MOST_CHANNELS = 48;   // of all plots (server.py)
 const LONGEST_NOTE = 80;
-const VIEWS = { plots: null, parameters: "parameters", errors: "errors", inside: null, link: "link", faults: "faults", help: null };   // and what each needs of the source
+const VIEWS = { plots: null, parameters: "parameters", errors: "errors", inside: null, link: "link", faults: "faults", twins: "twins", help: null };   // and what each needs of the source
 const FIRST = [["hip_rad", "ankle_outer_rad", "ankle_inner_rad"], ["hip_A", "outer_A", "inner_A"], ["FSM_HIP", "FSM_FO", "FSM_FI"]];
 const FIRST_OF_A_LOG = [["MCH_ANGLE", "MCFO_RIGHT_ANKLE_ANGLE", "MCFI_MID_ANKLE_ANGLE"], ["MCH_MOTOR_CURRENT"], ["FSM_HIP"]];
 

@@ -16,7 +16,8 @@ COUNTS = 600
 COUNT_A = 0.000502  # of the battery's current
 
 
-def between(random, low, high):
+def between(random: RandomStream, low: float, high: float) -> float:
+    """A number drawn evenly."""
     return low + (high - low) * random.uniform()
 
 
@@ -30,15 +31,15 @@ class Drive:
     meter_scale: float = 1.0
     lag_s: float = 0.004
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.random = RandomStream(self.seed, "motor drive")
         self.now_ns = 0
         self.unit = MotorUnit("m", self.motor)
-        self.channels = {
+        self.channels: dict[str, list[tuple[float, float]]] = {
             name: [] for name in ("BATT_POWER", "MOTOR_CURRENT", "MOTOR_VELOCITY", "MOTOR_POSITION", "BATT_VOLTAGE")
         }
 
-    def steady(self, amps, rate, volts):
+    def steady(self, amps: float, rate: float, volts: float) -> tuple[float, float]:
         """(power, current) over four slots at the duty for this current; the leads take turns."""
         m = self.motor
         wanted = (
@@ -67,14 +68,16 @@ class Drive:
                     taken += 1
         return joule / (taken * STEP_NS * 1e-9), flown / taken
 
-    def put(self, name, time_s, value):
+    def put(self, name: str, time_s: float, value: float) -> None:
+        """Add a sample of a channel."""
         self.channels[name].append((time_s, value))
 
-    def meter(self, power, volts):
+    def meter(self, power: float, volts: float) -> float:
+        """The power as the board's meter shows it, W."""
         amps = self.meter_scale * power / volts + COUNT_A * self.random.normal()
         return volts * COUNT_A * round(amps / COUNT_A)
 
-    def record(self, holds=24, moving_s=40.0):
+    def record(self, holds: int = 24, moving_s: float = 40.0) -> Dataset:
         """A dataset of `holds` holds, each with a rest after it, and a motion of 0.5 Hz sampled every 30 ms."""
         random, time_s, angle = self.random, 0.0, 0.0
         for _ in range(holds):
@@ -110,7 +113,7 @@ class Drive:
         return Dataset(f"drive {self.seed}", made)
 
 
-def drawn(seed):
+def drawn(seed: int) -> MotorParameters:
     """A motor with everything that the law has drawn anew."""
     random = RandomStream(seed, "drawn motor")
     return dataclasses.replace(
