@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 from ranger_sim.firmware_sim.native import crash
 from ranger_sim.foundation import descriptors, systems
 from ranger_sim.harness.processes import board_process, kernel, places
-from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
+from ranger_sim.harness.processes.block import Block, StageMemory, alone, words_shown
 from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import DEADLINE_S, Settings
@@ -44,20 +44,20 @@ class ForkedBoards:
         self.names = names
         self.used = processor_for_this_worker()
         self.settings = Settings(speed=None, real_time=False, processor=self.used)
-        words, doubles = stage = new_stage()
+        stage = StageMemory()
         place = {name: number for number, name in enumerate(robot.boards)}
         self.blocks = {name: Block(name, place[name], words_shown(robot.boards[name])) for name in names}
         self.ended = False
         self.children = {}
         for name in names:
-            with alone(self.blocks[name], self.blocks.values()):
-                self.children[name] = fork(self._board(name, stage))
+            with alone(self.blocks[name], self.blocks.values(), stage):
+                self.children[name] = fork(self._board(name, stage.shown))
         self.numbers = tuple(self.children.values())  # of the processes, also of those that have ended
         self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
         in_c = frozenset(robot.firmware)
         self.guard = fork(Guard(self.blocks, self.children, self.watches, in_c, deadline_s).watch)
         loop = robot.loop
-        show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
+        show = Stage(*stage.written, robot.plant, loop.step_times, loop.word_wires)
         self.remotes = {}
         for name in names:
             board = robot.boards[name]
