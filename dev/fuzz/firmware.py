@@ -117,7 +117,8 @@ PIECES = {
     "timer off": "struct itimerval none; memset(&none, 0, sizeof none); "
     "setitimer(ITIMER_PROF, &none, 0); for (;;) sink++;",
     "alarm": "alarm(1);",
-    "handlers default": "for (int each = 1; each < 32; each++) signal(each, SIG_DFL); *(volatile int *)(uintptr_t)n = 1;",
+    "handlers default": "for (int each = 1; each < 32; each++) signal(each, SIG_DFL); "
+    "*(volatile int *)(uintptr_t)n = 1;",
     "exit": "exit(n);",
     "_exit": "_exit(n);",
     "quick_exit": "quick_exit(n);",
@@ -278,7 +279,8 @@ class Fuzz:
         self.seed = seed
         self.folder = folder
         self.programs = folder / "programs"
-        self.counts: dict[str, float] = {"cases": 0, "refused": 0, "lost": 0, "failed": 0, "went_on": 0, "images": 0, "longest_s": 0, "beyond_the_deadline_s": 0}
+        counted = ("cases", "refused", "lost", "failed", "went_on", "images", "longest_s", "beyond_the_deadline_s")
+        self.counts: dict[str, float] = dict.fromkeys(counted, 0)
 
     def compile(self) -> None:
         """Compile the program that the cases share, by a walk in which it does nothing hostile."""
@@ -370,9 +372,7 @@ class Fuzz:
 
     # --- the walk -----------------------------------------------------------------------------------------
 
-    def walk(
-        self, folder: pathlib.Path, firmware: list[str], deadline_s: float, where: str
-    ) -> tuple[int, bytes, str]:
+    def walk(self, folder: pathlib.Path, firmware: list[str], deadline_s: float, where: str) -> tuple[int, bytes, str]:
         """Walk in a forked process; exit code, standard output, standard error."""
         command = ["walk", "--time", WALKED, *firmware, "--json", "-", "--log", "none"]
         command += ["--board-deadline", f"{deadline_s:g}s"]
