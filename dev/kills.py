@@ -186,14 +186,10 @@ class Kills:
         """Nothing is lost that was reported as kept, and nothing is left."""
         code = command.end()
         end_s = wallclock.monotonic_s() + LEFT_S
-        while left := command.processes():
+        while left := self.left_by(command):
             if wallclock.monotonic_s() > end_s:
-                raise Finding(f"{where}: processes are left: {left}")
+                raise Finding(f"{where}: {left}")
             wallclock.sleep_s(0.01)
-        if more := set(os.listdir("/dev/shm")) - self.shared:
-            raise Finding(f"{where}: shared memory is left: {sorted(more)}")
-        if f"kills-{os.getpid()}" in pathlib.Path("/proc/net/unix").read_text(encoding="utf-8"):
-            raise Finding(f"{where}: a local socket is left")
         text = command.text()
         if "Traceback" in text:
             raise Finding(f"{where}: {text[-3000:]}")

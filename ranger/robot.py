@@ -62,9 +62,9 @@ class Ranger(Machine):
     schedules; boards that it has outside are emulated here. firmware: boards that run C, by folder, each in its own
     process, or `in_process`: faster, but a crash of one of them ends this process. images: boards that run a
     firmware image, by file. board_deadline_s: how long a board's own process may leave a request unanswered, and its
-    trial may take; 0: for ever (debuggers), 10 s for the trial. printed: takes what programs in C print; without it they print on standard output. mode: where
-    the boards run, instead of what `board_deadline_s` chooses. require_confined: UserError where the kernel does not
-    grant every confinement of a program in C.
+    trial may take; 0: for ever (debuggers), 10 s for the trial. printed: takes what programs in C print; without it
+    they print on standard output. mode: where the boards run, instead of what `board_deadline_s` chooses.
+    require_confined: UserError where the kernel does not grant every confinement of a program in C.
     """
 
     end_word, end_name = "the robot fell", "a fall"
