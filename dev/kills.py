@@ -182,6 +182,15 @@ class Kills:
             os.kill(victim, signal.SIGKILL)
         return f"process {running.index(victim)} of {len(running)} killed after {after_s:.3f} s"
 
+    def left_by(self, command: Command) -> str:
+        """What is left of a command that has ended; empty for nothing."""
+        if processes := command.processes():
+            return f"processes are left: {processes}"
+        if shared := set(os.listdir("/dev/shm")) - self.shared:
+            return f"shared memory is left: {sorted(shared)}"
+        sockets = pathlib.Path("/proc/net/unix").read_text(encoding="utf-8")
+        return "a local socket is left" if f"kills-{os.getpid()}" in sockets else ""
+
     def check(self, name: str, command: Command, out: pathlib.Path, before: dict[str, Any], where: str) -> None:
         """Nothing is lost that was reported as kept, and nothing is left."""
         code = command.end()

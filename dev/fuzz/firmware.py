@@ -9,7 +9,7 @@ lost board has a cause, a refusal says so after what the program printed, standa
 no process, file or shared memory is left.
 
 A board's process has half a second for an answer, in every twentieth case the default of ten; the case has ten seconds
-more than that.
+more than that, and the time in which processes of the machine waited for a processor.
 
 `--state FILE` keeps the counts after each case; a later run of the same seed goes on there.
 """
@@ -387,7 +387,9 @@ class Fuzz:
         if process == 0:
             _walk(command, places, temporary)
         watch = os.pidfd_open(process)
+        busy_s = _busy_s()
         has_ended = bool(descriptors.wait([watch], [], deadline_s + MORE_S)[0])
+        has_ended = has_ended or bool(descriptors.wait([watch], [], _busy_s() - busy_s)[0])
         os.close(watch)
         left = processes_of(process)
         if not has_ended:
@@ -428,6 +430,15 @@ class Fuzz:
         if is_lost and not ("MCH" in failed and lost.get("why")):
             raise Finding(f"{where}: lost without a cause")
         self.counts["lost" if is_lost else "failed" if failed else "went_on"] += 1
+
+
+def _busy_s() -> float:
+    """For how long some process of this machine has waited for a processor, s; 0 where the kernel does not count it."""
+    try:
+        pressure = pathlib.Path("/proc/pressure/cpu").read_text(encoding="ascii")
+    except OSError:
+        return 0.0
+    return int(pressure.split("total=")[1].split()[0]) * 1e-6
 
 
 def _walk(command: list[str], places: list[pathlib.Path], temporary: pathlib.Path) -> None:
