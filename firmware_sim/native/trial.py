@@ -78,7 +78,7 @@ def tried(
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # other threads: nothing in the child needs them
-        process = os.fork()
+        process = confinement.fork(needs.has_own_numbers)
     if process == 0:
         os.close(reading)
         work = functools.partial(_load_and_start, library, start, made, record)
@@ -148,7 +148,7 @@ def _end_of(process: int, until_s: float, is_over: bool) -> int | None:
         watch = os.pidfd_open(process)
         try:
             if descriptors.wait([watch], [], max(0.0, until_s - wallclock.monotonic_s()))[0]:
-                return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+                return confinement.wait_for(process)
             for number in (crash.ASKED, signal.SIGCONT):
                 os.kill(process, number)
             descriptors.wait([watch], [], ASKING_S)
@@ -156,7 +156,7 @@ def _end_of(process: int, until_s: float, is_over: bool) -> int | None:
             os.close(watch)
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
-    os.waitpid(process, 0)
+    confinement.wait_for(process)
     return None
 
 

@@ -8,6 +8,7 @@ import os
 import signal
 from typing import Any
 
+from ranger_sim.firmware_sim.native import confinement
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places
@@ -31,15 +32,15 @@ class LoneBoard:
         stage = StageMemory()
         parent = os.getpid()
         with alone(self.block, [self.block], stage):
-            self.process = os.fork()
-        if self.process == 0:
-            code = board_process.FAILED
-            try:
-                kernel.die_with_parent(parent)
-                gc.freeze()  # this process must not finalize the parent's objects
-                code = board_process.serve(robot, name, self.block, stage.shown, Settings(real_time=False), False)
-            finally:
-                os._exit(code)
+            self.process = confinement.fork(board_process.is_confined(robot, name))
+            if self.process == 0:
+                code = board_process.FAILED
+                try:
+                    kernel.die_with_parent(parent)
+                    gc.freeze()  # this process must not finalize the parent's objects
+                    code = board_process.serve(robot, name, self.block, stage.shown, Settings(real_time=False), False)
+                finally:
+                    os._exit(code)
         self.watch = os.pidfd_open(self.process)
         self.ask = Bell(self.words, places.ASKED, places.BOARD_SLEEPS, self.block.ask_descriptor)
 
@@ -90,5 +91,5 @@ class LoneBoard:
     def _reap(self) -> int:
         """The exit code of the process, which has ended or is about to."""
         if self.code is None:
-            self.code = os.waitstatus_to_exitcode(os.waitpid(self.process, 0)[1])
+            self.code = confinement.wait_for(self.process)
         return self.code

@@ -19,7 +19,7 @@ from typing import Any
 
 from ranger_sim.can_bus.edge.peers import REASONS
 from ranger_sim.firmware_sim.gdb.server import GdbServer
-from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native import confinement, crash
 from ranger_sim.foundation import descriptors, systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
@@ -122,15 +122,15 @@ class Supervisor:
 
     # --- processes ----------------------------------------------------------------------------------------
 
-    def fork(self, name: str, body: Callable[[], int]) -> int:
-        """A child that runs `body` and leaves with what it returns."""
+    def fork(self, name: str, body: Callable[[], int], has_own_numbers: bool = False) -> int:
+        """A child that runs `body` and leaves with what it returns; confinement.fork has `has_own_numbers`."""
         parent = os.getpid()
         sys.stdout.flush()
         sys.stderr.flush()
         with warnings.catch_warnings():
             # numerical libraries keep threads for matrices; no process of ours uses them
             warnings.simplefilter("ignore", DeprecationWarning)
-            process = os.fork()
+            process = confinement.fork(has_own_numbers, lambda: kernel.schedule(self.settings))
         if process:
             self.children[name] = Child(name, process)
             return process
@@ -172,7 +172,7 @@ class Supervisor:
         block.words[places.CRASH] = 0
         block.words[places.HELD] = 0
         with alone(block, self.blocks.values(), self.stage, is_held):
-            self.fork(name, body)
+            self.fork(name, body, board_process.is_confined(self.robot, name))
 
     def close_servers(self) -> None:
         """Close the endpoints in a process that does not use them."""
@@ -602,7 +602,7 @@ class Supervisor:
         for child in self.children.values():
             if child.state != GONE:
                 with contextlib.suppress(ChildProcessError):
-                    os.waitpid(child.process, 0)
+                    confinement.wait_for(child.process)
 
 
 def check_platform() -> None:

@@ -149,7 +149,48 @@ def test_where_user_namespaces_are_forbidden_the_rest_holds(tmp_path):
     with os.fdopen(reading, "rb") as pipe:
         lacks = json.loads(pipe.read())
     os.waitpid(process, 0)
-    assert lacks == ["no separate namespaces: Operation not permitted", "refused"]
+    assert lacks == [
+        "no separate process numbers: not asked for",
+        "no separate namespaces: Operation not permitted",
+        "refused",
+    ]
+
+
+@needs_all
+def test_a_board_has_process_numbers_of_its_own_and_nothing_of_it_is_left(tmp_path):
+    """It is the second process of its namespace, after an init, and a child of the run's process nevertheless."""
+    folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
+    before = children_of(os.getpid())
+    with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
+        robot.run_for("1 ms")
+        board = robot.processes.children["MCH"]
+        status = pathlib.Path(f"/proc/{board}/status").read_text(encoding="utf-8")
+        assert re.search(rf"^NSpid:\t{board}\t2$", status, re.MULTILINE)
+        assert board in children_of(os.getpid())
+        assert robot.deaths == []
+    assert children_of(os.getpid()) == before
+
+
+@needs_all
+def test_a_board_runs_without_process_numbers_of_its_own_where_the_kernel_does_not_grant_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(confinement, "CLONE_NEWPID", 1)  # not a flag of unshare
+    folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
+    with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
+        robot.run_for("1 ms")
+        assert robot.deaths == []
+        confined = robot.summary()["firmware"]["MCH"]["confined"]
+    assert confined == "partly (no separate process numbers: Invalid argument)"
+
+
+def children_of(parent):
+    """Every process whose parent it is, zombies as well."""
+    found = set()
+    for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            if int(fields[1]) == parent:
+                found.add(int(stat.parent.name))
+    return found
 
 
 def test_the_walks_own_process_never_loads_the_library(tmp_path):
