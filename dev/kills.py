@@ -229,6 +229,8 @@ class Kills:
         for line in text.splitlines():
             if line.startswith(KEPT) and not (ROOT / line.removeprefix(KEPT)).is_file():
                 raise Finding(f"{where}: reported, but not there: {line}")
+        if names == {OPEN} and not (out / OPEN).stat().st_size:
+            return  # killed before the first word of its record, and before any other file
         for each in names & {SUMMARY, OPEN}:
             json.loads((out / each).read_text(encoding="utf-8"))
         for each in names:
