@@ -1,4 +1,4 @@
-"""python -m dev.kills --kills 200: runs whose processes are killed, or stopped and continued, at random instants.
+"""python -m dev.kills --kills 200: runs whose processes are killed, or stopped and continued, at random times.
 
 Commands are `walk`, `walk` with a board in C, `up` at full speed and `campaign`, in turn; the victim is the command's
 own process in every second kill, otherwise any that it has started. After a kill: no process of it is left, no
@@ -8,7 +8,7 @@ had, and, killed again and again in one folder, ends with the results of one tha
 process of a command in turn for a while: it ends as an undisturbed one, with the same digest. A board or the body's
 process alone may be lost: the command then ends by itself, and says so.
 
-Victims and instants come from the seed; what a process does at an instant depends on the machine. Ends with 1 at the
+Victims and times come from the seed; what a process does at a time depends on the machine. Ends with 1 at the
 first finding.
 """
 
@@ -167,7 +167,7 @@ class Kills:
                 os.kill(process, signal.SIGCONT)
 
     def kill(self, command: Command, stream: Any) -> str:
-        """Kill one process at a random instant; returns which, and when."""
+        """Kill one process at a random time; returns which, and when."""
         after_s = LATEST_S * stream.uniform()
         own, choice = stream.integer(2) == 0, stream.uniform()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -283,7 +283,7 @@ def main(arguments: list[str] | None = None) -> int:
     """0 when all held, 1 with the first finding."""
     command = argparse.ArgumentParser(prog=COMMAND, description=(__doc__ or "").partition("\n")[0])
     command.add_argument("--kills", type=whole_number(1), default=KILLS, metavar="N", help=f"cases (default {KILLS})")
-    command.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="of victims and instants")
+    command.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="of victims and times")
     options = command.parse_args(arguments)
     try:
         counts = run(options.kills, options.seed)

@@ -120,7 +120,7 @@ class Needs:
 
     @property
     def has_own_numbers(self) -> bool:
-        """Whether its process can have process numbers of its own: the address sanitizer names its files by them."""
+        """Whether its process can have separate process numbers: the address sanitizer names its files by them."""
         return not self.large_memory
 
 
@@ -142,7 +142,7 @@ def describe(lacks: Iterable[str] | None) -> str:
 
 
 LAUNCHERS: dict[int, int] = {}  # by the process that `fork` returned: the one that ends after it
-# Why this process has no process numbers of its own; empty where it has.
+# Why this process has no separate process numbers; empty where it has.
 without_numbers = "not asked for"
 
 

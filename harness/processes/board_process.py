@@ -51,7 +51,7 @@ class Hold:
 
 
 def is_confined(robot: Any, name: str) -> bool:
-    """Whether board `name` runs a program in C in a process that can have process numbers of its own."""
+    """Whether board `name` runs a program in C in a process that can have separate process numbers."""
     return name in robot.firmware and robot.boards[name].out_of_process and place_of_findings() is None
 
 

@@ -22,7 +22,7 @@ def _libc() -> ctypes.CDLL:
 def die_with_parent(parent: int) -> None:
     """Let the kernel kill this process when `parent` (a process id) ends in any way; at once if it has ended.
 
-    A process with numbers of its own does not see its parent: its launcher ends it (native/confinement.py).
+    A process with separate process numbers does not see its parent: its launcher ends it (native/confinement.py).
     """
     _libc().prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() not in (parent, 0):  # it died before the call above: the kernel would not send the signal

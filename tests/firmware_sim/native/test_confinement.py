@@ -157,7 +157,7 @@ def test_where_user_namespaces_are_forbidden_the_rest_holds(tmp_path):
 
 
 @needs_all
-def test_a_board_has_process_numbers_of_its_own_and_nothing_of_it_is_left(tmp_path):
+def test_a_board_has_separate_process_numbers_and_nothing_of_it_is_left(tmp_path):
     """It is the second process of its namespace, after an init, and a child of the run's process nevertheless."""
     folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
     before = children_of(os.getpid())
@@ -172,7 +172,7 @@ def test_a_board_has_process_numbers_of_its_own_and_nothing_of_it_is_left(tmp_pa
 
 
 @needs_all
-def test_a_board_runs_without_process_numbers_of_its_own_where_the_kernel_does_not_grant_them(tmp_path, monkeypatch):
+def test_a_board_runs_without_separate_process_numbers_where_the_kernel_does_not_grant_them(tmp_path, monkeypatch):
     monkeypatch.setattr(confinement, "CLONE_NEWPID", 1)  # not a flag of unshare
     folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
     with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
