@@ -117,7 +117,7 @@ class Kills:
         self.commands: dict[str, tuple[str, ...]] = {
             "walk": ("walk", *run),
             "walk with a board in C": ("walk", "--time", "2s", "--firmware", f"MCH={in_c}"),
-            "up": ("up", *run, "--speed", "max", "--no-real-time", "--name", f"kills-{os.getpid()}"),
+            "up": ("up", "--time", "1s", "--speed", "max", "--no-real-time", "--name", f"kills-{os.getpid()}"),
             "campaign": ("campaign", str(plan), "--jobs", "2", "--pool", "local"),
         }
         self.shared = set(os.listdir("/dev/shm"))
