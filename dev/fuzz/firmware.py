@@ -501,7 +501,7 @@ def run(cases: int, seed: int, state: pathlib.Path | None = None) -> dict[str, f
             fuzz.counts = kept["counts"]
         fuzz.compile()
         while fuzz.counts["cases"] < cases:
-            fuzz.case(fuzz.counts["cases"])
+            fuzz.case(int(fuzz.counts["cases"]))
             if state is not None:
                 state.write_text(json.dumps({"seed": seed, "counts": fuzz.counts}), encoding="utf-8")
         return fuzz.counts
