@@ -61,10 +61,10 @@ class Ranger(Machine):
     quirks: of the emulated firmware; the controller's program has its own estimator. profile: its bit rates and
     schedules; boards that it has outside are emulated here. firmware: boards that run C, by folder, each in its own
     process, or `in_process`: faster, but a crash of one of them ends this process. images: boards that run a
-    firmware image, by file. board_deadline_s: how long a board's own process may leave a request unanswered; 0: for
-    ever (debuggers). printed: takes what programs in C print; without it they print on standard output. mode: where
-    the boards run, instead of what `board_deadline_s` chooses. require_confined: UserError where the kernel does not
-    grant every confinement of a program in C.
+    firmware image, by file. board_deadline_s: how long a board's own process may leave a request unanswered, and its
+    trial may take; 0: for ever (debuggers), 10 s for the trial. printed: takes what programs in C print; without it
+    they print on standard output. mode: where the boards run, instead of what `board_deadline_s` chooses.
+    require_confined: UserError where the kernel does not grant every confinement of a program in C.
     """
 
     end_word, end_name = "the robot fell", "a fall"
@@ -91,7 +91,10 @@ class Ranger(Machine):
         self.controller = controllers.load(self.scenario.controller)
         self.quirks = program(self.controller.program).switches(quirks if quirks is not None else Quirks())
         self.programs_in_c = ProgramsInC(
-            native_boards.built(firmware if firmware is not None else {}), printed, elsewhere=not in_process
+            native_boards.built(firmware if firmware is not None else {}),
+            printed,
+            elsewhere=not in_process,
+            patience_s=board_deadline_s,
         )
         self.firmware = self.programs_in_c.firmware
         self.images: dict[str, Image] = image_boards.loaded(images if images is not None else {})

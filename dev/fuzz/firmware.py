@@ -1,10 +1,15 @@
 """Hostile firmware: generated programs in C, and images, each as the hip board of a separate walk.
 
 A case is a program of one to three hostile pieces (signals, exits, descriptors, memory, stack, control flow, tables,
-calls, output) at places where a program runs: a constructor, the start, a task, an interrupt. Every sixth case is an
-image: random instructions, or ELF files with pieces exchanged. `walk` runs in a forked process. After it: it has
-ended in time with a code that agrees with its summary, a lost board has a cause, a refusal is one line, standard output
-is JSON and nothing else, and no process, file or shared memory is left.
+calls, output) at places where a program runs: a constructor, the start, a task, an interrupt. One library has every
+piece and is compiled once; each case writes the file `choice`, which the library reads before its other constructors.
+Every fiftieth case is compiled for itself. Every sixth case is an image: random instructions, or ELF files with pieces
+exchanged. `walk` runs in a forked process. After it: it has ended in time with a code that agrees with its summary, a
+lost board has a cause, a refusal says so after what the program printed, standard output is JSON and nothing else, and
+no process, file or shared memory is left.
+
+A board's process has half a second for an answer, in every twentieth case the default of ten; the case has ten seconds
+more than that, and the time in which processes of the machine waited for a processor.
 
 `--state FILE` keeps the counts after each case; a later run of the same seed goes on there.
 """
@@ -29,12 +34,15 @@ from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.cli import main
 
-DEADLINE = "2s"  # for an answer of the board's process: the same mechanism as with 10 s
-LONGEST_S = 120.0  # of a case: the compiler and a busy machine included. Chosen by us
+DEADLINE_S = 0.5  # for an answer of the board's process: the same mechanism as with the default, which tries the
+USUAL_S, USUAL_EVERY = 10.0, 20  # ... limit of the processor's time as well
+LONGEST_COMPILING_S = 120.0
+MORE_S = 10.0  # of a case, beyond the deadline: start, walk and end on a busy machine. Chosen by us
 LARGEST_OUTPUT = 1 << 26
 WALKED = "30ms"  # of the robot: the pieces run from the tenth slot of 0.5 ms on
 CODES = (0, 1, 2)
 IMAGE_EVERY = 6
+COMPILED_EVERY = 50
 
 # What a piece needs at the top of the file. fork and pthread_create fail with EPERM where system calls are restricted;
 # elsewhere the loops around them end.
@@ -60,12 +68,14 @@ HEAD = """#define _GNU_SOURCE
 #include <time.h>
 #include <unistd.h>
 void quick_exit(int);
-static volatile uint32_t sink, slots;
+static volatile uint32_t sink, slots, handled;
+static uint32_t place, which, version, n, s, w, d, acts[3], act_count;
 static jmp_buf earlier;
 extern int64_t fw_mail[32];
 extern int64_t (*fw_calls[])(int64_t, int64_t, int64_t, int64_t, int64_t);
 static void *thread(void *with) { for (;;) sink++; return with; }
 static void again(int number) { sink += number; }
+static void away(int number) { (void)number; longjmp(earlier, 1); }
 static uint32_t deeper(uint32_t depth)
 {
     volatile uint32_t here[200];
@@ -92,45 +102,50 @@ static void over_shared(int how, uint64_t value)
 }
 """
 
-# By name; %(n)d: a small number, %(s)d: a signal, %(w)d: any word, %(d)d: a descriptor.
+# By name; n: a small number, s: a signal, w: any word, d: a descriptor.
 PIECES = {
-    "signal": "raise(%(s)d);",
-    "signal to itself": "kill(getpid(), %(s)d);",
+    "signal": "raise(s);",
+    "signal to itself": "kill(getpid(), s);",
     "signals blocked": "sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); for (;;) sink++;",
     "signals blocked, asleep": "sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); for (;;) pause();",
     "signals ignored": "for (int each = 1; each < 65; each++) signal(each, SIG_IGN); for (;;) sink++;",
     "signals handled": "for (int each = 1; each < 65; each++) signal(each, again); *(volatile int *)8 = 1;",
+    "signal to others": "kill(-1, s); kill(0, s); kill(1, s); kill(getppid(), s);",
+    "group and session": "setpgid(0, 0); setsid(); kill(0, s);",
+    "handler that goes on elsewhere": "signal(SIGALRM, away); alarm(1); for (;;) sink++;",
+    "no stack for signals": "stack_t none = {.ss_flags = SS_DISABLE}; sigaltstack(&none, 0); sink = deeper(sink);",
     "timer off": "struct itimerval none; memset(&none, 0, sizeof none); "
     "setitimer(ITIMER_PROF, &none, 0); for (;;) sink++;",
     "alarm": "alarm(1);",
-    "handlers default": "for (int each = 1; each < 32; each++) signal(each, SIG_DFL); *(volatile int *)%(n)d = 1;",
-    "exit": "exit(%(n)d);",
-    "_exit": "_exit(%(n)d);",
-    "quick_exit": "quick_exit(%(n)d);",
+    "handlers default": "for (int each = 1; each < 32; each++) signal(each, SIG_DFL); "
+    "*(volatile int *)(uintptr_t)n = 1;",
+    "exit": "exit(n);",
+    "_exit": "_exit(n);",
+    "quick_exit": "quick_exit(n);",
     "abort": "abort();",
     "exit at exit": "atexit((void (*)(void))abort); exit(0);",
-    "exit by the kernel": "syscall(SYS_exit_group, %(n)d);",
-    "exit of the thread": "syscall(SYS_exit, %(n)d);",
+    "exit by the kernel": "syscall(SYS_exit_group, n);",
+    "exit of the thread": "syscall(SYS_exit, n);",
     "descriptors closed": "for (int each = 0; each < 1024; each++) close(each);",
-    "one descriptor closed": "close(%(d)d);",
+    "one descriptor closed": "close(d);",
     "descriptors reused": 'int it = open("/dev/null", O_RDWR); for (int each = 0; each < 40; each++) dup2(it, each);',
-    "one descriptor reused": 'int it = open("/dev/zero", O_RDONLY); dup2(it, %(d)d);',
+    "one descriptor reused": 'int it = open("/dev/zero", O_RDONLY); dup2(it, d);',
     "descriptors written": "for (int each = 0; each < 40; each++) { uint64_t one = 1; "
     "if (write(each, &one, 8) < 0) sink++; }",
     "descriptors read": "for (int each = 0; each < 40; each++) { char some[64]; fcntl(each, F_SETFL, O_NONBLOCK); "
     "if (read(each, some, 64) < 0) sink++; }",
-    "read for ever": "char some[64]; for (;;) if (read(%(d)d, some, 64) < 0) sink++;",
+    "read for ever": "char some[64]; for (;;) if (read(d, some, 64) < 0) sink++;",
     "descriptors used up": 'while (open("/dev/null", O_RDONLY) >= 0) sink++;',
-    "block filled": "over_shared(0, %(w)dull);",
+    "block filled": "over_shared(0, w);",
     "block zeroed": "over_shared(0, 0);",
-    "block scribbled": "srand(%(w)d); over_shared(1, 0);",
+    "block scribbled": "srand(w); over_shared(1, 0);",
     "block counted up": "for (;;) over_shared(2, 0);",
     "block counted up, blocked": "sigset_t all; sigfillset(&all); sigprocmask(SIG_BLOCK, &all, 0); "
     "for (;;) over_shared(2, 0);",
     "answers out of order": "for (int each = 0; each < 200; each++) { over_shared(2, 0); uint64_t one = 1; "
     "for (int to = 3; to < 12; to++) if (write(to, &one, 8) < 0) sink++; }",
-    "mail": "for (int each = 0; each < 32; each++) fw_mail[each] = %(w)d;",
-    "calls exchanged": "fw_calls[%(n)d] = fw_calls[%(n)d + 3];",
+    "mail": "for (int each = 0; each < 32; each++) fw_mail[each] = w;",
+    "calls exchanged": "fw_calls[n] = fw_calls[n + 3];",
     "calls removed": "for (int each = 0; each < 40; each++) fw_calls[each] = 0;",
     "threads": "pthread_t it; for (int each = 0; each < 8; each++) sink += pthread_create(&it, 0, thread, 0);",
     "forks": "for (int each = 0; each < 4; each++) if (fork() == 0) "
@@ -141,9 +156,9 @@ PIECES = {
     "sockets": "sink += socket(AF_INET, SOCK_STREAM, 0); sink += socket(AF_UNIX, SOCK_STREAM, 0);",
     "recursion": "sink = deeper(sink);",
     "huge stack": "volatile char *much = alloca(1u << 30); much[0] = 1; sink += much[0];",
-    "stack overwritten": "volatile char here[8]; memset((void *)here, %(n)d, 4096);",
+    "stack overwritten": "volatile char here[8]; memset((void *)here, n, 4096);",
     "jump to a function that has returned": "longjmp(earlier, 1);",
-    "jump to nowhere": "((void (*)(void))(uintptr_t)%(w)dull)();",
+    "jump to nowhere": "((void (*)(void))(uintptr_t)w)();",
     "null": "*(volatile int *)0 = 1;",
     "instruction": "__builtin_trap();",
     "memory used up": "for (;;) { char *much = malloc(1 << 22); if (!much) break; memset(much, 1, 1 << 22); }",
@@ -155,60 +170,106 @@ PIECES = {
     "asleep for long": "struct timespec it = {100, 0}; nanosleep(&it, 0);",
     "yielding": "for (;;) syscall(SYS_sched_yield);",
     "stopped": "raise(SIGSTOP);",
-    "double start": "fw_can_start(1, 0x00254001, 0); fw_can_start(%(n)d, %(w)d, %(w)d);",
-    "unknown devices": "fw_timer_start(%(n)d, %(w)d, 1); fw_adc_start(%(n)d); fw_spi_transfer(%(n)d);",
-    "unknown pins": "fw_pin_write(%(w)d, 1); fw_capture_connect(%(n)d, %(n)d, %(w)d);",
-    "frames": "fw_can_frame it = {%(w)d, %(w)d, %(w)d, %(w)d}; for (int each = 0; each < 9; each++) "
-    "fw_can_transmit(each %% 5, each, &it);",
-    "time": "fw_spend(%(w)du); fw_idle();",
-    "interrupts": "fw_request(%(n)d, %(w)d); fw_detach(%(n)d, 0);",
-    "output": 'for (int each = 0; each < 20000; each++) printf("%%d {\\"a\\": [", each);',
+    "double start": "fw_can_start(1, 0x00254001, 0); fw_can_start(n, w, w);",
+    "unknown devices": "fw_timer_start(n, w, 1); fw_adc_start(n); fw_spi_transfer(n);",
+    "unknown pins": "fw_pin_write(w, 1); fw_capture_connect(n, n, w);",
+    "frames": "fw_can_frame it = {w, w, w, w}; for (int each = 0; each < 9; each++) "
+    "fw_can_transmit(each % 5, each, &it);",
+    "time": "fw_spend(w); fw_idle();",
+    "interrupts": "fw_request(n, w); fw_detach(n, 0);",
+    "output": 'for (int each = 0; each < 20000; each++) printf("%d {\\"a\\": [", each);',
     "bytes": 'for (int each = 0; each < 4096; each++) putchar(each); fputs("\\033[2J\\033]0;x\\007", stderr);',
     "output for ever": 'for (;;) if (write(1, "0123456789abcdef", 16) < 0) sink++;',
 }
 PLACES = ("task", "start", "constructor", "handler", "schedule")
 OFTEN = 3  # of five cases, a task
+NAMES = sorted(PIECES)
+CHOICE = "choice"
 
 PROGRAM = """
 __attribute__((noinline)) static void %(name)s(void)
 {
-    %(pieces)s
+    %(piece)s
 }
 """
 BODY = """
-%(constructor)s
+static void (*const every_act[])(void) = {%(names)s};
+__attribute__((noinline)) static void act(uint32_t here)
+{
+    if (here == place)
+        for (uint32_t each = 0; each < act_count; each++)
+            every_act[acts[each]]();
+}
+__attribute__((constructor(101))) static void choose(void)
+{
+    FILE *file = fopen("%(choice)s", "r");
+    if (!file || fscanf(file, "%%u %%u %%u %%u %%u %%u %%u", &place, &which, &version, &n, &s, &w, &d) != 7)
+        abort();
+    while (act_count < 3 && fscanf(file, "%%u", &acts[act_count]) == 1)
+        act_count++;
+    fclose(file);
+}
+__attribute__((constructor)) static void early(void) { act(CONSTRUCTOR); }
 static int32_t control(void)
 {
     if (!slots)
         setjmp(earlier);
-    if (++slots == 10) { %(task)s; }
+    if (++slots == 10) { act(TASK); act(SCHEDULE); }
     return 0;
 }
-static int32_t handler(void) { %(handler)s; return 0; }
+static int32_t handler(void)
+{
+    if (++handled < 20) /* of some 300 */
+        act(HANDLER);
+    return 0;
+}
 static const fw_task every[] = {{control, "control", 20, 30}};
-static const fw_schedule schedule = {%(schedule)s};
+static const fw_schedule schedules[] = {%(schedules)s};
+static const uintptr_t instead[] = {%(instead)s};
 void firmware_start(void)
 {
     fw_interrupt it = {.kind = FW_TIMER_MATCH, .index = 1, .handler = handler, .name = "it", .cost = 20, .vic_slot = 3};
-    (void)it;
     fw_can_start(1, 0x00254001, 0);
-    %(start)s;
+    if (place == HANDLER) {
+        fw_timer_start(1, 6000, 1);
+        fw_attach(&it);
+    }
+    act(START);
 }
-const fw_schedule *firmware_schedule(void) { %(before)s; return %(which)s; }
-uint32_t firmware_table_version(void) { return %(version)s; }
+const fw_schedule *firmware_schedule(void)
+{
+    return instead[which] == 1 ? &schedules[which] : (const fw_schedule *)instead[which];
+}
+uint32_t firmware_table_version(void) { return version ? version : RANGER_TABLE_VERSION; }
 """
 GOOD = ".slot_ns = 500000, .every = FW_TASKS(every), .tick_cost = 60, .tick_vic_slot = 4"
+# the address returned in place of a schedule, 1: its own
 SCHEDULES = (
-    (".slot_ns = 0, .every = FW_TASKS(every)", "&schedule"),
-    (".slot_ns = 4000000000u, .every = FW_TASKS(every), .tick_vic_slot = 99", "&schedule"),
-    (".slot_ns = 1, .every = FW_TASKS(every), .tick_vic_slot = 4", "&schedule"),
-    (".slot_ns = 500000, .every = {every, 4000000000u}, .tick_vic_slot = 4", "&schedule"),
-    (".slot_ns = 500000, .every = {(const fw_task *)8, 1}, .tick_vic_slot = 4", "&schedule"),
-    (".slot_ns = 500000, .every = {0, 1}, .tick_vic_slot = 4", "&schedule"),
-    (GOOD, "0"),
-    (GOOD, "(const fw_schedule *)4096"),
+    (GOOD, 1),
+    (".slot_ns = 0, .every = FW_TASKS(every)", 1),
+    (".slot_ns = 4000000000u, .every = FW_TASKS(every), .tick_vic_slot = 99", 1),
+    (".slot_ns = 1, .every = FW_TASKS(every), .tick_vic_slot = 4", 1),
+    (".slot_ns = 500000, .every = {every, 4000000000u}, .tick_vic_slot = 4", 1),
+    (".slot_ns = 500000, .every = {(const fw_task *)8, 1}, .tick_vic_slot = 4", 1),
+    (".slot_ns = 500000, .every = {0, 1}, .tick_vic_slot = 4", 1),
+    (GOOD, 0),
+    (GOOD, 4096),
 )
 MANIFEST = "[firmware]\nname = 'small'\ntables = ['mch']\n"
+
+
+def write_program(folder: pathlib.Path) -> None:
+    """The program with every piece; what it does is in its folder's file `choice`."""
+    pieces = "".join(PROGRAM % {"name": f"piece{i}", "piece": PIECES[name]} for i, name in enumerate(NAMES))
+    parts = {
+        "names": ", ".join(f"piece{i}" for i in range(len(NAMES))),
+        "choice": folder.resolve() / CHOICE,
+        "schedules": ", ".join(f"{{{text}}}" for text, _ in SCHEDULES),
+        "instead": ", ".join(str(address) for _, address in SCHEDULES),
+    }
+    places = f"enum {{{', '.join(PLACES).upper()}}};\n"
+    (folder / "small.c").write_text(HEAD + places + pieces + BODY % parts, encoding="utf-8")
+    (folder / "firmware.toml").write_text(MANIFEST, encoding="utf-8")
 
 
 class Fuzz:
@@ -217,7 +278,20 @@ class Fuzz:
     def __init__(self, seed: int, folder: pathlib.Path) -> None:
         self.seed = seed
         self.folder = folder
-        self.counts = {"cases": 0, "refused": 0, "lost": 0, "went_on": 0, "images": 0, "longest_s": 0}
+        self.programs = folder / "programs"
+        counted = ("cases", "refused", "lost", "failed", "went_on", "images", "longest_s", "beyond_the_deadline_s")
+        self.counts: dict[str, float] = dict.fromkeys(counted, 0)
+
+    def compile(self) -> None:
+        """Compile the program that the cases share, by a walk in which it does nothing hostile."""
+        self.programs.mkdir()
+        write_program(self.programs)
+        (self.programs / CHOICE).write_text("0 0 0 0 0 0 0", encoding="utf-8")
+        scratch = self.folder / "compiled"
+        scratch.mkdir()
+        code, _, errors = self.walk(scratch, ["--firmware", f"MCH={self.programs}"], LONGEST_COMPILING_S, "compiling")
+        if code:
+            raise Finding(f"the program without a hostile piece: code {code}: {errors[-2000:]}")
 
     def case(self, number: int) -> None:
         """Generate a program, walk with it, check everything."""
@@ -225,11 +299,23 @@ class Fuzz:
         folder = self.folder / str(number)
         folder.mkdir()
         is_image = number % IMAGE_EVERY == IMAGE_EVERY - 1
-        what = self.image(folder) if is_image else self.program(folder)
+        is_compiled = number % COMPILED_EVERY == 0  # the compiler's trial has the default deadline
+        deadline_s = USUAL_S if number % USUAL_EVERY == 0 or is_compiled else DEADLINE_S
+        if is_image:
+            firmware = ["--image", f"MCH={folder / 'small.elf'}"]
+            what = self.image(folder)
+        else:
+            programs = folder if is_compiled else self.programs
+            if programs is folder:
+                write_program(folder)
+            firmware = ["--firmware", f"MCH={programs}"]
+            what = self.program(programs)
         where = f"case {number} ({what})"
         began_s = wallclock.monotonic_s()
-        code, output, errors = self.walk(folder, is_image, where)
-        self.counts["longest_s"] = max(self.counts["longest_s"], round(wallclock.monotonic_s() - began_s))
+        code, output, errors = self.walk(folder, firmware, deadline_s, where)
+        took_s = wallclock.monotonic_s() - began_s
+        self.counts["longest_s"] = max(self.counts["longest_s"], round(took_s, 1))
+        self.counts["beyond_the_deadline_s"] = max(self.counts["beyond_the_deadline_s"], round(took_s - deadline_s, 1))
         self.counts["cases"] += 1
         self.counts["images"] += is_image
         self.check(code, output, errors, where)
@@ -248,31 +334,18 @@ class Fuzz:
     # --- programs -----------------------------------------------------------------------------------------
 
     def program(self, folder: pathlib.Path) -> str:
-        """Write a program; returns what is in it."""
+        """Choose what the program in `folder` does; returns that."""
         place = "task" if self.number(5) < OFTEN else self.one_of(PLACES)
-        names = [self.one_of(sorted(PIECES)) for _ in range(1 + self.number(3))]
-        values = {"n": self.number(9), "s": 1 + self.number(64), "w": self.number(1 << 31), "d": self.number(12)}
-        functions = [{"name": f"piece{i}", "pieces": PIECES[name] % values} for i, name in enumerate(names)]
-        pieces = "".join(PROGRAM % each for each in functions)
-        calls = " ".join(f"piece{i}();" for i in range(len(names)))
-        parts = {"task": "", "start": "", "handler": "", "before": "", "constructor": ""}
-        parts.update(schedule=GOOD, which="&schedule", version="RANGER_TABLE_VERSION")
-        if place == "constructor":
-            parts["constructor"] = f"__attribute__((constructor)) static void early(void) {{ {calls} }}"
-        elif place == "schedule":
-            parts["schedule"], parts["which"] = self.one_of(SCHEDULES)
-            parts["task"] = calls
-            names.insert(0, parts["schedule"])
-            if self.number(4) == 0:
-                parts["version"] = str(values["w"])
-        elif place == "handler":
-            parts["handler"] = calls
-            parts["start"] = "fw_timer_start(1, 6000, 1); fw_attach(&it)"
-        else:
-            parts[place] = calls
-        (folder / "small.c").write_text(HEAD + pieces + BODY % parts, encoding="utf-8")
-        (folder / "firmware.toml").write_text(MANIFEST, encoding="utf-8")
-        return f"{place}: {', '.join(names)}"
+        names = [self.one_of(NAMES) for _ in range(1 + self.number(3))]
+        values = [self.number(9), 1 + self.number(64), self.number(1 << 31), self.number(12)]
+        which, version, shown = 0, 0, names
+        if place == "schedule":
+            which = 1 + self.number(len(SCHEDULES) - 1)
+            version = values[2] if self.number(4) == 0 else 0
+            shown = [f"{SCHEDULES[which][0]} at {SCHEDULES[which][1]}", *names]
+        numbers = [PLACES.index(place), which, version, *values, *map(NAMES.index, names)]
+        (folder / CHOICE).write_text(" ".join(map(str, numbers)), encoding="utf-8")
+        return f"{place}: {', '.join(shown)}; n, s, w, d: {values}"
 
     # --- images -------------------------------------------------------------------------------------------
 
@@ -299,10 +372,10 @@ class Fuzz:
 
     # --- the walk -----------------------------------------------------------------------------------------
 
-    def walk(self, folder: pathlib.Path, is_image: bool, where: str) -> tuple[int, bytes, str]:
+    def walk(self, folder: pathlib.Path, firmware: list[str], deadline_s: float, where: str) -> tuple[int, bytes, str]:
         """Walk in a forked process; exit code, standard output, standard error."""
-        what = ["--image", f"MCH={folder / 'small.elf'}"] if is_image else ["--firmware", f"MCH={folder}"]
-        command = ["walk", "--time", WALKED, *what, "--json", "-", "--log", "none", "--board-deadline", DEADLINE]
+        command = ["walk", "--time", WALKED, *firmware, "--json", "-", "--log", "none"]
+        command += ["--board-deadline", f"{deadline_s:g}s"]
         places = [folder / name for name in ("stdout", "stderr")]
         temporary = folder / "temporary"
         temporary.mkdir()
@@ -314,14 +387,16 @@ class Fuzz:
         if process == 0:
             _walk(command, places, temporary)
         watch = os.pidfd_open(process)
-        has_ended = bool(descriptors.wait([watch], [], LONGEST_S)[0])
+        busy_s = _busy_s()
+        has_ended = bool(descriptors.wait([watch], [], deadline_s + MORE_S)[0])
+        has_ended = has_ended or bool(descriptors.wait([watch], [], _busy_s() - busy_s)[0])
         os.close(watch)
         left = processes_of(process)
         if not has_ended:
             os.killpg(process, signal.SIGKILL)
         code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
         if not has_ended:
-            raise Finding(f"{where}: it has not ended after {LONGEST_S:g} s")
+            raise Finding(f"{where}: it has not ended after {deadline_s + MORE_S:g} s")
         if left - {process}:
             raise Finding(f"{where}: {len(left) - 1} processes are left")
         shared = [name for name in os.listdir("/dev/shm") if "ranger" in name]  # others are of other programs
@@ -335,8 +410,11 @@ class Fuzz:
         """The exit code, the summary and the messages agree."""
         if "Traceback" in errors or code not in CODES:
             raise Finding(f"{where}: code {code}: {errors[-2000:]}")
+        if not errors.replace("\n", "").isprintable():
+            raise Finding(f"{where}: control characters on standard error: {errors[-2000:]!r}")
         if code == 2:  # noqa: PLR2004  (a user's mistake: argparse's code)
-            if output or not errors.startswith("ranger-sim: "):
+            own = [line for line in errors.split("\n") if not line.startswith("MCH: ")]  # what it printed is shown
+            if output or not own[0].startswith("ranger-sim: "):
                 raise Finding(f"{where}: refused, but: {output[:200]!r} {errors[:500]}")
             self.counts["refused"] += 1
             return
@@ -348,9 +426,19 @@ class Fuzz:
         if code != (1 if summary["fell"] or failed else 0):
             raise Finding(f"{where}: code {code}, failed boards {failed}")
         lost = summary["firmware"].get("MCH", {}) if "firmware" in summary else {}
-        if "MCH" in failed and not lost.get("why") and "lost_s" in lost:
+        is_lost = lost.get("lost_s") is not None  # a board that fails without it finishes none of its slots
+        if is_lost and not ("MCH" in failed and lost.get("why")):
             raise Finding(f"{where}: lost without a cause")
-        self.counts["lost" if failed else "went_on"] += 1
+        self.counts["lost" if is_lost else "failed" if failed else "went_on"] += 1
+
+
+def _busy_s() -> float:
+    """For how long some process of this machine has waited for a processor, s; 0 where the kernel does not count it."""
+    try:
+        pressure = pathlib.Path("/proc/pressure/cpu").read_text(encoding="ascii")
+    except OSError:
+        return 0.0
+    return int(pressure.split("total=")[1].split()[0]) * 1e-6
 
 
 def _walk(command: list[str], places: list[pathlib.Path], temporary: pathlib.Path) -> None:
@@ -400,7 +488,7 @@ def elf(content: bytes) -> bytes:
     return head + struct.pack("<8I", 1, 84, 0, 0, len(content), len(content), 5, 4) + content
 
 
-def run(cases: int, seed: int, state: pathlib.Path | None = None) -> dict[str, int]:
+def run(cases: int, seed: int, state: pathlib.Path | None = None) -> dict[str, float]:
     """`cases` cases; the counts. state: a file in which an earlier run of this seed has kept its counts."""
     for name in ("harness.processes.forked_boards", "firmware_sim.native.library", "tools.run.walk", "ranger.robot"):
         importlib.import_module(f"ranger_sim.{name}")  # here once, and not in every forked process
@@ -411,8 +499,9 @@ def run(cases: int, seed: int, state: pathlib.Path | None = None) -> dict[str, i
             if kept["seed"] != seed:
                 raise UserError(f"{state}: seed {kept['seed']}, not {seed}")
             fuzz.counts = kept["counts"]
+        fuzz.compile()
         while fuzz.counts["cases"] < cases:
-            fuzz.case(fuzz.counts["cases"])
+            fuzz.case(int(fuzz.counts["cases"]))
             if state is not None:
                 state.write_text(json.dumps({"seed": seed, "counts": fuzz.counts}), encoding="utf-8")
         return fuzz.counts

@@ -2,17 +2,21 @@
 
 `confine` is called in that process, before the program is loaded. It takes, as far as the kernel grants each:
 
-- separate user, network, IPC and host-name namespaces, and no capabilities in any;
+- separate user, network, IPC and host-name namespaces, and no capabilities in any; with `fork`, one of process
+  numbers;
 - Landlock: it reads the interpreter, the system's libraries and the firmware's folder, and writes only where coverage
   and sanitizers keep their results;
 - limits of memory, of the size of a file, of descriptors and of core dumps;
 - a list of system calls (seccomp): files, memory, clocks and its own signals. Everything else fails with EPERM:
   sockets, processes, threads, other processes' memory, mounts, modules, keys.
 
-There is no PID namespace: its first process ignores signals that it sends itself, so `abort()` would go unnoticed. The
-system calls that could use another process's number are refused instead.
+`fork` starts such a process in a namespace of process numbers. The first process of one ignores signals that it sends
+itself, so that `abort()` would go unnoticed; it is an init of ours, which only waits, and the board is the second. The
+board is nevertheless a child of the process that called `fork`, which sees its signals and its end as of every child.
+System calls that could use another process's number are refused as well.
 """
 
+import contextlib
 import ctypes
 import dataclasses
 import os
@@ -22,19 +26,23 @@ import re
 import signal
 import struct
 import sys
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
+from typing import NoReturn
 
-from ranger_sim.foundation import systems
+from ranger_sim.foundation import descriptors, systems
 
 MEMORY_BYTES = 512 << 20  # for a program beyond what the process has; the chip has 16 KB. Chosen by us
 FILE_BYTES = 256 << 20  # of one file: what it prints, and its coverage. Chosen by us
 DESCRIPTORS = 64  # beyond those that are open; chosen by us
 
+CLONE_PARENT, CLONE_NEWPID = 0x00008000, 0x20000000  # sched.h
 CLONE_NEWUTS, CLONE_NEWIPC, CLONE_NEWUSER, CLONE_NEWNET = 0x04000000, 0x08000000, 0x10000000, 0x40000000  # sched.h
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_CAPBSET_DROP, PR_SET_NO_NEW_PRIVS = 1, 4, 24, 38  # linux/prctl.h
 PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL = 47, 4
 CAPABILITY_VERSION_3 = 0x20080522  # linux/capability.h
 LAST_CAPABILITY = 63
+LONG_S = 3600.0  # between two looks at a board that does not end
+BOARD = 2  # its number in its namespace: the process after init
 ERROR_NOT_PERMITTED = 1  # EPERM
 MCL_CURRENT = 1  # sys/mman.h
 
@@ -63,6 +71,7 @@ class Processor:
     """The numbers of a processor's system calls (asm/unistd_64.h, asm-generic/unistd.h)."""
 
     architecture: int  # AUDIT_ARCH_*
+    clone: int
     seccomp: int
     capset: int
     close_range: int
@@ -74,7 +83,7 @@ class Processor:
 
 PROCESSORS = {
     "x86_64": Processor(
-        0xC000003E, 317, 126, 436,
+        0xC000003E, 56, 317, 126, 436,
         free=(
             0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 17, 18, 19, 20, 21, 23, 24, 25, 26, 27, 28, 32,
             33, 34, 35, 36, 37, 38, 39, 60, 63, 74, 75, 77, 78, 79, 83, 87, 89, 95, 96, 97, 98, 99, 100, 102, 104,
@@ -85,7 +94,7 @@ PROCESSORS = {
         fcntl=72, prlimit=302,
     ),
     "aarch64": Processor(
-        0xC00000B7, 277, 91, 436,
+        0xC00000B7, 220, 277, 91, 436,
         free=(
             17, 23, 24, 34, 35, 46, 48, 56, 57, 61, 62, 63, 64, 65, 66, 67, 68, 72, 73, 78, 79, 80, 82, 83, 93, 94,
             98, 99, 101, 102, 103, 113, 114, 115, 123, 124, 128, 132, 133, 134, 135, 136, 137, 139, 153, 160, 163,
@@ -109,6 +118,11 @@ class Needs:
     write: tuple[pathlib.Path, ...] = ()
     large_memory: bool = False
 
+    @property
+    def has_own_numbers(self) -> bool:
+        """Whether its process can have separate process numbers: the address sanitizer names its files by them."""
+        return not self.large_memory
+
 
 def unavailable() -> str:
     """Why no process can be confined on this system; empty where it can."""
@@ -127,6 +141,110 @@ def describe(lacks: Iterable[str] | None) -> str:
     return f"partly ({lacking})" if lacking else "yes"
 
 
+LAUNCHERS: dict[int, int] = {}  # by the process that `fork` returned: the one that ends after it
+# Why this process has no separate process numbers; empty where it has.
+without_numbers = "not asked for"
+
+
+def fork(has_own_numbers: bool, prepare: Callable[[], object] = lambda: None) -> int:
+    """As os.fork; has_own_numbers: into a namespace of process numbers, where the kernel grants it (`confine` reports
+    it). Such a child ends with this process, in whatever way that ends; its `os.getppid()` is 0.
+
+    prepare: called with the rights of this process; what it does is inherited, such as scheduling.
+    """
+    if not has_own_numbers or unavailable():
+        return os.fork()
+    reading, writing = os.pipe()
+    parent = os.getpid()
+    launcher = os.fork()
+    if launcher == 0:
+        os.close(reading)
+        prepare()
+        _launch(writing, parent)
+        return 0
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        number = int(pipe.read() or launcher)  # nothing: it ended early, which its parent will see
+    if number != launcher:
+        LAUNCHERS[number] = launcher
+    return number
+
+
+def wait_for(process: int) -> int:
+    """Wait until nothing of a process that `fork` returned is left; its code, as os.waitstatus_to_exitcode has it."""
+    code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    if launcher := LAUNCHERS.pop(process, 0):
+        with contextlib.suppress(ChildProcessError):  # the caller waits for every child
+            os.waitpid(launcher, 0)
+    return code
+
+
+def _launch(report: int, parent: int) -> None:
+    """In the launcher: start the namespace's init and the board, which returns; without a namespace it is the board."""
+    global without_numbers  # noqa: PLW0603  (of this process, for its `confine`)
+    libc = ctypes.PyDLL(None, use_errno=True)  # one that keeps the interpreter's lock while it clones
+    user, group = os.getuid(), os.getgid()
+    libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    number, init = 0, 0
+    if libc.unshare(CLONE_NEWUSER | CLONE_NEWPID) == 0:
+        _map_itself(user, group)
+        libc.prctl(PR_SET_DUMPABLE, 1, 0, 0, 0)
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        (begun, init_begun), (board_begun, begin) = os.pipe(), os.pipe()
+        init = os.fork()
+        if init == 0:
+            os.close(begin)
+            _be_init(libc, init_begun, board_begun)
+        os.close(init_begun)
+        os.close(board_begun)
+        os.read(begun, 1)  # it ends with this process from now on
+        os.close(begun)
+        flags = ctypes.c_ulong(CLONE_PARENT | signal.SIGCHLD)
+        number = libc.syscall(PROCESSORS[platform.machine()].clone, flags, None, None, None, None)
+        if number == 0:
+            os.close(begin)
+            os.close(report)
+            without_numbers = ""
+            return
+        if number > 0:
+            os.write(begin, b"+")
+        os.close(begin)
+    without_numbers = os.strerror(ctypes.get_errno())
+    if os.getppid() != parent:
+        os._exit(1)
+    os.write(report, str(number if number > 0 else os.getpid()).encode())
+    os.close(report)
+    if number > 0:
+        _wait_silently(libc)
+        os.waitpid(init, 0)
+        os._exit(0)
+
+
+def _be_init(libc: ctypes.CDLL, has_begun: int, board_has_begun: int) -> NoReturn:
+    """The first process of the namespace: ends with the board, its second process, and with its parent."""
+    try:
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        os.write(has_begun, b"+")
+        os.close(has_begun)
+        _wait_silently(libc, board_has_begun)
+        if os.read(board_has_begun, 1):
+            watch = os.pidfd_open(BOARD)
+            while not descriptors.wait([watch], [], LONG_S)[0]:
+                pass
+    finally:
+        os._exit(0)
+
+
+def _wait_silently(libc: ctypes.CDLL, *keep: int) -> None:
+    """Keep no descriptor open but these, and leave Ctrl-C and the like to others."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    _keep_descriptors(libc, PROCESSORS[platform.machine()], keep)
+    for output in (1, 2):
+        os.dup2(0, output)
+
+
 def confine(needs: Needs, keep: Collection[int]) -> list[str]:
     """Confine this process for the rest of its life; returns what could not be had, in words.
 
@@ -137,7 +255,7 @@ def confine(needs: Needs, keep: Collection[int]) -> list[str]:
     numbers = PROCESSORS[platform.machine()]
     libc = ctypes.CDLL(None, use_errno=True)
     parent = os.getppid()
-    lacks: list[str] = []
+    lacks = [f"no separate process numbers: {without_numbers}"] if without_numbers else []
     if _locks_memory():  # what is locked stays so; what comes later cannot be, without the right to it
         libc.munlockall()
         libc.mlockall(MCL_CURRENT)

@@ -22,7 +22,8 @@ from ranger_sim.firmware_sim.native import confinement, crash, sanitizers
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.user_error import FirmwareError, UserError
 
-PATIENCE_S = 10.0  # of the clock: to load and to start takes milliseconds; chosen by us
+PATIENCE_S = 10.0  # of the clock, for all of it: to load and to start takes milliseconds; chosen by us
+ASKING_S = 0.2  # of the clock, for a program that is asked for its position; it writes a few words
 LONGEST_TEXT = 32768  # less than a pipe holds
 LONGEST_DESCRIPTION = 1 << 20  # bytes; one of a large schedule has some 20,000. Chosen by us
 LOADED, STARTED, REFUSED = b"L", b"S", b"R"  # reports of the process: its progress; after the last one the reason
@@ -60,12 +61,14 @@ def tried(
     sources: pathlib.Path,
     start: Callable[[Any], Any] = lambda record: None,
     made: pathlib.Path | None = None,
+    patience_s: float | None = None,
 ) -> Tried:
     """Load a library in a forked process, then call `start(record)` there. UserError, which begins with `what`, when
     the program ends that process or does not return in time; a UserError of `start` is raised here as well.
 
     record: where the program leaves its place (`leave_record_in`). made: the file, where it is not at `library` yet;
-    what it prints is dropped then, because it is loaded again from there.
+    what it prints is dropped then, because it is loaded again from there. patience_s: the time, of the clock; None:
+    PATIENCE_S.
     """
     importlib.import_module("cffi")  # a missing library is not the program's fault
     record = record_words()
@@ -75,15 +78,17 @@ def tried(
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # other threads: nothing in the child needs them
-        process = os.fork()
+        process = confinement.fork(needs.has_own_numbers)
     if process == 0:
         os.close(reading)
         work = functools.partial(_load_and_start, library, start, made, record)
         _be_the_trial(work, writing, needs, is_silent=made is not None)
     os.close(writing)
-    output = _all_of(reading)
+    patience_s = PATIENCE_S if patience_s is None else patience_s
+    until_s = wallclock.monotonic_s() + patience_s
+    output = _all_of(reading, until_s)
     os.close(reading)
-    code = _end_of(process, is_over=_is_through(output))
+    code = _end_of(process, until_s, is_over=_is_through(output))
     lacks, _, progress = output.partition(b"\n")
     if _is_through(output):
         try:
@@ -93,13 +98,13 @@ def tried(
     reached, _, mistake = progress.partition(REFUSED)
     if mistake:
         raise FirmwareError(*mistake.decode(errors="replace").split("\n"))
-    how = crash.describe(library, sources, record.tolist()) or (
-        f"no answer for {PATIENCE_S:g} s"
-        if code is None
-        else f"its process was killed by signal {-code}"
-        if code < 0
-        else f"it ended its process with code {code}"
-    )
+    place = crash.describe(library, sources, record.tolist())
+    if code is None:
+        how = ": ".join(filter(None, (f"no answer for {patience_s:g} s", place)))
+    else:
+        how = place or (
+            f"its process was killed by signal {-code}" if code < 0 else f"it ended its process with code {code}"
+        )
     when = "start" if reached == LOADED else "loading (what runs in it before firmware_start, such as a constructor)"
     raise FirmwareError(f"{what}: its program fails in its {when}: {how}")
 
@@ -124,11 +129,10 @@ def _is_through(output: bytes) -> bool:
     return progress.startswith(LOADED + STARTED) and progress.endswith(b"\n")
 
 
-def _all_of(pipe: int) -> bytes:
-    """Bytes from a pipe until the program is done, the pipe ends, or PATIENCE_S are over."""
+def _all_of(pipe: int, until_s: float) -> bytes:
+    """Bytes from a pipe until the program is done, the pipe ends, or it is `until_s` by the clock."""
     output = b""
-    until_s = wallclock.monotonic_s() + PATIENCE_S
-    while not _is_through(output) and descriptors.wait([pipe], [], until_s - wallclock.monotonic_s())[0]:
+    while not _is_through(output) and descriptors.wait([pipe], [], max(0.0, until_s - wallclock.monotonic_s()))[0]:
         part = os.read(pipe, LONGEST_TEXT)
         if not part or len(output) > LONGEST_DESCRIPTION:
             break
@@ -136,17 +140,23 @@ def _all_of(pipe: int) -> bytes:
     return output
 
 
-def _end_of(process: int, is_over: bool) -> int | None:
-    """The exit code of an ending process; None when it did not end and was killed."""
+def _end_of(process: int, until_s: float, is_over: bool) -> int | None:
+    """The exit code of a process that ends before `until_s`; None when it did not and was asked for its position and
+    killed, or `is_over`: nothing more is wanted of it.
+    """
     if not is_over and hasattr(os, "pidfd_open"):
         watch = os.pidfd_open(process)
-        is_over = not descriptors.wait([watch], [], PATIENCE_S)[0]
-        os.close(watch)
-        if not is_over:
-            return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        try:
+            if descriptors.wait([watch], [], max(0.0, until_s - wallclock.monotonic_s()))[0]:
+                return confinement.wait_for(process)
+            for number in (crash.ASKED, signal.SIGCONT):
+                os.kill(process, number)
+            descriptors.wait([watch], [], ASKING_S)
+        finally:
+            os.close(watch)
     with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
-    os.waitpid(process, 0)
+    confinement.wait_for(process)
     return None
 
 
@@ -161,6 +171,8 @@ def _be_the_trial(
         for output in (1, 2):
             os.dup2(nothing, output)
         os.close(nothing)
+    else:
+        os.dup2(1, 2)  # all that it prints is its board's output
     os.environ[IN_TRIAL] = "1"
     library.runs_one_program = True
     try:

@@ -1,10 +1,12 @@
 """The memory that the processes share. All of it is anonymous: it disappears with the processes.
 
 One block per board, written by its board process, the plant process and the supervisor; one stage, written by the
-plant process, with the sensors' values for all boards. places.py has the place of every word.
+plant process, with the sensors' values for all boards, which boards can only read. places.py has the place of every
+word.
 """
 
 import contextlib
+import fcntl
 import mmap
 import os
 from collections.abc import Iterable, Iterator
@@ -31,6 +33,7 @@ from ranger_sim.harness.processes.places import (
 )
 
 MAGIC = 0x52414E4745523031  # "RANGER01"
+F_SEAL_FUTURE_WRITE = 0x0010  # linux/fcntl.h, from Linux 5.1 on; pidfds, which boards as processes need, came with 5.3
 
 
 class Block:
@@ -103,14 +106,19 @@ class Block:
 
 
 @contextlib.contextmanager
-def alone(block: Block, blocks: Iterable[Block]) -> Iterator[None]:
-    """Within it, a forked process has the shared memory of `block` and no other."""
+def alone(block: Block, blocks: Iterable[Block], stage: "StageMemory", is_held: bool = False) -> Iterator[None]:
+    """Within it, a forked process can write into the shared memory of `block` and no other; it reads the stage.
+
+    is_held: a debugger may hold the board, whose process then moves the pace on: it writes the stage as well.
+    """
     every = list(blocks)
     for each in every:
         each.is_forked(shared=each is block, private=False)
+    stage.is_forked(is_held)
     try:
         yield
     finally:
+        stage.is_forked(True)
         for each in every:
             each.is_forked(shared=True, private=True)
 
@@ -120,10 +128,26 @@ def words_shown(board: Any) -> int:
     return 0 if board.memory is None else len(board.memory)
 
 
-def new_stage() -> Any:
-    """The stage as (words, doubles), two views of one anonymous shared memory."""
-    memory = mmap.mmap(-1, 8 * (STAGE_FIRST + STAGE_RING * ROW_SIZE))
-    view = memoryview(memory)
-    words = view.cast("q")
-    words[MAGIC_WORD], words[VERSION_WORD] = MAGIC, VERSION
-    return words, view.cast("d")
+class StageMemory:
+    """The stage as two mappings of one anonymous memory, each as (words, doubles): `written`, and `shown`, which no
+    process can make writable: the memory is sealed against further writers.
+    """
+
+    def __init__(self) -> None:
+        size = 8 * (STAGE_FIRST + STAGE_RING * ROW_SIZE)
+        descriptor = os.memfd_create("ranger-stage", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        try:
+            os.ftruncate(descriptor, size)
+            self.memory = mmap.mmap(descriptor, size)
+            fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, F_SEAL_FUTURE_WRITE | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW)
+            view = memoryview(mmap.mmap(descriptor, size, access=mmap.ACCESS_READ))
+        finally:
+            os.close(descriptor)
+        self.shown = view.cast("q"), view.cast("d")
+        view = memoryview(self.memory)
+        self.written = words, _ = view.cast("q"), view.cast("d")
+        words[MAGIC_WORD], words[VERSION_WORD] = MAGIC, VERSION
+
+    def is_forked(self, writable: bool) -> None:
+        """Whether processes that this one forks from now on can write it; all can read it."""
+        self.memory.madvise(mmap.MADV_DOFORK if writable else mmap.MADV_DONTFORK)

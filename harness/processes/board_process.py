@@ -8,6 +8,7 @@ from typing import Any
 from ranger_sim.can_bus.edge.peers import reasons_text
 from ranger_sim.firmware_sim.gdb.server import GdbServer
 from ranger_sim.firmware_sim.native import confinement, coverage
+from ranger_sim.firmware_sim.native.sanitizers import place_of_findings
 from ranger_sim.firmware_sim.native.trial import needs_of
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.user_error import BoardFailure
@@ -47,6 +48,11 @@ class Hold:
     def ends(self) -> bool:
         """Whether the run is to end."""
         return bool(self.words[places.LET_GO])
+
+
+def is_confined(robot: Any, name: str) -> bool:
+    """Whether board `name` runs a program in C in a process that can have separate process numbers."""
+    return name in robot.firmware and robot.boards[name].out_of_process and place_of_findings() is None
 
 
 def serve(

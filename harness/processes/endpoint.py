@@ -93,8 +93,8 @@ class Endpoint:
     shared: object
     activity: object
     block: cython.longlong[::1]
-    stage: cython.longlong[::1]
-    stage_doubles: cython.double[::1]
+    stage: cython.const[cython.longlong][::1]
+    stage_doubles: cython.const[cython.double][::1]
     ask: Bell
     answer: Bell
     to_board: Mailbox

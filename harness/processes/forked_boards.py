@@ -17,10 +17,11 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
-from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native import confinement, crash
 from ranger_sim.foundation import descriptors, systems
 from ranger_sim.harness.processes import board_process, kernel, places
-from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
+from ranger_sim.harness.processes.block import Block, StageMemory, alone, words_shown
+from ranger_sim.harness.processes.board_process import is_confined
 from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.remote_board import RemoteBoard
 from ranger_sim.harness.processes.settings import DEADLINE_S, Settings
@@ -44,20 +45,20 @@ class ForkedBoards:
         self.names = names
         self.used = processor_for_this_worker()
         self.settings = Settings(speed=None, real_time=False, processor=self.used)
-        words, doubles = stage = new_stage()
+        stage = StageMemory()
         place = {name: number for number, name in enumerate(robot.boards)}
         self.blocks = {name: Block(name, place[name], words_shown(robot.boards[name])) for name in names}
         self.ended = False
         self.children = {}
         for name in names:
-            with alone(self.blocks[name], self.blocks.values()):
-                self.children[name] = fork(self._board(name, stage))
+            with alone(self.blocks[name], self.blocks.values(), stage):
+                self.children[name] = fork(self._board(name, stage.shown), is_confined(robot, name))
         self.numbers = tuple(self.children.values())  # of the processes, also of those that have ended
         self.watches = {name: os.pidfd_open(process) for name, process in self.children.items()}
         in_c = frozenset(robot.firmware)
         self.guard = fork(Guard(self.blocks, self.children, self.watches, in_c, deadline_s).watch)
         loop = robot.loop
-        show = Stage(words, doubles, robot.plant, loop.step_times, loop.word_wires)
+        show = Stage(*stage.written, robot.plant, loop.step_times, loop.word_wires)
         self.remotes = {}
         for name in names:
             board = robot.boards[name]
@@ -88,7 +89,7 @@ class ForkedBoards:
         """Take lost boards off their buses; their pins stay, so that the watchdogs of bridges expire."""
         for name, remote in self.remotes.items():
             if remote.gone and name in self.children and not self.ended:
-                code = os.waitstatus_to_exitcode(os.waitpid(self.children.pop(name), 0)[1])
+                code = confinement.wait_for(self.children.pop(name))
                 how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
                 why = ": ".join(filter(None, (self.blocks[name].fault(), self._where(name))))
                 loop = self.robot.loop
@@ -138,7 +139,7 @@ class ForkedBoards:
             del self.children[name]
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
-            os.waitpid(process, 0)
+            confinement.wait_for(process)
 
     def close(self) -> None:
         """End all processes."""
@@ -149,7 +150,7 @@ class ForkedBoards:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
         for process in (self.guard, *self.children.values()):
-            os.waitpid(process, 0)
+            confinement.wait_for(process)
         self.children.clear()
         for descriptor in self.watches.values():
             os.close(descriptor)
@@ -187,14 +188,17 @@ def processor_for_this_worker() -> int:
     return allowed[int(number) % len(allowed) if number.isdecimal() else 0]
 
 
-def fork(body: Callable[[], int]) -> int:
-    """Fork a process that exits with the result of `body` and does not outlive this one; returns its number."""
+def fork(body: Callable[[], int], has_own_numbers: bool = False) -> int:
+    """Fork a process that exits with the result of `body` and does not outlive this one; returns its number.
+
+    has_own_numbers: it is in a namespace of process numbers, where the kernel grants it.
+    """
     parent = os.getpid()
     sys.stdout.flush()
     sys.stderr.flush()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # other threads: nothing in the child needs them
-        process = os.fork()
+        process = confinement.fork(has_own_numbers)
     if process:
         return process
     _live(parent, body)

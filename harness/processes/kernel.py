@@ -20,9 +20,12 @@ def _libc() -> ctypes.CDLL:
 
 
 def die_with_parent(parent: int) -> None:
-    """Let the kernel kill this process when `parent` (a process id) ends in any way; at once if it has ended."""
+    """Let the kernel kill this process when `parent` (a process id) ends in any way; at once if it has ended.
+
+    A process with separate process numbers does not see its parent: its launcher ends it (native/confinement.py).
+    """
     _libc().prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it died before the call above: the kernel would not send the signal
+    if os.getppid() not in (parent, 0):  # it died before the call above: the kernel would not send the signal
         os._exit(PARENT_GONE)
 
 
@@ -55,9 +58,14 @@ def begin_process(name: str, settings: Settings) -> None:
     name_process(name)
     sharp_timers()
     leave_signals_to_the_supervisor()
-    stay_on(settings.processor)
     if settings.real_time:
         lock_memory()
+    schedule(settings)
+
+
+def schedule(settings: Settings) -> None:
+    """Set the processor and the scheduling of this process, which its forks inherit."""
+    stay_on(settings.processor)
     if settings.wants_fifo:
         real_time_scheduling()
 

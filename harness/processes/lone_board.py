@@ -8,10 +8,11 @@ import os
 import signal
 from typing import Any
 
+from ranger_sim.firmware_sim.native import confinement
 from ranger_sim.foundation import descriptors
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places
-from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.block import Block, StageMemory, alone
 from ranger_sim.harness.processes.channel import Bell
 from ranger_sim.harness.processes.settings import Settings
 
@@ -28,17 +29,18 @@ class LoneBoard:
         self.block = Block(name, place, 0)
         self.words = self.block.words
         self.code: int | None = None
-        stage = new_stage()
+        stage = StageMemory()
         parent = os.getpid()
-        self.process = os.fork()
-        if self.process == 0:
-            code = board_process.FAILED
-            try:
-                kernel.die_with_parent(parent)
-                gc.freeze()  # this process must not finalize the parent's objects
-                code = board_process.serve(robot, name, self.block, stage, Settings(real_time=False), False)
-            finally:
-                os._exit(code)
+        with alone(self.block, [self.block], stage):
+            self.process = confinement.fork(board_process.is_confined(robot, name))
+            if self.process == 0:
+                code = board_process.FAILED
+                try:
+                    kernel.die_with_parent(parent)
+                    gc.freeze()  # this process must not finalize the parent's objects
+                    code = board_process.serve(robot, name, self.block, stage.shown, Settings(real_time=False), False)
+                finally:
+                    os._exit(code)
         self.watch = os.pidfd_open(self.process)
         self.ask = Bell(self.words, places.ASKED, places.BOARD_SLEEPS, self.block.ask_descriptor)
 
@@ -89,5 +91,5 @@ class LoneBoard:
     def _reap(self) -> int:
         """The exit code of the process, which has ended or is about to."""
         if self.code is None:
-            self.code = os.waitstatus_to_exitcode(os.waitpid(self.process, 0)[1])
+            self.code = confinement.wait_for(self.process)
         return self.code

@@ -88,12 +88,12 @@ class Audience:
     `wires`: (place among the row's words, register) of its digital sensors.
     """
 
-    words: cython.longlong[::1]
+    words: cython.const[cython.longlong][::1]
     step_times: cython.longlong[::1]
     board_words: cython.longlong[::1]
     sources: cython.longlong[::1]
     registers: cython.longlong[::1]
-    doubles: cython.double[::1]
+    doubles: cython.const[cython.double][::1]
     analog_start: cython.double[::1]
     analog_end: cython.double[::1]
     rows: cython.longlong

@@ -19,11 +19,11 @@ from typing import Any
 
 from ranger_sim.can_bus.edge.peers import REASONS
 from ranger_sim.firmware_sim.gdb.server import GdbServer
-from ranger_sim.firmware_sim.native import crash
+from ranger_sim.firmware_sim.native import confinement, crash
 from ranger_sim.foundation import descriptors, systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import board_process, kernel, places, plant_process
-from ranger_sim.harness.processes.block import Block, alone, new_stage, words_shown
+from ranger_sim.harness.processes.block import Block, StageMemory, alone, words_shown
 from ranger_sim.harness.processes.control import ControlServer
 from ranger_sim.harness.processes.guard import Use, cause, is_starved, use_of
 from ranger_sim.harness.processes.lateness import figures
@@ -102,7 +102,7 @@ class Supervisor:
         self.next_ask_s = self.next_check_s = 0.0
         self.polled_s = 0.0
         self.sent_away: dict[str, dict[str, int]] = {}  # clients by endpoint and reason, as far as reported
-        self.stage = new_stage()
+        self.stage = StageMemory()
         self.blocks = {
             name: Block(name, place, words_shown(robot.boards[name])) for place, name in enumerate(robot.boards)
         }
@@ -122,15 +122,15 @@ class Supervisor:
 
     # --- processes ----------------------------------------------------------------------------------------
 
-    def fork(self, name: str, body: Callable[[], int]) -> int:
-        """A child that runs `body` and leaves with what it returns."""
+    def fork(self, name: str, body: Callable[[], int], has_own_numbers: bool = False) -> int:
+        """A child that runs `body` and leaves with what it returns; confinement.fork has `has_own_numbers`."""
         parent = os.getpid()
         sys.stdout.flush()
         sys.stderr.flush()
         with warnings.catch_warnings():
             # numerical libraries keep threads for matrices; no process of ours uses them
             warnings.simplefilter("ignore", DeprecationWarning)
-            process = os.fork()
+            process = confinement.fork(has_own_numbers, lambda: kernel.schedule(self.settings))
         if process:
             self.children[name] = Child(name, process)
             return process
@@ -157,20 +157,22 @@ class Supervisor:
     def start_board(self, name: str, fresh: bool = False) -> None:
         """Start a process for a board: for the one that was built, or for a new, unwired one."""
         block = self.blocks[name]
+        is_held = name in self.debug_servers
+        stage = self.stage.written if is_held else self.stage.shown
 
         def body() -> int:
             self.plant_link.close()
             self.robot.logbook.close()
             server = self.debug_servers.pop(name, None)
             self.close_servers()
-            return board_process.serve(self.robot, name, block, self.stage, self.settings, fresh, server)
+            return board_process.serve(self.robot, name, block, stage, self.settings, fresh, server)
 
         block.private[places.FATE] = places.ALIVE
         block.words[places.FAULT_TEXT] = 0
         block.words[places.CRASH] = 0
         block.words[places.HELD] = 0
-        with alone(block, self.blocks.values()):
-            self.fork(name, body)
+        with alone(block, self.blocks.values(), self.stage, is_held):
+            self.fork(name, body, board_process.is_confined(self.robot, name))
 
     def close_servers(self) -> None:
         """Close the endpoints in a process that does not use them."""
@@ -186,7 +188,7 @@ class Supervisor:
             return plant_process.serve(
                 self.robot,
                 self.blocks,
-                self.stage,
+                self.stage.written,
                 self.settings,
                 self.plant_link,
                 self.stop_rule,
@@ -528,7 +530,7 @@ class Supervisor:
 
     def check_plant(self, plant: Child, now: float) -> None:
         """Report the plant's process when it makes no progress although no board delays it."""
-        progress = self.stage[0][places.HEARTBEAT_NS]
+        progress = self.stage.shown[0][places.HEARTBEAT_NS]
         waits = any(block.private[places.AWAITED] for block in self.blocks.values())
         if progress != self.plant_seen[0] or waits:
             self.plant_seen = (progress, now)
@@ -600,7 +602,7 @@ class Supervisor:
         for child in self.children.values():
             if child.state != GONE:
                 with contextlib.suppress(ChildProcessError):
-                    os.waitpid(child.process, 0)
+                    confinement.wait_for(child.process)
 
 
 def check_platform() -> None:

@@ -22,10 +22,18 @@ class ProgramsInC:
     """`firmware`: by board; those compiled for coverage have a folder for their counts.
 
     printed: takes what they print; without it they print on standard output. elsewhere: they run in other processes,
-    and none of them is loaded in this one.
+    and none of them is loaded in this one. patience_s: how long the trial of each may take; 0 or None: as long as
+    trial.py says.
     """
 
-    def __init__(self, firmware: dict[str, Firmware], printed: Printed | None, elsewhere: bool = False) -> None:
+    def __init__(
+        self,
+        firmware: dict[str, Firmware],
+        printed: Printed | None,
+        elsewhere: bool = False,
+        patience_s: float | None = None,
+    ) -> None:
+        self.patience_s = patience_s or None
         self.printed = printed
         self.elsewhere = elsewhere
         self.trials: dict[str, Tried] = {}  # by board
@@ -54,7 +62,13 @@ class ProgramsInC:
                 return description(board)
 
             with self.printing(name):
-                self.trials[name] = tried(f"{firmware.folder}: {name}", firmware.library, firmware.folder, start)
+                self.trials[name] = tried(
+                    f"{firmware.folder}: {name}",
+                    firmware.library,
+                    firmware.folder,
+                    start,
+                    patience_s=self.patience_s,
+                )
             if self.printed is not None:
                 self.printed.drop(name)  # its program will print that again
 

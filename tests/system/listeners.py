@@ -3,6 +3,7 @@
 python -m tests.system.listeners     # the table, as root
 """
 
+import ast
 import collections
 import concurrent.futures
 import contextlib
@@ -120,6 +121,33 @@ COMMANDS = {
     ),
     "a debugger's port": Command(("0",), " at ", {"tcp": 1}, module="tests.firmware_sim.gdb.machine"),
 }
+
+# Modules that open an endpoint, and the entry above that starts them.
+OPENED_BY = {
+    "can_bus/edge/attach.py": "bus",
+    "can_bus/edge/peers.py": "bus",
+    "can_bus/edge/socketcand.py": "bus",
+    "firmware_sim/gdb/server.py": "a debugger's port",
+    "harness/campaigns/dask_cluster.py": "campaign, of Dask",
+    "harness/processes/control.py": "up",
+    "harness/xcp/udp.py": "up",
+    "ranger/feed.py": "up",
+    "tools/panel/command.py": "panel of a recording",
+    "tools/timing/trace_server.py": "trace open",
+}
+OPENING = {"openpty", "create_server", "start_server", "start_unix_server", "LocalCluster"}  # and bind(address)
+
+
+def opens_an_endpoint(source):
+    """Whether a module calls one of these, or is a scheduler of Dask."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if name in OPENING or (name == "bind" and len(node.args) == 1):
+                return True
+        elif isinstance(node, ast.ClassDef) and "distributed.Scheduler" in map(ast.unparse, node.bases):
+            return True
+    return False
 
 
 def processes(session):

@@ -34,6 +34,32 @@ def test_another_user_is_refused_before_the_first_byte(name, folder):
         assert not {place: answer for place, answer in got.items() if answer not in listeners.REFUSALS}
 
 
+def test_every_module_that_opens_an_endpoint_is_started_by_a_command_of_the_table():
+    links = [each for each in (listeners.ROOT / "ranger_sim").iterdir() if each.is_dir()]
+    modules = [path for each in links for path in each.resolve().rglob("*.py") if "build" not in path.parts]
+    found = {
+        path.relative_to(listeners.ROOT).as_posix()
+        for path in modules
+        if listeners.opens_an_endpoint(path.read_text(encoding="utf-8"))
+    }
+    assert found == set(listeners.OPENED_BY)
+    assert set(listeners.OPENED_BY.values()) <= set(listeners.COMMANDS)
+
+
+@pytest.mark.parametrize(
+    ("source", "opens"),
+    [
+        ("listener.bind((host, port))", True),
+        ("socket.create_server(('', 1))", True),
+        ("class Own(Base, distributed.Scheduler): pass", True),
+        ("signature.bind(**settings)", False),
+        ("robot.logbook.listen(stream, take)", False),
+    ],
+)
+def test_a_module_that_opens_an_endpoint_is_recognised(source, opens):
+    assert listeners.opens_an_endpoint(source) is opens
+
+
 def test_the_stranger_would_see_data_sent_at_once_and_an_open_connection(tmp_path):
     """The oracle can fail: a server that sends at once, one that waits, and one that closes."""
     kept = []

@@ -138,8 +138,10 @@ class RunFolder:
             raise UserError(f"{record}: {cause_of(error)}") from None
         try:
             systems.lock(self.lock)
-            self._remove_older_run(is_new)
-            self._write_record(self._record())
+            older = self._files_of_older_run(is_new)
+            self._write_record(self._record())  # before they go: a killed run leaves no file that belongs to none
+            for name in older:
+                (self.path / name).unlink()
         except BaseException as error:
             if systems.is_windows():
                 self._release()
@@ -152,12 +154,13 @@ class RunFolder:
                 raise UserError(f"{record}: {cause_of(error)}") from None
             raise
 
-    def _remove_older_run(self, is_new: bool) -> None:
+    def _files_of_older_run(self, is_new: bool) -> list[str]:
+        """The summary first: from then on nothing marks the rest as a whole run. UserError where one is not a run's."""
         printed = sorted(each.name for each in self.path.glob(printed_name("*")))  # partial ones as well
         names = [SUMMARY, *FILES, *map(partial, FILES), *printed]
         there = [name for name in names if (self.path / name).is_symlink() or (self.path / name).exists()]
         if not there:
-            return
+            return []
         is_ours = is_run_record(self.path / SUMMARY) or (not is_new and is_run_record(self.path / OPEN))
         foreign = there if not is_ours else [name for name in there if (self.path / name).is_dir()]
         if SUMMARY in there and not is_run_record(self.path / SUMMARY):
@@ -167,9 +170,7 @@ class RunFolder:
                 f"{self.path / foreign[0]}: exists and belongs to no run of this folder; "
                 "remove it or choose another folder"
             )
-        # the summary first: from here on nothing marks the rest as a whole run
-        for name in there:
-            (self.path / name).unlink()
+        return there
 
     def _record(self) -> dict:
         return {"complete": False, "what": BROKEN_OFF, "command": self.command, "files": self.files}

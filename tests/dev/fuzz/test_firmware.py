@@ -19,7 +19,7 @@ def test_hostile_programs_end_with_a_cause_and_leave_nothing_and_a_later_run_goe
     state = tmp_path / "state.json"
     assert fuzz_firmware.run(6, 1, state)["cases"] == 6
     counts = fuzz_firmware.run(12, 1, state)
-    assert counts["refused"] + counts["lost"] + counts["went_on"] == counts["cases"] == 12
+    assert counts["refused"] + counts["lost"] + counts["failed"] + counts["went_on"] == counts["cases"] == 12
     assert counts["images"] == 2 and counts["lost"] > 2
     with pytest.raises(UserError, match="seed 1, not 2"):
         fuzz_firmware.run(12, 2, state)
@@ -48,15 +48,15 @@ def test_a_walk_that_ends_otherwise_is_a_finding(tmp_path, code, output, errors,
 
 
 def test_the_same_seed_makes_the_same_programs(tmp_path, monkeypatch):
-    sources = []
+    choices = []
     for again in ("a", "b"):
-        (tmp_path / again).mkdir()
         fuzz = fuzz_firmware.Fuzz(7, tmp_path / again)
+        fuzz.programs.mkdir(parents=True)
 
-        def keeps(folder, *_):
-            sources.append((folder / "small.c").read_text(encoding="utf-8"))
+        def keeps(*_, fuzz=fuzz):
+            choices.append((fuzz.programs / fuzz_firmware.CHOICE).read_text(encoding="utf-8"))
             return 1, json.dumps(SUMMARY).encode(), ""
 
         monkeypatch.setattr(fuzz, "walk", keeps)
         fuzz.case(3)
-    assert sources[0] == sources[1]
+    assert choices[0] == choices[1]

@@ -149,7 +149,48 @@ def test_where_user_namespaces_are_forbidden_the_rest_holds(tmp_path):
     with os.fdopen(reading, "rb") as pipe:
         lacks = json.loads(pipe.read())
     os.waitpid(process, 0)
-    assert lacks == ["no separate namespaces: Operation not permitted", "refused"]
+    assert lacks == [
+        "no separate process numbers: not asked for",
+        "no separate namespaces: Operation not permitted",
+        "refused",
+    ]
+
+
+@needs_all
+def test_a_board_has_separate_process_numbers_and_nothing_of_it_is_left(tmp_path):
+    """It is the second process of its namespace, after an init, and a child of the run's process nevertheless."""
+    folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
+    before = children_of(os.getpid())
+    with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
+        robot.run_for("1 ms")
+        board = robot.processes.children["MCH"]
+        status = pathlib.Path(f"/proc/{board}/status").read_text(encoding="utf-8")
+        assert re.search(rf"^NSpid:\t{board}\t2$", status, re.MULTILINE)
+        assert board in children_of(os.getpid())
+        assert robot.deaths == []
+    assert children_of(os.getpid()) == before
+
+
+@needs_all
+def test_a_board_runs_without_separate_process_numbers_where_the_kernel_does_not_grant_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(confinement, "CLONE_NEWPID", 1)  # not a flag of unshare
+    folder = folder_with(tmp_path / "fw", program(WELL)[0], MANIFEST)
+    with contextlib.closing(Ranger(firmware={"MCH": folder})) as robot:
+        robot.run_for("1 ms")
+        assert robot.deaths == []
+        confined = robot.summary()["firmware"]["MCH"]["confined"]
+    assert confined == "partly (no separate process numbers: Invalid argument)"
+
+
+def children_of(parent):
+    """Every process whose parent it is, zombies as well."""
+    found = set()
+    for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            if int(fields[1]) == parent:
+                found.add(int(stat.parent.name))
+    return found
 
 
 def test_the_walks_own_process_never_loads_the_library(tmp_path):
@@ -175,3 +216,64 @@ def test_every_jump_of_the_filter_ends_at_an_instruction(name):
 
 def test_the_words_of_a_confinement():
     assert (describe([]), describe(["a", "b"]), describe(None)) == ("yes", "partly (a; b)", "no")
+
+
+# Makes everything shared writable that the kernel lets it, and fills it.
+SCRIBBLING = """
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+static void break_down(void)
+{
+    static int done;
+    char line[512], rights[8];
+    unsigned long first[64], end[64];
+    int count = 0, writable = 0;
+    if (done++)
+        return;
+    FILE *list = fopen("/proc/self/maps", "r");
+    while (count < 64 && fgets(line, sizeof line, list))
+        if (sscanf(line, "%lx-%lx %7s", &first[count], &end[count], rights) == 3 && rights[3] == 's')
+            count++;
+    for (int part = 0; part < count; part++)
+        if (mprotect((void *)first[part], end[part] - first[part], PROT_READ | PROT_WRITE) == 0) {
+            writable++;
+            if (SCRIBBLES)
+                memset((void *)first[part], 0x55, end[part] - first[part]);
+        }
+    printf("%d writable\\n", writable);
+    fflush(stdout);
+}
+"""
+# Prints what its converter measures in every slot.
+MEASURING = """
+#include <stdio.h>
+static void break_down(void)
+{
+    fw_adc_start(1);
+    printf("%u\\n", (unsigned)fw_adc_result());
+}
+"""
+
+
+@needs_all
+def test_a_board_that_writes_over_all_shared_memory_that_it_can_write_changes_nothing_for_others(tmp_path):
+    """Of the shared memory in its process it can write its own block alone."""
+    measuring = program(MEASURING)[0].replace("mch_table", "mcfi_table")
+    measuring = measuring.replace("fw_can_start(1", "fw_adc_start_clock(13); fw_can_start(2")
+    other = folder_with(tmp_path / "other", measuring, MANIFEST.replace("mch", "mcfi"))
+    measured, printed = [], []
+    for scribbles in (0, 1):
+        source = program(SCRIBBLING.replace("SCRIBBLES", str(scribbles)))[0]
+        folder = folder_with(tmp_path / f"fw{scribbles}", "#define _GNU_SOURCE\n" + source, MANIFEST)
+        out = tmp_path / f"run{scribbles}"
+        done, found = walked(folder, "--firmware", f"MCFI={other}", "--board-deadline", "500ms", "--out", str(out))
+        assert found, done.stderr
+        assert "MCFI" not in found["failed_boards"], done.stderr
+        (text,) = out.rglob("printed*MCH*")
+        printed.append(text.read_text(encoding="utf-8"))
+        (text,) = out.rglob("printed*MCFI*")
+        measured.append(text.read_text(encoding="utf-8"))
+    assert printed == ["1 writable\n"] * 2
+    assert len(set(measured[0].split())) > 3
+    assert measured[0] == measured[1]

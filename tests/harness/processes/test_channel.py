@@ -12,7 +12,7 @@ from ranger_sim.foundation import events
 from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import kinds, places, shared_words
-from ranger_sim.harness.processes.block import Block, new_stage
+from ranger_sim.harness.processes.block import Block, StageMemory
 from ranger_sim.harness.processes.channel import SLOT_WORDS, Bell, Mailbox
 from ranger_sim.harness.processes.kinds import FROM_BOARD, KINDS, TO_BOARD
 from ranger_sim.harness.processes.places import SLOTS
@@ -300,7 +300,7 @@ def test_a_sleeper_on_the_bell_of_a_process_that_ends_is_woken_with_the_reason(b
 def test_a_board_that_ends_in_its_turn_is_gone_for_the_plant_and_not_asked_again():
     new_block = Block("MCSI", wiring.BOARDS.index("MCSI"), 0)
     with contextlib.closing(Ranger()) as robot, contextlib.closing(new_block) as block:
-        words, doubles = new_stage()
+        words, doubles = StageMemory().written
         stage = Stage(words, doubles, robot.plant, robot.loop.step_times, [])
         remote = RemoteBoard(robot.boards["MCSI"], block, stage, wiring.BOARDS.index("MCSI"), False)
         ask = Bell(block.words, places.ASKED, places.BOARD_SLEEPS, block.ask_descriptor)

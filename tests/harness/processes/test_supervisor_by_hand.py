@@ -228,7 +228,7 @@ def test_a_board_that_a_debugger_holds_is_reported_once_each_time(alone):
 
 def test_a_plant_without_progress_is_named_once_until_it_goes_on(alone):
     plant = alone.children[PLANT] = Child(PLANT, 50, turn=0)
-    alone.stage[0][places.HEARTBEAT_NS] = 5
+    alone.stage.written[0][places.HEARTBEAT_NS] = 5
     alone.check()
     alone.clock.now += HANG_S
     alone.check()
@@ -242,7 +242,7 @@ def test_a_plant_without_progress_is_named_once_until_it_goes_on(alone):
     alone.clock.now += 5
     alone.check()
     assert alone.view.received() == [f"{PLANT} (process 50) hangs: no progress for {HANG_S + 0.5:.1f} s"]
-    alone.stage[0][places.HEARTBEAT_NS] = 6
+    alone.stage.written[0][places.HEARTBEAT_NS] = 6
     alone.check()
     assert plant.turn == 0
     alone.clock.now += HANG_S + 0.1

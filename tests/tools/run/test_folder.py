@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import pathlib
 
 import pytest
 
@@ -52,6 +53,27 @@ def test_what_an_older_run_left_goes_first_and_a_users_own_file_stays(tmp_path, 
         assert names(tmp_path) == ["can1.log.old", "incomplete.json", "notes.txt"]
         folder.finish(SUMMARY)
     assert names(tmp_path) == ["can1.log.old", "notes.txt", "summary.json"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="a killed process needs one")
+def test_what_a_run_left_that_was_killed_while_it_removed_an_older_one_goes_too(tmp_path, lines, monkeypatch):
+    with RunFolder(tmp_path, "first", lines.append) as folder:
+        for name in run_folder.FILES:
+            with folder.file(name) as path:
+                path.write_text("of the first run")
+        folder.finish(SUMMARY)
+    if (killed := os.fork()) == 0:
+        removed = []
+        remove = pathlib.Path.unlink
+        monkeypatch.setattr(
+            pathlib.Path, "unlink", lambda path: os._exit(9) if removed else removed.append(remove(path))
+        )
+        RunFolder(tmp_path, "killed", lines.append)
+        os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(killed, 0)[1]) == 9
+    assert names(tmp_path) == sorted(["incomplete.json", *run_folder.FILES])
+    with RunFolder(tmp_path, "second", lines.append):
+        assert names(tmp_path) == ["incomplete.json"]
 
 
 def test_what_a_killed_run_left_goes_too(tmp_path, lines):
