@@ -5,7 +5,7 @@ from typing import Any
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.network_time import NetworkTime
-from ranger_sim.firmware_sim.native.native_board import Started
+from ranger_sim.firmware_sim.native.started import Started
 from ranger_sim.foundation.user_error import FirmwareError
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.table_board import TableBoard
