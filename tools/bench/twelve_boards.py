@@ -77,7 +77,7 @@ class PythonBoard(Microcontroller):
         self.vic.attach(CAN_RX, 1, self.on_frame, 180)
         rows = ((Task(self.send_rate, 260, 400),), (), (Task(self.send_angle, 260, 400),), (), ())
         every = (Task(self.observe, 900, 1200), Task(self.control, 900, 1200))
-        self.start(Schedule(1000, every=every, rows=rows), phase_ns)
+        self.start(Schedule(1000, every=every, rows=rows, transmitters=[]), phase_ns)
 
     def on_edge(self, queue: Any) -> None:
         self.edges += -1 if self.pins[ENCODER_A] == self.pins[ENCODER_B] else 1
@@ -148,6 +148,7 @@ def machine(maker: Maker, mode: InProcess | None = None) -> Machine:
     wiring = Wiring(
         can=[CanWire(name, 1, 1) for name in boards],
         encoders=[EncoderWire(node - 1, f"B{node}", "P0.22", "P0.27") for node in range(1, BOARDS)],
+        receive_in_slots=tuple(boards),
         names={name: {"P0.22": ENCODER_A, "P0.27": ENCODER_B} for name in boards},
     )
     return Machine(Wheels(), boards, {"can1": BIT_RATE}, wiring, seed=1, mode=mode)

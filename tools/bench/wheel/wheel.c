@@ -84,7 +84,7 @@ static const fw_schedule schedule = {
     .tick_vic_slot = 4,
     .every = FW_TASKS(every),
     .rows = rows,
-    .row_count = 5,
+    .row_count = 5, .flags = FW_TRANSMITTERS_NAMED,
 };
 static const fw_interrupt interrupts[] = {
     {FW_PIN_EDGE, ENCODER_A, on_edge, "on_edge", 90, 0, FW_FIQ, FW_USUAL_LATENCY},
