@@ -1,5 +1,5 @@
 /* A board of twelve on one bus: it counts the edges of its encoder and sends rate and angle; board 0 sends the target.
- * Which one it is, four straps at P1.16 ... P1.19 say. */
+ * Four straps at P1.16 ... P1.19 have its number. AHEAD: its schedule names the tasks that send (none of every slot). */
 #include <ranger_sim/firmware.h>
 
 #define ENCODER_A FW_P0(22) /* CAP0.0 */
@@ -84,7 +84,8 @@ static const fw_schedule schedule = {
     .tick_vic_slot = 4,
     .every = FW_TASKS(every),
     .rows = rows,
-    .row_count = 5, .flags = FW_TRANSMITTERS_NAMED,
+    .row_count = 5,
+    .flags = AHEAD ? FW_TRANSMITTERS_NAMED : 0,
 };
 static const fw_interrupt interrupts[] = {
     {FW_PIN_EDGE, ENCODER_A, on_edge, "on_edge", 90, 0, FW_FIQ, FW_USUAL_LATENCY},
