@@ -150,7 +150,7 @@ def makers(in_c: bool, ahead: bool) -> Iterator[Maker]:
 
 
 def machine(maker: Maker, ahead: bool, mode: InProcess) -> Machine:
-    """The twelve boards, by crystals and power-ups of their own."""
+    """The twelve boards, each with its own crystal and power-up."""
     boards = {}
     for node in range(BOARDS):
         stream = RandomStream(1, f"board {node}")
