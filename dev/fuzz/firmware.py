@@ -72,7 +72,8 @@ static volatile uint32_t sink, slots, handled;
 static uint32_t place, which, version, n, s, w, d, acts[3], act_count;
 static jmp_buf earlier;
 extern int64_t fw_mail[32];
-extern int64_t (*fw_calls[])(int64_t, int64_t, int64_t, int64_t, int64_t);
+extern int64_t (*fw_answer)(void *, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
+extern void *fw_host;
 static void *thread(void *with) { for (;;) sink++; return with; }
 static void again(int number) { sink += number; }
 static void away(int number) { (void)number; longjmp(earlier, 1); }
@@ -145,8 +146,8 @@ PIECES = {
     "answers out of order": "for (int each = 0; each < 200; each++) { over_shared(2, 0); uint64_t one = 1; "
     "for (int to = 3; to < 12; to++) if (write(to, &one, 8) < 0) sink++; }",
     "mail": "for (int each = 0; each < 32; each++) fw_mail[each] = w;",
-    "calls exchanged": "fw_calls[n] = fw_calls[n + 3];",
-    "calls removed": "for (int each = 0; each < 40; each++) fw_calls[each] = 0;",
+    "host of calls moved": "fw_host = (char *)fw_host + 8 * (n + 3);",
+    "calls removed": "fw_answer = 0;",
     "threads": "pthread_t it; for (int each = 0; each < 8; each++) sink += pthread_create(&it, 0, thread, 0);",
     "forks": "for (int each = 0; each < 4; each++) if (fork() == 0) "
     "for (int turn = 0; turn < 100; turn++) usleep(10000);",

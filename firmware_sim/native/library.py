@@ -10,11 +10,12 @@ import os
 import pathlib
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import cffi
 
+from ranger_sim import loading
 from ranger_sim.firmware_sim.native import coverage, crash, sanitizers
 from ranger_sim.foundation.user_error import FirmwareError
 
@@ -39,7 +40,7 @@ typedef struct { uint32_t slot_ns; uint32_t divider; uint32_t tick_cost; int32_t
                  fw_call on_tick; fw_call on_overrun; fw_call on_limit; fw_call on_near_limit; } fw_schedule;
 typedef struct { int kind; uint32_t index; fw_work handler; const char *name; uint32_t cost; uint32_t per_item;
                  int32_t vic_slot; int32_t latency; } fw_interrupt;
-typedef int64_t (*host_call)(int64_t, int64_t, int64_t, int64_t, int64_t);
+typedef int64_t (*host_call)(void *, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
 
 void firmware_start(void);
 const fw_schedule *firmware_schedule(void);
@@ -52,7 +53,8 @@ uint32_t firmware_time_ms(void);
 extern uint32_t fw_compiled_version;
 extern uint32_t fw_sizes[4];
 extern const char *fw_call_names[];
-extern host_call fw_calls[];
+extern host_call fw_answer;
+extern void *fw_host;
 extern const int64_t *fw_pin_levels;
 extern int64_t fw_mail[32];
 int64_t fw_turn(void);
@@ -63,6 +65,7 @@ void fw_write_counts(void);
 void fw_end_counts(void);
 """
 SIZED = ("fw_task", "fw_step", "fw_schedule", "fw_interrupt")  # in the order of fw_sizes
+REQUIRED = ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_answer", "fw_turn", "fw_watch", "fw_turns")
 ENTRY_POINTS = "firmware_start() and one of firmware_schedule() and firmware_main()"
 
 runs_one_program = False  # this process is that of one board: nothing else is loaded here
@@ -86,7 +89,7 @@ class Library:
         self.code = _loaded(path) if runs_one_program else _loaded_copy(path)
         sanitizers.lead_findings()
         path = shown if shown is not None else path
-        for name in ("fw_compiled_version", "fw_sizes", "fw_call_names", "fw_turn", "fw_watch", "fw_turns"):
+        for name in REQUIRED:
             if not self.has(name):
                 raise FirmwareError(f"{path}: no {name} in it: not made by `ranger-sim firmware build`")
         version = self.code.fw_compiled_version
@@ -106,7 +109,6 @@ class Library:
         if len(kinds) == 2:
             raise FirmwareError(f"{path}: both firmware_schedule() and firmware_main() are defined; one is allowed")
         self.schedule = kinds == ["firmware_schedule"]
-        self.turns = ffi.addressof(self.code, "fw_turns")
         if self.code.fw_counts_lines:
             WATCHED.append(self)  # it would write its counts when it is unloaded
             atexit.register(self._end_counts)
@@ -149,6 +151,15 @@ class Library:
         except AttributeError:
             return False
         return True
+
+    def place(self, name: str) -> Any:
+        """Where the variable `name` is: for `program.pointer`."""
+        return address(ffi.addressof(self.code, name))
+
+    def answer_by(self, answer: Callable[..., int], calls: Any) -> None:
+        """Let the program's calls go to `answer`, with `calls` in place of the host's pointer, as interpreted code."""
+        self.callback = ffi.callback("host_call", lambda host, *numbers: answer(calls, *numbers), error=0)
+        self.code.fw_answer = self.callback
 
     def call_names(self) -> list[str]:
         """The calls of the header that it was compiled with, in the order of its table."""
@@ -193,6 +204,11 @@ def _loaded_copy(path: pathlib.Path) -> Any:
     finally:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(copy)
+
+
+def address(given: Any) -> Any:
+    """Of a pointer, for `program.pointer`: a number where modules are compiled, otherwise the pointer itself."""
+    return int(ffi.cast("uintptr_t", given)) if loading.RUNS_COMPILED else given
 
 
 def text(characters: Any) -> str:

@@ -1,7 +1,8 @@
 """A board with firmware in C and variables of a master table. Separate from native_firmware.py: it loads cffi."""
 
 import dataclasses
-from typing import Any
+
+import cython
 
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.firmware_sim.native.hardware import Hardware
@@ -10,6 +11,7 @@ from ranger_sim.foundation.user_error import FirmwareError
 from ranger_sim.harness.firmware.native_firmware import Firmware, table_version
 
 
+@cython.cclass
 class TableBoard(NativeBoard):
     """Board `name` with `firmware` from `power_up_ns` (ns) on; its CAN controller `controller` is on a bus.
 
@@ -18,15 +20,7 @@ class TableBoard(NativeBoard):
     """
 
     def __init__(
-        self,
-        name: str,
-        firmware: Firmware,
-        controller: int,
-        crystal: Any = None,
-        power_up_ns: int = 0,
-        hardware: Hardware | None = None,
-        version: int | None = None,
-        record: Any = None,
+        self, name, firmware, controller, crystal=None, power_up_ns=0, hardware=None, version=None, record=None
     ) -> None:
         given = firmware.manifest.hardware
         if given is None:

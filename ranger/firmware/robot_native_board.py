@@ -1,21 +1,22 @@
 """A board of the robot whose firmware is C. Separate from native_boards.py: other walks need no cffi."""
 
-from typing import Any
+import cython
 
 from ranger_sim.boards.counters import RangerCounters
 from ranger_sim.boards.modules.error_module import ErrorModule
 from ranger_sim.boards.modules.network_time import NetworkTime
-from ranger_sim.firmware_sim.native.native_board import Started
 from ranger_sim.foundation.user_error import FirmwareError
-from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.table_board import TableBoard
 from ranger_sim.ranger.firmware.native_boards import PLACES, hardware_of, table_version
 
 
+@cython.cclass
 class RobotNativeBoard(TableBoard):
     """Board `name` of the robot with a firmware in C, instead of the emulated one."""
 
-    def __init__(self, name: str, firmware: Firmware, crystal: Any, power_up_ns: int, record: Any = None) -> None:
+    module: object
+
+    def __init__(self, name, firmware, crystal, power_up_ns, record=None) -> None:
         table = PLACES[name].table
         TableBoard.__init__(
             self, name, firmware, table.CONTROLLER, crystal, power_up_ns, hardware_of(name), table_version(), record
@@ -23,22 +24,22 @@ class RobotNativeBoard(TableBoard):
         self.module = ErrorModule(table.BOARD_NUMBER, NetworkTime())
 
     @property
-    def errors(self) -> ErrorModule:
+    def errors(self):
         """How often its program recorded each error, where it reports that (`firmware_error_totals`); otherwise 0."""
         self.module.totals = self.error_totals(len(self.module.totals))
         return self.module
 
     @property
-    def adc_external(self) -> Any:
+    def adc_external(self):
         """Its external converter, where faults of it act."""
         return self._started(self.devices.adcxs)
 
     @property
-    def adc_internal(self) -> Any:
+    def adc_internal(self):
         """Its chip's own converter."""
         return self._started(self.devices.adcs)
 
-    def _started(self, devices: Started) -> Any:
+    def _started(self, devices):
         """The one device of a kind."""
         if 0 not in devices:
             raise FirmwareError(f"{self.name}: its program has not started the {devices.what}")

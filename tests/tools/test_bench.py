@@ -8,7 +8,8 @@ from ranger_sim.can_bus.edge import benchmark
 from ranger_sim.foundation.events import EventQueue
 from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools import cli
-from ranger_sim.tools.bench import cases, command, interfaces, processes, traffic, walks
+from ranger_sim.tools.bench import cases, command, interfaces, processes, traffic, twelve_boards, walks
+from tests.firmware_sim.native.support import COMPILER
 
 
 def reported(capsys, *arguments):
@@ -156,3 +157,13 @@ def test_a_queue_of_wrong_frames_is_counted_by_the_load():
     load.expected[5] = 1  # node 1 hears frame 0 of node 0's third identifier, which it takes for heard already
     load.run(30)
     assert load.out_of_order + load.wrong > 0
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler here")
+def test_twelve_boards_in_c_and_in_python_put_the_same_on_their_bus_ahead_or_not():
+    found = {
+        (in_c, ahead): twelve_boards.measure(0.05, in_c, ahead)["digest"]
+        for in_c in (True, False)
+        for ahead in (True, False)
+    }
+    assert len(set(found.values())) == 1

@@ -104,6 +104,13 @@ def fmu(seconds: float, plant_steps: int = 4, exchanged: bool = True) -> dict:
     return co_simulation.measure(seconds, plant_steps, exchanged)
 
 
+def twelve_boards(seconds: float, in_c: bool = True, ahead: bool = False, processes: bool = False) -> dict:
+    """Twelve boards on one bus, eleven with an encoder."""
+    from ranger_sim.tools.bench import twelve_boards as part
+
+    return part.measure(seconds, in_c, ahead, processes)
+
+
 CASES = {
     "robot": Case("whole robot, trace hashed, nothing kept", SIMULATED, robot),
     "robot-longer": Case("whole robot, four times as long", SIMULATED, lambda s: robot(4 * s)),
@@ -117,6 +124,15 @@ CASES = {
     "bus": Case("four buses, every buffer always full", FRAMES, bus),
     "bus-quarter": Case("four buses at 25 % load", FRAMES, lambda s: bus(s, 0.25)),
     "bus-eight": Case("four buses of eight boards, 75 % load", FRAMES, lambda s: bus(s, 0.75, 8)),
+    "boards-in-c": Case("twelve boards in C", SIMULATED, twelve_boards),
+    "boards-in-c-ahead": Case("the same, running ahead", SIMULATED, lambda s: twelve_boards(s, ahead=True)),
+    "boards-in-python": Case("the same boards in Python", SIMULATED, lambda s: twelve_boards(s, in_c=False)),
+    "boards-in-python-ahead": Case(
+        "the same in Python, running ahead", SIMULATED, lambda s: twelve_boards(s, in_c=False, ahead=True)
+    ),
+    "boards-in-c-processes": Case(
+        "in C, ahead, a process for each board", SIMULATED, lambda s: twelve_boards(s, ahead=True, processes=True)
+    ),
     "robot-interpreted": Case("whole robot, interpreted", SIMULATED, robot, interpreted=True),
     "plant-interpreted": Case("body alone, interpreted", SIMULATED, plant, interpreted=True),
     "bus-interpreted": Case("four full buses, interpreted", FRAMES, bus, interpreted=True),

@@ -80,6 +80,11 @@ PARTS = {
         ("plant", "fmu", "fmu-fine", "fmu-steps"),
         only_named=True,
     ),
+    "boards-in-c": Part(
+        "twelve boards in C on one bus: in one process, as processes, and the same in Python",
+        ("boards-in-c", "boards-in-c-ahead", "boards-in-python", "boards-in-python-ahead", "boards-in-c-processes"),
+        only_named=True,
+    ),
     "bus": Part("four CAN buses alone: full, a quarter full, of eight boards", ("bus", "bus-quarter", "bus-eight")),
     "interpreted": Part(
         "robot, body and buses from the plain sources", ("robot-interpreted", "plant-interpreted", "bus-interpreted")

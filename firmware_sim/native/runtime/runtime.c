@@ -44,13 +44,14 @@ void firmware_main(void) __attribute__((weak));
 #define NAME(name) #name,
 enum call { CALLS(NUMBER) CALL_COUNT };
 
-/* What a call does in the harness: up to five numbers in, one out. */
-typedef int64_t (*host_call)(int64_t, int64_t, int64_t, int64_t, int64_t);
+/* What calls do in the harness: its own pointer, the number of the call, and up to five numbers in, one out. */
+typedef int64_t (*host_call)(void *, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
 
 EXPORTED const uint32_t fw_compiled_version = FW_VERSION;
 EXPORTED const uint32_t fw_sizes[4] = {sizeof(fw_task), sizeof(fw_step), sizeof(fw_schedule), sizeof(fw_interrupt)};
 EXPORTED const char *const fw_call_names[CALL_COUNT + 1] = {CALLS(NAME) NULL};
-EXPORTED host_call fw_calls[CALL_COUNT];
+EXPORTED host_call fw_answer;
+EXPORTED void *fw_host;
 EXPORTED const int64_t *fw_pin_levels; /* of the chip's 64 pins */
 EXPORTED int64_t fw_mail[32];          /* what does not fit into five numbers, both ways */
 
@@ -115,7 +116,7 @@ EXPORTED int64_t fw_turn(void)
             return 0;
         const int64_t *with = loop.arguments;
         asking = loop.frame;
-        loop.answer = fw_calls[loop.asked](with[0], with[1], with[2], with[3], with[4]);
+        loop.answer = fw_answer(fw_host, loop.asked, with[0], with[1], with[2], with[3], with[4]);
         asking = NULL;
     }
 }
@@ -124,7 +125,7 @@ static int64_t host(enum call asked, int64_t a, int64_t b, int64_t c, int64_t d,
 {
     if (!loop.running) {
         asking = __builtin_frame_address(0);
-        const int64_t answer = fw_calls[asked](a, b, c, d, e);
+        const int64_t answer = fw_answer(fw_host, asked, a, b, c, d, e);
         asking = NULL;
         return answer;
     }

@@ -1,0 +1,720 @@
+"""What the calls of firmware.h do on the models of the devices.
+
+A program in C reaches them by one function, `answered`, which gets the number of the call.
+"""
+
+from typing import Final
+
+import cython
+
+from ranger_sim.firmware_sim.microcontroller import Microcontroller
+from ranger_sim.firmware_sim.native.functions import Function
+from ranger_sim.firmware_sim.native.library import Library, ffi, text
+from ranger_sim.firmware_sim.native.program import answer_by, pointer
+from ranger_sim.firmware_sim.native.started import Started
+from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
+from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
+from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.gpio import Gpio
+from ranger_sim.firmware_sim.peripherals.pwm import Pwm
+from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
+from ranger_sim.firmware_sim.peripherals.ssp import (
+    LONGEST_WORD,
+    SEGMENT_WORDS,
+    SspDevice,
+    SspMaster,
+    SspPort,
+    SspSegment,
+)
+from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
+from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.foundation.user_error import FirmwareError
+
+CMR_AT: Final = 0x2  # CxCMR
+CMR_CDO: Final = 0x8
+CMR_STB1: Final = 0x20
+WORD: Final = 0xFFFF_FFFF
+USUAL_LATENCY: Final = -1
+# numbers of the calls, as in runtime.c
+CALL_ATTACH: Final = 0
+CALL_DETACH: Final = 1
+CALL_REQUEST: Final = 2
+CALL_SPEND: Final = 3
+CALL_IDLE: Final = 4
+CALL_SLOT_CYCLES: Final = 5
+CALL_CYCLES: Final = 6
+CALL_PIN_WRITE: Final = 7
+CALL_PIN_TOGGLE: Final = 8
+CALL_IOPIN: Final = 9
+CALL_IOSET: Final = 10
+CALL_IOCLR: Final = 11
+CALL_TIMER_START: Final = 12
+CALL_CAPTURE_CONNECT: Final = 13
+CALL_TIMER_CCR: Final = 14
+CALL_TIMER_WRITE_CCR: Final = 15
+CALL_TIMER_CR: Final = 16
+CALL_TIMER_IR: Final = 17
+CALL_TIMER_CLEAR_IR: Final = 18
+CALL_TIMER_TC: Final = 19
+CALL_PWM_START: Final = 20
+CALL_PWM_MR: Final = 21
+CALL_PWM_WRITE_MR: Final = 22
+CALL_PWM_LATCH: Final = 23
+CALL_PWM_WRITE: Final = 24
+CALL_ADC_START_CLOCK: Final = 25
+CALL_ADC_START: Final = 26
+CALL_ADC_RESULT: Final = 27
+CALL_ADC_BURST: Final = 28
+CALL_ADC_DR: Final = 29
+CALL_ADCX_START_SSP: Final = 30
+CALL_ADCX_WRITE: Final = 31
+CALL_ADCX_BUSY: Final = 32
+CALL_ADCX_RESULT: Final = 33
+CALL_SPI_START: Final = 34
+CALL_SPI_TRANSFER: Final = 35
+CALL_SPI_SPSR: Final = 36
+CALL_SPI_SPDR: Final = 37
+CALL_SSP_START: Final = 38
+CALL_SSP_EXCHANGE: Final = 39
+CALL_SSP_LOAD: Final = 40
+CALL_SSP_TAKE: Final = 41
+CALL_UART_START: Final = 42
+CALL_UART_RBR: Final = 43
+CALL_UART_THR: Final = 44
+CALL_UART_LSR: Final = 45
+CALL_UART_IIR: Final = 46
+CALL_CAN_START: Final = 47
+CALL_CAN_TRANSMIT: Final = 48
+CALL_CAN_BUFFER_FREE: Final = 49
+CALL_CAN_ABORT: Final = 50
+CALL_CAN_READ: Final = 51
+CALL_CAN_RELEASE: Final = 52
+CALL_CAN_CLEAR_OVERRUN: Final = 53
+CALL_CAN_GSR: Final = 54
+CALL_CAN_SR: Final = 55
+CALL_CAN_ICR: Final = 56
+CALL_CAN_MOD: Final = 57
+CALL_CAN_WRITE_MOD: Final = 58
+CALL_CAN_WRITE_IER: Final = 59
+CALL_SSP_START_WORDS: Final = 60
+CALL_SSP_WORD: Final = 61
+NAMES = (
+    "attach detach request spend idle slot_cycles cycles pin_write pin_toggle IOPIN IOSET IOCLR timer_start "
+    "capture_connect timer_CCR timer_write_CCR timer_CR timer_IR timer_clear_IR timer_TC pwm_start pwm_MR "
+    "pwm_write_MR pwm_latch pwm_write adc_start_clock adc_start adc_result adc_burst adc_DR adcx_start_ssp "
+    "adcx_write adcx_busy adcx_result spi_start spi_transfer spi_SPSR spi_SPDR ssp_start ssp_exchange ssp_load "
+    "ssp_take uart_start uart_RBR uart_THR uart_LSR uart_IIR can_start can_transmit can_buffer_free can_abort "
+    "can_read can_release can_clear_overrun can_GSR can_SR can_ICR can_MOD can_write_MOD can_write_IER "
+    "ssp_start_words ssp_word"
+).split()
+
+
+@cython.final
+@cython.cclass
+class Calls:
+    """What the calls of firmware.h do: a method for each, with whole numbers in and out."""
+
+    board: object
+    chip: Microcontroller
+    gpio: Gpio
+    mail: cython.p_longlong
+    phase_ns: cython.longlong
+    hardware: object
+    timers: object
+    pwms: object
+    adcs: object
+    adcxs: object
+    spis: object
+    ssps: object
+    masters: object
+    uarts: object
+    cans: object
+
+    def __init__(self, board, library: Library, hardware, phase_ns) -> None:
+        self.board = board
+        self.chip = board
+        if cython.compiled:
+            self.mail = cython.cast(cython.p_longlong, pointer(library.place("fw_mail")))
+        else:
+            self.mail = library.code.fw_mail
+        self.hardware = hardware
+        self.phase_ns = phase_ns
+        self.gpio = Gpio(board)
+        self.timers = Started("timer")
+        self.pwms = Started("PWM")
+        self.adcs = Started("internal converter")
+        self.adcxs = Started("external converter")
+        self.spis = Started("SPI")
+        self.ssps = Started("SSP")
+        self.masters = Started("SSP as a master of words")
+        self.uarts = Started("UART")
+        self.cans = Started("CAN controller")
+
+    @cython.ccall
+    def answer(
+        self,
+        call: cython.longlong,
+        a: cython.longlong,
+        b: cython.longlong,
+        c: cython.longlong,
+        d: cython.longlong,
+        e: cython.longlong,
+    ) -> cython.longlong:
+        """The result of call number `call` with its numbers; 0 for one without a result."""
+        if call == CALL_ATTACH:
+            self.attach(a)
+        elif call == CALL_DETACH:
+            self.detach(a, b)
+        elif call == CALL_REQUEST:
+            return self.request(a, b)
+        elif call == CALL_SPEND:
+            self.spend(a)
+        elif call == CALL_IDLE:
+            self.idle()
+        elif call == CALL_SLOT_CYCLES:
+            return self.slot_cycles()
+        elif call == CALL_CYCLES:
+            return self.cycles()
+        elif call == CALL_PIN_WRITE:
+            self.pin_write(a, b)
+        elif call == CALL_PIN_TOGGLE:
+            self.pin_toggle(a)
+        elif call == CALL_IOPIN:
+            return self.IOPIN(a)
+        elif call == CALL_IOSET:
+            self.IOSET(a, b)
+        elif call == CALL_IOCLR:
+            self.IOCLR(a, b)
+        elif call == CALL_TIMER_START:
+            self.timer_start(a, b, c)
+        elif call == CALL_CAPTURE_CONNECT:
+            self.capture_connect(a, b, c)
+        elif call == CALL_TIMER_CCR:
+            return self.timer_CCR(a)
+        elif call == CALL_TIMER_WRITE_CCR:
+            self.timer_write_CCR(a, b)
+        elif call == CALL_TIMER_CR:
+            return self.timer_CR(a, b)
+        elif call == CALL_TIMER_IR:
+            return self.timer_IR(a)
+        elif call == CALL_TIMER_CLEAR_IR:
+            self.timer_clear_IR(a, b)
+        elif call == CALL_TIMER_TC:
+            return self.timer_TC(a)
+        elif call == CALL_PWM_START:
+            self.pwm_start(a)
+        elif call == CALL_PWM_MR:
+            return self.pwm_MR(a)
+        elif call == CALL_PWM_WRITE_MR:
+            self.pwm_write_MR(a, b)
+        elif call == CALL_PWM_LATCH:
+            self.pwm_latch(a)
+        elif call == CALL_PWM_WRITE:
+            self.pwm_write(a, b)
+        elif call == CALL_ADC_START_CLOCK:
+            self.adc_start_clock(a)
+        elif call == CALL_ADC_START:
+            return self.adc_start(a)
+        elif call == CALL_ADC_RESULT:
+            return self.adc_result()
+        elif call == CALL_ADC_BURST:
+            self.adc_burst(a)
+        elif call == CALL_ADC_DR:
+            return self.adc_DR(a)
+        elif call == CALL_ADCX_START_SSP:
+            self.adcx_start_ssp()
+        elif call == CALL_ADCX_WRITE:
+            return self.adcx_write(a, b)
+        elif call == CALL_ADCX_BUSY:
+            return self.adcx_busy()
+        elif call == CALL_ADCX_RESULT:
+            return self.adcx_result()
+        elif call == CALL_SPI_START:
+            self.spi_start(a)
+        elif call == CALL_SPI_TRANSFER:
+            return self.spi_transfer(a)
+        elif call == CALL_SPI_SPSR:
+            return self.spi_SPSR(a)
+        elif call == CALL_SPI_SPDR:
+            return self.spi_SPDR(a)
+        elif call == CALL_SSP_START:
+            self.ssp_start(a)
+        elif call == CALL_SSP_EXCHANGE:
+            self.ssp_exchange(a)
+        elif call == CALL_SSP_LOAD:
+            self.ssp_load(a)
+        elif call == CALL_SSP_TAKE:
+            return self.ssp_take(a)
+        elif call == CALL_UART_START:
+            self.uart_start(a, b, c, d, e)
+        elif call == CALL_UART_RBR:
+            return self.uart_RBR(a)
+        elif call == CALL_UART_THR:
+            return self.uart_THR(a, b)
+        elif call == CALL_UART_LSR:
+            return self.uart_LSR(a)
+        elif call == CALL_UART_IIR:
+            return self.uart_IIR(a)
+        elif call == CALL_CAN_START:
+            self.can_start(a, b, c)
+        elif call == CALL_CAN_TRANSMIT:
+            return self.can_transmit(a, b, c, d, e)
+        elif call == CALL_CAN_BUFFER_FREE:
+            return self.can_buffer_free(a, b)
+        elif call == CALL_CAN_ABORT:
+            self.can_abort(a, b)
+        elif call == CALL_CAN_READ:
+            self.can_read(a)
+        elif call == CALL_CAN_RELEASE:
+            self.can_release(a)
+        elif call == CALL_CAN_CLEAR_OVERRUN:
+            self.can_clear_overrun(a)
+        elif call == CALL_CAN_GSR:
+            return self.can_GSR(a)
+        elif call == CALL_CAN_SR:
+            return self.can_SR(a)
+        elif call == CALL_CAN_ICR:
+            return self.can_ICR(a)
+        elif call == CALL_CAN_MOD:
+            return self.can_MOD(a)
+        elif call == CALL_CAN_WRITE_MOD:
+            self.can_write_MOD(a, b)
+        elif call == CALL_CAN_WRITE_IER:
+            self.can_write_IER(a, b)
+        elif call == CALL_SSP_START_WORDS:
+            self.ssp_start_words(a, b)
+        elif call == CALL_SSP_WORD:
+            return self.ssp_word(a)
+        return 0
+
+    @cython.ccall
+    def fail(self, call: cython.longlong, error: object) -> cython.void:
+        """End the run with what a call raised, unless an earlier one has failed."""
+        if self.board.failure is None:
+            self.board.failure = FirmwareError(f"{self.chip.name}: fw_{NAMES[call]}: {error}")
+            self.chip.stop_at(self.chip.now)
+
+    def new(self, started, number) -> None:
+        """Check that device `number` can be started."""
+        if number in started:
+            raise FirmwareError(f"{started.what} {number} is started twice")
+
+    # --- interrupts, time ---------------------------------------------------------------------------------
+
+    @cython.ccall
+    def attach(self, address: cython.longlong) -> None:
+        it = ffi.cast("fw_interrupt *", address)
+        handler = it.handler
+        if handler == ffi.NULL:
+            raise FirmwareError(f"interrupt {it.kind}/{it.index}: no handler")
+        self.chip.vic.attach(
+            it.kind,
+            it.index,
+            Function(handler).serve,
+            it.cost,
+            it.per_item,
+            it.vic_slot,
+            None if it.latency == USUAL_LATENCY else it.latency,
+            text(it.name) or None,
+        )
+
+    @cython.ccall
+    def detach(self, kind: cython.longlong, index: cython.longlong) -> None:
+        self.chip.vic.detach(self.chip.vic.source(kind, index))
+
+    @cython.ccall
+    def request(self, kind: cython.longlong, index: cython.longlong) -> cython.longlong:
+        return self.chip.request(self.chip.vic.source(kind, index))
+
+    @cython.ccall
+    def spend(self, cycles: cython.longlong) -> None:
+        self.chip.spend(cycles)
+
+    @cython.ccall
+    def idle(self) -> None:
+        raise FirmwareError("only a board's own main loop can sleep, not a task or a handler")
+
+    @cython.ccall
+    def slot_cycles(self) -> cython.longlong:
+        return self.chip.cycles_since_tick()
+
+    @cython.ccall
+    def cycles(self) -> cython.longlong:
+        return int((self.chip.now - self.phase_ns) * self.chip.cycles_per_ns)
+
+    # --- pins ---------------------------------------------------------------------------------------------
+
+    @cython.ccall
+    def pin_write(self, pin: cython.longlong, level: cython.longlong) -> None:
+        self.gpio.write(self.pin(pin), int(level != 0))
+
+    @cython.ccall
+    def pin_toggle(self, pin: cython.longlong) -> None:
+        self.gpio.toggle(self.pin(pin))
+
+    @cython.ccall
+    def pin(self, pin: cython.longlong) -> cython.longlong:
+        """The number of a pin that exists: the models take any."""
+        if pin > 63:
+            raise FirmwareError(f"pin {pin} is not 0 ... 63")
+        return pin
+
+    @cython.ccall
+    def port(self, port: cython.longlong) -> cython.longlong:
+        """The number of a port that exists."""
+        if port > 1:
+            raise FirmwareError(f"port {port} is neither 0 nor 1")
+        return port
+
+    @cython.ccall
+    def IOPIN(self, port: cython.longlong) -> cython.longlong:
+        return self.gpio.IOPIN(self.port(port))
+
+    @cython.ccall
+    def IOSET(self, port: cython.longlong, mask: cython.longlong) -> None:
+        self.gpio.IOSET(self.port(port), mask)
+
+    @cython.ccall
+    def IOCLR(self, port: cython.longlong, mask: cython.longlong) -> None:
+        self.gpio.IOCLR(self.port(port), mask)
+
+    # --- timers -------------------------------------------------------------------------------------------
+
+    @cython.ccall
+    def timer_start(self, timer: cython.longlong, period: cython.longlong, match_interrupt: cython.longlong) -> None:
+        self.new(self.timers, timer)
+        self.timers[timer] = TimerCapture(
+            self.chip, timer, period, phase_ns=self.phase_ns, match_interrupt=match_interrupt != 0
+        )
+
+    @cython.ccall
+    def capture_connect(self, timer: cython.longlong, channel: cython.longlong, pin: cython.longlong) -> None:
+        device = self.timers[timer]
+        bits = device.CCR  # connecting arms a channel; here the program does
+        device.use_channel(channel, pin)
+        device.CCR = bits
+
+    @cython.ccall
+    def timer_CCR(self, timer: cython.longlong) -> cython.longlong:
+        return self.timers[timer].CCR
+
+    @cython.ccall
+    def timer_write_CCR(self, timer: cython.longlong, value: cython.longlong) -> None:
+        self.timers[timer].CCR = value & 0xFFF
+
+    @cython.ccall
+    def timer_CR(self, timer: cython.longlong, channel: cython.longlong) -> cython.longlong:
+        device: TimerCapture = self.timers[timer]
+        return device.CR(channel & 3)
+
+    @cython.ccall
+    def timer_IR(self, timer: cython.longlong) -> cython.longlong:
+        return self.timers[timer].IR
+
+    @cython.ccall
+    def timer_clear_IR(self, timer: cython.longlong, mask: cython.longlong) -> None:
+        device: TimerCapture = self.timers[timer]
+        device.clear(mask)
+
+    @cython.ccall
+    def timer_TC(self, timer: cython.longlong) -> cython.longlong:
+        device: TimerCapture = self.timers[timer]
+        return device.TC()
+
+    # --- PWM ----------------------------------------------------------------------------------------------
+
+    @cython.ccall
+    def pwm_start(self, period: cython.longlong) -> None:
+        self.new(self.pwms, 0)
+        self.pwms[0] = Pwm(self.chip, period=period, phase_ns=self.phase_ns)
+
+    def match(self, number) -> str:
+        """The name of a match register."""
+        if number > 6:
+            raise FirmwareError(f"PWM: match register {number} is not 0 ... 6")
+        return f"MR{number}"
+
+    @cython.ccall
+    def pwm_MR(self, match: cython.longlong) -> cython.longlong:
+        return getattr(self.pwms[0], self.match(match))
+
+    @cython.ccall
+    def pwm_write_MR(self, match: cython.longlong, counts: cython.longlong) -> None:
+        setattr(self.pwms[0], self.match(match), counts)
+
+    @cython.ccall
+    def pwm_latch(self, mask: cython.longlong) -> None:
+        self.pwms[0].latch(mask)
+
+    @cython.ccall
+    def pwm_write(self, MR2: cython.longlong, MR6: cython.longlong) -> None:
+        device: Pwm = self.pwms[0]
+        device.write(MR2, MR6)
+
+    # --- converters ---------------------------------------------------------------------------------------
+
+    @cython.ccall
+    def adc_start_clock(self, clkdiv: cython.longlong) -> None:
+        self.new(self.adcs, 0)
+        it = self.hardware.internal
+        adc = AdcInternal(
+            self.chip, clkdiv=clkdiv, reference_V=it.reference_V, scale=it.scale, offset_counts=it.offset_counts
+        )
+        adc.inputs = [it.inputs.get(channel, channel) for channel in range(8)]
+        self.adcs[0] = adc
+
+    @cython.ccall
+    def channel(self, channel: cython.longlong) -> cython.longlong:
+        """A channel of the internal converter that exists."""
+        if channel > 7:
+            raise FirmwareError(f"internal converter: channel {channel} is not 0 ... 7")
+        return channel
+
+    @cython.ccall
+    def adc_start(self, channel: cython.longlong) -> cython.longlong:
+        device: AdcInternal = self.adcs[0]
+        return device.start(self.channel(channel))
+
+    @cython.ccall
+    def adc_result(self) -> cython.longlong:
+        return self.adcs[0].result
+
+    @cython.ccall
+    def adc_burst(self, mask: cython.longlong) -> None:
+        self.adcs[0].start_burst(*[channel for channel in range(8) if mask >> channel & 1])
+
+    @cython.ccall
+    def adc_DR(self, channel: cython.longlong) -> cython.longlong:
+        return self.adcs[0].DR(self.channel(channel))
+
+    @cython.ccall
+    def adcx_start_ssp(self) -> None:
+        self.new(self.adcxs, 0)
+        it = self.hardware.external
+        if it is None:
+            raise FirmwareError("this board has no external converter")
+        if 0 in self.masters:
+            raise FirmwareError("the SSP is a master of words already, so the external converter cannot have it")
+        adc = Ads7871(self.chip, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)
+        adc.inputs = [it.inputs.get(code, code) for code in range(16)]
+        self.adcxs[0] = adc
+
+    @cython.ccall
+    def adcx_write(self, register4: cython.longlong, later_ns: cython.longlong) -> cython.longlong:
+        device: Ads7871 = self.adcxs[0]
+        return device.write(register4, self.chip.now + later_ns)
+
+    @cython.ccall
+    def adcx_busy(self) -> cython.longlong:
+        return self.adcxs[0].busy
+
+    @cython.ccall
+    def adcx_result(self) -> cython.longlong:
+        device: Ads7871 = self.adcxs[0]
+        return device.read_result()
+
+    # --- serial ports -------------------------------------------------------------------------------------
+
+    @cython.ccall
+    def spi_start(self, number: cython.longlong) -> None:
+        self.new(self.spis, number)
+        if number not in self.hardware.spi:
+            raise FirmwareError(f"nothing hangs on SPI {number} of this board")
+        it = self.hardware.spi[number]
+        self.spis[number] = SpiEncoder(self.chip, number, it.word, it.bits, it.bit_rate, it.value_bits)
+
+    @cython.ccall
+    def spi_transfer(self, number: cython.longlong) -> cython.longlong:
+        device: SpiEncoder = self.spis[number]
+        return device.start()
+
+    @cython.ccall
+    def spi_SPSR(self, number: cython.longlong) -> cython.longlong:
+        return self.spis[number].SPSR
+
+    @cython.ccall
+    def spi_SPDR(self, number: cython.longlong) -> cython.longlong:
+        device: SpiEncoder = self.spis[number]
+        return device.read()
+
+    @cython.ccall
+    def ssp_start(self, number: cython.longlong) -> None:
+        self.new(self.ssps, number)
+        self.ssps[number] = SspPort(self.chip, number)
+
+    def posted_segment(self) -> object:
+        """The half-words in the mail."""
+        segment = SspSegment()
+        segment.words = [self.mail[place] for place in range(SEGMENT_WORDS)]
+        return segment
+
+    @cython.ccall
+    def ssp_exchange(self, number: cython.longlong) -> None:
+        self.ssps[number].start(self.posted_segment())
+
+    @cython.ccall
+    def ssp_load(self, number: cython.longlong) -> None:
+        self.ssps[number].load(self.posted_segment())
+
+    @cython.ccall
+    def ssp_take(self, number: cython.longlong) -> cython.longlong:
+        segment = self.ssps[number].take()
+        if segment is None:
+            return 0
+        for place, word in enumerate(segment.words):
+            self.mail[place] = word
+        return 1
+
+    @cython.ccall
+    def ssp_start_words(self, bits: cython.longlong, divider: cython.longlong) -> None:
+        self.new(self.masters, 0)
+        if 0 in self.adcxs:
+            raise FirmwareError("the external converter has the SSP")
+        if not 4 <= bits <= LONGEST_WORD:
+            raise FirmwareError(f"SSP: words of {bits} bits: 4 to {LONGEST_WORD} are possible")
+        if divider % 2 or not 2 <= divider <= 512:
+            raise FirmwareError(f"SSP: divider {divider}: even, 2 to 512 is possible")
+        device = self.chip.panel.ssp if self.chip.panel is not None else SspDevice(self.chip)
+        self.masters[0] = SspMaster(self.chip, device, bits)
+
+    @cython.ccall
+    def ssp_word(self, word: cython.longlong) -> cython.longlong:
+        return self.masters[0].word(word)
+
+    @cython.ccall
+    def uart_start(
+        self,
+        number: cython.longlong,
+        divisor: cython.longlong,
+        divaddval: cython.longlong,
+        mulval: cython.longlong,
+        trigger: cython.longlong,
+    ) -> None:
+        self.new(self.uarts, number)
+        self.uarts[number] = Uart(self.chip, number, divisor, divaddval, mulval, trigger)
+
+    @cython.ccall
+    def uart_RBR(self, number: cython.longlong) -> cython.longlong:
+        return self.uarts[number].RBR()
+
+    @cython.ccall
+    def uart_THR(self, number: cython.longlong, byte: cython.longlong) -> cython.longlong:
+        return self.uarts[number].THR(byte)
+
+    @cython.ccall
+    def uart_LSR(self, number: cython.longlong) -> cython.longlong:
+        return self.uarts[number].LSR()
+
+    @cython.ccall
+    def uart_IIR(self, number: cython.longlong) -> cython.longlong:
+        return self.uarts[number].IIR
+
+    # --- CAN ----------------------------------------------------------------------------------------------
+
+    @cython.ccall
+    def can_start(self, controller: cython.longlong, BTR: cython.longlong, IER: cython.longlong) -> None:
+        self.new(self.cans, controller)
+        self.cans[controller] = CanController(self.chip, controller, BTR, IER)
+
+    @cython.ccall
+    def can_transmit(
+        self,
+        place: cython.longlong,
+        TFI: cython.longlong,
+        TID: cython.longlong,
+        TDA: cython.longlong,
+        TDB: cython.longlong,
+    ) -> cython.longlong:
+        # DLC in bits 16-19, RTR bit 30, FF bit 31; as the flags of foundation/events.py: bits 0-3, 4, 6
+        flags: cython.longlong = TFI >> 16 & 15 | TFI >> 26 & 16 | TFI >> 25 & 64
+        can: CanController = self.cans[place >> 32]
+        return can.transmit_if_free(place & WORD, TID, flags, TDA, TDB)
+
+    @cython.ccall
+    def buffer(self, buffer: cython.longlong) -> cython.longlong:
+        """A transmit buffer that exists."""
+        if not 1 <= buffer <= 3:
+            raise FirmwareError(f"CAN: transmit buffer {buffer} is not 1 ... 3")
+        return buffer
+
+    @cython.ccall
+    def can_buffer_free(self, controller: cython.longlong, buffer: cython.longlong) -> cython.longlong:
+        can: CanController = self.cans[controller]
+        return can.buffer_free(self.buffer(buffer))
+
+    @cython.ccall
+    def can_abort(self, controller: cython.longlong, buffer: cython.longlong) -> None:
+        self.cans[controller].write_CMR(CMR_AT | CMR_STB1 << self.buffer(buffer) - 1)
+
+    @cython.ccall
+    def can_read(self, controller: cython.longlong) -> None:
+        can: CanController = self.cans[controller]
+        self.mail[0] = can.RFS
+        self.mail[1] = can.RID
+        self.mail[2] = can.RDA
+        self.mail[3] = can.RDB
+
+    @cython.ccall
+    def can_release(self, controller: cython.longlong) -> None:
+        can: CanController = self.cans[controller]
+        can.release()
+
+    @cython.ccall
+    def can_clear_overrun(self, controller: cython.longlong) -> None:
+        self.cans[controller].write_CMR(CMR_CDO)
+
+    @cython.ccall
+    def can_GSR(self, controller: cython.longlong) -> cython.longlong:
+        return self.cans[controller].GSR()
+
+    @cython.ccall
+    def can_SR(self, controller: cython.longlong) -> cython.longlong:
+        return self.cans[controller].SR()
+
+    @cython.ccall
+    def can_ICR(self, controller: cython.longlong) -> cython.longlong:
+        return self.cans[controller].read_ICR()
+
+    @cython.ccall
+    def can_MOD(self, controller: cython.longlong) -> cython.longlong:
+        return self.cans[controller].MOD
+
+    @cython.ccall
+    def can_write_MOD(self, controller: cython.longlong, value: cython.longlong) -> None:
+        self.cans[controller].write_MOD(value)
+
+    @cython.ccall
+    def can_write_IER(self, controller: cython.longlong, value: cython.longlong) -> None:
+        self.cans[controller].write_IER(value)
+
+
+@cython.cfunc
+@cython.exceptval(check=False)
+def answered(
+    host: cython.p_void,
+    call: cython.longlong,
+    a: cython.longlong,
+    b: cython.longlong,
+    c: cython.longlong,
+    d: cython.longlong,
+    e: cython.longlong,
+) -> cython.longlong:
+    """Carry out a call of the program; what it raises ends the run."""
+    calls: Calls = cython.cast(Calls, host)
+    try:
+        return calls.answer(call, a, b, c, d, e)
+    except BaseException as error:  # noqa: BLE001  (nothing may pass through the program)
+        calls.fail(call, error)
+        return 0
+
+
+def connect(calls: Calls, library: Library) -> None:
+    """Let the calls of the program in `library` arrive at `calls`, which must be kept with it."""
+    if library.call_names() != NAMES:
+        unknown = ", ".join(f"fw_{name}" for name in library.call_names() if name not in NAMES) or "fewer calls"
+        raise FirmwareError(f"{library.path}: it has {unknown}, unlike this version: build it again")
+    if cython.compiled:
+        library.code.fw_host = ffi.cast("void *", id(calls))
+        library.code.fw_answer = ffi.cast("host_call", answer_by(answered))
+    else:
+        library.answer_by(answered, calls)
