@@ -165,11 +165,22 @@ class Winding:
 
 
 def read(file: str | pathlib.Path) -> Any:
-    """The model in an MJCF or URDF file, as MuJoCo's reader has it, not yet compiled."""
+    """The model in an MJCF or URDF file, as MuJoCo's reader has it, not yet compiled.
+
+    A joint without a name is `joint_0` by its number; an actuator without one has the name of what it acts on.
+    """
     try:
-        return mujoco.MjSpec.from_file(str(file))
+        spec = mujoco.MjSpec.from_file(str(file))
     except (ValueError, OSError) as error:
         raise ModelError(f"{file}: MuJoCo cannot read it: {one_line(error)}") from None
+    for number, joint in enumerate(spec.joints):
+        joint.name = joint.name or f"joint_{number}"
+    taken = {each.name for each in spec.actuators}
+    for number, actuator in enumerate(spec.actuators):
+        if not actuator.name:
+            actuator.name = actuator.target if actuator.target not in taken else f"actuator_{number}"
+            taken.add(actuator.name)
+    return spec
 
 
 def compiled(spec: Any, file: str) -> Any:
