@@ -48,7 +48,7 @@ class MujocoBody(MappedBody):
 
     MuJoCo's timestep is the largest divisor of step_ns that is not above the model's. Its sensors show the state one
     such timestep ago, as after `mj_step`; joints and encoders show the present one. locked: names of joints that stay
-    where they start (a robot on a stand; MuJoCo's equality constraints).
+    where they start, by MuJoCo's equality constraints; the robot is then on a stand and touches nothing.
 
     ModelError for a file that MuJoCo refuses, and for a name that the model does not have. `model` and `data` are
     MuJoCo's own. An unstable simulation ends in `fell`.
@@ -67,6 +67,8 @@ class MujocoBody(MappedBody):
         driven = [motor(spec, self.file, each) for each in mapping.drives]
         for name in locked:
             lock(spec, self.file, name)
+        if locked:
+            spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         inner = substeps(step_ns, spec.option.timestep)
         spec.option.timestep = step_ns * 1e-9 / inner
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET

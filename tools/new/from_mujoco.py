@@ -36,6 +36,7 @@ LINES = 1000
 GEAR = {"rad": 4.0, "m": 40.0}  # of the encoder: an edge is 0.8 mrad, or 0.08 mm
 REACH = {"rad": 0.2, "m": 0.05}  # of the trajectory, and at most a third of the joint's range
 LOOP_RAD_PER_S, LOOP_DAMPING = 20.0, 0.8  # of a joint without a law in the model, chosen by us
+SPRING_SHARE = 5.0  # in addition, in stiffnesses of the spring that the model has at the joint
 NO_LIMIT_SHARE = 1.0  # a position actuator without a limit gets the force of this error, rad or m
 FREQUENCIES_HZ = (0.5, 1.3)
 LONGEST_NAME = 8  # of a board, by the master table
@@ -176,12 +177,12 @@ def joint_of(body: MujocoBody, number: int, board: str, actuator: str, name: str
     if law.limit is math.nan:
         most = (3.0 * abs(float(data.qfrc_bias[dof])) + 50.0 * inertia) / abs(gear)
     start = body.shown[number][0]
-    low, high = (float(each) for each in joint.range) if joint_is_limited(joint) else (-math.inf, math.inf)
+    low, high = (float(each) for each in joint.range) if first(joint.limited) else (-math.inf, math.inf)
     up, down = high - start, start - low
     reach = min(REACH[unit], max(up, down) / 3.0) * (1.0 if up >= down else -1.0)
     stiffness, damping, source = law.stiffness * gear**2, law.damping * gear**2, "the model's own law"
     if stiffness <= 0.0:
-        stiffness = inertia * LOOP_RAD_PER_S**2
+        stiffness = inertia * LOOP_RAD_PER_S**2 + SPRING_SHARE * first(joint.stiffness)
         damping, source = 0.0, f"{LOOP_RAD_PER_S:g} rad/s with the model's inertia"
     if damping <= 0.0:
         damping = 2.0 * LOOP_DAMPING * math.sqrt(stiffness * inertia)
@@ -192,9 +193,9 @@ def joint_of(body: MujocoBody, number: int, board: str, actuator: str, name: str
     )  # fmt: skip
 
 
-def joint_is_limited(joint: Any) -> bool:
-    """Whether a compiled joint has a range."""
-    return bool(joint.limited[0])
+def first(values: Any) -> float:
+    """A number of a compiled part, or the first one where MuJoCo has several."""
+    return float(np.ravel(values)[0])
 
 
 def mass_matrix(model: Any, data: Any) -> np.ndarray:
