@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from ranger_sim.foundation.user_error import ModelError, unknown
 from ranger_sim.harness.bodies.mapping import Drive, MappedBody, Mapping, component_of, substeps
@@ -44,7 +45,8 @@ TURNS = (HINGE, SLIDE) = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.
 
 
 class MujocoBody(MappedBody):
-    """The model in the file, at its first keyframe if it has one. `step_ns`: of the boards' view, at least 1 us.
+    """The model in the file, at its first keyframe if it has one; a joint beyond its range starts at the end of it.
+    `step_ns`: of the boards' view.
 
     MuJoCo's timestep is the largest divisor of step_ns that is not above the model's. Its sensors show the state one
     such timestep ago, as after `mj_step`; joints and encoders show the present one. locked: names of joints that stay
@@ -76,6 +78,9 @@ class MujocoBody(MappedBody):
         self.data = data = mujoco.MjData(model)
         if model.nkey:
             mujoco.mj_resetDataKeyframe(model, data, 0)
+        limits = model.jnt_limited.astype(bool) & np.isin(model.jnt_type, TURNS)
+        places = model.jnt_qposadr[limits]
+        data.qpos[places] = np.clip(data.qpos[places], *model.jnt_range[limits].T)
         for name in locked:
             lock_at_start(model, data, name)
         self.inner = range(inner)
