@@ -1,10 +1,10 @@
 """A functional mock-up unit (FMI 2.0 or 3.0, co-simulation) as the body of a machine; FMPy imports it.
 
-    body = FmuBody("axis.fmu", Mapping(
-        drives=[Input("voltage", per_duty=24.0)],             # bridge 0
-        encoders=[Encoder("angle", rate="speed")],            # encoder 0
-        voltages=[Voltage("current", V_per_unit=0.1)],        # analog input 0
-    ))
+body = FmuBody("axis.fmu", Mapping(
+    drives=[Input("voltage", per_duty=24.0)],             # bridge 0
+    encoders=[Encoder("angle", rate="speed")],            # encoder 0
+    voltages=[Voltage("current", V_per_unit=0.1)],        # analog input 0
+))
 """
 
 import pathlib
@@ -56,7 +56,9 @@ class FmuBody(MappedBody):
         self.turning = [(self._output(each.joint), self._output(each.rate or each.joint)) for each in mapping.encoders]
         for wire, encoder in zip(mapping.encoders, self.turning, strict=True):
             if encoder[0] is encoder[1]:
-                raise ModelError(f"{file}: encoder {wire.joint}: name its derivative, Encoder({wire.joint!r}, rate=...)")
+                raise ModelError(
+                    f"{file}: encoder {wire.joint}: name its derivative, Encoder({wire.joint!r}, rate=...)"
+                )
         self.sources = []
         for source in (*mapping.voltages, *mapping.words):
             component_of(self.file, source, 1)

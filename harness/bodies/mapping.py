@@ -20,8 +20,8 @@ class Drive:
     """A bridge, a motor's winding, and MuJoCo's actuator of this name; or its joint, where no actuator acts on it.
 
     The current i runs to (duty supply_V - emf_Vs v) / resistance_ohm with the time constant L / R, v being the
-    actuator's velocity; the actuator's force is `most_force` i / `most_A`, within `most_force`. lag_s: the force follows
-    that with a first-order lag. most_force: N or N m before the actuator's gear; None: the limit in the model.
+    actuator's velocity; the actuator's force is `most_force` i / `most_A`, within `most_force`. lag_s: the force
+    follows that with a first-order lag. most_force: N or N m before the actuator's gear; None: the limit in the model.
 
     The defaults are chosen by us: a full duty at standstill gives twice the largest current, after 0.5 ms.
     """

@@ -314,4 +314,3 @@ def samples(model: Any, mapping: Mapping) -> dict[str, str]:
         for axis in range(int(sensor.dim[0])):
             add(name if sensor.dim[0] == 1 else f"{name}_{axis}", UNITS.get(kind, "1"))
     return found
-

@@ -19,7 +19,8 @@ from ranger_sim.tools.new import from_mujoco  # noqa: E402
 ROBOTS = pathlib.Path(__file__).parents[2] / "examples" / "robots"
 BARE = """<mujoco><worldbody>
 <body name="cart"><joint name="rail" type="slide" axis="1 0 0"/><geom type="box" size="0.1 0.1 0.1" mass="1"/>
-<body name="pole"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 0.5" size="0.02" mass="0.1"/></body></body>
+<body name="pole"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 0.5" size="0.02" mass="0.1"/></body>
+</body>
 </worldbody><actuator><motor joint="rail" gear="-10" ctrlrange="-1 1"/></actuator></mujoco>"""
 URDF = """<robot name="swing"><link name="base"/>
 <link name="arm"><inertial><origin xyz="0 0 -0.2"/><mass value="1"/>
@@ -35,9 +36,7 @@ def written(folder, model):
 def run_tests_of(project):
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *how_to_find_the_plugin(), "."]
     path = {"PYTHONPATH": str(pathlib.Path(__file__).resolve().parents[2])}
-    return subprocess.run(
-        command, cwd=project, env=environment() | path, capture_output=True, text=True, check=False
-    )
+    return subprocess.run(command, cwd=project, env=environment() | path, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
@@ -101,7 +100,7 @@ def test_an_included_file_and_an_asset_come_along(tmp_path):
 
 def test_actuators_that_do_not_act_on_a_joint_are_left_out_by_name(tmp_path, capsys):
     text = BARE.replace("</actuator>", '<motor name="pull" site="tip" ctrlrange="-1 1"/></actuator>')
-    (tmp_path / "cart.xml").write_text(text.replace("<geom type=\"capsule\"", '<site name="tip"/><geom type="capsule"'))
+    (tmp_path / "cart.xml").write_text(text.replace('<geom type="capsule"', '<site name="tip"/><geom type="capsule"'))
     written(tmp_path / "project", tmp_path / "cart.xml")
     assert "left out: actuator pull: acts on a site, not on a joint" in capsys.readouterr().out
 
@@ -118,9 +117,7 @@ def test_actuators_that_do_not_act_on_a_joint_are_left_out_by_name(tmp_path, cap
 def test_what_cannot_be_a_project_is_refused_in_a_line_and_nothing_is_left(tmp_path, capsys, monkeypatch, asked, line):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "still.xml").write_text("<mujoco><worldbody/></mujoco>")
-    bodies = "".join(
-        f'<body><joint name="j{n}"/><geom size="0.1" mass="1"/></body>' for n in range(30)
-    )
+    bodies = "".join(f'<body><joint name="j{n}"/><geom size="0.1" mass="1"/></body>' for n in range(30))
     (tmp_path / "many.xml").write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
     assert cli.main(["new", "project", "--plant", *asked]) == 2
     printed = capsys.readouterr().err

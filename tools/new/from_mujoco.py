@@ -1,4 +1,4 @@
-"""`ranger-sim new DIR --plant mujoco robot.xml`: a board for each actuator of a user's own robot model, and a main board.
+"""`ranger-sim new DIR --plant mujoco robot.xml`: a board for each actuator of a user's robot, and a main board.
 
 The model stays the one description of the robot: its names are in the project's table of wires, and the gains of a
 joint's board follow from the model's own law or from the inertia at the joint.
@@ -47,7 +47,8 @@ FOLDERS = {"main", "table", "build", "runs", "machine", "common", "joint", "reco
 
 @dataclasses.dataclass(frozen=True)
 class Joint:
-    """A driven joint. Gains in A per unit of the joint; reach signed; source: of the gains. most: before the gear."""
+    """A driven joint. Gains in A per unit of the joint; reach signed; source: of the gains. most: before the
+    gear. viscous, dry: the friction that the model has."""
 
     board: str
     folder: str
@@ -59,6 +60,8 @@ class Joint:
     most: float
     gear: float
     inertia: float
+    viscous: float
+    dry: float
     stiffness: float
     damping: float
     integral: float
@@ -129,7 +132,9 @@ def driven(spec: Any) -> tuple[list[tuple[str, str]], list[str]]:
     for each in spec.actuators:
         kind = mujoco.mjtTrn(each.trntype)
         if kind not in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
-            left_out.append(f"actuator {each.name}: acts on a {kind.name.removeprefix('mjTRN_').lower()}, not on a joint")
+            left_out.append(
+                f"actuator {each.name}: acts on a {kind.name.removeprefix('mjTRN_').lower()}, not on a joint"
+            )
         elif kinds[each.target] not in TURNS:
             left_out.append(f"actuator {each.name}: joint {each.target} is neither a hinge nor a slide")
         elif each.target in taken:
@@ -141,7 +146,7 @@ def driven(spec: Any) -> tuple[list[tuple[str, str]], list[str]]:
 
 
 class Law(NamedTuple):
-    """An actuator's own position law, before its gear; 0: it has none. limit: of its force, None: as the model has it."""
+    """An actuator's own position law, before its gear; 0: without one. limit: of its force, None: that of the model."""
 
     stiffness: float
     damping: float
@@ -188,9 +193,23 @@ def joint_of(body: MujocoBody, number: int, board: str, actuator: str, name: str
         damping = 2.0 * LOOP_DAMPING * math.sqrt(stiffness * inertia)
     per_A = most * gear / MOST_A
     return Joint(
-        board, f"{board.lower()}_board" if board.lower() in FOLDERS else board.lower(), actuator, name, unit, start, reach,
-        most, gear, inertia, stiffness / per_A, damping / per_A, 4.0 * stiffness / per_A, source,
-    )  # fmt: skip
+        board=board,
+        folder=f"{board.lower()}_board" if board.lower() in FOLDERS else board.lower(),
+        actuator=actuator,
+        joint=name,
+        unit=unit,
+        start=start,
+        reach=reach,
+        most=most,
+        gear=gear,
+        inertia=inertia,
+        viscous=first(model.dof_damping[dof]),
+        dry=first(model.dof_frictionloss[dof]),
+        stiffness=stiffness / per_A,
+        damping=damping / per_A,
+        integral=4.0 * stiffness / per_A,
+        source=source,
+    )
 
 
 def first(values: Any) -> float:
@@ -238,7 +257,7 @@ def files(robot: Robot, name: str) -> dict[str, bytes]:
         "places": ", ".join(f'"{each.board}.encoder"' for each in robot.joints),
         "instances": "".join(
             f'{each.board} = Joint("{each.board.lower()}", "{quantity(each)}", "{each.unit}", {each.per_A:.6g}, '
-            f"{each.inertia:.6g})\n"
+            f"{each.inertia:.6g}, {each.viscous:.6g}, {each.dry:.6g})\n"
             for each in robot.joints
         ).rstrip("\n"),
     }
@@ -270,7 +289,7 @@ PLAIN = (
 
 
 def model_files(file: pathlib.Path) -> tuple[str, dict[str, bytes]]:
-    """(name of the model in the project, its files): as it is, or with included files in it and its assets next to it."""
+    """(name of the model in the project, its files): as it is, or with the files that it includes, and its assets."""
     content = file.read_bytes()
     spec = mujoco_body.read(file)
     parts = [each for each in (*spec.meshes, *spec.textures, *spec.hfields, *spec.skins) if getattr(each, "file", "")]
@@ -339,7 +358,9 @@ def main_words(robot: Robot, period_ms: int) -> dict[str, str]:
             f"    {{{each.board}_TARGET, {each.board}_POSITION, {single(each.start)}f, {single(each.reach)}f}},\n"
             for each in joints
         ),
-        "senders": "".join(f"static int32_t send_{k}(void) {{ return send_target({k}); }}\n" for k in range(len(joints))),
+        "senders": "".join(
+            f"static int32_t send_{k}(void) {{ return send_target({k}); }}\n" for k in range(len(joints))
+        ),
         "tasks": "\n".join(
             f'static const fw_task row{k}[] = {{{{send_{k}, "{each.board}_TARGET", 300, 450}}}};'
             for k, each in enumerate(joints)
@@ -400,13 +421,12 @@ def variables_table(robot: Robot, period_ms: int) -> str:
     out.append(f"1,ERROR_MAIN,u32,,0,MAIN,{every},CAN1,{2 * period_ms},,,{waiting}")
     for k, each in enumerate(robot.joints):
         out.append(f"{2 + k},ERROR_{each.board},u32,,0,{each.board},MAIN,CAN1,{2 * period_ms},,,{waiting}")
-    for first, word, text in ((64, "TARGET", "where it is to be"), (96, "POSITION", "by its encoder")):
+    for number, word, text in ((64, "TARGET", "where it is to be"), (96, "POSITION", "by its encoder")):
         for k, each in enumerate(robot.joints):
             publisher, subscriber = ("MAIN", each.board) if word == "TARGET" else (each.board, "MAIN")
             about = f"joint {each.joint}: {text}".replace('"', "'")
-            out.append(
-                f'{first + k},{each.board}_{word},f32,{each.unit},0,{publisher},{subscriber},CAN1,{period_ms},,,"{about}"'
-            )
+            wire = f"{publisher},{subscriber},CAN1,{period_ms}"
+            out.append(f'{number + k},{each.board}_{word},f32,{each.unit},0,{wire},,,"{about}"')
     for k, each in enumerate(robot.joints):
         out.append(f"{128 + k},{each.board}_CURRENT,f32,A,0,{each.board},MAIN,CAN1,{period_ms},,,current as measured")
     return "\n".join(out) + "\n"
