@@ -52,7 +52,7 @@ class FmuBody(MappedBody):
         self.version = description.fmiVersion[0]
         self.variables = {each.name: each for each in description.modelVariables if each.type in NUMBERS}
         self.outputs = [each for each in self.variables.values() if each.causality == "output" and not each.dimensions]
-        self.inputs = [(self._input(each), each) for each in mapping.drives]
+        self.inputs: list[tuple[Any, Any]] = [(self._input(each), each) for each in mapping.drives]
         self.turning = [(self._output(each.joint), self._output(each.rate or each.joint)) for each in mapping.encoders]
         for wire, encoder in zip(mapping.encoders, self.turning, strict=True):
             if encoder[0] is encoder[1]:
@@ -60,9 +60,10 @@ class FmuBody(MappedBody):
                     f"{file}: encoder {wire.joint}: name its derivative, Encoder({wire.joint!r}, rate=...)"
                 )
         self.sources = []
-        for source in (*mapping.voltages, *mapping.words):
-            component_of(self.file, source, 1)
-            self.sources.append(self._output(source.source))
+        wires: list[Any] = [*mapping.voltages, *mapping.words]
+        for each in wires:
+            component_of(self.file, each, 1)
+            self.sources.append(self._output(each.source))
         try:
             self.unit = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
             if self.version == "2":
