@@ -21,7 +21,8 @@ from ranger_sim.foundation import wallclock
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 LONGEST_S = 1800.0  # `make walk` compiles
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-FILE_NAME = re.compile(r"(?:# ([\w-]+\.(?:py|toml))|/\* ([\w-]+\.c) \*/)\n")
+FILE_NAME = re.compile(r"(?:# ([\w-]+\.(?:py|toml))|/\* ([\w-]+\.c) \*/|<!-- ([\w-]+\.xml) -->)\n")
+FILE_KINDS = ("python", "toml", "c", "xml")  # blocks whose first line may be such a name
 EXIT_CODE = re.compile(r"#.*\bexit code (\d+)")
 
 
@@ -79,8 +80,8 @@ def in_order(page: pathlib.Path, folder: pathlib.Path, environment: Mapping[str,
     before = ""
     for kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
         named = FILE_NAME.match(text)
-        if named and kind in ("python", "toml", "c"):
-            (folder / (named[1] or named[2])).write_text(text, encoding="utf-8")
+        if named and kind in FILE_KINDS:
+            (folder / (named[1] or named[2] or named[3])).write_text(text, encoding="utf-8")
         for line in filter(None, text.splitlines() if kind == "sh" else ()):
             if line.startswith(". "):
                 before += f"{line} && "

@@ -54,6 +54,12 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--bit-rate", type=int, metavar="BIT/S", help="with --from: of the bus, where the file has no Baudrate (500000)"
     )
+    command.add_argument(
+        "--plant",
+        nargs=2,
+        metavar=("mujoco", "FILE"),
+        help="a board for each actuator of a robot's MJCF or URDF model, and a main board",
+    )
     command.set_defaults(run=run)
 
 
@@ -68,12 +74,20 @@ def run(options: argparse.Namespace) -> int:
     check(folder)
     if options.dbc is None and options.bit_rate is not None:
         raise UserError("new --bit-rate: belongs to --from FILE.dbc")
-    files = {} if options.dbc is None else files_of_dbc(options.dbc, options.bit_rate, name)
+    if options.plant is not None and options.dbc is not None:
+        raise UserError("new: --plant and --from exclude each other")
+    files = {}
+    if options.dbc is not None:
+        files = files_of_dbc(options.dbc, options.bit_rate, name)
+    elif options.plant is not None:
+        files = files_of_model(*options.plant, name)
     try:
         folder.resolve().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".ranger-sim-new-", dir=folder.resolve().parent) as making:
             project = pathlib.Path(making) / "project"
-            write_files(project, files) if files else write(project, name)
+            write_files(project, files or own_files(name))
+            if (project / "table").is_dir():
+                generate_table(project)
             check(folder)
             take_over(project, folder)
     except OSError as error:
@@ -90,17 +104,38 @@ def check(folder: pathlib.Path) -> None:
         raise UserError(f"new {folder}: the folder is not empty; give one that is not there yet")
 
 
-def write(project: pathlib.Path, name: str) -> None:
-    """The whole project, with the files generated from its table."""
+def own_files(name: str) -> dict[str, bytes]:
+    """The files of the project with a wheel."""
+    return {
+        path: (HERE / template)
+        .read_text(encoding="utf-8")
+        .replace("[% name %]", name)
+        .replace("[% board %]", board)
+        .encode("utf-8")
+        for path, (template, board) in FILES.items()
+    }
+
+
+def generate_table(project: pathlib.Path) -> None:
+    """Write the files generated from the project's table."""
     from ranger_sim.datatable import generate
     from ranger_sim.datatable.loader import load_table
 
-    files = {
-        path: (HERE / template).read_text(encoding="utf-8").replace("[% name %]", name).replace("[% board %]", board)
-        for path, (template, board) in FILES.items()
-    }
-    write_files(project, {path: text.encode("utf-8") for path, text in files.items()})
     generate.write(load_table(project / "table"), project / "table" / "generated")
+
+
+def files_of_model(kind: str, model: str, name: str) -> dict[str, bytes]:
+    """The files of a project for the actuators of a robot's model."""
+    if kind != "mujoco":
+        raise UserError(f"new --plant {kind}: allowed is mujoco")
+    from ranger_sim.tools.new import from_mujoco
+
+    robot = from_mujoco.read(pathlib.Path(model))
+    made = from_mujoco.files(robot, name)
+    print(f"{model}: {len(robot.joints)} actuators, {len(robot.others)} other joints")
+    for line in robot.left_out:
+        print(f"{model}: left out: {line}")
+    return made
 
 
 def files_of_dbc(dbc: pathlib.Path, bit_rate: int | None, name: str) -> dict[str, bytes]:

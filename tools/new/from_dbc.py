@@ -223,7 +223,7 @@ def files(network: Network, name: str, dbc: pathlib.Path) -> dict[str, str]:
         "left_out": "".join(f"- {line}\n" for line in network.left_out) or "Nothing.\n",
     }
     made = {
-        path: _filled(HERE / template, words)
+        path: filled(HERE / template, words)
         for path, template in {
             "README.md": "README.md.j2",
             "board.h": "board.h.j2",
@@ -250,7 +250,8 @@ def _tested(network: Network) -> list[DbcMessage]:
     return [each for each in network.messages if 0 < each.period_ms <= LONGEST_TESTED_MS]
 
 
-def _filled(path: pathlib.Path, words: dict[str, str]) -> str:
+def filled(path: pathlib.Path, words: dict[str, str]) -> str:
+    """A template with its words in their places."""
     text = path.read_text(encoding="utf-8")
     for key, value in words.items():
         text = text.replace(f"[% {key} %]", value)
