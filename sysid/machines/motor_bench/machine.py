@@ -45,6 +45,7 @@ SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
 # Least own noise of a stand-in, of its difference to the measurement. Three spreads cannot estimate less of a current;
 # and a friction that changes its sign within 0.05 rad/s is not a cause.
 OWN_I, OWN_W = 0.3, 0.5
+HALF_WAY, AS_WELL = 0.25, 1.05  # rows about half a row, times what a lag of any size leaves
 SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
 SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
 
@@ -165,16 +166,16 @@ class MotorBench:
                 },
             ),
         }
+        ways: dict[str, str] = {}
         if measured:
-            # the slope over two samples is the speed's mean over them: Simpson's rule for samples of a point or a mean
             turning = np.gradient(s["angle"], table.step_s) / self.gear
-            mean_w = np.convolve(w, (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0), mode="same")
             no_kink = no_jump(V, JUMP_IN_STEPS, 1) & inner(table, REACH)  # Simpson's rule takes the speed for smooth
+            mean_w, ways["speed_rad_per_s"] = _mean_speed(turning, w, no_kink)
             equations["transmission"] = Equation(
                 "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, no_kink, lines=False
             )
         regimes = _regimes(s, firm_w)
-        return Recording(table, s, equations, regimes, firm=True)
+        return Recording(table, s, equations, regimes, firm=True, between_rows=ways)
 
     def generic(self, recording: Recording) -> dict[str, dict[str, Array]]:
         """Signals over which each equation is examined without a cause in mind."""
@@ -201,6 +202,26 @@ class MotorBench:
         if all("transmission" in r.equations for r in recordings):
             made += transmission()
         return made
+
+
+def _mean_speed(turning: Array, w: Array, counts: np.ndarray) -> tuple[Array, str]:
+    """(mean of the speed over the two rows of the angle's slope, way of the speed's samples), by what it leaves.
+
+    Simpson's rule where angle and speed are samples of a kind, points or means. Where the speed alone is a mean over
+    the time from row to row, the two means are exact; then Simpson's rule with a lag of any size leaves no less.
+    """
+    like = np.convolve(w, (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0), mode="same")
+    left, slope = (turning - like)[counts], np.gradient(w)[counts]
+    lag = float(slope @ left) / max(float(slope @ slope), 1e-300)  # rows by which the angle is early
+    ways = {
+        "a mean after its row": (-0.5, 0.5 * (w + np.append(w[:1], w[:-1]))),
+        "a mean before its row": (0.5, 0.5 * (w + np.append(w[1:], w[-1:]))),
+    }
+    for name, (early, mean) in ways.items():
+        rest = float(np.linalg.norm((turning - mean)[counts]))
+        if abs(lag - early) < HALF_WAY and rest <= AS_WELL * float(np.linalg.norm(left - lag * slope)):
+            return mean, name
+    return like, "like the angle"
 
 
 def _same_motion(table: Table, angle: Array, w: Array) -> None:
