@@ -66,7 +66,8 @@ class MujocoBody(MappedBody):
     ) -> None:
         self.file = str(file)
         spec = read(file)
-        driven = [motor(spec, self.file, each) for each in mapping.drives]
+        drives: list[Any] = list(mapping.drives)  # `motor` refuses other kinds
+        driven = [motor(spec, self.file, each) for each in drives]
         for name in locked:
             lock(spec, self.file, name)
         if locked:
@@ -88,7 +89,7 @@ class MujocoBody(MappedBody):
         self.actuators = [model.actuator(name).id for name in driven]
         self.windings = [
             Winding(drive, most_force(model, self.file, number, drive), self.inner_s)
-            for drive, number in zip(mapping.drives, self.actuators, strict=True)
+            for drive, number in zip(drives, self.actuators, strict=True)
         ]
         self.joints = [self._joint(each.joint) for each in mapping.encoders]
         self.sources = [self._source(wire, mapping) for wire in (*mapping.voltages, *mapping.words)]

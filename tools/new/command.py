@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     if options.dbc is not None:
         files = files_of_dbc(options.dbc, options.bit_rate, name)
     elif options.plant is not None:
-        files = files_of_model(*options.plant, name)
+        files = files_of_model(options.plant[0], options.plant[1], name)
     try:
         folder.resolve().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".ranger-sim-new-", dir=folder.resolve().parent) as making:
