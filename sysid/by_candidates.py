@@ -486,7 +486,7 @@ def _learnable(found: Diagnosis) -> tuple[str, ...]:
 def _gain(errors: Mapping[str, HeldOutError], holdout: str) -> gain.Gain:
     """Share of what can be explained at all that the named causes explain on held-out data, in squares of the error."""
     won, possible, ends = gained(errors.values())
-    scale = max(possible, won, 1e-300)
+    scale = max(possible, abs(won), 1e-300)  # where nothing can be gained, a loss counts as a whole one
     before = math.sqrt(sum(each.before**2 for each in errors.values()))
     after = math.sqrt(sum(each.after**2 for each in errors.values()))
     return gain.Gain(won / scale, (float(ends[0]) / scale, min(1.0, float(ends[1]) / scale)), before, after, holdout)
