@@ -231,7 +231,7 @@ def averaged(table: Table, count: int) -> Table:
         for name, column in table.columns.items():
             columns[name].append(column[inside].reshape(size, count).mean(axis=1))
         for name, rows in table.unmeasured.items():
-            unmeasured[name].append(rows[inside].reshape(size, count).any(axis=1))
+            unmeasured[name].append(np.any(rows[inside].reshape(size, count), axis=1))
         runs.append(slice(start, start + size))
         start += size
     return Table(

@@ -74,8 +74,8 @@ class TrajectoryFit:
             ]
         )
         steps = np.array([table.resolution.get(each.channel, 0.0) for each in machine.outputs])
-        whole = np.zeros(len(table), dtype=bool)
-        self.unmeasured = np.column_stack([table.unmeasured.get(each.channel, whole) for each in machine.outputs])
+        nowhere = np.zeros(len(table), dtype=bool)
+        self.unmeasured = np.column_stack([table.unmeasured.get(each.channel, nowhere) for each in machine.outputs])
         rough = np.array([signals.roughness(table, *each) for each in zip(self.y.T, self.unmeasured.T, strict=True)])
         self.noise_y = np.maximum(np.hypot(rough, steps / np.sqrt(12.0)), 1e-9 * np.ptp(self.y, axis=0))
         self.shown_y = self.noise_y
@@ -204,8 +204,8 @@ class TrajectoryFit:
         if np.any(back):
             after = np.concatenate((back[1:], back[-1:]))  # a step has the mean of its two ends
             lin.f_x, lin.h_x = lin.f_x + 0.5 * lin.f_q @ (back + after @ lin.f_x), lin.h_x + lin.h_q @ back
-        for each in (lin.h_x, lin.h_u, lin.h_p, lin.h_q):  # an output that is not measured shows nothing
-            each[self.unmeasured] = 0.0
+        for derivative in (lin.h_x, lin.h_u, lin.h_p, lin.h_q):  # an output that is not measured shows nothing
+            derivative[self.unmeasured] = 0.0
         numbers = (lin.next_state, lin.output, lin.f_x, lin.h_x, lin.f_p, lin.h_p)
         if not all(np.all(np.isfinite(each)) for each in numbers):
             raise UserError(
