@@ -18,6 +18,7 @@ from ranger_sim.sysid.three_numbers import gained
 # in 30 sound recordings of the motor bench; effects worth a name are far below it.
 GENERAL_LEVEL = 0.0001
 LITTLE = 0.02  # of the residual's square: an integrator's own error is predictable too
+SURELY = 1e-6  # chance of a misfit that counts whatever held-out data show; surrogates give no less than 0.0025
 EXPLAINED = 0.7  # of the repeatable excess: causes that explain less are not named
 # The same of what can be predicted in the data that the causes were chosen on. A bump of torque that a leg has and the
 # catalogue has not is explained to 0.71 and 0.72 by a bend of its spring; true causes explain 0.98 and more there.
@@ -83,7 +84,9 @@ class Diagnosis:
     @property
     def detected(self) -> bool:
         """Something is wrong."""
-        general = self.before.p < self.level and (not self.by_candidates or self.before.excess > LITTLE)
+        general = self.before.p < self.level
+        if self.by_candidates:
+            general = general and self.before.excess > LITTLE and self._seen_on_held_out()
         return general or bool(self.named) or self.doubts.forbid
 
     @property
@@ -94,6 +97,20 @@ class Diagnosis:
         gained = sum(each.chi2 - each.freedom for each in self.named)
         total = gained + self.after.excess
         return float(gained / total) if total > 0.0 else 0.0
+
+    def _seen_on_held_out(self) -> bool:
+        """False where chance alone hardly explains the misfit, but a black box gains nothing by it on held-out data.
+
+        They do not show what goes with time, which the black box does not have.
+        """
+        if not self.errors or self.before.p < SURELY:
+            return True
+        if not {"t", "time"}.isdisjoint(self.before.telling.features.split()):
+            return True
+        return any(
+            each.black_box is not None and each.black_box**2 < (1.0 - LITTLE) * each.before**2
+            for each in self.errors.values()
+        )
 
     def _more_on_held_out(self) -> bool:
         """True unless held-out data show that a black box explains little more than the named effects do.
