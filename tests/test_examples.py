@@ -50,6 +50,8 @@ WALKED = {
 IN_A_PROJECT = "docs/testing.md"
 # Its machine diagnoses hidden effects: sysid/test_machines_of_a_user.py.
 A_MACHINE = "docs/diagnose-your-machine.md"
+# Their commands are run in a folder of their own: tests/pages.
+PAGES = {"docs/how-to/mujoco.md", "docs/how-to/fmu-body.md"}
 
 
 def examples(name):
@@ -65,7 +67,7 @@ def test_every_document_with_python_examples_is_run():
         for path in documents
         if not {".venv", "build", "tests", ".pytest_cache"} & set(path.parts) and examples(path)
     }
-    assert found == {*PRINTED, IN_A_PROJECT, A_MACHINE, *WALKED}
+    assert found == {*PRINTED, IN_A_PROJECT, A_MACHINE, *PAGES, *WALKED}
 
 
 @pytest.mark.parametrize("name", PRINTED)

@@ -6,7 +6,6 @@ word.
 """
 
 import contextlib
-import fcntl
 import mmap
 import os
 from collections.abc import Iterable, Iterator
@@ -139,6 +138,8 @@ class StageMemory:
         try:
             os.ftruncate(descriptor, size)
             self.memory = mmap.mmap(descriptor, size)
+            import fcntl  # only where there is one: other systems have messages of their own
+
             fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, F_SEAL_FUTURE_WRITE | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW)
             view = memoryview(mmap.mmap(descriptor, size, access=mmap.ACCESS_READ))
         finally:

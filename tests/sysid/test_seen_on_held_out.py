@@ -8,9 +8,9 @@ from ranger_sim.sysid.plausibility import Doubts
 from ranger_sim.sysid.results import HeldOutError
 
 
-def found(p, features, black_box):
+def found(p, features, black_box, share=0.1):
     """A diagnosis without a name; black_box: its error on held-out data of an equation that leaves 1 there."""
-    before = misfit.Misfit([misfit.Test("force", features, 30.0, 1, p, 0.1)], p, 0.1)
+    before = misfit.Misfit([misfit.Test("force", features, 30.0, 1, p, share)], p, share)
     errors = {} if black_box is None else {"force": HeldOutError(1.0, 1.0, black_box, (1.0, 1.0))}
     return Diagnosis(
         None, [], None, None, [], [], [], [], {}, before, before, Doubts([], False),
@@ -34,3 +34,7 @@ def found(p, features, black_box):
 )
 def test_held_out_data_confirm_what_chance_might_explain(p, features, black_box, detected):
     assert found(p, features, black_box).detected is detected
+
+
+def test_a_large_part_counts_though_the_black_box_learns_nothing_that_another_run_has():
+    assert found(0.005, "over x", 1.0, share=0.6).detected

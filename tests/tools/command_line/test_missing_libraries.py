@@ -39,6 +39,7 @@ NEEDED = {
     "h5py": ["read t.h5"],
     "jinja2": ["campaign few.toml --out c"],
     "mcap": ["walk --time 50ms --trace t.mcap"],
+    "mujoco": ["new m --plant mujoco robot.xml"],
     "nptdms": ["read t.tdms"],
     "numpy": ["walk --time 50ms", "diagnose run.csv --experiment motor-bench"],
     "perfetto": ["walk --time 50ms --trace t.pftrace"],
@@ -72,6 +73,7 @@ def folder(tmp_path):
     (tmp_path / "t.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     (tmp_path / "t.tdms").write_bytes(b"TDSm" + bytes(100))
     (tmp_path / "t.ulg").write_bytes(b"ULog\x01\x12\x35")
+    (tmp_path / "robot.xml").write_text("<mujoco/>")
     for name in ("run.csv", "run.mf4", "x.dbc"):
         (tmp_path / name).write_text("t,angle\n0,1\n")
     return tmp_path
