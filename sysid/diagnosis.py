@@ -103,9 +103,10 @@ class Diagnosis:
     def _seen_on_held_out(self) -> bool:
         """False where chance alone hardly explains the misfit, but a black box gains nothing by it on held-out data.
 
-        They do not show what goes with time, which the black box does not have.
+        They do not show what goes with time, which the black box does not have; and a name that they refuse may be true
+        of the other recordings alone.
         """
-        if not self.errors or self.before.p < SURELY or self.before.excess > MUCH:
+        if not self.errors or self.refused or self.before.p < SURELY or self.before.excess > MUCH:
             return True
         if not {"t", "time"}.isdisjoint(self.before.telling.features.split()):
             return True
