@@ -19,6 +19,7 @@ import contextlib
 import json
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -262,11 +263,8 @@ def results_in(folder: pathlib.Path) -> dict[str, Any]:
 
 def remove(folder: pathlib.Path) -> None:
     """Remove a folder and what is in it, if it is there."""
-    if not folder.is_dir():
-        return
-    for path in sorted(folder.rglob("*"), reverse=True):
-        path.rmdir() if path.is_dir() else path.unlink()
-    folder.rmdir()
+    if folder.is_dir():
+        shutil.rmtree(folder)
 
 
 def run(kills: int, seed: int) -> dict[str, int]:

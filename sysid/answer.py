@@ -46,17 +46,15 @@ def of(
 ) -> DiagnosisResult:
     """The result. final: `found` without the effects that held-out data refuse; prepared: every recording."""
     doubtful, refused = found.doubtful, len(final.named) < len(found.named)
-    # a name alone was the evidence, and held-out data refuse it: nothing is left
-    detected = bool(final.detected if refused else found.detected)
-    abstained = detected and (not final.named if refused else doubtful)
+    abstained = not final.named if refused else doubtful
     evidence = _evidence(found, held, term)
     if found.by_candidates:
         evidence = by_candidates.evidence(found, evidence)
     return DiagnosisResult(
-        detected=detected,
+        detected=bool(found.detected),
         misfit=tuple(_channels(found)),
-        subsystem=_subsystem(found) if detected else None,
-        causes=tuple(_cause(final, each) for each in final.named) if detected and not doubtful else (),
+        subsystem=_subsystem(found) if found.detected else None,
+        causes=tuple(_cause(final, each) for each in final.named) if found.detected and not doubtful else (),
         abstained=bool(abstained),
         gain=held.result if held is not None else None,
         next_experiment=tuple(_next(found.named)),

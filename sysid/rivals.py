@@ -17,7 +17,8 @@ from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.regression import Regression
 
 CLOSE, MOST_CLOSE = 0.03, 3  # of a cause's chi-square: rivals so near are simulated as well, so many of them
-SURELY = 100.0  # of -2 log likelihood: a rival that is so far behind in the simulator is not simulated again
+# Of -2 log likelihood: a rival that is so far behind in the simulator is not simulated again. Chosen by us, 16 ties
+SURELY = 100.0
 
 
 class Simulations:

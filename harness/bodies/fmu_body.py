@@ -99,14 +99,19 @@ class FmuBody(MappedBody):
             raise ModelError(f"{self.file}: {unknown('output', name, known)}")
         return self.variables[name]
 
+    def _kind(self, variable: Any) -> str:
+        """The type by which the interface sets and gets a variable."""
+        if variable.type == "Enumeration":
+            return "Integer" if self.version == "2" else "Int64"
+        return str(variable.type)
+
     def _set(self, variable: Any, value: float) -> None:
-        kind = variable.type if variable.type != "Enumeration" else "Integer" if self.version == "2" else "Int64"
+        kind = self._kind(variable)
         number = bool(value) if kind == "Boolean" else round(value) if variable.type in WHOLE else float(value)
         getattr(self.unit, f"set{kind}")([variable.valueReference], [number])
 
     def _get(self, variable: Any) -> float:
-        kind = variable.type if variable.type != "Enumeration" else "Integer" if self.version == "2" else "Int64"
-        return float(getattr(self.unit, f"get{kind}")([variable.valueReference])[0])
+        return float(getattr(self.unit, f"get{self._kind(variable)}")([variable.valueReference])[0])
 
     def advance(self) -> None:
         """Set the inputs, then let the unit pass one communication step."""

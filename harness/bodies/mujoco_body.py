@@ -23,7 +23,7 @@ from ranger_sim.harness.bodies.mapping import Drive, MappedBody, Mapping, compon
 from ranger_sim.harness.bodies.names import identifier
 
 STEP_NS = 500_000  # a slot of fast motor boards
-# of MuJoCo's sensors, by the beginning of their type's name
+# of MuJoCo's sensors, by type (a slide joint's are m and m/s); others are numbers without a unit
 UNITS = {
     "TOUCH": "N",
     "ACCELEROMETER": "m/s^2",
@@ -312,6 +312,9 @@ def samples(model: Any, mapping: Mapping) -> dict[str, str]:
         sensor = model.sensor(number)
         kind = mujoco.mjtSensor(int(sensor.type[0])).name.removeprefix("mjSENS_")
         name = identifier(sensor.name or f"sensor_{number}")
+        unit = UNITS.get(kind, "1")
+        if kind in ("JOINTPOS", "JOINTVEL") and model.jnt_type[sensor.objid[0]] == SLIDE:
+            unit = unit.replace("rad", "m")
         for axis in range(int(sensor.dim[0])):
-            add(name if sensor.dim[0] == 1 else f"{name}_{axis}", UNITS.get(kind, "1"))
+            add(name if sensor.dim[0] == 1 else f"{name}_{axis}", unit)
     return found

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.timeline.packing import PACKET_TAG, index_packets, varint
+from ranger_sim.harness.timeline.packing import index_packets
 from ranger_sim.harness.timeline.perfetto_file import library
 
 INSTANT_TYPE = b"\x48\x03"  # field 9 of a TrackEvent, its type: an instant
@@ -129,24 +129,22 @@ def contents(path: pathlib.Path) -> bytes:
     except OSError as error:
         raise UserError(f"trace {path}: cannot be read: {error.strerror}") from None
     schema, parts = library(), []
-    for begin, end, _ in index_of(path, data).tolist():
-        if data.startswith(COMPRESSED, begin):
-            inflate = zlib.decompressobj()
-            try:
-                packets = schema.TracePacket.FromString(data[begin:end]).compressed_packets
-                parts.append(inflate.decompress(packets, INFLATED_BYTES))
-            except zlib.error as error:
-                raise UserError(f"trace {path}: damaged at byte {begin}: {error}") from None
-            if not inflate.eof:
-                raise UserError(f"trace {path}: damaged at byte {begin}: packets end early or exceed 64 MiB")
-        else:
-            parts.append(framed(data[begin:end]))
-    return b"".join(parts)
-
-
-def framed(packet: bytes) -> bytes:
-    """A packet as a trace has it."""
-    return bytes((PACKET_TAG,)) + varint(len(packet)) + packet
+    index, text = index_of(path, data), np.frombuffer(data, dtype=np.uint8)
+    first, second = (text[np.minimum(index[:, 0] + place, len(text) - 1)] for place in (0, 1))
+    plain = 0  # byte from which packets are taken as they are
+    for row in np.flatnonzero((first == COMPRESSED[0]) & (second == COMPRESSED[1])).tolist():
+        begin, end = index[row, :2].tolist()
+        parts.append(data[plain : index[row - 1, 1] if row else 0])
+        plain = end
+        inflate = zlib.decompressobj()
+        try:
+            packets = schema.TracePacket.FromString(data[begin:end]).compressed_packets
+            parts.append(inflate.decompress(packets, INFLATED_BYTES))
+        except zlib.error as error:
+            raise UserError(f"trace {path}: damaged at byte {begin}: {error}") from None
+        if not inflate.eof:
+            raise UserError(f"trace {path}: damaged at byte {begin}: packets end early or exceed 64 MiB")
+    return b"".join([*parts, data[plain:]])
 
 
 def index_of(path: pathlib.Path, data: Any) -> np.ndarray:

@@ -90,7 +90,7 @@ class TrajectoryFit:
         self.starts = np.array([k for run in table.runs for k in range(run.start, run.stop, reach)])
         self.ends = np.zeros(len(table), dtype=bool)  # no step leads from here to the next sample
         self.ends[[run.stop - 1 for run in table.runs]] = True
-        self.far_off = False  # the plain fit ended so: a fit with candidates follows the measurement at once
+        self.far_off = False  # or unsettled, the plain fit was: one with candidates follows the measurement at once
         self.acting: list[Acting] = []
         self.enter: list[effects.Entering] = []  # of what acts, along the trajectory of the last round
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
@@ -137,7 +137,6 @@ class TrajectoryFit:
         new = self.acted_on(acting, fixed=False)
         new.x, new.u, start = self.began
         new.p = np.concatenate((start[:count], np.zeros(len(new.p) - count)))
-        new.far_off = self.far_off
         new.damped = np.concatenate((np.zeros(count), np.full(len(new.p) - count, DAMPED)))
         new.came_from, new.predictor = (new.x, new.u, new.p), None
         new.noise_y = self.shown_y

@@ -186,3 +186,13 @@ def test_a_simulation_that_becomes_unstable_ends(tmp_path, monkeypatch):
         if body.fell:
             break
     assert body.fell and body.fall_cause == "MuJoCo's simulation became unstable"
+
+
+def test_a_joints_sensor_has_the_unit_of_its_joint(tmp_path):
+    (tmp_path / "two.xml").write_text("""<mujoco><worldbody>
+      <body><joint name="turn" type="hinge"/><geom size="0.1"/></body>
+      <body pos="1 0 0"><joint name="way" type="slide"/><geom size="0.1"/></body></worldbody>
+      <sensor><jointpos name="a" joint="turn"/><jointpos name="b" joint="way"/><jointvel name="c" joint="way"/></sensor>
+    </mujoco>""")
+    units = MujocoBody(tmp_path / "two.xml", Mapping()).sample_names
+    assert (units["a"], units["b"], units["c"]) == ("rad", "m", "m/s")
