@@ -38,6 +38,60 @@ from typing import Final
 
 import cython
 
+from ranger_sim.firmware_sim.arm7.decoding import (
+    ADD,
+    ADD_CONSTANT,
+    ADD_SHIFTED,
+    ADDS,
+    ADDS_CONSTANT,
+    AMOUNT,
+    AND,
+    AND_CONSTANT,
+    BRANCH,
+    BRANCH_EXCHANGE,
+    BRANCH_LINK,
+    BRANCH_LINK_LOW,
+    CLEAR,
+    COMPARE,
+    COMPARE_CONSTANT,
+    CONDITION,
+    DATA,
+    DESTINATION,
+    FIRST,
+    IN_THUMB,
+    INDEXED,
+    KIND,
+    LOAD,
+    LOAD_BYTE,
+    LOAD_CONSTANT,
+    LOAD_HALF,
+    MOVE,
+    MOVE_CONSTANT,
+    MOVES,
+    MOVES_CONSTANT,
+    OR,
+    OR_CONSTANT,
+    REVERSE,
+    REVERSE_CONSTANT,
+    SECOND,
+    SHIFT_LEFT,
+    SHIFT_RIGHT,
+    SHIFT_SIGNED,
+    SHIFTS,
+    STORE,
+    STORE_BYTE,
+    STORE_HALF,
+    SUBS,
+    SUBS_CONSTANT,
+    SUBTRACT,
+    TEST,
+    TEST_CONSTANT,
+    WHOLE,
+    XOR,
+    XOR_CONSTANT,
+    decode_arm,
+    decode_thumb,
+)
 from ranger_sim.foundation.user_error import BoardFailure, FirmwareError, UserError
 
 WRITTEN_BITS: Final = 8
@@ -60,6 +114,7 @@ _MASK: cython.longlong = 4294967295
 NOTHING = 0xFFFFFFFF  # what erased flash holds
 ENDLESS = 0xEAFFFFFE  # b to itself: what start-up files have in place of a handler
 _SIGN: cython.longlong = 2147483648
+_NEVER: cython.longlong = 1 << 60
 _STATUS: cython.longlong = 4026532095
 
 MODES = (USER, FAST, INTERRUPT, SUPERVISOR, ABORT, UNDEFINED, SYSTEM)
@@ -133,10 +188,11 @@ class Core:
     what an instruction touches together in memory.
     """
 
-    pc: cython.longlong
-    following: cython.longlong
+    # Counters lie apart: gcc 12 joins stores to neighbours into one of 16 bytes, and the next load waits for it.
     cycles: cython.longlong
+    following: cython.longlong
     began: cython.longlong
+    pc: cython.longlong
     instructions: cython.longlong
     n: cython.longlong
     z: cython.longlong
@@ -182,6 +238,7 @@ class Core:
     banked: cython.longlong[::1]
     saved: cython.longlong[::1]
     flash: cython.longlong[::1]
+    decoded: cython.longlong[::1]
     ram: cython.longlong[::1]
     device: object
     bridge: Device
@@ -194,6 +251,7 @@ class Core:
         self.name = name
         self.flash = memory(f"{name}: flash", flash_size)
         self.ram = memory(f"{name}: RAM", ram_size)
+        self.decoded = array.array("q", [0]) * (flash_size >> 1)  # what the instruction at each half-word of flash does
         self.flash_base = flash_base
         self.flash_size = flash_size
         self.ram_base = ram_base
@@ -271,6 +329,8 @@ class Core:
         end = address + len(content)
         if self.flash_base <= address and end <= self.flash_base + self.flash_size:
             put(self.flash, address - self.flash_base, content)
+            for i in range((address - self.flash_base) >> 2 << 1, (end - self.flash_base + 3) >> 2 << 1):
+                self.decoded[i] = 0
             return
         if self.ram_base <= address and end <= self.ram_base + self.ram_size:
             put(self.ram, address - self.ram_base, content)
@@ -685,7 +745,7 @@ class Core:
         while self.cycles < until and not self.stopped:
             if self.lines and self.interrupt():
                 continue  # the entry's cycles may have reached `until`
-            self.one()
+            self.execute(until, _NEVER)
         return 0
 
     @cython.ccall
@@ -849,54 +909,259 @@ class Core:
         return 1
 
     @cython.cfunc
-    @cython.locals(pc=cython.longlong, place=cython.longlong, op=cython.longlong)
     def one(self) -> cython.int:
+        return self.execute(_NEVER, 1)
+
+    @cython.cfunc
+    @cython.locals(
+        pc=cython.longlong,
+        cycles=cython.longlong,
+        began=cython.longlong,
+        first=cython.longlong,
+        place=cython.longlong,
+        entry=cython.longlong,
+        size=cython.longlong,
+        condition=cython.longlong,
+        kind=cython.longlong,
+        rd=cython.longlong,
+        word=cython.longlong,
+        a=cython.longlong,
+        b=cython.longlong,
+    )
+    def execute(self, until: cython.longlong, most: cython.longlong) -> cython.int:
+        """Instructions until `cycles` has reached `until`, `most` of them at the most; ends earlier after one that
+        stopped the run, and after one that may have changed whether an interrupt is to be entered.
+
+        Program counter and cycles are local as long as no instruction needs more than registers, flags and RAM: those
+        that do are `execute_whole`.
+        """
         pc = self.pc
-        self.began = self.cycles
-        self.instructions += 1
-        self.cycles += 1
-        place = pc - self.flash_base
-        if 0 <= place < self.flash_size:
-            if place >> 4 != self.line:
-                self.fetch_line(place >> 4)
-            op = self.flash[place >> 2]
-        else:
-            place = pc - self.ram_base
-            self.line = -2
-            if 0 <= place < self.ram_size:
-                op = self.ram[place >> 2]
+        cycles = self.cycles
+        began = self.began
+        first = self.instructions
+        most += first
+        size = 2 if self.control & 0x20 else 4
+        while first < most and cycles < until:
+            first += 1
+            began = cycles
+            cycles += 1
+            place = pc - self.flash_base
+            if 0 <= place < self.flash_size:
+                if place >> 4 != self.line:
+                    self.cycles = cycles
+                    self.fetch_line(place >> 4)
+                    cycles = self.cycles
+                entry = self.decoded[place >> 1]
+                if entry == 0 or (entry >> IN_THUMB & 1) == size >> 2:
+                    entry = self.decoded[place >> 1] = self.decode(self.flash[place >> 2], pc)
             else:
-                self.nothing(pc, 2 if self.control & 0x20 else 4, False)
-                self.faulted = 0
-                if self.needs_handlers and not self.has_handler(0x0C):
-                    self.fail("prefetch abort: no memory", 0x0C, self.r[14])
-                self.enter(ABORT, 0x0C, pc + 4)
-                self.pc = self.following
-                return 0
-        if self.control & 0x20:
-            self.following = pc + 2 & _MASK
-            self.r[15] = pc + 4 & _MASK
-            self.thumb(op >> 16 if pc & 2 else op & 0xFFFF)
-        else:
-            self.following = pc + 4 & _MASK
-            self.r[15] = pc + 8 & _MASK
-            if op >> 28 == 14 or self.passes(op >> 28):
-                self.arm(op)
-        if self.cycles_per_instruction:
-            self.cycles = self.began + self.cycles_per_instruction
-        if self.faulted:
-            self.faulted = 0
-            self.cycles += 1
-            if self.needs_handlers and not self.has_handler(0x10):
-                self.fail(f"data abort: no memory for an access to {self.fault_address:#010x}", 0x10, pc)
-            self.enter(ABORT, 0x10, pc + 8)
+                place = pc - self.ram_base
+                self.line = -2
+                if not 0 <= place < self.ram_size:
+                    self.pc = pc
+                    self.cycles = cycles
+                    self.began = began
+                    self.instructions = first
+                    return self.abort_fetch()
+                entry = self.decode(self.ram[place >> 2], pc)
+            condition = entry >> CONDITION & 15
+            if condition != 14 and not self.passes(condition):
+                pc = pc + size & _MASK
+                if self.cycles_per_instruction:
+                    cycles = began + self.cycles_per_instruction
+                continue
+            self.r[15] = pc + 2 * size & _MASK
+            kind = entry >> KIND
+            word = entry & _MASK
+            rd = entry >> DESTINATION & 15
+            a = self.r[entry >> FIRST & 15]
+            b = self.r[entry >> SECOND & 15]
+            if kind >= LOAD:
+                if kind >= INDEXED:
+                    kind -= INDEXED - LOAD
+                    word = b << (entry >> AMOUNT & 31)
+                word = a + word & _MASK
+                place = word - self.ram_base
+                if not 0 <= place < self.ram_open or word & (3 if kind <= STORE else 1) and kind <= STORE_HALF:
+                    kind += INDEXED  # by way of `execute_whole`
+            if kind == BRANCH:
+                pc = word - size
+                cycles += 2
+                self.line = -2 if self.mam_mode == 1 else self.line
+            elif kind == BRANCH_LINK:
+                self.r[14] = pc + size & _MASK
+                pc = word - size
+                cycles += 2
+                self.line = -2 if self.mam_mode == 1 else self.line
+            elif kind == BRANCH_LINK_LOW:
+                word = self.r[14] + word & _MASK - 1
+                self.r[14] = pc + size & _MASK | 1
+                pc = word - size
+                cycles += 2
+                self.line = -2 if self.mam_mode == 1 else self.line
+            elif kind == MOVE_CONSTANT:
+                self.r[rd] = word
+            elif kind == ADD_CONSTANT:
+                self.r[rd] = a + word & _MASK
+            elif kind == REVERSE_CONSTANT:
+                self.r[rd] = word - a & _MASK
+            elif kind == AND_CONSTANT:
+                self.r[rd] = a & word
+            elif kind == OR_CONSTANT:
+                self.r[rd] = a | word
+            elif kind == XOR_CONSTANT:
+                self.r[rd] = a ^ word
+            elif kind == COMPARE_CONSTANT:
+                self.add(a, word, 1)
+            elif kind == ADDS_CONSTANT:
+                self.r[rd] = self.add(a, word, 0)
+            elif kind == SUBS_CONSTANT:
+                self.r[rd] = self.add(a, word, 1)
+            elif kind == MOVES_CONSTANT:
+                self.r[rd] = word
+                self.mark(word)
+            elif kind == TEST_CONSTANT:
+                self.mark(a & word)
+            elif kind == MOVE:
+                self.r[rd] = b
+            elif kind == ADD:
+                self.r[rd] = a + b & _MASK
+            elif kind == SUBTRACT:
+                self.r[rd] = a - b & _MASK
+            elif kind == REVERSE:
+                self.r[rd] = b - a & _MASK
+            elif kind == AND:
+                self.r[rd] = a & b
+            elif kind == OR:
+                self.r[rd] = a | b
+            elif kind == XOR:
+                self.r[rd] = a ^ b
+            elif kind == CLEAR:
+                self.r[rd] = a & (_MASK ^ b)
+            elif kind == COMPARE:
+                self.add(a, _MASK ^ b, 1)
+            elif kind == ADDS:
+                self.r[rd] = self.add(a, b, 0)
+            elif kind == SUBS:
+                self.r[rd] = self.add(a, _MASK ^ b, 1)
+            elif kind == MOVES:
+                self.r[rd] = b
+                self.mark(b)
+            elif kind == TEST:
+                self.mark(a & b)
+            elif kind == SHIFT_LEFT:
+                self.r[rd] = b << (entry >> AMOUNT & 31) & _MASK
+            elif kind == SHIFT_RIGHT:
+                self.r[rd] = b >> (entry >> AMOUNT & 31)
+            elif kind == SHIFT_SIGNED:
+                self.r[rd] = (b ^ _SIGN) - _SIGN >> (entry >> AMOUNT & 31) & _MASK
+            elif kind == SHIFTS:
+                b = self.shift_fixed(entry >> (AMOUNT + 5) & 3, b, entry >> AMOUNT & 31)
+                self.r[rd] = b
+                self.mark(b)
+                self.c = self.carry
+            elif kind == ADD_SHIFTED:
+                self.r[rd] = a + (b << (entry >> AMOUNT & 31)) & _MASK
+            elif kind == DATA:
+                self.data(word)
+            elif kind == LOAD:
+                self.r[rd] = self.ram[place >> 2]
+                cycles += 2
+            elif kind == LOAD_HALF:
+                self.r[rd] = self.ram[place >> 2] >> 8 * (word & 2) & 0xFFFF
+                cycles += 2
+            elif kind == LOAD_BYTE:
+                self.r[rd] = self.ram[place >> 2] >> 8 * (word & 3) & 0xFF
+                cycles += 2
+            elif kind == STORE:
+                self.written[place >> WRITTEN_BITS] = 1
+                self.ram[place >> 2] = self.r[rd]
+                cycles += 1
+                self.line = -2 if self.mam_mode == 1 else self.line
+            elif kind == STORE_HALF or kind == STORE_BYTE:
+                self.store(word, 2 if kind == STORE_HALF else 1, self.r[rd])
+                cycles += 1
+            else:
+                self.pc = pc
+                self.following = pc + size & _MASK
+                self.cycles = cycles
+                self.began = began
+                self.instructions = first
+                self.execute_whole(kind, rd, word, b)
+                if self.cycles_per_instruction:
+                    self.cycles = began + self.cycles_per_instruction
+                if self.faulted:
+                    self.abort_data()
+                pc = self.pc = self.following
+                cycles = self.cycles
+                if self.stopped or self.lines:
+                    return 0
+                size = 2 if self.control & 0x20 else 4
+                continue
+            pc = pc + size & _MASK
+            if self.cycles_per_instruction:
+                cycles = began + self.cycles_per_instruction
+        self.pc = pc
+        self.cycles = cycles
+        self.began = began
+        self.instructions = first
+        return 0
+
+    @cython.cfunc
+    def execute_whole(
+        self, kind: cython.longlong, rd: cython.longlong, word: cython.longlong, b: cython.longlong
+    ) -> cython.int:
+        """An instruction that may end in an exception, another state or mode, or with a device; INDEXED in `kind`:
+        loads and stores at the address `word`."""
+        if kind == WHOLE:
+            return self.arm(word)
+        elif kind == BRANCH_EXCHANGE:
+            self.control = self.control & 0xDF | (b & 1) << 5
+            return self.jump(b)
+        elif kind == LOAD_CONSTANT or kind == INDEXED + LOAD:
+            return self.finish_load(rd, self.load_word(word))
+        elif kind == INDEXED + STORE:
+            return self.store(word & -4, 4, self.r[rd])
+        elif kind == INDEXED + LOAD_HALF:
+            return self.finish_load(rd, self.load_half(word, False))
+        elif kind == INDEXED + STORE_HALF:
+            return self.store(word & -2, 2, self.r[rd])
+        elif kind == INDEXED + LOAD_BYTE:
+            return self.finish_load(rd, self.load(word, 1))
+        return self.store(word, 1, self.r[rd])
+
+    @cython.cfunc
+    def abort_fetch(self) -> cython.int:
+        """No memory at the program counter: the instruction is not executed."""
+        self.nothing(self.pc, 2 if self.control & 0x20 else 4, False)
+        self.faulted = 0
+        if self.needs_handlers and not self.has_handler(0x0C):
+            self.fail("prefetch abort: no memory", 0x0C, self.r[14])
+        self.enter(ABORT, 0x0C, self.pc + 4)
         self.pc = self.following
         return 0
+
+    @cython.cfunc
+    def abort_data(self) -> cython.int:
+        """A load or store met no memory."""
+        self.faulted = 0
+        self.cycles += 1
+        if self.needs_handlers and not self.has_handler(0x10):
+            self.fail(f"data abort: no memory for an access to {self.fault_address:#010x}", 0x10, self.pc)
+        return self.enter(ABORT, 0x10, self.pc + 8)
+
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    def decode(self, word: cython.longlong, pc: cython.longlong) -> cython.longlong:
+        """The instruction at `pc` in the present state, in the memory's word `word`."""
+        if self.control & 0x20:
+            return decode_thumb(word >> 16 if pc & 2 else word & 0xFFFF, pc)
+        return decode_arm(word, pc)
 
     # ---- ARM state
 
     @cython.cfunc
-    @cython.locals(group=cython.longlong, offset=cython.longlong)
+    @cython.locals(group=cython.longlong)
     def arm(self, op: cython.longlong) -> cython.int:
         group = op >> 25 & 7
         if group == 0:
@@ -917,13 +1182,6 @@ class Core:
             return self.undefined() if op & 0x10 else self.transfer(op)
         elif group == 4:
             return self.block(op)
-        elif group == 5:
-            offset = (op & 0xFFFFFF) << 2
-            if op & 0x800000:
-                offset -= 0x4000000
-            if op & 0x01000000:
-                self.r[14] = self.following
-            return self.jump(self.r[15] + offset)
         elif group == 7:
             if op & 0x01000000:
                 return self.enter(SUPERVISOR, 8, self.following)
@@ -1029,15 +1287,10 @@ class Core:
     @cython.cfunc
     @cython.locals(value=cython.longlong, mask=cython.longlong, turn=cython.longlong)
     def status(self, op: cython.longlong) -> cython.int:
-        """MRS, MSR and BX; what else has this form belongs to later architectures."""
+        """MRS and MSR; what else has this form belongs to later architectures."""
         if op & 0x0FBF0FFF == 0x010F0000:
             self.r[op >> 12 & 15] = self.spsr() if op & 0x400000 else self.cpsr()
             return 0
-        if op & 0x0FFFFFF0 == 0x012FFF10:
-            value = self.r[op & 15]
-            if value & 1:
-                self.control |= 0x20
-            return self.jump(value)
         if op & 0x0FB0F000 == 0x0320F000:
             turn = op >> 7 & 30
             value = op & 0xFF
@@ -1276,190 +1529,3 @@ class Core:
                 else:
                     self.r[i] = value
         return 0
-
-    # ---- Thumb state
-
-    @cython.cfunc
-    @cython.locals(
-        rd=cython.longlong,
-        rs=cython.longlong,
-        a=cython.longlong,
-        b=cython.longlong,
-        kind=cython.longlong,
-        address=cython.longlong,
-        result=cython.longlong,
-    )
-    def thumb(self, op: cython.longlong) -> cython.int:
-        kind = op >> 11
-        rd = op & 7
-        rs = op >> 3 & 7
-        if kind < 3:
-            result = self.shift_fixed(kind, self.r[rs], op >> 6 & 31)
-            self.r[rd] = result
-            self.mark(result)
-            self.c = self.carry
-            return 0
-        elif kind == 3:
-            b = op >> 6 & 7
-            if not op & 0x400:
-                b = self.r[b]
-            self.r[rd] = self.add(self.r[rs], _MASK ^ b, 1) if op & 0x200 else self.add(self.r[rs], b, 0)
-            return 0
-        elif kind < 8:
-            rd = op >> 8 & 7
-            b = op & 0xFF
-            if kind == 4:
-                self.r[rd] = b
-                return self.mark(b)
-            result = self.add(self.r[rd], b, 0) if kind == 6 else self.add(self.r[rd], _MASK ^ b, 1)
-            if kind != 5:
-                self.r[rd] = result
-            return 0
-        elif kind == 8:
-            return self.thumb_register(op)
-        elif kind == 9:
-            return self.finish_load(op >> 8 & 7, self.load_word((self.r[15] & -4) + ((op & 0xFF) << 2)))
-        elif kind < 20:
-            return self.thumb_transfer(op)
-        elif kind < 22:
-            self.r[op >> 8 & 7] = ((self.r[13] if op & 0x800 else self.r[15] & -4) + ((op & 0xFF) << 2)) & _MASK
-            return 0
-        elif kind < 24:
-            if op & 0xFF00 == 0xB000:
-                a = (op & 0x7F) << 2
-                self.r[13] = self.r[13] + (-a if op & 0x80 else a) & _MASK
-                return 0
-            if op & 0x0600 == 0x0400:
-                # PUSH is STMDB r13!, POP is LDMIA r13!; the ninth bit is r14 or the program counter
-                if op & 0x800:
-                    return self.block(0x08BD0000 | op & 0xFF | (op & 0x100) << 7)
-                return self.block(0x092D0000 | op & 0xFF | (op & 0x100) << 6)
-            return self.undefined()
-        elif kind < 26:
-            return self.block((0x08B00000 if op & 0x800 else 0x08A00000) | (op >> 8 & 7) << 16 | op & 0xFF)
-        elif kind < 28:
-            a = op >> 8 & 15
-            if a == 15:
-                return self.enter(SUPERVISOR, 8, self.following)
-            if a == 14:
-                return self.undefined()
-            if self.passes(a):
-                b = (op & 0xFF) << 1
-                return self.jump(self.r[15] + (b - 0x200 if b & 0x100 else b))
-            return 0
-        elif kind == 28:
-            b = (op & 0x7FF) << 1
-            return self.jump(self.r[15] + (b - 0x1000 if b & 0x800 else b))
-        elif kind == 30:
-            b = (op & 0x7FF) << 12
-            self.r[14] = self.r[15] + (b - 0x800000 if b & 0x400000 else b) & _MASK
-            return 0
-        elif kind == 31:
-            address = self.r[14] + ((op & 0x7FF) << 1)
-            self.r[14] = self.following | 1
-            return self.jump(address)
-        return self.undefined()
-
-    @cython.cfunc
-    @cython.locals(
-        rd=cython.longlong, a=cython.longlong, b=cython.longlong, code=cython.longlong, result=cython.longlong
-    )
-    def thumb_register(self, op: cython.longlong) -> cython.int:
-        """Operations on two registers, and those on high registers with BX."""
-        rd = op & 7
-        if op & 0x400:
-            rd |= op >> 4 & 8
-            a = self.r[rd]
-            b = self.r[op >> 3 & 15]
-            code = op >> 8 & 3
-            if code == 1:
-                self.add(a, _MASK ^ b, 1)
-                return 0
-            if code == 3:
-                if not b & 1:
-                    self.control &= 0xDF
-                return self.jump(b)
-            result = a + b & _MASK if code == 0 else b
-            if rd == 15:
-                return self.jump(result)
-            self.r[rd] = result
-            return 0
-        a = self.r[rd]
-        b = self.r[op >> 3 & 7]
-        code = op >> 6 & 15
-        if code == 2 or code == 3 or code == 4 or code == 7:
-            self.cycles += 1
-            result = self.shift(3 if code == 7 else code - 2, a, b & 0xFF)
-            self.c = self.carry
-        elif code == 5:
-            self.r[rd] = self.add(a, b, self.c)
-            return 0
-        elif code == 6:
-            self.r[rd] = self.add(a, _MASK ^ b, self.c)
-            return 0
-        elif code == 9:
-            self.r[rd] = self.add(0, _MASK ^ b, 1)
-            return 0
-        elif code == 10:
-            self.add(a, _MASK ^ b, 1)
-            return 0
-        elif code == 11:
-            self.add(a, b, 0)
-            return 0
-        elif code == 0 or code == 8:
-            result = a & b
-        elif code == 1:
-            result = a ^ b
-        elif code == 12:
-            result = a | b
-        elif code == 13:
-            self.multiplier_cycles(a, True)
-            result = (a & 0xFFFF) * b + (((a >> 16) * (b & 0xFFFF)) << 16) & _MASK
-        elif code == 14:
-            result = a & (_MASK ^ b)
-        else:
-            result = _MASK ^ b
-        if code != 8:
-            self.r[rd] = result
-        return self.mark(result)
-
-    @cython.cfunc
-    @cython.locals(address=cython.longlong, rd=cython.longlong, kind=cython.longlong)
-    def thumb_transfer(self, op: cython.longlong) -> cython.int:
-        """Load or store of one register, by a register's offset, by one in the instruction, or on the stack."""
-        rd = op & 7
-        kind = op >> 12
-        if kind == 5:
-            address = self.r[op >> 3 & 7] + self.r[op >> 6 & 7] & _MASK
-            kind = op >> 9 & 7
-            if kind == 0:
-                return self.store(address & -4, 4, self.r[rd])
-            elif kind == 1:
-                return self.store(address & -2, 2, self.r[rd])
-            elif kind == 2:
-                return self.store(address, 1, self.r[rd])
-            elif kind == 3:
-                return self.finish_load(rd, self.load_byte(address, True))
-            elif kind == 4:
-                return self.finish_load(rd, self.load_word(address))
-            elif kind == 5:
-                return self.finish_load(rd, self.load_half(address, False))
-            elif kind == 6:
-                return self.finish_load(rd, self.load(address, 1))
-            return self.finish_load(rd, self.load_half(address, True))
-        if kind == 9:
-            rd = op >> 8 & 7
-            address = self.r[13] + ((op & 0xFF) << 2) & _MASK
-        else:
-            address = self.r[op >> 3 & 7] + ((op >> 6 & 31) << (2 if kind == 6 else 0 if kind == 7 else 1)) & _MASK
-        if kind == 7:
-            if op & 0x800:
-                return self.finish_load(rd, self.load(address, 1))
-            return self.store(address, 1, self.r[rd])
-        if kind == 8:
-            if op & 0x800:
-                return self.finish_load(rd, self.load_half(address, False))
-            return self.store(address & -2, 2, self.r[rd])
-        if op & 0x800:
-            return self.finish_load(rd, self.load_word(address))
-        return self.store(address & -4, 4, self.r[rd])
