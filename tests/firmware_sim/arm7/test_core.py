@@ -2,8 +2,9 @@
 
 import pytest
 
-from ranger_sim.firmware_sim.arm7.core import FIQ_LINE, IRQ_LINE, BusFault, Core
+from ranger_sim.firmware_sim.arm7.core import FIQ_LINE, IRQ_LINE, BusFault, Core, ProcessorError
 from ranger_sim.foundation.user_error import UserError
+from tests.firmware_sim.arm7.against_unicorn import CODE, DATA, LENGTH, Generator
 
 RAM = 0x40000000
 SUPERVISOR, SYSTEM, USER = 0xD3, 0xDF, 0x10
@@ -203,3 +204,60 @@ def test_memory_that_cannot_be_is_one_line():
         Core().place(0x4000FFFC, bytes(8))
     with pytest.raises(UserError, match="MAM mode 3 of 4 clocks"):
         Core().set_mam(3, 4)
+
+
+def test_the_same_place_in_flash_is_another_instruction_in_the_other_state_and_after_it_was_written():
+    made = Core()
+    made.place(0x100, (0x2001_2002).to_bytes(4, "little"))  # movs r0, #2; movs r0, #1; in ARM state: andcs r2, r1, r2
+    made.r[1], made.r[2] = 0xF, 0x3A
+    made.set_cpsr(SYSTEM & 0x1F | 0x20)
+    made.pc = 0x100
+    made.step()
+    assert (made.r[0], made.pc) == (2, 0x102)
+    made.set_cpsr(SYSTEM & 0x1F | 0x20000000)
+    made.pc = 0x100
+    made.step()
+    assert (made.r[0], made.r[2], made.pc) == (2, 0xA, 0x104)
+    made.set_cpsr(SYSTEM & 0x1F | 0x20)
+    made.pc = 0x100
+    made.step()
+    assert (made.r[0], made.pc) == (2, 0x102)
+    half_words(made, 0x100, 0x2007)  # movs r0, #7
+    made.pc = 0x100
+    made.step()
+    made.step()
+    assert (made.r[0], made.pc) == (1, 0x104)
+    assert made.instructions == 5
+
+
+@pytest.mark.parametrize("thumb", [False, True], ids=["arm", "thumb"])
+def test_random_code_in_flash_run_in_one_go_does_what_it_does_in_ram_step_by_step(thumb):
+    generator = Generator(20)
+    make = generator.thumb if thumb else generator.arm
+    width = 2 if thumb else 4
+    compared = 0
+    for _ in range(100):
+        pool = b"" if thumb else b"".join((CODE + 4 * i).to_bytes(4, "little") for i in range(LENGTH + 1))
+        code = b"".join(make(LENGTH - i).to_bytes(width, "little") for i in range(LENGTH)) + pool
+        code += generator.random.randbytes(256 * 4)
+        registers = [generator.random.getrandbits(32) for _ in range(15)]
+        registers[4:7] = DATA, DATA + 0x1000, 4 * generator.random.randrange(32)
+        stepped = Core(ram_base=CODE, ram_size=0x10000)
+        run = Core(flash_base=CODE, flash_size=0x4000, ram_base=CODE + 0x4000, ram_size=0xC000)
+        for each in (stepped, run):
+            each.place(CODE, code)
+            for i, value in enumerate(registers):
+                each.r[i] = value
+            each.set_cpsr(SYSTEM | (0x20 if thumb else 0))
+            each.pc = CODE
+        try:
+            while CODE <= stepped.pc < CODE + LENGTH * width:
+                stepped.step()
+        except ProcessorError:  # a mode that does not exist, where Unicorn's saved status would be
+            continue
+        while run.instructions < stepped.instructions:
+            run.run(run.cycles + 1 + (stepped.instructions - run.instructions) // 2)
+        assert (list(run.r)[:15], run.cpsr(), run.pc) == (list(stepped.r)[:15], stepped.cpsr(), stepped.pc)
+        assert list(run.ram) == list(stepped.ram)[0x1000:]
+        compared += 1
+    assert compared > 60
