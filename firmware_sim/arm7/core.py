@@ -933,7 +933,7 @@ class Core:
         stopped the run, and after one that may have changed whether an interrupt is to be entered.
 
         Program counter and cycles are local as long as no instruction needs more than registers, flags and RAM: those
-        that do are `execute_whole`.
+        that do are `execute_whole`. The function is long because all kinds are cases of one switch around these locals.
         """
         pc = self.pc
         cycles = self.cycles
