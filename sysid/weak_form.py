@@ -24,6 +24,7 @@ from ranger_sim.sysid.dataset import Array, Table
 PARTS = 8  # of the time from row to row
 CLEARLY = 0.98  # of what is left: an input is held only where that leaves less
 FEWEST = 7  # rows of a run, in addition to the triangle's
+RINGS = 3  # rows after which a spline's answer to a bend is a fiftieth
 HALF = 0.5  # of what a row's neighbours at twice the distance miss it by: a corner at the rows' own distance
 LOUD = 2.0  # deviations of what is left: a row that a corner can move by more does not count
 LEAST = 1e-5  # of the channel's own size: less is the arithmetic's, and the channel's last digits
@@ -112,12 +113,13 @@ class WeakForm:
         return self.straight(missed)
 
     def turning(self, rate: Array) -> NDArray[np.bool_]:
-        """(n,) True where the rate's sign changes within the triangle."""
-        out = np.zeros(len(self.table), dtype=bool)
+        """(n,) True where the rate's sign changes within the triangle, and within RINGS rows: friction that sticks bends
+        the rate there, which the position's spline follows with an error for some rows."""
+        out, reach = np.zeros(len(self.table), dtype=bool), max(self.rows, RINGS)
         for run in self.table.runs:
             for at in np.flatnonzero(np.diff(np.sign(rate[run]))):
                 middle = run.start + int(at)
-                out[max(run.start, middle - self.rows) : min(run.stop, middle + self.rows + 2)] = True
+                out[max(run.start, middle - reach) : min(run.stop, middle + reach + 2)] = True
         return out
 
     def _fine(self, count: int) -> Array:

@@ -24,7 +24,8 @@ from ranger_sim.sysid.weak_form import WeakForm, way_between_rows
 FORCE_N_PER_V = 35.15065188  # the drive's gain, published with the data
 FINE_S = 0.0015  # Gaussian of the speed that finds the fastest one: -3 dB at 88 Hz, far above the controller's motion
 HALF_S = 0.0037  # of the triangle: as wide as that Gaussian
-NEAR_STANDSTILL = 0.01  # of the fastest speed: below it friction may be anything up to its limit
+NEAR_STANDSTILL = 0.01  # of the fastest speed: about it the sign of a smooth friction turns
+SLOWEST = 0.025  # of the fastest speed: below it friction may be anything up to its limit, and rows do not count
 DELAYS_S = (0.0, -0.1, -0.06, -0.04, -0.03, -0.02, -0.01, 0.01, 0.02, 0.03, 0.04, 0.06, 0.1)  # 0: small ones
 PITCHES_M = tuple(round(0.0005 * n, 4) for n in range(2, 61))
 
@@ -81,7 +82,7 @@ class Positioning:
             "coulomb_friction_N": sign,
             "force_offset_N": np.ones_like(v),
         }
-        valid = (np.abs(v) > NEAR_STANDSTILL * top) & weak.complete & ~weak.turning(v)
+        valid = (np.abs(v) > SLOWEST * top) & weak.complete & ~weak.turning(v)
         force = self.force_N_per_V * table["voltage_V"]
         others = [*columns.values(), weak.of_rate(np.abs), weak.of_rate(lambda rate: rate * np.abs(rate))]
         way = way_between_rows(weak, force, np.column_stack(others), valid)
