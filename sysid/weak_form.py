@@ -1,8 +1,8 @@
 """A balance with a measured position, in its weak form: both sides are means under one triangle.
 
 The second difference of a position over n rows *is* the mean of the acceleration under a triangle of that half width,
-so that nothing is differentiated and nothing is lost between rows. Rates, frictions, candidates and inputs are means under
-the same triangle, of what they are between the rows: the position is on a cubic spline, an input on straight lines, on
+so that nothing is differentiated and nothing is lost between rows. Rates, frictions, candidates and inputs are means
+under the same triangle, of what they are between the rows: the position is on a cubic spline, an input on straight lines, on
 a cubic spline, or held. Compared at the rows instead, a chirp that is logged at 100 Hz was a friction on every sound
 recording, and a ripple was too small by what it loses under the triangle.
 
@@ -113,8 +113,10 @@ class WeakForm:
         return self.straight(missed)
 
     def turning(self, rate: Array) -> NDArray[np.bool_]:
-        """(n,) True where the rate's sign changes within the triangle, and within RINGS rows: friction that sticks bends
-        the rate there, which the position's spline follows with an error for some rows."""
+        """(n,) True where the rate's sign changes within the triangle, and within RINGS rows.
+
+        Friction that sticks bends the rate there, which the position's spline follows with an error for some rows.
+        """
         out, reach = np.zeros(len(self.table), dtype=bool), max(self.rows, RINGS)
         for run in self.table.runs:
             for at in np.flatnonzero(np.diff(np.sign(rate[run]))):

@@ -3,7 +3,8 @@
     force   F = M a + F_v v + F_c sgn v + F_0        F = the drive's gain times the voltage command
 
 Only the position is measured: the equation is in its weak form (`sysid/weak_form.py`), both sides under a triangle, and
-the voltage on straight lines, smooth or held between rows, as the recording shows. Published for this machine: M 95.1089 kg, F_v 203.50 N s/m, F_c 20.39 N, relative error of the force 4.08 % on run 1 and 5.98 % on run 2.
+the voltage on straight lines, smooth or held between rows, as the recording shows. Published for this machine:
+M 95.1089 kg, F_v 203.50 N s/m, F_c 20.39 N, relative error of the force 4.08 % on run 1 and 5.98 % on run 2.
 The pulses of the second run come through the drive: the voltage has them already (added once more, or taken off, the
 error of that run rises from 4.6 to 6.6 %).
 """
@@ -114,8 +115,10 @@ class Positioning:
 
         def waves(r: Recording, p: Shape, _: Values) -> Columns:
             turn = 2.0 * np.pi / p["pitch_m"]
-            made = [_weak(r).of_place(lambda x, wave=wave: wave(turn * x)) for wave in (np.cos, np.sin)]
-            return {"force": np.column_stack(made)}
+            cosine, sine = (
+                _weak(r).of_place(wave) for wave in (lambda x: np.cos(turn * x), lambda x: np.sin(turn * x))
+            )
+            return {"force": np.column_stack((cosine, sine))}
 
         def warm_up(r: Recording, p: Shape, _: Values) -> Columns:
             way = signals.lagged(r.table, np.abs(r.signals["v"]), p["time_constant_s"])

@@ -37,6 +37,10 @@ def of_rate(of):
     return mean(of, slope=1)
 
 
+def slow_at(shape):
+    return lambda w: np.sign(w) * np.exp(-np.square(w / shape["speed_m_per_s"]))
+
+
 def straight(values):
     return mean(lambda at: at, 1, values)
 
@@ -59,11 +63,11 @@ def book():
     return [
         Row("direction_friction", *GUIDE, ("viscous_Ns_per_m",), force(lambda p: of_rate(abs))),
         Row("drag", *GUIDE, ("quadratic_Ns2_per_m2",), force(lambda p: of_rate(lambda w: np.sign(w) * w * w))),
-        Row("stribeck", *GUIDE, ("excess_N",), force(lambda p: of_rate(lambda w: np.sign(w) * np.exp(-np.square(w / p["speed_m_per_s"])))),
+        Row("stribeck", *GUIDE, ("excess_N",), force(lambda p: of_rate(slow_at(p))),
             slow, **positive("excess_N")),
         Row("presliding", *GUIDE, ("friction_N",), force(lambda p: straight(bend(v, p["slide_m"])) - sign),
             [{"slide_m": way} for way in (1e-4, 3e-4, 1e-3, 3e-3, 0.01)], form="by the way", **positive("friction_N")),
-        Row("presliding", *GUIDE, ("friction_N",), force(lambda p: of_rate(lambda w: -np.sign(w) * np.exp(-np.square(w / p["speed_m_per_s"])))),
+        Row("presliding", *GUIDE, ("friction_N",), force(lambda p: -of_rate(slow_at(p))),
             slow, form="by the speed", **positive("friction_N")),
         Row("sensor_lag", "drive", "timing", ("time_constant_s",),
             force(lambda p: (s["F"] - after(s["F"], p["delay_s"])) / p["delay_s"] if p["delay_s"] else -s["dF"]),

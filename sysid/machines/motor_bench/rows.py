@@ -74,7 +74,8 @@ def rows_of(
         columns, response = np.column_stack([current, sign * current, *rest])[counts], rows.mean(T)[counts]
         found = np.linalg.lstsq(columns, response, rcond=None)[0]
         slows = rough[2] / rough[0] * (found[0] - found[1]) - found[3]  # torque lost per speed, while it drives
-        return float(np.linalg.norm(response - columns @ found)), float(-found[-1] / slows)
+        settles_s = float(-found[-1] / slows) if slows > 0.0 else 0.0
+        return float(np.linalg.norm(response - columns @ found)), settles_s
 
     others = left(at, current)[0], left(held, held.mean(current))[0]
     mine, settles_s = left(held, held.current(current, w))
