@@ -2,8 +2,8 @@
 
 The second difference of a position over n rows *is* the mean of the acceleration under a triangle of that half width,
 so that nothing is differentiated and nothing is lost between rows. Rates, frictions, candidates and inputs are means
-under the same triangle, of what they are between the rows: the position is on a cubic spline, an input on straight lines, on
-a cubic spline, or held. Compared at the rows instead, a chirp that is logged at 100 Hz was a friction on every sound
+under the same triangle, of what they are between the rows: the position is on a cubic spline, an input on straight
+lines, on a cubic spline, or held. Compared at the rows instead, a chirp that is logged at 100 Hz was a friction on every sound
 recording, and a ripple was too small by what it loses under the triangle.
 
 An input that steps or bends between two rows, as a command at its limit does, does so at a time that the rows do not
@@ -27,6 +27,7 @@ FEWEST = 7  # rows of a run, in addition to the triangle's
 RINGS = 3  # rows after which a spline's answer to a bend is a fiftieth
 HALF = 0.5  # of what a row's neighbours at twice the distance miss it by: a corner at the rows' own distance
 LOUD = 2.0  # deviations of what is left: a row that a corner can move by more does not count
+KEPT = 0.6  # of the rows that count, at least: of a command that bends in nearly every row few would be left
 LEAST = 1e-5  # of the channel's own size: less is the arithmetic's, and the channel's last digits
 ROBUST = 0.6745  # median of the absolute values of a normal distribution, in deviations
 
@@ -156,7 +157,9 @@ def way_between_rows(weak: WeakForm, column: Array, others: Array, counts: NDArr
     late = signals.per_run(weak.table, np.gradient, means[name])  # a channel that is late has more left, but no noise
     noise = float(np.median(np.abs(_left(np.column_stack([others, late]), means[name], counts)))) / ROBUST
     noise = max(noise, LEAST * float(np.std(column)))
-    return Way(name, means[name], weak.corners(column) <= LOUD * noise)
+    corners = weak.corners(column)
+    limit = max(LOUD * noise, float(np.quantile(corners[counts], KEPT)))
+    return Way(name, means[name], corners <= limit)
 
 
 def _left(others: Array, column: Array, counts: NDArray[np.bool_]) -> Array:
