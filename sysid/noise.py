@@ -58,7 +58,7 @@ def autoregression(residual: Array, good: np.ndarray, most: int = MOST) -> Array
     lengths = np.array([len(part) for part in parts], dtype=int)
     rows = int(lengths.sum())
     followed = [int(np.sum(np.maximum(lengths - order, 0))) for order in range(1, most + 1)]
-    longest = sum(left >= FOLLOWED * np.count_nonzero(good) for left in followed)
+    longest = sum(1 for left in followed if left >= FOLLOWED * np.count_nonzero(good))
     tried = burg(parts, min(longest, rows // SHARE))
     criteria = [rows * np.log(max(left, 1e-300)) + len(found) * np.log(max(rows, 2)) for found, left in tried]
     return tried[int(np.argmin(criteria))][0]

@@ -5,6 +5,7 @@ so that nothing is differentiated and nothing is lost between rows. Rates, frict
 under the same triangle, of what they are between the rows: the position is on a cubic spline, an input on straight
 lines, on a cubic spline, or held. Compared at the rows instead, a chirp that is logged at 100 Hz was a friction on
 every sound recording, and a ripple was too small by what it loses under the triangle.
+
 An input that steps or bends between two rows, as a command at its limit does, does so at a time that the rows do not
 show. Rows that this can move by more than their noise do not count, unless the input is held.
 """
