@@ -14,6 +14,7 @@ from ranger_sim.sysid.dataset import Array
 
 MOST = 20  # largest order
 SHARE = 20  # rows per coefficient, at least
+FOLLOWED = 0.5  # of the rows, at least, that have a memory's rows before them without a gap
 SETTLE = 2000  # samples that a surrogate runs before it counts: longer than any memory that an order of 20 can show
 
 
@@ -49,10 +50,16 @@ def burg(parts: Sequence[Array], most: int = MOST) -> list[tuple[Array, float]]:
 
 
 def autoregression(residual: Array, good: np.ndarray, most: int = MOST) -> Array:
-    """Coefficients (p,) of the noise of a residual (n,) on its rows that count; p by the information criterion."""
+    """Coefficients (p,) of the noise of a residual (n,) on its rows that count; p by the information criterion.
+
+    Gaps limit p: a row counts only with p rows before it.
+    """
     parts = [residual[each] for each in stretches(good)]
-    rows = sum(map(len, parts))
-    tried = burg(parts, min(most, rows // SHARE))
+    lengths = np.array([len(part) for part in parts], dtype=int)
+    rows = int(lengths.sum())
+    followed = [int(np.sum(np.maximum(lengths - order, 0))) for order in range(1, most + 1)]
+    longest = sum(1 for left in followed if left >= FOLLOWED * np.count_nonzero(good))
+    tried = burg(parts, min(longest, rows // SHARE))
     criteria = [rows * np.log(max(left, 1e-300)) + len(found) * np.log(max(rows, 2)) for found, left in tried]
     return tried[int(np.argmin(criteria))][0]
 

@@ -8,6 +8,7 @@ K is in both: a change of one side of it only is a sensor's scale. Near standsti
 its limit (eq. 35), and near zero current so may the brushes' drop: rows whose sign is within the noise do not count.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -16,10 +17,12 @@ import numpy as np
 from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
-from ranger_sim.sysid.machine import Effect, Equation, Known, Quantity, Recording
+from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.machines.forms import Made, Shape
 from ranger_sim.sysid.machines.motor_bench.electrical import electrical
 from ranger_sim.sysid.machines.motor_bench.friction import friction
 from ranger_sim.sysid.machines.motor_bench.rotor import periodic
+from ranger_sim.sysid.machines.motor_bench.rows import Rows, rows_of
 from ranger_sim.sysid.machines.motor_bench.sensors import sensors
 from ranger_sim.sysid.machines.motor_bench.stand_ins import (
     away,
@@ -45,6 +48,7 @@ SIGN_IN_NOISE = 4.0  # deviations of noise within which a sign means nothing
 # Least own noise of a stand-in, of its difference to the measurement. Three spreads cannot estimate less of a current;
 # and a friction that changes its sign within 0.05 rad/s is not a cause.
 OWN_I, OWN_W = 0.3, 0.5
+SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)  # mean over two rows, by three values
 HALF_WAY, AS_WELL = 0.25, 1.05  # rows about half a row, times what a lag of any size leaves
 SAME_MOTION = 0.7  # correlation of angle and speed; slip and lost counts leave more
 SAME_SPEED = 2.0  # times: rpm, degrees and thousands are more
@@ -128,6 +132,10 @@ class MotorBench:
         firm_I = steady & away(s["I"], SIGN_IN_NOISE * noise_I, REACH) & one_sign(s["I"])
         firm_w = steady & away(s["w"], SIGN_IN_NOISE * noise_w, 2) & one_sign(s["w"])
         loaded = -s["sgn_w"] * np.sign(s["I"])
+        mechanical = rows_of(table, rough, s, w, T, firm_w)
+        ways = {"voltage_V": "held"} if mechanical.held else {}
+        if mechanical.held:  # where current or friction changes its sign within a row, its mean is another one
+            firm_w &= firm_I
         equations = {
             "electric": Equation(
                 "electric",
@@ -149,30 +157,30 @@ class MotorBench:
                 "M",
                 "mechanical",
                 "N m",
-                T,
+                mechanical.mean(T),
                 {
-                    "torque_constant_Nm_per_A": I,
-                    "constant_friction_Nm": -s["sgn_w"],
-                    "viscous_friction_Nms": -w,
-                    "load_friction_Nm_per_A": loaded * I,
-                    "inertia_kg_m2": -np.gradient(w, table.step_s),
+                    "torque_constant_Nm_per_A": mechanical.current(I, w),
+                    "constant_friction_Nm": -mechanical.mean(s["sgn_w"]),
+                    "viscous_friction_Nms": -mechanical.mean_speed(w),
+                    "load_friction_Nm_per_A": loaded * mechanical.current(I, w),
+                    "inertia_kg_m2": -mechanical.slope(w),
                 },
                 firm_w,
                 {
-                    "torque_constant_Nm_per_A": s["I"],
-                    "viscous_friction_Nms": -s["w"],
-                    "load_friction_Nm_per_A": loaded * s["I"],
-                    "inertia_kg_m2": -s["dw"],
+                    "torque_constant_Nm_per_A": mechanical.current(s["I"], s["w"]),
+                    "viscous_friction_Nms": -mechanical.mean_speed(s["w"]),
+                    "load_friction_Nm_per_A": loaded * mechanical.current(s["I"], s["w"]),
+                    "inertia_kg_m2": -(mechanical.slope(s["w"]) if mechanical.held else s["dw"]),
                 },
             ),
         }
-        ways: dict[str, str] = {}
         if measured:
             turning = np.gradient(s["angle"], table.step_s) / self.gear
             no_kink = no_jump(V, JUMP_IN_STEPS, 1) & inner(table, REACH)  # Simpson's rule takes the speed for smooth
-            mean_w, ways["speed_rad_per_s"] = _mean_speed(turning, w, no_kink)
+            follows = no_kink & firm_w if mechanical.held else no_kink
+            mean_w, ways["speed_rad_per_s"] = _mean_speed(turning, w, no_kink, mechanical)
             equations["transmission"] = Equation(
-                "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, no_kink, lines=False
+                "transmission", "T", "transmission", "rad/s", turning - mean_w, {}, follows, lines=False
             )
         regimes = _regimes(s, firm_w)
         return Recording(table, s, equations, regimes, firm=True, between_rows=ways)
@@ -201,16 +209,33 @@ class MotorBench:
         made += periodic(self.gear)
         if all("transmission" in r.equations for r in recordings):
             made += transmission()
-        return made
+        return [dataclasses.replace(each, columns=_as_the_balance(each.columns)) for each in made]
 
 
-def _mean_speed(turning: Array, w: Array, counts: np.ndarray) -> tuple[Array, str]:
+def _as_the_balance(make: Made) -> Made:
+    """Columns of an effect; in the mechanical balance means where it is one of means."""
+
+    def columns(r: Recording, shape: Shape, values: Values) -> Columns:
+        found = make(r, shape, values)
+        if "voltage_V" in r.between_rows and "mechanical" in found:
+            mean = Rows(r.table, True, 0.0).mean
+            found["mechanical"] = np.column_stack([mean(each) for each in found["mechanical"].T])
+        return found
+
+    return columns
+
+
+def _mean_speed(turning: Array, w: Array, counts: np.ndarray, rows: Rows) -> tuple[Array, str]:
     """(mean of the speed over the two rows of the angle's slope, way of the speed's samples), by what it leaves.
 
-    Simpson's rule where angle and speed are samples of a kind, points or means. Where the speed alone is a mean over
+    Simpson's rule where angle and speed are samples of a kind, points or means; row by row where a held voltage
+    bends the speed at every row. Where the speed alone is a mean over
     the time from row to row, the two means are exact; then Simpson's rule with a lag of any size leaves no less.
     """
-    like = np.convolve(w, (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0), mode="same")
+    like = np.convolve(w, SIMPSON, mode="same")
+    if rows.held:
+        after = rows.mean_speed(w)
+        like = 0.5 * (after + np.append(after[:1], after[:-1]))
     left, slope = (turning - like)[counts], np.gradient(w)[counts]
     lag = float(slope @ left) / max(float(slope @ slope), 1e-300)  # rows by which the angle is early
     ways = {

@@ -278,13 +278,14 @@ def none(size, numbers):
 
 @dataclasses.dataclass(frozen=True)
 class Hidden:
-    """names: causes that are right; coefficient, true: value per unit of the size, "" where it has another form."""
+    """names: causes that are right; coefficient: the one whose interval is judged, "" where the cause has another form;
+    factor: numbers -> its true value per unit of the size."""
 
     law: object
     names: tuple
     numbers: object = lambda draw: {}
     coefficient: str = ""
-    factor: float = 1.0
+    factor: object = lambda numbers: 1.0
 
 
 def _power(draw):
@@ -305,7 +306,9 @@ HIDDEN = {
     "ankle": {"spring": Hidden(hardening, ("return_spring",))},
     "positioning": {
         "direction": Hidden(lopsided, ("direction_friction",), coefficient="viscous_Ns_per_m"),
-        "ripple": Hidden(wave, ("once_per_turn",), _turn(TAU / 0.02)),
+        "ripple": Hidden(
+            wave, ("once_per_turn",), _turn(TAU / 0.02), "sine_N", lambda numbers: math.cos(numbers["phase"])
+        ),
     },
     "axis": {
         "drag": Hidden(drag, ("drag",), _power),

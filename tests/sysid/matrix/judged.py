@@ -1,7 +1,5 @@
 """What the diagnosis answers to a case of the matrix."""
 
-import math
-
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.foundation.wallclock import process_cpu_s
 from ranger_sim.sysid.dataset import Table
@@ -33,7 +31,7 @@ def answer(levels, seed, name="", strength=0.0):
     """A plain record of one case. levels: of the cell, in their order."""
     cell = Cell(*levels)
     before = process_cpu_s()
-    run, other, size, _ = recordings(cell, seed, name, strength)
+    run, other, size, numbers = recordings(cell, seed, name, strength)
     generated = process_cpu_s()
     record = {"cell": cell.name, "seed": seed, "hidden": name, "strength": strength, "size": size, "refused": ""}
     try:
@@ -54,8 +52,6 @@ def answer(levels, seed, name="", strength=0.0):
         record["tied"] = not record["right"] and tied
         if record["right"] and hidden.coefficient in first.parameters:
             value = first.parameters[hidden.coefficient]
-            low, high = (
-                sorted(map(abs, value.ci95)) if math.prod(value.ci95) > 0.0 else (0.0, max(map(abs, value.ci95)))
-            )
-            record |= {"value": value.value, "ci95": list(value.ci95), "inside": low <= hidden.factor * size <= high}
+            record |= {"value": value.value, "ci95": list(value.ci95)}
+            record |= {"inside": value.ci95[0] <= hidden.factor(numbers) * size <= value.ci95[1]}
     return record
