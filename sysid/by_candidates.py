@@ -107,14 +107,16 @@ def diagnose(
         if [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]:
             if all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):
                 break
-    if found.named and hasattr(machine, "numerical"):
+    while found.named and hasattr(machine, "numerical"):  # what is named instead of a small effect may be small as well
         progress("numerics", 0.7)
         recordings = simulations.again(recordings, found.named, found.with_named)
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
-        small = [each.effect.name for each in found.named if _below(floor, found, each.effect)]
-        if small:
-            effects = [each for each in effects if each.name not in small]
-            found = selected(recordings, held, 0.7)
+        below = [each.effect.name for each in found.named if _below(floor, found, each.effect)]
+        if not below:
+            break
+        small += below
+        effects = [each for each in effects if each.name not in small]
+        found = selected(recordings, held, 0.7)
     progress("what is left", 0.75)
     known_to: dict[str, intervals.Intervals] = {}
     extended = found.with_named

@@ -3,7 +3,7 @@
 import copy
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -35,6 +35,7 @@ FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the f
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
 CARRIED = 2  # rounds in which covariances go from one stretch to the next
+OTHER_CLOCK = 0.5  # of a jump: deviation of a row that shows it or not, alike likely
 UNKNOWN_PLACE = 0.29  # of a jump: deviation of a step's mean where its place is anywhere in the step, 1 / sqrt(12)
 CHOSEN = 20.0  # of -2 log likelihood: by so much another way between samples is the likelier one
 MOST_UNMEASURED = 0.5  # of an output's rows: its noise is estimated from the rest. Chosen by us
@@ -187,7 +188,9 @@ class TrajectoryFit:
         simulator, states = self.simulator, self.machine.states
         values = dict(zip(simulator.names, self.p, strict=False))
         seen = self._closed(values) if self.acting else None
-        there = sorted({number for each in self.enter for number in each} | set(self._unsure()))
+        there = sorted(
+            {number for each in self.enter for number in each} | set(self._ports(self.simulator.numerics.open_jumps))
+        )
         sizes = self.size_x, self.size_u, self.size_p[: self.count]
         lin = simulator.linearised(
             self.x, self.u, self.p, self.entering(), sizes, range(len(simulator.ports)) if every_port else there
@@ -229,16 +232,23 @@ class TrajectoryFit:
             + self.slack
         )
 
-    def _unsure(self) -> dict[int, str]:
-        """Inputs whose jumps are somewhere inside a step, by number of their port."""
-        names = {into(name): name for name in self.simulator.numerics.unsure}
+    def _ports(self, inputs: Collection[str]) -> dict[int, str]:
+        """Inputs by number of their port."""
+        names = {into(name): name for name in inputs}
         return {number: names[port.name] for number, port in enumerate(self.simulator.ports) if port.name in names}
 
     def open_steps(self) -> Array:
         """(n, s) deviations of each step: what the law leaves open, and inputs' jumps at an unknown place inside it."""
         square = self.loose() ** 2
-        for number, name in self._unsure().items():
+        for number, name in self._ports(self.simulator.numerics.unsure).items():
             square = square + (UNKNOWN_PLACE * self.lin.f_q[:, :, number] * self.simulator.jumps[name][:, None]) ** 2
+        return np.asarray(np.sqrt(square))
+
+    def open_outputs(self) -> Array:
+        """(n, o) deviations of each row: the sensors' noise, and jumps of inputs that another clock stamps."""
+        square = np.broadcast_to(self.noise_y**2, self.y.shape)
+        for number, name in self._ports(self.simulator.numerics.apart).items():
+            square = square + (OTHER_CLOCK * self.lin.h_q[:, :, number] * self.simulator.jumps[name][:, None]) ** 2
         return np.asarray(np.sqrt(square))
 
     def choose_way(self) -> bool:
@@ -246,7 +256,7 @@ class TrajectoryFit:
 
         Its gain counts in units of what the fit leaves, so that an error of the model does not choose.
         """
-        ways = self.simulator.ways()
+        ways = self.simulator.ways(self.simulator.shown_at_once(self.u, self.p))
         if len(ways) == 1:
             return False
         here = self._end()
@@ -261,8 +271,8 @@ class TrajectoryFit:
             moved = self.simulator.at(self.x, self.p, self.simulator.driven(self.u, self.entering()))[0] - f
             moved[self.ends] = 0.0
             wide = first
-            if way.unsure != now.numerics.unsure:
-                wide = Predictor(self.lin, self.noise_u, self.noise_y, self.open_steps(), self.starts,
+            if (way.unsure, way.apart) != (now.numerics.unsure, now.numerics.apart):
+                wide = Predictor(self.lin, self.noise_u, self.open_outputs(), self.open_steps(), self.starts,
                                  AWAY * self.size_x, first)  # fmt: skip
             missed = np.concatenate(((self.state - moved)[:, :, None], self.lin.f_p), axis=2)
             shown = np.concatenate((self.output[:, :, None], self.lin.h_p), axis=2)
@@ -283,7 +293,7 @@ class TrajectoryFit:
         """One round; returns the largest step of a parameter in its standard errors."""
         self.lin = lin = self.linearise(every_port)
         self.predictor = Predictor(
-            lin, self.noise_u, self.noise_y, self.open_steps(), self.starts, AWAY * self.size_x, self.predictor
+            lin, self.noise_u, self.open_outputs(), self.open_steps(), self.starts, AWAY * self.size_x, self.predictor
         )
         wide = self.predictor
         assert wide is not None

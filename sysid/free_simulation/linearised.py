@@ -83,7 +83,7 @@ def free(fit: TrajectoryFit) -> LinearisedRecording:
     """
     window = max(SHORTEST_WINDOW, round(fit.machine.window_s / fit.step_s))
     starts = np.array([k for run in fit.table.runs for k in range(run.start, run.stop, window)])
-    predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.noise_y, fit.open_steps(), starts,
+    predictor = Predictor(fit.lin, np.zeros_like(fit.noise_u), fit.open_outputs(), fit.open_steps(), starts,
                           AWAY * fit.size_x, stretch=window)  # fmt: skip
     missed = predictor.white(predictor.errors(fit.state[:, :, None], fit.output[:, :, None]))[:, :, 0]
     columns = predictor.white(predictor.errors(fit.lin.f_p, fit.lin.h_p))
@@ -101,7 +101,7 @@ def _by_noise(fit: TrajectoryFit, predictor: Predictor) -> Array:
 
     inputs = drawn(fit.noise_u)
     state = fit.lin.f_u @ inputs + drawn(fit.open_steps())
-    shown = drawn(np.where(fit.unmeasured, 0.0, fit.noise_y))
+    shown = drawn(np.where(fit.unmeasured, 0.0, fit.open_outputs()))
     left = predictor.white(predictor.errors(state, fit.lin.h_u @ inputs + shown))
     measured = np.count_nonzero(~fit.unmeasured, axis=0)
     return np.asarray(np.sqrt(np.sum(np.mean(left**2, axis=2), axis=0) / measured))

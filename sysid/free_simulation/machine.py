@@ -141,8 +141,12 @@ class SimulatedMachine(DeclaredMachine):
 
 
 def _chosen(fit: TrajectoryFit) -> None:
-    """Settle the fit on the likeliest way of its inputs between samples, an input at a time."""
-    for _ in fit.simulator.open_ways:
+    """Settle the fit on the likeliest way of its inputs between samples, a change at a time.
+
+    Where rows next to a jump weigh less, another way may be the likelier one again.
+    """
+    at_once = fit.simulator.shown_at_once(fit.u, fit.p)
+    for _ in range(len(fit.simulator.open_ways) + 2 * len(at_once)):
         if not fit.choose_way():
             break
         fit.settle(AGAIN)

@@ -38,8 +38,8 @@ class Predictor:
 
     def __init__(self, lin: Jacobians, noise_u: Array, noise_y: Array, loose: Array, starts: np.ndarray, away: Array,
                  before: "Predictor | None" = None, stretch: int = STRETCH) -> None:  # fmt: skip
-        """noise_u: (i,), noise_y: (o,) standard deviations; loose: (n, s) of each step; starts: samples at which the
-        state is free, with standard deviations `away` (s,). before: of the last round of a fit."""
+        """noise_u: (i,), noise_y: (o,) or (n, o) standard deviations; loose: (n, s) of each step; starts: samples at
+        which the state is free, with standard deviations `away` (s,). before: of the last round of a fit."""
         n, s = lin.next_state.shape
         o = lin.output.shape[1]
         self.n, self.s, self.o = n, s, o

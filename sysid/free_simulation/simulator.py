@@ -19,13 +19,15 @@ NUDGE = 1e-6  # of a quantity's size: step of a central difference
 @dataclasses.dataclass(frozen=True)
 class Numerics:
     """How a simulator steps: parts of a sample; inputs that are held, on cubics, and means of the step that ends at
-    their row; inputs of which it is not known where in a step they jump; share of what is open at standstill."""
+    their row; inputs of which it is not known where in a step they jump, and those that another clock stamps than the
+    outputs, so that a row next to a jump may show them before it or after it; share of what is open at standstill."""
 
     parts: int
     held: frozenset[str]
     curved: frozenset[str]
     means: frozenset[str] = frozenset()
     unsure: frozenset[str] = frozenset()
+    apart: frozenset[str] = frozenset()
     open_share: float = 1.0
 
     @property
@@ -33,11 +35,17 @@ class Numerics:
         """Ports of the inputs that are held."""
         return frozenset(into(name) for name in self.held)
 
+    @property
+    def open_jumps(self) -> frozenset[str]:
+        """Inputs of which a jump's place or row is not known."""
+        return self.unsure | self.apart
+
     def way(self, name: str) -> str:
         """How an input goes from a row to the next, in words."""
         ways = ((self.held, "held"), (self.means, "mean of the step before the row"), (self.curved, "cubic"))
         found = next((words for names, words in ways if name in names), "straight line")
-        return found + (", jumps anywhere inside a step" if name in self.unsure else "")
+        found += ", jumps anywhere inside a step" if name in self.unsure else ""
+        return found + (", jumps a row earlier or later than the outputs" if name in self.apart else "")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,8 +93,29 @@ class Simulator:
         names = self.numerics.held_ports
         return frozenset(number for number, port in enumerate(self.ports) if port.name in names)
 
-    def ways(self) -> list[Numerics]:
+    def shown_at_once(self, u: Array, p: Array) -> list[str]:
+        """Inputs that jump and that an output shows in the same row. u: (n, i), p: (p,)."""
+        nothing = np.zeros((len(self.table), len(self.ports)))
+        states = {name: np.zeros((1, len(self.table))) for name in self.machine.states}
+        values = {name: p[None, None, i] for i, name in enumerate(self.names)}
+        found = []
+        for number, port in enumerate(self.ports):
+            name = next((each for each in self.inputs if into(each) == port.name), "")
+            if not name or not np.any(self.jumps[name]):
+                continue
+            moved = nothing.copy()
+            moved[:, number] = 1.0
+            with np.errstate(all="ignore"):
+                plain, other = (self.machine.observe(states, self.driven(u, each).samples, values)
+                                for each in (nothing, moved))  # fmt: skip
+            if any(not np.array_equal(plain[each], other[each], equal_nan=True) for each in plain):
+                found.append(name)
+        return found
+
+    def ways(self, at_once: Sequence[str] = ()) -> list[Numerics]:
         """This way between samples first, and others for each input of which the data do not show it.
+
+        at_once: inputs that jump and that an output shows in the same row; their clock may be another one.
 
         Known are inputs that the machine holds, those that stay at a value and jump, and smooth ones. Of the others the
         row may be a point of straight lines, held until the next row, or the mean of the step that ends there; where
@@ -101,7 +130,7 @@ class Simulator:
             if np.any(self.jumps[name]):
                 some += [dataclasses.replace(each, unsure=lines.unsure | alone) for each in some]
             made += [each for each in some if each != now]
-        return made
+        return made + [dataclasses.replace(now, apart=now.apart ^ {name}) for name in at_once]
 
     def driven(self, u: Array, ports: Array) -> Driven:
         """Inputs and ports. u: (n, i), ports: (n, q)."""

@@ -1,5 +1,9 @@
 """Three machines as docs/diagnose-your-machine.md has a user write them: equations, channels, parameters."""
 
+from typing import ClassVar
+
+import numpy as np
+
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.free_simulation import Joint, Output, Port, SimulatedMachine, Term, runge_kutta
 from ranger_sim.sysid.machine import Known, Quantity
@@ -160,3 +164,56 @@ class ElasticJoint(SimulatedMachine):
             return {"gear_Nm": (r.signals["motor"] - r.signals["link"]) ** 3}
 
         return [Term("stiffening", "gear", "transmission", ("Nm_per_rad3",), cubed)]
+
+
+class LoggedStand(ThrustStand):
+    """The same stand; its voltage is shown in counts of 5 mV."""
+
+    noisy_inputs: ClassVar = {"V": 0.0042}
+
+
+class LoggedJoint(ElasticJoint):
+    """The same joint; its torque is shown in counts of 0.01 N m."""
+
+    noisy_inputs: ClassVar = {"u": 0.0058}
+
+
+class Battery(SimulatedMachine):
+    """E' = -slope i, v1' = (R1 i - v1) / tau; the voltage is E - R0 i - v1."""
+
+    name = "battery"
+    quantities = (
+        Quantity("current_A", "A", "out of the battery", drives=True),
+        Quantity("voltage_V", "V", "at the clamps", drives=False),
+    )
+    parameters = (
+        Known("R0", "ohm", 0.02, 0.001, 1.0, "at once"),
+        Known("R1", "ohm", 0.02, 0.001, 1.0, "after a while"),
+        Known("tau", "s", 20.0, 1.0, 500.0, "of R1"),
+        Known("slope", "V/(A s)", 5e-5, 0.0, 1.0, "of the voltage without current, per charge"),
+    )
+    states = ("E", "v1")
+    outputs = (Output("voltage_V", "E", "electrical", "V"),)
+    ports = (Port("lost_V", "V", "electrical"),)
+    noisy_inputs: ClassVar = {"i": 0.0042}
+
+    def inputs(self, table):
+        return {"i": table["current_A"]}
+
+    def first_guess(self, table):
+        return {"E": table["voltage_V"], "v1": np.zeros(len(table))}
+
+    def rates(self, x, u, p):
+        return {"E": -p["slope"] * u["i"], "v1": (p["R1"] * u["i"] - x["v1"]) / p["tau"]}
+
+    def step(self, x, u, p, step_s):
+        return runge_kutta(self.rates, x, u, p, step_s)
+
+    def observe(self, x, u, p):
+        return {"voltage_V": x["E"] - p["R0"] * u["i"] - x["v1"] - u["lost_V"]}
+
+    def terms(self, recordings):
+        def grown(r, shape, values):
+            return {"lost_V": r.signals["t"] * r.signals["i"]}
+
+        return [Term("resistance_growth", "cell", "electrical", ("ohm_per_s",), grown)]

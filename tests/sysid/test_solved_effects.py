@@ -1,0 +1,67 @@
+"""A sample of the machines that scipy solves: the rest by `python -m tests.sysid.solved_effects`."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
+from tests.sysid import solved_machines
+from tests.sysid.machines_of_a_user import Battery
+from tests.sysid.solved_effects import answer, rows
+
+BATTERY = dataclasses.replace(solved_machines.BATTERY, seconds=500.0)
+
+
+def test_a_sound_battery_whose_current_has_another_clock_is_silent():
+    """Its current jumps a row earlier or later than the voltage that shows it: without that, 14 times the noise."""
+    found = answer(BATTERY, "", 0.0, 1)
+    assert not found["detected"] and found["before"] < 0.01
+
+
+def test_a_resistance_that_grows_is_found_in_a_battery_s_log():
+    found = answer(BATTERY, "resistance grows", 8e-7, 1)
+    assert found["causes"] == ["resistance_growth at cell"]
+    assert found["after"] < 0.9 * found["before"]
+
+
+def test_a_sensor_shows_the_nearest_tick_of_its_own_clock():
+    log = solved_machines.BATTERY.log(1)
+    base, given, corners = solved_machines.BATTERY.drawn((1, "a"))
+    off = np.abs(log["current [A]"] - given(log["t [s]"])) > 0.05
+    near = np.min(np.abs(log["t [s]"][:, None] - corners[None]), axis=1) <= 0.5 / 2.0 + 0.1
+    assert not np.any(off & ~near)
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_a_row_next_to_a_jump_weighs_less_only_where_the_clocks_differ(late):
+    """The voltage shows the current at once; a row late, the fit finds that jumps are in another row."""
+    current = np.repeat(np.array([0.0, 8.0, -4.0, 6.0, 1.0, -6.0, 5.0, 2.0]), 100)
+    E, v1, volts = 3.8, 0.0, []
+    for i in current:  # the exact solution of Battery's law for a held current
+        volts.append(E - 0.03 * i - v1)
+        E, v1 = E - 4e-5 * i * 0.5, v1 + (0.02 * i - v1) * (1.0 - np.exp(-0.5 / 25.0))
+    noise = 1e-3 * np.sin(np.arange(800.0) ** 2)
+    columns = {"current_A": np.roll(current, late), "voltage_V": np.array(volts) + noise}
+    fit = TrajectoryFit(Battery(), Table(0.5 * np.arange(800), columns, (slice(0, 800),), "battery"))
+    assert fit.simulator.shown_at_once(fit.u, fit.p) == ["i"]
+    fit.settle()
+    fit.choose_way()
+    assert (fit.simulator.numerics.apart == {"i"}) == bool(late)
+
+
+def test_the_table_counts_alarms_names_and_intervals():
+    sound = {
+        "detected": True,
+        "causes": [],
+        "right": False,
+        "before": 1.0,
+        "after": 1.0,
+        "black_box": 1.0,
+        "seconds": 2,
+    }
+    named = sound | {"right": True, "value": 2.0, "ci95": [1.0, 3.0], "true": 4.0, "after": 0.5}
+    table = list(rows({"battery | nothing | 1": sound, "battery | leak | 4 | 1": named}))
+    assert table[2] == "| battery | leak | 4 | 1 of 1 | 0 of 1 | 100.00%, 50.00%, 100.00% | 2.0 |"
+    assert table[3].startswith("| battery | nothing |  | 1 alarms in 1 |")
