@@ -28,6 +28,7 @@ from ranger_sim.harness.faults import network_places
 from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.faults.error_rows import ErrorRows, StateWord
 from ranger_sim.harness.faults.fault import Fault, Place
+from ranger_sim.harness.firmware.fresh_board import first_outputs, pass_on
 from ranger_sim.harness.names import Names
 from ranger_sim.harness.outside.machine import leave_out
 from ranger_sim.harness.processes.modes import InProcess
@@ -94,6 +95,7 @@ class Machine:
         kept = self.recorder.words if self.logbook.records_words and words[1] is not None else None
         accept_lists(plant)
         sampler = Sampler(plant, words[1], self.recorder.samples, kept, self.start_ns)
+        started = {name: first_outputs(board) for name, board in self.boards.items()}
         self.loop: Any = lockstep.Lockstep(plant, list(self.boards.values()), self.buses, sampler, self.start_ns)
         self.wiring = wiring
         try:
@@ -101,6 +103,8 @@ class Machine:
         except BaseException:
             self.logbook.close()
             raise
+        for name, messages in started.items():  # what the boards' programs put out while they started
+            pass_on(messages, self.boards[name].outbox, self.start_ns)
         self.faults: list[Any] = []  # armed so far
         self.pace: Any = None  # an `outside.Pace` slows virtual time down to the wall clock's
         self.polled: list[Any] = []  # ends of wires that leave the simulation

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from ranger_sim import datatable
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.firmware.fresh_board import Message, first_outputs
 from ranger_sim.harness.outside import bus_schedule
 from ranger_sim.harness.outside.profile import Profile
 from ranger_sim.plant import body_files
@@ -25,15 +24,11 @@ BUS_BIT_RATE = 3_000_000  # bit/s, appendix 3.11
 
 
 class Parts(NamedTuple):
-    """A robot before it is wired: its body, its boards in the order in which they run, and the bit rates of its buses.
-
-    started: what programs in C sent while they started, by board.
-    """
+    """A robot before it is wired: its body, its boards in the order in which they run, its buses' bit rates."""
 
     plant: RangerPlant
     boards: dict[str, Any]
     buses: dict[str, int]
-    started: dict[str, list[Message]]
 
 
 def factory_of(
@@ -68,7 +63,6 @@ def parts_of(scenario: Scenario, body: body_files.BodyFile, factory: BoardFactor
     boards = {name: factory.first_board(name) for name in wiring.BOARDS}
     if isinstance(factory.program("CSR"), Emulated):
         boards["CSR"].time.ms = scenario.start_uptime_ms
-    started = {name: first_outputs(boards[name]) for name, each in factory.programs.items() if isinstance(each, InC)}
 
     rates = dict.fromkeys(BUSES, BUS_BIT_RATE)
     if profile is not None:
@@ -76,7 +70,7 @@ def parts_of(scenario: Scenario, body: body_files.BodyFile, factory: BoardFactor
         for board in boards.values():
             if not board.out_of_process:  # else where its program is
                 bus_schedule.apply(board, profile.schedules())
-    return Parts(plant, boards, rates, started)
+    return Parts(plant, boards, rates)
 
 
 def plant_of(scenario: Scenario, body: body_files.BodyFile) -> RangerPlant:

@@ -25,7 +25,6 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim.lpc2194.image import Image
 from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.faults.error_rows import StateWord
-from ranger_sim.harness.firmware.fresh_board import pass_on
 from ranger_sim.harness.firmware.native_firmware import Firmware
 from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.machine import Machine
@@ -105,13 +104,11 @@ class Ranger(Machine):
 
         # body, boards, buses; then the wires and the recorders
         self.body = body_files.load(self.scenario.body)
-        plant, boards, buses, started = parts_of(self.scenario, self.body, self.factory, profile)
+        plant, boards, buses = parts_of(self.scenario, self.body, self.factory, profile)
         if mode is None and self.firmware and not in_process:
             mode = OwnProcesses(tuple(self.firmware), board_deadline_s)
         seed, memory = self.scenario.seed, (all_variables.TABLE_SIZE, boards["MB"])
         Machine.__init__(self, plant, boards, buses, wiring.RANGER, seed, log, memory, RANGER, mode=mode)
-        for name, messages in started.items():
-            pass_on(messages, self.boards[name].outbox, self.start_ns)
 
         # the operator at the keys, and what observes the walk
         self.operator = Operator(self.controller.operator, self.plant, self.boards["UI"], self.start_ns, seed)

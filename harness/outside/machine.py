@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ranger_sim.firmware_sim.board import Board
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.events import NEVER
-from ranger_sim.foundation.user_error import UserError
+from ranger_sim.foundation.user_error import UserError, unknown
 
 if TYPE_CHECKING:
     from ranger_sim.can_bus.edge.external_bus import ExternalBus
@@ -110,3 +110,29 @@ def move_outside(
     for each in moved:
         move_bus(machine, each, {}, tuple(here))
     return moved
+
+
+def offer(machine: Any, name: str, speed: float = 1.0) -> str:
+    """Let other processes attach to the machine's emulated buses under `name`, at the wall clock's pace times `speed`.
+
+    Returns the channels, for can.Bus(interface="ranger_sim", channel=...). UserError when the name is taken.
+    """
+    from ranger_sim.can_bus.edge.attach import AttachServer
+
+    server = AttachServer(name, {bus.name: bus for bus in machine.buses})
+    machine.attach(server)
+    machine.pace = Pace(machine, speed)
+    return ", ".join(f"{name}/{bus.name}" for bus in machine.buses)
+
+
+def put_on(machine: Any, bus: str, where: str, speed: float = 1.0) -> str:
+    """Put a bus on an interface of python-can, "socketcan:vcan0"; every board stays here. Returns `where`.
+
+    UserError for a bus that the machine does not have, and when the interface cannot be opened.
+    """
+    known = [each.name for each in machine.buses]
+    if bus not in known:
+        raise UserError(unknown("bus", bus, known))
+    interface, _, channel = where.partition(":")
+    move_outside(machine, {bus: {"interface": interface, "channel": channel}}, tuple(machine.boards), speed)
+    return where

@@ -60,6 +60,12 @@ def register(commands: Any) -> None:
         metavar=("mujoco", "FILE"),
         help="a board for each actuator of a robot's MJCF or URDF model, and a main board",
     )
+    command.add_argument(
+        "--drive",
+        choices=("cia402", "odrive"),
+        help="joints' drives that a robot's own driver talks to: CiA 402 over CANopen, or ODrive's CAN protocol; with "
+        "--plant mujoco at each actuator of the model",
+    )
     command.set_defaults(run=run)
 
 
@@ -76,9 +82,13 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("new --bit-rate: belongs to --from FILE.dbc")
     if options.plant is not None and options.dbc is not None:
         raise UserError("new: --plant and --from exclude each other")
+    if options.drive is not None and options.dbc is not None:
+        raise UserError("new: --drive and --from exclude each other")
     files = {}
     if options.dbc is not None:
         files = files_of_dbc(options.dbc, options.bit_rate, name)
+    elif options.drive is not None:
+        files = files_of_drives(options.drive, options.plant, name)
     elif options.plant is not None:
         files = files_of_model(options.plant[0], options.plant[1], name)
     try:
@@ -136,6 +146,27 @@ def files_of_model(kind: str, model: str, name: str) -> dict[str, bytes]:
     for line in robot.left_out:
         print(f"{model}: left out: {line}")
     return made
+
+
+def files_of_drives(protocol: str, plant: list[str] | None, name: str) -> dict[str, bytes]:
+    """The files of a project with drives of this protocol, at links or at the actuators of a model."""
+    from ranger_sim import __version__
+    from ranger_sim.tools.new import drives
+
+    made: dict[str, bytes] = {}
+    axes, model = drives.links(), ""
+    if plant is not None:
+        if plant[0] != "mujoco":
+            raise UserError(f"new --drive {protocol} --plant {plant[0]}: allowed is mujoco")
+        from ranger_sim.tools.new import from_mujoco
+
+        robot = from_mujoco.read(pathlib.Path(plant[1]))
+        axes = from_mujoco.axes(robot)
+        model, made = from_mujoco.model_files(robot.file)
+        for line in robot.left_out:
+            print(f"{plant[1]}: left out: {line}")
+    texts = drives.files(axes, protocol, name, __version__, model)
+    return made | {path: text.encode("utf-8") for path, text in texts.items()}
 
 
 def files_of_dbc(dbc: pathlib.Path, bit_rate: int | None, name: str) -> dict[str, bytes]:

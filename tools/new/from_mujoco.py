@@ -23,6 +23,7 @@ from ranger_sim.harness.bodies import mujoco_body
 from ranger_sim.harness.bodies.mapping import Drive, Encoder, Mapping
 from ranger_sim.harness.bodies.mujoco_body import HINGE, TURNS, MujocoBody
 from ranger_sim.harness.bodies.names import identifier
+from ranger_sim.tools.new import drives
 from ranger_sim.tools.new.from_dbc import filled, timing_register
 
 HERE = pathlib.Path(__file__).resolve().parent / "mujoco"
@@ -222,6 +223,17 @@ def mass_matrix(model: Any, data: Any) -> np.ndarray:
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
     return full
+
+
+def axes(robot: Robot) -> list[drives.Axis]:
+    """The driven joints as drives have them."""
+    return [
+        drives.Axis(
+            each.board, each.folder, each.actuator, each.joint, quantity(each), each.unit, each.start, each.most,
+            each.per_A, GEAR[each.unit], each.stiffness, each.damping, each.integral, each.source,
+        )
+        for each in robot.joints
+    ]  # fmt: skip
 
 
 # --- the project's files --------------------------------------------------------------------------------------------
