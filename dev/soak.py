@@ -40,7 +40,9 @@ COMMAND = "python -m dev.soak"
 DISTANCE, MINUTES = "10km", 60.0
 SEED = 3  # of the robot
 ROUND_S = 4.0  # of each client
+SETTLE_S = 10.0  # from the last interface that opens to the count that the others are compared with
 PAUSE_S = 2.0  # at least, without clients, before a count
+KEPT = 1  # descriptor: the place of an XCP master on UDP, which has no connection that could end
 GONE_S = 30.0  # until a client that is gone has left nothing: the panel disconnects pages after 30 s of silence
 WALK_COUNT_S = 5.0
 STOPPED_S, STOP_EVERY = 0.3, 20  # a walk is stopped after every so many counts
@@ -98,6 +100,16 @@ def count(command: Command) -> Count:
             text = pathlib.Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
             memory_kb += sum(map(int, re.findall(r"^Pss:\s+(\d+) kB", text, re.MULTILINE)))
     return Count(len(processes), descriptors, memory_kb / 1024.0)
+
+
+def opened(command: Command) -> set[tuple[int, str]]:
+    """(process, what the descriptor is) of all that its processes have open."""
+    found = set()
+    for process in command.processes():
+        for descriptor in pathlib.Path(f"/proc/{process}/fd").glob("*"):
+            with contextlib.suppress(OSError):
+                found.add((process, os.readlink(descriptor)))
+    return found
 
 
 def quarters(counts: list[Count]) -> tuple[list[Count], list[Count]]:
@@ -224,26 +236,29 @@ class Robot:
             token=found[2],
         )
         self.counts: dict[str, list[Count]] = {"up": [], "panel": []}
+        wait_s(up, SETTLE_S)
         self.usual = (count(up), count(panel))
+        self.opened = (opened(up), opened(panel))
 
     def has_ended(self) -> bool:
         """True when the robot has reached its time."""
         return self.up.started.poll() is not None
 
-    def count(self) -> None:
-        """Count once the clients are gone; Finding where they leave descriptors for GONE_S."""
+    def count(self, client: str) -> None:
+        """Count once the clients of this name are gone; Finding where they leave descriptors for GONE_S."""
         end_s = wallclock.monotonic_s() + GONE_S
         while not wait_s(self.up, PAUSE_S):
             now = (count(self.up), count(self.panel))
             extra = [each.descriptors - usual.descriptors for each, usual in zip(now, self.usual, strict=True)]
-            if max(extra) <= 0 or wallclock.monotonic_s() > end_s:
+            if extra[0] <= KEPT and extra[1] <= 0 or wallclock.monotonic_s() > end_s:
                 break
         else:
             return
         if self.has_ended():
             return
         if max(extra) > 0:
-            raise Finding(f"{extra} descriptors more (up, panel) {GONE_S:g} s after the clients are gone")
+            more = [sorted(opened(each) - usual) for each, usual in zip((self.up, self.panel), self.opened, strict=True)]
+            raise Finding(f"{extra} descriptors more (up, panel) {GONE_S:g} s after {client} is gone: {more}")
         for name, each in zip(self.counts, now, strict=True):
             self.counts[name].append(each)
 
@@ -274,7 +289,7 @@ def soak_up(minutes: float, speed: float, seed: int, folder: pathlib.Path, repor
                 with flooders.flooded(client, robot.endpoints):  # killed at its end
                     wait_s(up, ROUND_S * (0.5 + stream.uniform()))
                 rounds[client] = rounds.get(client, 0) + 1
-                robot.count()
+                robot.count(client)
                 if sum(rounds.values()) % STOP_EVERY == 0:
                     report(f"{sum(rounds.values())} rounds, {robot.time_s():.0f} s of the robot, {robot.counts['up'][-1]}")
             seen = ended_well(up, folder / "up", "up")
