@@ -256,7 +256,7 @@ class Robot:
             return
         if self.has_ended():
             return
-        if max(extra) > 0:
+        if extra[0] > KEPT or extra[1] > 0:
             more = [sorted(opened(each) - usual) for each, usual in zip((self.up, self.panel), self.opened, strict=True)]
             raise Finding(f"{extra} descriptors more (up, panel) {GONE_S:g} s after {client} is gone: {more}")
         for name, each in zip(self.counts, now, strict=True):
