@@ -257,7 +257,8 @@ class Robot:
         if self.has_ended():
             return
         if extra[0] > KEPT or extra[1] > 0:
-            more = [sorted(opened(each) - usual) for each, usual in zip((self.up, self.panel), self.opened, strict=True)]
+            both = zip((self.up, self.panel), self.opened, strict=True)
+            more = [sorted(opened(each) - usual) for each, usual in both]
             raise Finding(f"{extra} descriptors more (up, panel) {GONE_S:g} s after {client} is gone: {more}")
         for name, each in zip(self.counts, now, strict=True):
             self.counts[name].append(each)
@@ -291,7 +292,8 @@ def soak_up(minutes: float, speed: float, seed: int, folder: pathlib.Path, repor
                 rounds[client] = rounds.get(client, 0) + 1
                 robot.count(client)
                 if sum(rounds.values()) % STOP_EVERY == 0:
-                    report(f"{sum(rounds.values())} rounds, {robot.time_s():.0f} s of the robot, {robot.counts['up'][-1]}")
+                    counted = robot.counts["up"][-1:]
+                    report(f"{sum(rounds.values())} rounds, {robot.time_s():.0f} s of the robot, {counted}")
             seen = ended_well(up, folder / "up", "up")
             panel.started.send_signal(signal.SIGINT)
             if code := panel.end():

@@ -54,8 +54,10 @@ def test_a_full_disk_is_reported_and_leaves_no_half_written_file(name, tmp_path)
     assert any(place in line and "No space left" in line for line in done.stderr.splitlines()), done.stderr
     for path in kept.rglob("*"):
         data = path.read_bytes() if path.is_file() and ".partial" not in path.name else b""
-        assert not data.strip() or path.suffix not in WHOLE or data.rstrip(b"\n \0")[-7:].endswith(
-            WHOLE[path.suffix].strip()
+        assert (
+            not data.strip()
+            or path.suffix not in WHOLE
+            or data.rstrip(b"\n \0")[-7:].endswith(WHOLE[path.suffix].strip())
         ), path
     if (summary := kept / "out" / "summary.json").is_file():
         assert json.loads(summary.read_text(encoding="utf-8"))["complete"] is False
