@@ -63,9 +63,9 @@ class RowStream:
         block = block[: self.used]
         if self.digest is not None:
             self.digest.update(block)
+        self.used = 0  # first: a sink that fails must not let the next row be written behind the block's end
         if self.sink is not None:
             self.sink(self.last_time_ns, block.tobytes())
-        self.used = 0
 
 
 @cython.final

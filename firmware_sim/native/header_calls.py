@@ -3,6 +3,7 @@
 A program in C reaches them by one function, `answered`, which gets the number of the call.
 """
 
+import os
 from typing import Final
 
 import cython
@@ -34,6 +35,7 @@ CMR_AT: Final = 0x2  # CxCMR
 CMR_CDO: Final = 0x8
 CMR_STB1: Final = 0x20
 WORD: Final = 0xFFFF_FFFF
+HOSTS: set[int] = set()  # addresses that programs may call with; those of ended boards stay, a number each
 USUAL_LATENCY: Final = -1
 # numbers of the calls, as in runtime.c
 CALL_ATTACH: Final = 0
@@ -699,7 +701,11 @@ def answered(
     d: cython.longlong,
     e: cython.longlong,
 ) -> cython.longlong:
-    """Carry out a call of the program; what it raises ends the run."""
+    """Carry out a call of the program; what it raises ends the run. A program that has changed the address it calls
+    with (fw_host) ends as by abort(): anything may be there.
+    """
+    if cython.compiled and cython.cast(cython.ulonglong, host) not in HOSTS:
+        os.abort()
     calls: Calls = cython.cast(Calls, host)
     try:
         return calls.answer(call, a, b, c, d, e)
@@ -714,6 +720,7 @@ def connect(calls: Calls, library: Library) -> None:
         unknown = ", ".join(f"fw_{name}" for name in library.call_names() if name not in NAMES) or "fewer calls"
         raise FirmwareError(f"{library.path}: it has {unknown}, unlike this version: build it again")
     if cython.compiled:
+        HOSTS.add(id(calls))
         library.code.fw_host = ffi.cast("void *", id(calls))
         library.code.fw_answer = ffi.cast("host_call", answer_by(answered))
     else:

@@ -1,6 +1,7 @@
 """Keeps the blocks of a row stream: those of the last seconds in memory, or all of them in an unnamed file."""
 
 import collections
+import contextlib
 import tempfile
 import weakref
 from collections.abc import Callable
@@ -22,6 +23,7 @@ class RowStore:
         self.before = before
         self.blocks: collections.deque[tuple[int, bytes]] = collections.deque()
         self.spool: Any = None
+        self.failure: OSError | None = None  # of the spool: the disk is full
         if last_ns is None:
             self.spool = tempfile.TemporaryFile(prefix="ranger-sim-timeline-")  # noqa: SIM115
             weakref.finalize(self, self.spool.close)  # also of a timeline that is never closed
@@ -31,15 +33,25 @@ class RowStore:
         if self.before is not None:
             self.before(last_time_ns, block)
         if self.spool is not None:
-            self.spool.write(block)
+            self._spool(block)
             return
         assert self.last_ns is not None
         self.blocks.append((last_time_ns, block))
         while self.blocks[0][0] < last_time_ns - self.last_ns:
             self.blocks.popleft()
 
+    def _spool(self, block: bytes) -> None:
+        """Write a block; the run goes on without a timeline where the disk is full, and `rows` reports it."""
+        if self.failure is None:
+            try:
+                self.spool.write(block)
+            except OSError as error:
+                self.failure = error
+
     def rows(self, kind: type = np.int64) -> np.ndarray:
-        """Everything kept: array (rows, columns)."""
+        """Everything kept: array (rows, columns). OSError where the file could not take everything."""
+        if self.failure is not None:
+            raise OSError(self.failure.errno, self.failure.strerror, f"rows of the timeline in {tempfile.gettempdir()}")
         if self.spool is not None:
             self.spool.flush()
             self.spool.seek(0)
@@ -59,5 +71,6 @@ class RowStore:
     def close(self) -> None:
         """Close the file."""
         if self.spool is not None:
-            self.spool.close()
+            with contextlib.suppress(OSError):  # a full disk, which `rows` reports
+                self.spool.close()
         self.blocks.clear()

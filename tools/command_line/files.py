@@ -1,5 +1,6 @@
 """Files that a command writes: checked before the work begins, written whole or not at all."""
 
+import contextlib
 import pathlib
 import tempfile
 
@@ -32,7 +33,7 @@ def json_target(option: str | None) -> pathlib.Path | None:
 
 
 def replace_file(path: pathlib.Path, content: bytes) -> None:
-    """Write the file whole or not at all."""
+    """Write the file whole or not at all. OSError that names it, where the disk is full."""
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.name, delete=False) as handle:
         temporary = pathlib.Path(handle.name)
         try:
@@ -40,6 +41,10 @@ def replace_file(path: pathlib.Path, content: bytes) -> None:
             handle.close()
             temporary.chmod(0o644)
             temporary.replace(path)
-        except BaseException:
+        except BaseException as error:
+            with contextlib.suppress(OSError):
+                handle.close()  # what did not fit is not tried again
             temporary.unlink(missing_ok=True)
+            if isinstance(error, OSError):
+                raise OSError(error.errno, error.strerror, str(path)) from None
             raise

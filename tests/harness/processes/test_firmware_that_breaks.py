@@ -24,6 +24,7 @@ from ranger_sim.harness.processes.guard import Guard
 from ranger_sim.harness.processes.lone_board import LoneBoard
 from ranger_sim.harness.processes.settings import Settings
 from ranger_sim.harness.processes.supervisor import Supervisor
+from ranger_sim.loading import RUNS_COMPILED
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario, StopRule
 from tests.firmware_sim.native.support import COMPILER, SCHEDULE, TIMER, folder_with, library_of
@@ -67,6 +68,13 @@ ABORT = """__attribute__((noinline)) static void break_down(void)
 ILLEGAL = """__attribute__((noinline)) static void break_down(void)
 {
     __builtin_trap(); /* HERE */
+}"""
+HOST_MOVED = """extern void *fw_host;
+__attribute__((noinline)) static void break_down(void)
+{
+    fw_host = (char *)fw_host + 16;
+    fw_pin_write(3, 1); /* HERE */
+    sink++;
 }"""
 DIVIDE = """__attribute__((noinline)) static void break_down(void)
 {
@@ -131,6 +139,11 @@ def broken(folder, function):
     [
         (NULL_WRITE, "SIGSEGV (Segmentation fault)"),
         (ABORT, "SIGABRT (Aborted)"),
+        pytest.param(
+            HOST_MOVED,
+            "SIGABRT (Aborted)",
+            marks=pytest.mark.skipif(not RUNS_COMPILED, reason="the interpreter does not call by an address"),
+        ),
         (DIVIDE, "SIGFPE (Floating point exception)"),
     ],
 )
