@@ -61,6 +61,12 @@ class Board:
         """Announce that `advance(until)` will follow: a board in a separate process starts now."""
 
     @cython.ccall
+    @cython.exceptval(check=False)
+    def can_wait(self, until: cython.longlong) -> cython.bint:
+        """Whether nothing that it does before `until` (ns) acts on anything but itself: it may run that time later."""
+        return False
+
+    @cython.ccall
     def advance(self, until: cython.longlong) -> cython.longlong:
         """Run everything before `until` (ns), or less far where an output asks for it; returns `next_time`."""
         raise NotImplementedError(f"{self.name}: a board must say how it advances")

@@ -369,6 +369,7 @@ class SlotScheduler:
     row_starts: cython.longlong[::1]
     histogram: cython.longlong[21]
     leads: Annotated[cython.longlong[::1], "readonly"]
+    row_leads: cython.longlong[::1]
     schedule: Schedule
     ns_per_cycle: cython.double
     slot_ns: cython.longlong
@@ -422,7 +423,7 @@ class SlotScheduler:
 
         `placed`: the task at each place, None at the end of a row.
         `leads`: ns from the start of the task at a place to that of the first one from there that may send, at least;
-        NEVER where none follows in its row.
+        NEVER where none follows in its row. `row_leads`: the same from the start of a row, over the rows that follow it.
         """
         schedule = self.schedule
         self.row_count = len(schedule.rows)
@@ -433,6 +434,7 @@ class SlotScheduler:
             self.placed += [*schedule.row_tasks(row), None]
             self.row_starts[row + 1] = len(self.placed)
         self.leads = integers(len(self.placed), NEVER)
+        self.row_leads = integers(self.row_count, NEVER)
         for number, task in enumerate(self.tasks):
             task.settle()
             task.scheduler = self
@@ -463,6 +465,14 @@ class SlotScheduler:
                 elif lead < NEVER:
                     lead += int(task.base_cycles * self.ns_per_cycle)
                 self.leads[place] = lead
+        slot = max(0, int(self.slot_cycles * self.ns_per_cycle) - 1)  # ns at least, whatever its ticks are rounded to
+        for row in range(self.row_count):
+            self.row_leads[row] = NEVER
+            for after in range(self.row_count):
+                lead = self.leads[self.row_starts[(row + after) % self.row_count]]
+                if lead < NEVER:
+                    self.row_leads[row] = after * slot + lead
+                    break
 
     @cython.ccall
     def earliest_transmit_ns(self, code_time: cython.longlong, tick_time: cython.longlong) -> cython.longlong:
@@ -470,9 +480,9 @@ class SlotScheduler:
 
         `code_time`: no task of the row that runs starts earlier; `tick_time`: no slot.
         """
-        next_row: cython.longlong = self.end + 1 if self.row + 1 < self.row_count else 0
+        next_row: cython.longlong = self.row + 1 if self.row + 1 < self.row_count else 0
         # a time and a lead are at most NEVER, so their sum fits
-        first: cython.longlong = tick_time + self.leads[next_row]
+        first: cython.longlong = tick_time + self.row_leads[next_row]
         if not self.done and code_time + self.leads[self.position] < first:
             first = code_time + self.leads[self.position]
         return first

@@ -81,6 +81,7 @@ class Lockstep:
     due: cython.longlong[::1]
     arrival: cython.longlong[::1]
     prompt: cython.longlong[::1]
+    begun: cython.longlong[::1]
     step_times: cython.longlong[::1]
     side_by_side: cython.bint
     stop_wanted: cython.bint
@@ -127,6 +128,7 @@ class Lockstep:
         # boards' the time at which a bus must decide
         self.due = integers(count + 1, self.time)
         self.arrival = integers(count, self.time)
+        self.begun = integers(count + 1)  # places of the boards that run in a window
         before, self.prompt = list(self.prompt), integers(count, 1)
         for place in range(count):
             if place < len(before):
@@ -247,9 +249,11 @@ class Lockstep:
         for i in range(board_count):
             # a board may have been changed between two runs
             board = boards[i]
-            due[i] = arrival[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
             wires = self.wires[i]
             wires.silent_until = 0
+            arrival[i] = min(board.next_time, board.inbox.head_time, board.edge_time)
+            # in its own process only what it is sent can have changed it
+            due[i] = self._next_due(i, arrival[i]) if board.out_of_process else arrival[i]
         while self.time < until:
             now = self.time
             if plant.time_ns <= now:
@@ -268,7 +272,7 @@ class Lockstep:
                 self._sense()
             end = plant.time_ns if plant.time_ns < until else until
             if self.side_by_side:
-                self._run_side_by_side(end)
+                self._run_side_by_side(end, end == until)
             else:
                 self._run_in_turn(end, end == until)
             self.time = end
@@ -325,16 +329,21 @@ class Lockstep:
 
     @cython.cfunc
     @cython.final
-    def _run_side_by_side(self, end: cython.longlong) -> cython.longlong:
-        """Run out-of-process boards, and buses, to `end` (ns) in windows; returns how many windows there were."""
+    def _run_side_by_side(self, end: cython.longlong, last: cython.bint) -> cython.longlong:
+        """Run out-of-process boards, and buses, to `end` (ns) in windows; returns how many windows there were.
+
+        `last`: a reader sees the boards then. Otherwise those are left alone that act on nothing but a bus.
+        """
         i: cython.longlong
         now: cython.longlong = self.time
         late: cython.longlong = 0
         windows: cython.longlong = 0
         first: cython.longlong
+        begun: cython.longlong
         board: Board
         due: cython.longlong[::1] = self.due
         arrival: cython.longlong[::1] = self.arrival
+        places: cython.longlong[::1] = self.begun
         board_count: cython.longlong = len(self.boards)
         while now < end:
             first = due[board_count]
@@ -348,13 +357,17 @@ class Lockstep:
             now += self.window_ns
             if now >= end:
                 now = late = end
+            begun = 0
             for i in range(board_count):
                 if due[i] < now or arrival[i] < late:
                     board = cython.cast(Board, self.boards[i])
+                    if due[i] >= now and not last and board.can_wait(now):
+                        continue
                     board.begin(now)
-            for i in range(board_count):
-                if due[i] < now or arrival[i] < late:
-                    due[i] = self._advance(i, now)
+                    places[begun] = i
+                    begun += 1
+            for i in range(begun):
+                due[places[i]] = self._advance(places[i], now)
             windows += 1
         return windows
 
@@ -363,13 +376,20 @@ class Lockstep:
     def _advance(self, place: cython.longlong, until: cython.longlong) -> cython.longlong:
         """Run a board to `until` (ns) or less; returns when it is due again."""
         board: Board = cython.cast(Board, self.boards[place])
-        wires: BoardWires
         following: cython.longlong = board.advance(until)
         if board.inbox.head_time < following:
             following = board.inbox.head_time
         if board.edge_time < following:
             following = board.edge_time
         self.arrival[place] = following
+        return self._next_due(place, following)
+
+    @cython.cfunc
+    @cython.final
+    def _next_due(self, place: cython.longlong, following: cython.longlong) -> cython.longlong:
+        """When a board must run (ns) that has something to do at `following`: not before it may use a bus."""
+        board: Board = cython.cast(Board, self.boards[place])
+        wires: BoardWires
         if self.prompt[place] == 0 and board.inbox.urgent_until < board.horizon:
             following = board.earliest_transmit_ns()
             wires = board.outbox

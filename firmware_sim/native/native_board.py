@@ -272,6 +272,12 @@ class NativeBoard(Microcontroller):
                 totals[code] = times
         return totals
 
+    def error_image(self, count: int) -> bytes:
+        """The memory of `error_totals(count)`; empty where the program does not say."""
+        if self.error_counts is None:
+            return b""
+        return bytes(ffi.buffer(self.error_counts.counts, 4 * min(count, self.error_counts.count)))
+
     def can_counters(self) -> list[CanCounters]:
         """Of each controller that the program has started."""
         return [

@@ -9,7 +9,7 @@ from typing import Any
 
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
-from ranger_sim.harness.campaigns.group import request_of
+from ranger_sim.harness.campaigns.group import request_of, start_of
 from ranger_sim.harness.campaigns.plan import Plan, Range, combinations
 from ranger_sim.harness.campaigns.statistics import Stopping
 from ranger_sim.harness.campaigns.store import Store
@@ -125,6 +125,7 @@ class Campaign:
             self.store.forget(key)  # one that timed out
         for members in groups.values():
             golden = members[0][1].golden()
+            starts = {start_of(case.fault) for _, case in members if case.fault}
             least = min(LEAST_IN_A_GROUP, math.ceil(len(members) / pool.jobs))
             size = min(MOST_IN_A_GROUP, max(least, math.ceil(len(members) / (3 * pool.jobs))))
             for start in range(0, len(members), size):
@@ -138,6 +139,7 @@ class Campaign:
                         healthy[self.healthy_key(golden)]["healthy"],
                         self.version,
                         self.plan.fault_module,
+                        starts,
                     )
                 )
         for result in pool.run(requests):

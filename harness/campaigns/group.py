@@ -1,6 +1,6 @@
 """A group of runs with one golden run: walked once for its record, and again to branch the runs off it.
 
-    python -m ranger_sim.harness.campaigns.group     # one request as a line of JSON in, one result a line out
+    python -m ranger_sim.harness.campaigns.group     # requests as lines of JSON in, one result a line out
 
 The process has one thread, so it may fork; whatever distributes the groups (threads, Dask's workers) starts one process
 for each group. A fault's run branches off `BRANCH_EARLY_NS` before the fault begins in the golden run, so that the walk
@@ -10,12 +10,13 @@ cannot fork, on Windows, each run walks from power-up, with the same result.
 
 import dataclasses
 import functools
+import gc
 import hashlib
 import json
 import os
 import pathlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from ranger_sim.foundation import systems, wallclock
@@ -140,33 +141,90 @@ class Golden:
         return self.known[until_ns]
 
 
-def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
+class Kept:
+    """What a process keeps from one request for the next: its version, and the latest golden run with a robot."""
+
+    def __init__(self) -> None:
+        self.versions: dict[str, str] = {}
+        self.modules: set[tuple[str, str]] = set()
+        self.latest: tuple[str, set[str]] = ("", set())
+        self._golden: Golden | None = None
+        self.robot: Machine | None = None
+        self.evidence: Evidence | None = None
+
+    def version(self, machine: str) -> str:
+        """Version of what this process has imported: not that of files that were changed since."""
+        if machine not in self.versions:
+            self.versions[machine] = version(machine)
+        return self.versions[machine]
+
+    def take_module(self, catalogue: Any, name: str, digest: str) -> None:
+        """Load the faults of a module, once. UserError where the file differs from the requested one."""
+        if (name, digest) in self.modules:
+            return
+        catalogue.load_file(name)
+        if digest_of(name) != digest:
+            raise CampaignError(f"campaign: fault module {name}: it differs from the requested file")
+        self.modules.add((name, digest))
+
+    def golden(self, settings: Settings, starts: set[str], watch: Watch) -> Golden:
+        """The golden run of these settings; walked when it is not the latest one, or lacks a start."""
+        text = json.dumps([settings.as_dict(), watch.as_dict()], sort_keys=True)
+        known, starts_known = self.latest
+        if self._golden is None or text != known or not starts <= starts_known:
+            self.robot = self.evidence = None
+            self._golden = Golden(settings, starts, watch)
+            self.latest = (text, starts)
+        self._golden.known.clear()
+        return self._golden
+
+    def robot_at(self, settings: Settings, latest_ns: int) -> tuple[Machine, Evidence]:
+        """A robot of the golden run's settings, with its record, that has walked no further than `latest_ns`."""
+        if self.robot is None or self.evidence is None or self.robot.loop.time > latest_ns or not systems.can_fork():
+            self.robot = settings.robot()
+            self.evidence = Evidence(self.robot)
+        return self.robot, self.evidence
+
+
+def run_group(request: dict[str, Any], emit: Callable[[Result], None], kept: Kept | None = None) -> None:
     """Run the cases of a request and `emit` the result of each as soon as it is available.
 
     request: version, settings of the golden run, watch, healthy (`Healthy.as_dict`), fault_module
-    (name and digest, or None), cases: [{key, fault, settings}].
+    (name and digest, or None), starts: of all faults with this golden run, cases: [{key, fault, settings}].
     UserError when this installation has other sources than the requester's.
     """
     settings = Settings(**request["settings"])
-    here = version(settings.machine)
+    kept = Kept() if kept is None else kept
+    here = kept.version(settings.machine)
     if request["version"] != here:
         raise CampaignError(f"campaign: this worker runs {here}, asked for is {request['version']}")
     if request.get("fault_module"):
-        name, digest = request["fault_module"]
-        settings.subject.catalogue.load_file(name)
-        if digest_of(name) != digest:
-            raise CampaignError(f"campaign: fault module {name}: it differs from the requested file")
+        kept.take_module(settings.subject.catalogue, *request["fault_module"])
     watch = Watch.from_dict(request["watch"])
     healthy = Healthy.from_dict(request["healthy"]) if request.get("healthy") else None
     cases = request["cases"]
-    golden = Golden(settings, {start_of(each["fault"]) for each in cases if each["fault"]}, watch)
+    golden = kept.golden(settings, set(request["starts"]), watch)
+    gc.freeze()  # a branch that visits every object would copy the memory of all
+    try:
+        run_cases(cases, settings, golden, healthy, watch, emit, kept)
+    finally:
+        gc.unfreeze()
+
+
+def run_cases(
+    cases: list[dict[str, Any]],
+    settings: Settings,
+    golden: Golden,
+    healthy: Healthy | None,
+    watch: Watch,
+    emit: Callable[[Result], None],
+    kept: Kept,
+) -> None:
+    """Run cases with one golden run, in the order in which their faults begin."""
     for case in cases:
         if not case["fault"]:
             emit(finished(case, functools.partial(sweep_run, case, golden, healthy, watch), watch))
     along = sorted((case for case in cases if case["fault"]), key=lambda case: golden.starts[start_of(case["fault"])])
-    if not along:
-        return
-    robot = None
     for case in along:
         start_ns = golden.starts[start_of(case["fault"])]
         if start_ns < 0:
@@ -175,10 +233,9 @@ def run_group(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
                 why += f": it fell ({golden.record.fall_cause})"
             emit({"key": case["key"], "outcome": "invalid", "why": why})
             continue
-        if robot is None or not systems.can_fork():  # without branches, a run uses its robot up
-            robot = settings.robot()
-            evidence = Evidence(robot)
-        branch_ns = max(robot.start_ns, (start_ns - BRANCH_EARLY_NS - robot.start_ns) // GRID_NS * GRID_NS)
+        begin_ns = golden.record.begin_ns
+        branch_ns = max(begin_ns, begin_ns + (start_ns - BRANCH_EARLY_NS - begin_ns) // GRID_NS * GRID_NS)
+        robot, evidence = kept.robot_at(settings, branch_ns)
         if branch_ns > robot.loop.time:
             robot.run(StopRule(time_s=(branch_ns - robot.start_ns) * 1e-9), 3600.0)
         work = functools.partial(fault_run, case["fault"], robot, evidence, golden, healthy, watch)
@@ -339,14 +396,16 @@ def request_of(
     healthy: dict[str, Any] | None,
     version: str,
     fault_module: str | None = None,
+    starts: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """The request to a worker."""
+    """The request to a worker. starts: of further faults with the same golden run, which it then walks once."""
     return {
         "version": version,
         "settings": golden.as_dict(),
         "watch": watch.as_dict(),
         "healthy": healthy,
         "fault_module": None if fault_module is None else [fault_module, digest_of(fault_module)],
+        "starts": sorted({*starts, *(start_of(case.fault) for case in cases if case.fault)}),
         "cases": [
             {"key": key, "fault": case.fault, "settings": case.settings.as_dict()}
             for case, key in zip(cases, keys, strict=True)
@@ -354,18 +413,21 @@ def request_of(
     }
 
 
-def answer(request: dict[str, Any], emit: Callable[[Result], None]) -> None:
+def answer(request: dict[str, Any], emit: Callable[[Result], None], kept: Kept) -> None:
     """Carry out a request: runs of a group, or healthy walks."""
     if "seeds" in request:
         watch = Watch.from_dict(request["watch"])
         found = healthy_walks(Settings(**request["settings"]), request["seeds"], watch)
         emit({"key": request["key"], **found})
     else:
-        run_group(request, emit)
+        run_group(request, emit, kept)
 
 
 def main() -> int:
-    """One request on standard input; results on standard output. It ends with its parent process."""
+    """Requests on standard input, results on standard output, after those of a request {"ended": true}.
+
+    It ends after the last request, after one that it refuses, and with its parent process.
+    """
     die_with(os.getppid())
     results = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what a user's fault module prints is not a result
@@ -377,14 +439,17 @@ def main() -> int:
         except BrokenPipeError:  # the requesting process has ended: results are useless
             os._exit(1)
 
-    request = sys.stdin.readline()
-    if not request:  # the requester has ended already
-        return 1
-    try:
-        answer(json.loads(request), emit)
-    except UserError as mistake:
-        emit({"refused": str(mistake)})
-    return 0
+    kept = Kept()
+    code = 1  # the requester has ended already
+    while request := sys.stdin.readline():
+        code = 0
+        try:
+            answer(json.loads(request), emit, kept)
+        except UserError as mistake:
+            emit({"refused": str(mistake)})
+            return 0
+        emit({"ended": True})
+    return code
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
 """Pools that do the runs: processes of this machine, or the workers of a Dask cluster.
 
-Either way a group of runs has its own process (`group`), with one thread, so that it may fork; Dask's workers have
-several threads and start such a process for each group. Results that a process returned before it died are kept, the
-rest of its group is requested again; a run at which `ATTEMPTS` processes died is "crashed".
+Either way groups of runs have a process (`group`) with one thread, so that it may fork. One of this machine works on
+one group after another and keeps what it has imported and walked; Dask's workers have several threads and start one for
+each group. Results that a process returned before it died are kept, the rest of its group is requested again; a run at
+which `ATTEMPTS` processes died is "crashed".
 """
 
 import contextlib
+import functools
 import importlib
 import json
 import logging
@@ -32,11 +34,26 @@ def process_for(request: Request) -> "subprocess.Popen[str]":
     process = subprocess.Popen(
         COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
     )
+    pass_on(request, process)
+    return process
+
+
+def pass_on(request: Request, process: "subprocess.Popen[str]") -> None:
+    """Give a process its next request; where it has died, that shows when its results are read."""
     assert process.stdin is not None
     with contextlib.suppress(BrokenPipeError):
         process.stdin.write(json.dumps(request) + "\n")
-        process.stdin.close()
-    return process
+        process.stdin.flush()
+
+
+def end(process: "subprocess.Popen[str]") -> None:
+    """End a process in any state."""
+    process.kill()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+    process.wait()
 
 
 def asked(request: Request) -> list[str]:
@@ -53,25 +70,30 @@ def without(request: Request, done: set[str]) -> Request | None:
     return {**request, "cases": [case for case in request["cases"] if case["key"] not in done]}
 
 
-def results_of(request: Request, start: Callable[[Request], "subprocess.Popen[str]"] = process_for) -> Iterator[Result]:
-    """The results of a request, each as it arrives, in as many processes as needed. `start` starts one."""
+def results_of(request: Request, start: Callable[[Request], "subprocess.Popen[str]"]) -> Iterator[Result]:
+    """The results of a request, each as it arrives, in as many processes as needed.
+
+    `start` gives the request to a process; the one that ends the request can take another one after this.
+    """
     left: Request | None = request
     deaths = 0
     while left is not None:
         process = start(left)
         done: set[str] = set()
         assert process.stdout is not None
-        with process.stdout:
-            for line in process.stdout:
-                if not line.endswith("\n"):
-                    break  # it died while it wrote
-                result = json.loads(line)
-                if "refused" in result:
-                    process.wait()
-                    raise CampaignError(result["refused"])
-                done.add(result["key"])
-                yield result
+        for line in process.stdout:
+            if not line.endswith("\n"):
+                break  # it died while it wrote
+            result = json.loads(line)
+            if "ended" in result:
+                return
+            if "refused" in result:
+                end(process)
+                raise CampaignError(result["refused"])
+            done.add(result["key"])
+            yield result
         code = process.wait()
+        end(process)
         left = without(left, done)
         if left is None:
             return
@@ -89,68 +111,117 @@ class ClosedError(Exception):
     """The pool was closed: nothing is started any more."""
 
 
+class Worker:
+    """One process at a time, which works on one request after another. `settings`: of its latest golden run."""
+
+    def __init__(self) -> None:
+        self.process: subprocess.Popen[str] | None = None
+        self.settings: Any = None
+
+    def start(self, request: Request) -> "subprocess.Popen[str]":
+        """Give the request to its process, or to a new one where that has ended."""
+        self.settings = request.get("settings")
+        if self.process is not None and self.process.poll() is None:
+            pass_on(request, self.process)
+        else:
+            self.process = process_for(request)
+        return self.process
+
+    def close(self) -> None:
+        """End its process."""
+        if self.process is not None:
+            end(self.process)
+
+
 class LocalPool:
-    """`jobs` processes of this machine at a time."""
+    """`jobs` processes of this machine, kept until the pool is closed.
+
+    Each has a thread of its own, which starts it and lives as long: the kernel ends a process with the thread that
+    started it (`die_with`).
+    """
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
         self.description = f"{jobs} process{'es' if jobs > 1 else ''} of this machine"
-        self.latest: dict[int, subprocess.Popen[str]] = {}  # by thread: each has one process at a time
-        self.lock = threading.Lock()
+        self.workers: list[Worker] = []
+        self.waiting: list[tuple[Request, queue.Queue[Any]]] = []
+        self.changed = threading.Condition()
         self.closed = False
 
     def run(self, requests: list[Request]) -> Iterator[Result]:
         """The results of all requests, each as it arrives."""
-        waiting: queue.Queue[Request] = queue.Queue()
-        for request in requests:
-            waiting.put(request)
-        results: queue.Queue[Result | BaseException | None] = queue.Queue()
+        results: queue.Queue[Any] = queue.Queue()
+        with self.changed:
+            if self.closed:
+                return
+            self.waiting += [(request, results) for request in requests]
+            while len(self.workers) < min(self.jobs, len(requests)):
+                self.workers.append(Worker())
+                threading.Thread(target=self._work, args=(self.workers[-1],), daemon=True).start()
+            self.changed.notify_all()
+        left = len(requests)
+        try:
+            while left:
+                result = results.get()
+                if result is None:  # the end of a request
+                    left -= 1
+                elif isinstance(result, BaseException):
+                    self.close()
+                    raise result
+                else:
+                    yield result
+        finally:
+            with self.changed:
+                self.waiting = [each for each in self.waiting if each[1] is not results]
 
-        def work() -> None:
+    def _work(self, worker: Worker) -> None:
+        """One request after another, until the pool is closed."""
+        while (taken := self._next(worker.settings)) is not None:
+            request, results = taken
             try:
-                while True:
-                    for result in results_of(waiting.get_nowait(), self._start):
-                        results.put(result)
-            except (queue.Empty, ClosedError):
+                for result in results_of(request, functools.partial(self._start, worker)):
+                    results.put(result)
+            except ClosedError:
                 pass
             except BaseException as error:  # raised where the results are awaited
                 results.put(error)
             results.put(None)
 
-        workers = [threading.Thread(target=work, daemon=True) for _ in range(min(self.jobs, len(requests)))]
-        for worker in workers:
-            worker.start()
-        left = len(workers)
-        while left:
-            result = results.get()
-            if result is None:
-                left -= 1
-            elif isinstance(result, BaseException):
-                self.close()
-                raise result
-            else:
-                yield result
+    def _next(self, settings: Any) -> "tuple[Request, queue.Queue[Any]] | None":
+        """Wait for a request, rather one with these settings, whose golden run is known; None: the pool is closed."""
+        with self.changed:
+            while not self.waiting and not self.closed:
+                self.changed.wait()
+            if self.closed:
+                return None
+            same = [at for at, each in enumerate(self.waiting) if each[0].get("settings") == settings]
+            return self.waiting.pop(same[0] if same else 0)
 
-    def _start(self, request: Request) -> "subprocess.Popen[str]":
-        """Start a process for a request, in the calling thread; ClosedError when the pool has been closed."""
-        with self.lock:
+    def _start(self, worker: Worker, request: Request) -> "subprocess.Popen[str]":
+        """Give a request to a worker's process, in its thread; ClosedError when the pool has been closed."""
+        with self.changed:
             if self.closed:
                 raise ClosedError
-            process = self.latest[threading.get_ident()] = process_for(request)
-            return process
+            return worker.start(request)
 
     def close(self) -> None:
         """End what still runs; nothing is started after this."""
-        with self.lock:
+        with self.changed:
             self.closed = True
-        for process in self.latest.values():
-            process.kill()
-            process.wait()
+            for _, results in self.waiting:
+                results.put(None)
+            self.waiting.clear()
+            self.changed.notify_all()
+            for worker in self.workers:
+                if worker.process is not None:
+                    worker.process.kill()
+                    worker.process.wait()
 
 
 def work_of(request: Request) -> list[Result]:
     """The work of a Dask worker: all results of a request."""
-    return list(results_of(request))
+    with contextlib.closing(Worker()) as worker:
+        return list(results_of(request, worker.start))
 
 
 class DaskPool:

@@ -27,10 +27,16 @@ class ErrorRows(StepWatch):
         self.codes = codes
         self.rows = RowStream("q", 4, False)
         self.before = [list(board.error_totals(codes)) for board in boards]
+        self.images: list[bytes | None] = [None] * len(boards)
 
     def before_step(self, now_ns: int) -> None:
         """Record the errors since the last step."""
         for place, board in enumerate(self.boards):
+            if hasattr(board, "error_image"):  # of a program in C: cheaper to compare than the numbers
+                image = board.error_image(self.codes)
+                if image == self.images[place]:
+                    continue
+                self.images[place] = image
             totals = list(board.error_totals(self.codes))
             if totals == self.before[place]:
                 continue

@@ -12,7 +12,15 @@ from ranger_sim.firmware_sim.counters import as_dict
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.scheduler import SlotScheduler
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, PIN_EDGE, UART_BYTE, EventQueue
+from ranger_sim.foundation.events import (
+    CAN_MODE,
+    CAN_REQUEST,
+    CAN_RX,
+    CAN_TX_DONE,
+    PIN_EDGE,
+    UART_BYTE,
+    EventQueue,
+)
 from ranger_sim.harness.processes.activity import ActivityStore
 from ranger_sim.harness.processes.channel import LONGEST, Bell, Mailbox
 from ranger_sim.harness.processes.kinds import (
@@ -38,12 +46,14 @@ from ranger_sim.harness.processes.places import (
     COMMAND_STOP,
     DAMAGED,
     ERRORS,
+    FRAMES_ONLY,
     LATE_COUNT,
     LATE_MAX,
     LATENESS,
     MAX_SLOT_CYCLES,
     NEXT_OUTPUT,
     NEXT_TIME,
+    NEXT_TRANSMIT,
     NOTE_WORDS,
     OVERRUNS,
     PACE_TIME_NS,
@@ -258,6 +268,7 @@ class Endpoint:
     def _put_out(self) -> cython.bint:
         """Put the board's outputs into the mailbox; True when more is left than fits."""
         out: EventQueue = self.out
+        frames_only: cython.bint = self.block[FRAMES_ONLY] != 0
         while True:
             if self.from_board.used + LONGEST > self.from_board.slots:
                 self.from_board.send()
@@ -265,7 +276,8 @@ class Endpoint:
             if out.take():
                 if out.time < self.promised:
                     self.broke_its_promise()
-                self.from_board.put(out)
+                if not frames_only or CAN_REQUEST <= out.kind <= CAN_MODE:
+                    self.from_board.put(out)
             elif self.pending.take():
                 self.from_board.put(self.pending)
             else:
@@ -281,6 +293,7 @@ class Endpoint:
         # more than the mailbox held goes out in the next turn, whatever that turn is
         self.promised = 0 if self.out.count > 0 else board.quiet_until()
         self.block[NEXT_OUTPUT] = self.promised
+        self.block[NEXT_TRANSMIT] = 0 if self.out.count > 0 else board.earliest_transmit_ns()
         self.block[URGENT] = board.urgent_kinds() & ~self.can_wait
         self.block[SLOT_TIME] = board.latest_slot()
         self.block[SLOT_COUNT] = board.scheduler.slot_count

@@ -24,6 +24,7 @@ ASK_USED: Final = 20  # slots in use of the mailbox to the board
 ROWS: Final = 21  # rows of the stage that were written so far
 POWER_UP: Final = 22  # ns: when a restarted board gets its power
 KEEP_NS: Final = 23  # how much of its activity the board keeps for later readers; 0: as much as fits
+FRAMES_ONLY: Final = 24  # 1: nothing but its controllers is connected, and its other outputs are not sent
 # the board's words
 ANSWERED: Final = 32  # how often the board has rung
 PLANT_SLEEPS: Final = 33
@@ -45,6 +46,7 @@ TURNS: Final = 48
 URGENT: Final = 49  # message kinds (bits) that the board may answer at once
 HELD: Final = 50  # 1 while a debugger has the board, or is awaited: it keeps its turn and does not hang
 RING_ROWS: Final = 51  # slots that were written into the ring so far; the latest may not have ended yet
+NEXT_TRANSMIT: Final = 52  # ns: before this time it puts nothing on a bus, unless an urgent message arrives
 # the supervisor's words
 LET_GO: Final = 55  # 1: the run is to end, debuggers have to let the board go
 # where a program in C was when a signal ended its process: firmware_sim/native/crash.py

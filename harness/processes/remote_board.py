@@ -5,7 +5,9 @@ channel when the board is next asked to run. The board's outputs come back onto 
 request, so that all boards of a window run at the same time; `advance(until)` waits for the answer.
 
 A board is asked only when that can matter. Each answer states a time before which it puts nothing out; before that it
-is left alone, unless an input arrives that may make it answer at once (`urgent_kinds`). It then runs
+is left alone, unless an input arrives that may make it answer at once (`urgent_kinds`). A board whose frames wait for
+its tasks is asked when it may use a bus; for what else it puts out, at the end of a step of the plant, and where nothing
+takes that, not even then. It runs the time that it was left alone for later, with the sensors' values of that time.
 """
 
 import json
@@ -37,8 +39,11 @@ from ranger_sim.harness.processes.places import (
     COMMAND_MORE,
     COMMAND_STOP,
     FATE,
+    FRAMES_ONLY,
     NEXT_OUTPUT,
     NEXT_TIME,
+    NEXT_TRANSMIT,
+    PACED,
     PLANT_SLEEPS,
     RESULT,
     RESULT_MORE,
@@ -48,12 +53,14 @@ from ranger_sim.harness.processes.places import (
     ROWS,
     SLOT_TIME,
     SLOTS,
+    STAGE_RING,
     UNTIL,
     URGENT,
     WAITS,
     WATCHED,
 )
 from ranger_sim.harness.processes.shared_words import load
+from ranger_sim.harness.wiring.board_wires import BoardWires
 
 if TYPE_CHECKING:
     from ranger_sim.harness.processes.stage import Stage
@@ -88,6 +95,9 @@ class RemoteBoard(Board):
     ring_first: cython.longlong
     place: cython.longlong
     silent_until: cython.longlong
+    next_transmit: cython.longlong
+    rows_shown: cython.longlong
+    paced: cython.bint
     urgent: cython.longlong
     turns: cython.longlong
     reached: cython.longlong
@@ -124,6 +134,9 @@ class RemoteBoard(Board):
         self.posted = False
         self.gone = False
         self.silent_until = 0
+        self.next_transmit = 0
+        self.rows_shown = 0  # rows of the stage up to its latest turn
+        self.paced = False
         self.turns = 0
         self.reached = 0
 
@@ -219,7 +232,7 @@ class RemoteBoard(Board):
         """Note that it has a process again, which has run until `now` (ns), and powers up at `power_up_ns`."""
         self.gone = False
         self.next_time = power_up_ns
-        self.silent_until = 0
+        self.silent_until = self.next_transmit = 0
         self.reached = now
 
     def fetch_counters(self) -> None:
@@ -280,6 +293,21 @@ class RemoteBoard(Board):
             raise UserError(f"{self.name} is gone")
         self.inbox.push(time, 0, kind, a, b)
 
+    def earliest_transmit_ns(self) -> cython.longlong:
+        """Earliest time (ns) at which the board can send on a bus, unless an urgent message arrives.
+
+        A board that keeps a pace runs when it has something to do: its lateness is measured.
+        """
+        return self.next_time if self.paced else self.next_transmit
+
+    def can_wait(self, until: cython.longlong) -> cython.bint:
+        """Whether only buses take what it puts out, and its inputs up to `until` (ns) have room until it next runs."""
+        wires: BoardWires = self.outbox
+        if self.paced or self.follows_steps or self.gone or not wires.frames_only():
+            return False
+        self.stage.update()
+        return self.stage.rows - self.rows_shown < STAGE_RING and not self._urgent(until)
+
     @cython.cfunc
     @cython.exceptval(check=False)
     def _urgent(self, until: cython.longlong) -> cython.bint:
@@ -317,10 +345,13 @@ class RemoteBoard(Board):
     @cython.cfunc
     def _ring(self, command: cython.longlong, until: cython.longlong) -> None:
         """Pass the turn on."""
+        wires: BoardWires = self.outbox
         self.to_board.send()
         self.block[COMMAND] = command
         self.block[UNTIL] = until
-        self.block[ROWS] = self.stage.rows
+        self.block[ROWS] = self.rows_shown = self.stage.rows
+        self.block[FRAMES_ONLY] = wires.frames_only()
+        self.paced = self.stage.words[PACED] != 0
         self.reached = until
         self.turns += 1
         self.posted = True
@@ -354,6 +385,7 @@ class RemoteBoard(Board):
         self.private[AWAITED] = 0
         self.next_time = self.block[NEXT_TIME]
         self.silent_until = self.block[NEXT_OUTPUT]
+        self.next_transmit = self.block[NEXT_TRANSMIT]
         self.urgent = self.block[URGENT]
         self.watched_number = self.block[WATCHED]
         self.slot_time = self.block[SLOT_TIME]

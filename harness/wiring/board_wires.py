@@ -180,6 +180,18 @@ class BoardWires(Outbox):
         for controller in CONTROLLERS:
             self._connect_ends(controller)
 
+    @cython.ccall
+    @cython.exceptval(check=False)
+    def frames_only(self) -> cython.bint:
+        """Whether only buses of this machine take what it puts out: no bridge, link, serial line, or observer."""
+        return (
+            self.drive is None
+            and self.watch is None
+            and self.link is None
+            and not self.serial_lines
+            and not self.can_lines
+        )
+
     def connect_drive(self, drive, watchdog_pin, low_side_2_pin, low_side_6_pin) -> None:
         """Connect the board's PWM unit and three of its pins to a bridge."""
         self.drive = drive
