@@ -423,7 +423,7 @@ class SlotScheduler:
 
         `placed`: the task at each place, None at the end of a row.
         `leads`: ns from the start of the task at a place to that of the first one from there that may send, at least;
-        NEVER where none follows in its row. `row_leads`: the same from the start of a row, over the rows that follow it.
+        NEVER where none follows in its row. `row_leads`: the same from the start of a row, over the rows after it.
         """
         schedule = self.schedule
         self.row_count = len(schedule.rows)

@@ -6,7 +6,6 @@ from ranger_sim.firmware_sim.activity import INTERRUPT_RAN, SLOT_ENDED, TASK_RAN
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.scheduler import Occasional, Schedule, Task, Wait
 from ranger_sim.firmware_sim.vic import EXTERNAL_INTERRUPT
-from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import UserError
 from tests.firmware_sim.board import TICK_CYCLES, TICK_NS, Log, kept, raise_at, rows_of
 
