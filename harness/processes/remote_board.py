@@ -7,7 +7,8 @@ request, so that all boards of a window run at the same time; `advance(until)` w
 A board is asked only when that can matter. Each answer states a time before which it puts nothing out; before that it
 is left alone, unless an input arrives that may make it answer at once (`urgent_kinds`). A board whose frames wait for
 its tasks is asked when it may use a bus; for what else it puts out, at the end of a step of the plant, and where
-nothing takes that, not even then. It runs the time that it was left alone for later, with the sensors' values of that time.
+nothing takes that, not even then. It runs the time that it was left alone for later, with the sensors' values of that
+time.
 """
 
 import json
