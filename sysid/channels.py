@@ -175,7 +175,10 @@ def named_for(dataset: Dataset, name: str) -> Dataset:
             repairs.append(Repair(expected.name, "renamed", 0, f"{channel.name} is called {expected.name}"))
         found[expected.name] = dataclasses.replace(channel, name=expected.name, unit=expected.unit, value=value)
         renamed[channel.name] = expected.name
-    return _renamed(dataset, found, renamed, repairs)
+    named = _renamed(dataset, found, renamed, repairs)
+    numbers = {each.name for each in wanted.channels if not each.unit}  # their files need no unit
+    named.findings = [each for each in named.findings if each.kind != "no_unit" or each.channel not in numbers]
+    return named
 
 
 def named_by(dataset: Dataset, quantities: Sequence[Quantity]) -> Dataset:

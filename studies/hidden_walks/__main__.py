@@ -7,6 +7,7 @@ import sys
 
 from threadpoolctl import threadpool_limits
 
+from ranger_sim.sysid.results import TwinsEvidence
 from ranger_sim.tools.command_line.files import replace_file
 from studies.hidden_walks import score
 
@@ -19,6 +20,14 @@ def main() -> int:
     parser.add_argument("--floors", nargs="+", default=list(score.FLOORS_M), choices=list(score.FLOORS_M))
     parser.add_argument("--rows", nargs="+", default=list(score.ROWS), choices=score.ROWS)
     parser.add_argument("--kinds", nargs="+", default=[], help="names of kinds (default: all)")
+    parser.add_argument(
+        "--turns",
+        nargs="+",
+        type=int,
+        default=list(score.TURNS),
+        choices=score.TURNS,
+        help="in a turn every kind walks once on each floor, at one multiple (all: every kind at every multiple)",
+    )
     parser.add_argument("--out", help="JSON file of all answers")
     options = parser.parse_args()
 
@@ -31,15 +40,19 @@ def main() -> int:
             flush=True,
         )
 
+    def alarm(row: str, found: TwinsEvidence) -> None:
+        if found.detected:
+            print(f"sound {row:5s} ALARM {found}", flush=True)
+
     with threadpool_limits(1):
         alarms = {}
         for floor in options.floors:
-            for row, found in score.sound(options.rows, floor, options.seed, options.sound).items():
+            for row, found in score.sound(options.rows, floor, options.seed, options.sound, alarm).items():
                 raised = [each for each in found if each.detected]
                 alarms[row, floor] = len(raised), len(found)
                 names = [f"{each.named.name} at {each.named.at}" if each.named else "no name" for each in raised]
                 print(f"{floor} {row}: {len(raised)} of {len(found)} sound walks raise an alarm {names}", flush=True)
-        cases = score.all_cases(options.seed, options.floors, options.rows, options.kinds, show)
+        cases = score.all_cases(options.seed, options.floors, options.rows, options.kinds, show, options.turns)
     rates = score.table(cases, alarms)
     for each in rates:
         print(json.dumps(each))

@@ -15,6 +15,7 @@ from studies.hidden_walks.kinds import KINDS, Kind
 MULTIPLES = (2.0, 4.0, 8.0)  # of the smallest size that the method says it would detect
 FLOORS_M = {"level": 0.0, "1 mm": 0.001}
 ROWS = ("full", "link", "2015")
+TURNS = tuple(range(len(MULTIPLES)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,10 +46,22 @@ def visible(row: str, floor: str, seed: int) -> dict[str, float]:
     return dict(found.smallest_visible)
 
 
-def sound(rows: Sequence[str], floor: str, seed: int, count: int) -> dict[str, list[TwinsEvidence]]:
+def sound(
+    rows: Sequence[str],
+    floor: str,
+    seed: int,
+    count: int,
+    each: Callable[[str, TwinsEvidence], None] = lambda row, found: None,
+) -> dict[str, list[TwinsEvidence]]:
     """Answers by row about sound walks: other seeds, batteries, bodies within tolerance."""
-    walks = [recorded(each) for each in drawn_sound(floor, seed, count)]
-    return {row: [evidence.of([as_row(each, row)], emulator=emulate)[0] for each in walks] for row in rows}
+    answers: dict[str, list[TwinsEvidence]] = {row: [] for row in rows}
+    for hidden in drawn_sound(floor, seed, count):
+        walk = recorded(hidden)
+        for row in rows:
+            found, _ = evidence.of([as_row(walk, row)], emulator=emulate)
+            answers[row].append(found)
+            each(row, found)
+    return answers
 
 
 def drawn_sound(floor: str, seed: int, count: int) -> list[Hidden]:
@@ -99,17 +112,23 @@ def all_cases(
     rows: Sequence[str],
     kinds: Sequence[str] = (),
     each: Callable[[Case], None] = lambda case: None,
+    turns: Sequence[int] = TURNS,
 ) -> list[Case]:
-    """Every kind at every multiple on every floor, by the full row's smallest sizes."""
+    """Every kind at every multiple on every floor, by the full row's smallest sizes.
+
+    turns: a turn has every kind once on each floor, at a multiple that changes from kind to kind, from floor to floor
+    and from turn to turn; all turns have every kind at every multiple.
+    """
     found = []
-    for floor in floors:
-        least = visible("full", floor, seed)
-        for kind in KINDS:
+    least = {floor: visible("full", floor, seed) for floor in floors}
+    for turn in turns:
+        for number, kind in enumerate(KINDS):
             key = f"{kind.right}: {kind.parameter}"
-            if key not in least or (kinds and kind.name not in kinds):
-                continue
-            for multiple in MULTIPLES:
-                for case in judged(drawn(kind, multiple, least[key], floor, seed), multiple, floor, rows):
+            for floor in floors:
+                if key not in least[floor] or (kinds and kind.name not in kinds):
+                    continue
+                multiple = MULTIPLES[(number + turn + list(FLOORS_M).index(floor)) % len(MULTIPLES)]
+                for case in judged(drawn(kind, multiple, least[floor][key], floor, seed), multiple, floor, rows):
                     found.append(case)
                     each(case)
     return found

@@ -1,6 +1,7 @@
 """Which cause moves a walk away from its sound twins, how far, and since which step."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -131,17 +132,27 @@ class Space:
     def __init__(self, view: View, mean: Mean, weights: Array, without: str = "") -> None:
         self.there = np.isfinite(mean.value)
         self.lower = self._lower(scatter(view, weights, mean.steps, without))
-        nominal = self._lower(scatter(view, weights, mean.steps, nominal=True))
         self.value = self.of(np.nan_to_num(mean.value) - weights @ view.middle)
         self.directions = view.directions
-        vectors = [np.vstack((each.terms, self._beyond_terms(each))) for each in view.directions]
-        self.terms = [self.of(terms.T).T for terms in vectors]
-        # products of the terms where tolerances count nothing: a direction's error goes with its whole length
-        whole = [self.of(terms.T, nominal).T for terms in vectors]
-        self.lengths = [terms @ terms.T for terms in whole]
+        self._vectors = [np.vstack((each.terms, self._beyond_terms(each))) for each in view.directions]
+        self.terms = self._each(self.lower)
         self.steps = sum(mean.steps)
-        # squared length of a nominal robot's noise: what the noise of a direction adds to its own
-        self.noise = float(np.sum(linalg.solve_triangular(self.lower, nominal, lower=True) ** 2))
+        self._of_nominal = functools.partial(scatter, view, weights, mean.steps, nominal=True)
+
+    @functools.cached_property
+    def nominal(self) -> Array:
+        """The lower triangle of the covariance without tolerances."""
+        return self._lower(self._of_nominal())
+
+    @functools.cached_property
+    def lengths(self) -> list[Array]:
+        """Products of the terms where tolerances count nothing: a direction's error goes with its whole length."""
+        return [terms @ terms.T for terms in self._each(self.nominal)]
+
+    @functools.cached_property
+    def noise(self) -> float:
+        """Squared length of a nominal robot's noise: what the noise of a direction adds to its own."""
+        return float(np.sum(linalg.solve_triangular(self.lower, self.nominal, lower=True) ** 2))
 
     def _lower(self, covariance: Array) -> Array:
         part = covariance[np.ix_(self.there, self.there)]
@@ -156,6 +167,23 @@ class Space:
         """A vector of features (or columns of them) in these coordinates, or in those of another covariance."""
         lower = self.lower if lower is None else lower
         return np.asarray(linalg.solve_triangular(lower, vector[self.there], lower=True))
+
+    def _each(self, lower: Array) -> list[Array]:
+        """Every cause's vectors, (3 + k, 2 p) each, in the coordinates of a covariance: solved at once."""
+        if not self._vectors:
+            return []
+        ends = np.cumsum([len(each) for each in self._vectors])[:-1]
+        return np.split(self.of(np.vstack(self._vectors).T, lower).T, ends)
+
+    def most(self) -> float:
+        """What no cause can gain more than, at whatever size: twice the squared part of the walk in a cause's terms.
+
+        `profile` is 2 p b - L + n with L = p G p and n <= L / 2, at most 2 b inv(G) b."""
+        found = 0.0
+        for terms in self.terms:
+            part = terms.T @ np.linalg.lstsq(terms.T, self.value, rcond=None)[0]
+            found = max(found, 2.0 * float(part @ part))
+        return found
 
     def moved(self, number: int, size: float) -> Array:
         """Where a cause of this size moves a sound walk."""
@@ -218,11 +246,14 @@ class Space:
         best = int(np.argmax(gains))
         size, gain = float(sizes[best]), float(gains[best])
         left = max(float(self.value @ self.value) - gain, 0.0) / self.freedom
-        within = sizes[gains > gain - HOLDS * max(1.0, left)]
+        at_best = self._powers(number, np.array([size]))
+        # the walks of the direction have a sound walk's noise as well, less by their steps
+        noise = max(1.0, left) * (1.0 + float(self.error(number, at_best)[0]))
+        within = sizes[gains > gain - HOLDS * noise]
         reach = float(np.hypot(float(np.ptp(within)) / 2.0, SIZE_ERROR * abs(size)))
         middle = 0.5 * (float(within.min()) + float(within.max()))
         low, high = middle - reach, middle + reach
-        unsure = float(self.unsure(number, self._powers(number, np.array([size])))[0])
+        unsure = float(self.unsure(number, at_best)[0])
         return Fit(each, size, min(low, size), max(high, size), gain, left / unsure)
 
     def potential(self, number: int) -> float:
@@ -281,6 +312,8 @@ def judge(
         if part is None:
             continue
         later = Space(view, part, weights)
+        if later.most() <= pays:
+            continue
         tried = later.fits()
         if tried and tried[0].gain > pays and _begins(view, found, onset, weights, tried[0]):
             fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain

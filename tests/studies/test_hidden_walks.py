@@ -46,6 +46,30 @@ def test_the_rates_count_what_was_detected_and_named():
     assert (rates["walks"], rates["detected"], rates["right"], rates["holds"]) == (2, 1, 1, 1)
 
 
+def test_all_turns_have_every_kind_at_every_multiple_and_one_turn_has_it_once(monkeypatch):
+    asked = []
+    sizes = {f"{kind.right}: {kind.parameter}": 0.001 for kind in KINDS}
+    monkeypatch.setattr(score, "visible", lambda row, floor, seed: sizes)
+    monkeypatch.setattr(score, "judged", lambda hidden, multiple, floor, rows: asked.append((hidden, multiple)) or [])
+    score.all_cases(5, ["level", "1 mm"], ["full"], turns=[0])
+    assert len(asked) == 2 * len(KINDS)
+    score.all_cases(5, ["level", "1 mm"], ["full"], turns=[1, 2])
+    cells = {(hidden.kind.name, hidden.floor_m, multiple) for hidden, multiple in asked}
+    assert len(cells) == len(asked) == 6 * len(KINDS)
+
+
+def test_sizes_that_would_have_been_detected_are_a_line_for_each_kind_of_cause():
+    sizes = {"geometry at outer_feet: foot_height_m": 0.00088, "geometry at inner_feet: foot_height_m": 0.0015,
+             "floor at floor: slope_rad": 0.0021}  # fmt: skip
+    lines = twin_words.visible({"smallest_visible": sizes, "cannot_be_seen": ["inertia at body: mass_kg"]})
+    assert lines == [
+        "twins: would have been detected from these sizes on:",
+        "twins:   floor (slope_rad): floor 0.0021",
+        "twins:   geometry (foot_height_m): inner_feet 0.0015, outer_feet 0.00088",
+        "twins: not shown by these channels: inertia at body: mass_kg",
+    ]
+
+
 @pytest.mark.parametrize(
     ("name", "size", "at"),
     [

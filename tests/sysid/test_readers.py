@@ -329,6 +329,12 @@ def test_what_is_odd_in_a_table_is_a_finding(table, text, kind, size):
     assert [each.size for each in found] == [size]
 
 
+def test_a_walks_states_and_contacts_are_numbers_and_need_no_unit(table):
+    text = "t_s,hip_angle_rad,walk_state,outer_contact,spare\n0,1,0,1,5\n1,2,1,0,6\n"
+    named = channels.named_for(table(text), "walk")
+    assert [each.channel for each in named.findings if each.kind == "no_unit"] == ["spare"]
+
+
 @pytest.mark.parametrize(
     ("text", "line"),
     [

@@ -204,6 +204,27 @@ def test_a_larger_effect_never_gains_less(view):
     assert gains == sorted(gains)
 
 
+@pytest.mark.parametrize(("size", "seed"), [(0.0, 9001), (0.3, 9100), (-0.8, 9200)])
+def test_no_cause_gains_more_than_its_bound(view, size, seed):
+    mean = mean_of(step_map.rest(view.legs, *made_up(seed, moved=size), few=True))
+    space = judgement.Space(view, mean, view.weights(0.0))
+    assert 0.0 < max(fit.gain for fit in space.fits()) <= space.most()
+
+
+def test_the_interval_of_a_size_counts_the_noise_of_its_direction(view):
+    """With the error of one walk of as many steps the variance of a size doubles."""
+    mean = mean_of(step_map.rest(view.legs, *made_up(9100, moved=0.3), few=True))
+    widths = []
+    for error in (0.0, 1.0 / 39.0 / 0.3**2):
+        unsure = np.zeros((3, 3))
+        unsure[0, 0] = error
+        made = [dataclasses.replace(each, unsure=unsure) for each in view.directions]
+        fit = judgement.Space(dataclasses.replace(view, directions=tuple(made)), mean, view.weights(0.0)).fit(0)
+        half = 0.5 * (fit.high - fit.low)
+        widths.append(np.sqrt(half**2 - (judgement.SIZE_ERROR * fit.size) ** 2))
+    assert 1.2 < widths[1] / widths[0] < 1.8  # sqrt(2), but for what the direction's noise takes off its length
+
+
 def test_a_cause_that_begins_on_the_way_has_its_first_step(view):
     verdict = judged(view, *made_up(9300, moved=0.5, since=22))
     assert verdict.named.direction.cause == "geometry" and abs(verdict.since - 22) <= 2

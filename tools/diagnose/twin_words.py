@@ -87,12 +87,23 @@ def cause(each: dict[str, Any]) -> str:
 
 
 def visible(found: dict[str, Any]) -> list[str]:
-    """The least sizes that would have been detected."""
-    sizes = [f"{name} {size:.2g}" for name, size in sorted(found["smallest_visible"].items())]
-    out = [f"twins: would have been detected from this size on: {'; '.join(sizes)}"] if sizes else []
+    """The least sizes that would have been detected, a line for each kind of cause."""
+    kinds: dict[str, list[str]] = {}
+    for name, size in sorted(found["smallest_visible"].items()):
+        kind, place, parameter = parts(name)
+        kinds.setdefault(f"{kind} ({parameter})", []).append(f"{place} {size:.2g}")
+    out = ["twins: would have been detected from these sizes on:"] if kinds else []
+    out += [f"twins:   {kind}: {', '.join(sizes)}" for kind, sizes in kinds.items()]
     if found["cannot_be_seen"]:
         out.append(f"twins: not shown by these channels: {'; '.join(found['cannot_be_seen'])}")
     return out
+
+
+def parts(name: str) -> tuple[str, str, str]:
+    """Cause, place and parameter of "cause at place: parameter"."""
+    cause, _, rest = name.partition(" at ")
+    place, _, parameter = rest.partition(": ")
+    return cause, place, parameter
 
 
 def shortened(names: list[str]) -> str:
