@@ -63,7 +63,14 @@ class Campaign:
         return len(self.cells()) * (plan.search.first + plan.search.rounds * plan.search.each)
 
     def run(self, pool: Any, report: Callable[[int, str], None]) -> None:
-        """Run what is missing. It calls `report(done, what)` after every result; `pool`: of pools.py."""
+        """Run what is missing. It calls `report(done, what)` after every result; `pool`: of pools.py, left without
+        processes."""
+        try:
+            self._run(pool, report)
+        finally:
+            pool.release()
+
+    def _run(self, pool: Any, report: Callable[[int, str], None]) -> None:
         plan = self.plan
         self.cases, self.stopped_at = [], None
         if plan.search:

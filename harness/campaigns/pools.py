@@ -117,6 +117,7 @@ class Worker:
     def __init__(self) -> None:
         self.process: subprocess.Popen[str] | None = None
         self.settings: Any = None
+        self.released = False
 
     def start(self, request: Request) -> "subprocess.Popen[str]":
         """Give the request to its process, or to a new one where that has ended."""
@@ -134,7 +135,7 @@ class Worker:
 
 
 class LocalPool:
-    """`jobs` processes of this machine, kept until the pool is closed.
+    """`jobs` processes of this machine, kept until the pool is released or closed.
 
     Each has a thread of its own, which starts it and lives as long: the kernel ends a process with the thread that
     started it (`die_with`).
@@ -175,8 +176,8 @@ class LocalPool:
                 self.waiting = [each for each in self.waiting if each[1] is not results]
 
     def _work(self, worker: Worker) -> None:
-        """One request after another, until the pool is closed."""
-        while (taken := self._next(worker.settings)) is not None:
+        """One request after another, until the worker is released."""
+        while (taken := self._next(worker)) is not None:
             request, results = taken
             try:
                 for result in results_of(request, functools.partial(self._start, worker)):
@@ -186,15 +187,16 @@ class LocalPool:
             except BaseException as error:  # raised where the results are awaited
                 results.put(error)
             results.put(None)
+        worker.close()
 
-    def _next(self, settings: Any) -> "tuple[Request, queue.Queue[Any]] | None":
-        """Wait for a request, rather one with these settings, whose golden run is known; None: the pool is closed."""
+    def _next(self, worker: Worker) -> "tuple[Request, queue.Queue[Any]] | None":
+        """Wait for a request, rather one whose golden run the worker knows; None: it has been released."""
         with self.changed:
-            while not self.waiting and not self.closed:
+            while not self.waiting and not worker.released:
                 self.changed.wait()
-            if self.closed:
+            if worker.released:
                 return None
-            same = [at for at, each in enumerate(self.waiting) if each[0].get("settings") == settings]
+            same = [at for at, each in enumerate(self.waiting) if each[0].get("settings") == worker.settings]
             return self.waiting.pop(same[0] if same else 0)
 
     def _start(self, worker: Worker, request: Request) -> "subprocess.Popen[str]":
@@ -211,11 +213,21 @@ class LocalPool:
             for _, results in self.waiting:
                 results.put(None)
             self.waiting.clear()
-            self.changed.notify_all()
-            for worker in self.workers:
-                if worker.process is not None:
-                    worker.process.kill()
-                    worker.process.wait()
+            self._end_workers()
+
+    def release(self) -> None:
+        """End the processes; a later `run` starts new ones. For a pool whose requests have all been answered."""
+        with self.changed:
+            self._end_workers()
+
+    def _end_workers(self) -> None:
+        for worker in self.workers:
+            worker.released = True
+            if worker.process is not None:
+                worker.process.kill()
+                worker.process.wait()
+        self.workers.clear()
+        self.changed.notify_all()
 
 
 def work_of(request: Request) -> list[Result]:
@@ -282,6 +294,9 @@ class DaskPool:
         finally:
             with contextlib.suppress(self.distributed.comm.CommClosedError):
                 self.client.cancel([future for future in futures if not future.done()])
+
+    def release(self) -> None:
+        """Nothing: a cluster's workers keep no process."""
 
     def close(self) -> None:
         """Leave the cluster; end it when it is our own."""
