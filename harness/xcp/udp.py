@@ -41,6 +41,9 @@ DATAGRAMS_PER_POLL = RULE.read_bytes // RULE.longest
 WAITING = 4096  # packets of measurements kept for the next poll; chosen by us: 2 s of one list at 0.5 ms
 UNKNOWN_PER_POLL = 2  # datagrams; chosen by us: polling those that get no answer takes 10 us
 QUESTIONS = 8  # to the kernel, at once; chosen by us: masters that a person starts and stops
+GONE_S = (
+    1.0  # between two questions whether the master has ended; chosen by us: each takes the kernel's list of sockets
+)
 POLL_NS = 500_000  # virtual time between two polls: the fastest event
 CONNECT, DISCONNECT = 0xFF, b"\xfe"  # codes of commands
 HEADER = struct.Struct("<HH")
@@ -91,6 +94,7 @@ class XcpUdpServer:
         self.allowance = RULE.burst
         self.clock = wallclock.monotonic_s
         self.questions, self.asked_s = float(QUESTIONS), self.clock()  # to the kernel: how many, as of when
+        self.ask_at_s = 0.0  # when to ask next whether the master has ended
         self.sampling = _Sampling(self)
         robot.loop.watchers.append(self.sampling)
 
@@ -106,6 +110,10 @@ class XcpUdpServer:
 
     def poll(self, now_ns: int) -> int:
         """Handle commands that have arrived and send waiting measurements; returns the next poll's time, ns."""
+        if self.master is not None and self.clock() >= self.ask_at_s:
+            self.ask_at_s = self.clock() + GONE_S
+            if self._master_is_gone():
+                self._disconnect(now_ns)
         while self.waiting:
             self._send(self.waiting.popleft())
         self.allowance, self.left_over = RULE.burst, False
@@ -148,8 +156,7 @@ class XcpUdpServer:
         if not self._may_ask():
             return FULL
         if self._master_is_gone():
-            self.slave.command(DISCONNECT, now_ns)
-            self._leave()
+            self._disconnect(now_ns)
         return self._fault_of(sender)
 
     def _may_ask(self) -> bool:
@@ -161,6 +168,11 @@ class XcpUdpServer:
             return False
         self.questions -= 1.0
         return True
+
+    def _disconnect(self, now_ns: int) -> None:
+        """End the session of a master that did not."""
+        self.slave.command(DISCONNECT, now_ns)
+        self._leave()
 
     def _leave(self) -> None:
         """Release the master's place."""
@@ -178,6 +190,7 @@ class XcpUdpServer:
         """
         self._leave()
         self.master = master
+        self.ask_at_s = self.clock() + GONE_S
         own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)

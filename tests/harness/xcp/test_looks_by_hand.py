@@ -97,6 +97,20 @@ def test_a_master_that_has_ended_without_a_word_gives_its_place_to_the_next(serv
     assert asks(server, CONNECT, sender=ME) == []  # of another machine nothing is known
 
 
+def test_a_master_that_has_ended_leaves_its_place_within_a_second_without_another_client(server):
+    asks(server, CONNECT)
+    server.now_s += 1.5
+    server.poll(0)
+    assert server.master == ME and server.slave.connected
+    del server.owners[ME]
+    server.now_s += 0.5
+    server.poll(1)
+    assert server.master == ME
+    server.now_s += 0.6
+    server.poll(2)
+    assert server.master is None and not server.slave.connected
+
+
 def test_a_client_that_is_unknown_or_of_another_user_is_not_answered(server):
     server.owners = {OTHER: 8}
     assert asks(server, CONNECT) == asks(server, CONNECT, sender=OTHER) == []
