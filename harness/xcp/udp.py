@@ -41,9 +41,7 @@ DATAGRAMS_PER_POLL = RULE.read_bytes // RULE.longest
 WAITING = 4096  # packets of measurements kept for the next poll; chosen by us: 2 s of one list at 0.5 ms
 UNKNOWN_PER_POLL = 2  # datagrams; chosen by us: polling those that get no answer takes 10 us
 QUESTIONS = 8  # to the kernel, at once; chosen by us: masters that a person starts and stops
-GONE_S = (
-    1.0  # between two questions whether the master has ended; chosen by us: each takes the kernel's list of sockets
-)
+GONE_S = 1.0  # between two questions whether the master has ended; chosen by us: the kernel lists its sockets for it
 POLL_NS = 500_000  # virtual time between two polls: the fastest event
 CONNECT, DISCONNECT = 0xFF, b"\xfe"  # codes of commands
 HEADER = struct.Struct("<HH")
