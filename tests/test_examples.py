@@ -51,7 +51,7 @@ IN_A_PROJECT = "docs/testing.md"
 # Its machine diagnoses hidden effects: sysid/test_machines_of_a_user.py.
 A_MACHINE = "docs/diagnose-your-machine.md"
 # Their commands are run in a folder of their own: tests/pages.
-PAGES = {"docs/how-to/mujoco.md", "docs/how-to/fmu-body.md"}
+PAGES = {"docs/how-to/canopen-drive.md", "docs/how-to/mujoco.md", "docs/how-to/fmu-body.md"}
 
 
 def examples(name):

@@ -118,6 +118,7 @@ class Worker:
         self.process: subprocess.Popen[str] | None = None
         self.settings: Any = None
         self.released = False
+        self.thread: threading.Thread | None = None
 
     def start(self, request: Request) -> "subprocess.Popen[str]":
         """Give the request to its process, or to a new one where that has ended."""
@@ -137,7 +138,7 @@ class Worker:
 class LocalPool:
     """`jobs` processes of this machine, kept until the pool is released or closed.
 
-    Each has a thread of its own, which starts it and lives as long: the kernel ends a process with the thread that
+    Each has a separate thread, which starts it and lives as long: the kernel ends a process with the thread that
     started it (`die_with`).
     """
 
@@ -157,8 +158,10 @@ class LocalPool:
                 return
             self.waiting += [(request, results) for request in requests]
             while len(self.workers) < min(self.jobs, len(requests)):
-                self.workers.append(Worker())
-                threading.Thread(target=self._work, args=(self.workers[-1],), daemon=True).start()
+                worker = Worker()
+                worker.thread = threading.Thread(target=self._work, args=(worker,), daemon=True)
+                worker.thread.start()
+                self.workers.append(worker)
             self.changed.notify_all()
         left = len(requests)
         try:
@@ -202,7 +205,7 @@ class LocalPool:
     def _start(self, worker: Worker, request: Request) -> "subprocess.Popen[str]":
         """Give a request to a worker's process, in its thread; ClosedError when the pool has been closed."""
         with self.changed:
-            if self.closed:
+            if self.closed or worker.released:
                 raise ClosedError
             return worker.start(request)
 
@@ -213,21 +216,20 @@ class LocalPool:
             for _, results in self.waiting:
                 results.put(None)
             self.waiting.clear()
-            self._end_workers()
+        self.release()
 
     def release(self) -> None:
         """End the processes; a later `run` starts new ones. For a pool whose requests have all been answered."""
         with self.changed:
-            self._end_workers()
-
-    def _end_workers(self) -> None:
-        for worker in self.workers:
-            worker.released = True
-            if worker.process is not None:
-                worker.process.kill()
-                worker.process.wait()
-        self.workers.clear()
-        self.changed.notify_all()
+            ended, self.workers = self.workers, []
+            for worker in ended:
+                worker.released = True
+                if worker.process is not None:
+                    worker.process.kill()
+            self.changed.notify_all()
+        for worker in ended:  # each closes its pipes
+            if worker.thread is not None and worker.thread is not threading.current_thread():
+                worker.thread.join()
 
 
 def work_of(request: Request) -> list[Result]:

@@ -302,7 +302,7 @@ class RemoteBoard(Board):
         return self.next_time if self.paced else self.next_transmit
 
     def can_wait(self, until: cython.longlong) -> cython.bint:
-        """Whether only buses take what it puts out, and its inputs up to `until` (ns) have room until it next runs."""
+        """Whether only buses take what it puts out, and its inputs up to `until` (ns) fit until it next runs."""
         wires: BoardWires = self.outbox
         if self.paced or self.follows_steps or self.gone or not wires.frames_only():
             return False
@@ -346,12 +346,12 @@ class RemoteBoard(Board):
     @cython.cfunc
     def _ring(self, command: cython.longlong, until: cython.longlong) -> None:
         """Pass the turn on."""
-        wires: BoardWires = self.outbox
+        wires: BoardWires | None = self.outbox if isinstance(self.outbox, BoardWires) else None
         self.to_board.send()
         self.block[COMMAND] = command
         self.block[UNTIL] = until
         self.block[ROWS] = self.rows_shown = self.stage.rows
-        self.block[FRAMES_ONLY] = wires.frames_only()
+        self.block[FRAMES_ONLY] = wires is not None and wires.frames_only()
         self.paced = self.stage.words[PACED] != 0
         self.reached = until
         self.turns += 1

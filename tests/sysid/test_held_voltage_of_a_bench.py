@@ -16,7 +16,7 @@ SETTLES_S = J / (K * K / R + C)
 
 
 def turned(held):
-    """Voltages that move about 6 V, held over each row or on straight lines; the motor never stands still."""
+    """Voltages that move about 6 V, held over each row or on straight lines; its speed keeps its sign."""
     rows = np.arange(ROWS + 1)
     volts = 6.0 + 2.5 * np.sin(2.0 * np.pi * 2.3 * STEP_S * rows) + np.sin(2.0 * np.pi * 0.7 * STEP_S * rows)
     places = np.arange(ROWS * FINE) / FINE

@@ -12,8 +12,8 @@ import sys
 import can
 import pytest
 
+from ranger_sim.can_bus.edge.lockstep_bus import LockstepBus
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.harness.outside.lockstep_bus import LockstepBus
 from ranger_sim.harness.outside.machine import put_on
 from ranger_sim.tools import cli
 from ranger_sim.tools.new import drives
