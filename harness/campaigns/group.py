@@ -2,9 +2,9 @@
 
     python -m ranger_sim.harness.campaigns.group     # requests as lines of JSON in, one result a line out
 
-The process has one thread, so it may fork; whatever distributes the groups (threads, Dask's workers) starts one process
-for each group. A fault's run branches off `BRANCH_EARLY_NS` before the fault begins in the golden run, so that the walk
-before it is computed once per group; a sweep of settings differs from power-up on and branches there. Where the system
+The process has one thread, so it may fork; threads of the command give it one group after another, Dask's workers one
+group. A fault's run branches off `BRANCH_EARLY_NS` before the fault begins in the golden run, so that the walk
+before it is computed once; a sweep of settings differs from power-up on and branches there. Where the system
 cannot fork, on Windows, each run walks from power-up, with the same result.
 """
 
