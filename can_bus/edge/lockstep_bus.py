@@ -13,7 +13,7 @@ import can
 
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
 from ranger_sim.can_bus.edge.taps import FULL, NOT_ON_BUS, RECEIVED, Taps, fault_of_frame
-from ranger_sim.foundation.user_error import UserError, unknown
+from ranger_sim.foundation.user_error import BusError, UserError, unknown
 
 LEAST_NS = 1000  # a time that `run_for` certainly passes
 SLICE_NS = 100_000  # virtual time between two looks at the bus; chosen by us: two frames of 1 Mbit/s
@@ -25,7 +25,7 @@ class LockstepBus(can.BusABC):
     def __init__(self, machine: Any, bus: str = "can1", **options: Any) -> None:
         buses = {each.name: each for each in machine.buses}
         if bus not in buses:
-            raise UserError(unknown("bus", bus, buses))
+            raise BusError(unknown("bus", bus, buses))
         self.machine = machine
         self.taps = Taps(buses[bus])
         self.taps.time = machine.loop.time

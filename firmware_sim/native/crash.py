@@ -100,6 +100,8 @@ def describe(library: pathlib.Path, sources: pathlib.Path, record: Sequence[int]
         return f"{what}, outside of the program's code"
     lines = lines_of(library, sources, places)
     once = [line for i, line in enumerate(lines) if line not in lines[:i]]  # a recursion is reported once
+    if number == ASKED:  # the call of the header that it was in at that moment says nothing of the endless loop
+        once = [line for line in once if " at runtime.c:" not in line] or once
     return f"{what} in {', called from '.join(once)}"
 
 
