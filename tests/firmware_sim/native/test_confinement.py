@@ -267,7 +267,7 @@ def test_a_board_that_writes_over_all_shared_memory_that_it_can_write_changes_no
         source = program(SCRIBBLING.replace("SCRIBBLES", str(scribbles)))[0]
         folder = folder_with(tmp_path / f"fw{scribbles}", "#define _GNU_SOURCE\n" + source, MANIFEST)
         out = tmp_path / f"run{scribbles}"
-        done, found = walked(folder, "--firmware", f"MCFI={other}", "--board-deadline", "500ms", "--out", str(out))
+        done, found = walked(folder, "--firmware", f"MCFI={other}", "--board-deadline", "3s", "--out", str(out))
         assert found, done.stderr
         assert "MCFI" not in found["failed_boards"], done.stderr
         (text,) = out.rglob("printed*MCH*")
