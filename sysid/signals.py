@@ -121,6 +121,41 @@ def resting(table: Table, rate: Array, share: float = 0.01, shortest_s: float = 
     return out
 
 
+def lattice_step(value: Array) -> float:
+    """The finest step of a quantised or printed channel; 0 when its values are not on a lattice."""
+    different = np.unique(value[np.isfinite(value)])
+    if len(different) < 4:
+        return 0.0
+    different = different[:20_000]
+    gaps = np.diff(different)
+    gaps = gaps[gaps > 1e-9 * (different[-1] - different[0])]
+    small = gaps[gaps < 1.5 * np.percentile(gaps, 5.0)]
+    step = float(np.median(small))
+    counts = np.concatenate(([0.0], np.cumsum(np.round(gaps / step))))
+    if (np.round(gaps / step) < 1.0).any():
+        return 0.0
+    places = np.concatenate(([0.0], np.cumsum(gaps)))
+    step = float(counts @ places / (counts @ counts))
+    off = places / step - counts
+    return step if float(np.sqrt(np.mean((off - off.mean()) ** 2))) < 0.15 else 0.0
+
+
+def on_one_count(table: Table, column: Array, rows: int) -> np.ndarray:
+    """True where a column in counts stays on one of them, or between two, for `rows` rows about each: (n,).
+
+    What it is rounded by is then one error for all of these rows, which noise from row to row does not show.
+    """
+    step = lattice_step(column)
+    if not step > 0.0:
+        return np.zeros(len(column), dtype=bool)
+
+    def reach(part: Array) -> Array:
+        highest = ndimage.maximum_filter1d(part, rows, mode="nearest")
+        return np.asarray(highest - ndimage.minimum_filter1d(part, rows, mode="nearest"))
+
+    return per_run(table, reach, column) < 1.5 * step
+
+
 def clipped(table: Table, column: Array) -> np.ndarray:
     """True where a measured column is cut off at its largest or its smallest value.
 

@@ -46,19 +46,18 @@ from ranger_sim.sysid.machines.ankle_motion import (
     PARAMETERS,
     RATE_FILTER_S,
     ROTOR,
-    SMOOTHED,
-    STANDING,
     STIFFNESS,
     TORQUE,
     USUAL,
     VISCOUS,
+    SIGN_WIDTH,
     ZERO,
     Drive,
     Motion,
     REST_rad,
 )
 from ranger_sim.sysid.machines.forms import bristles
-from ranger_sim.sysid.regression import Regression
+from ranger_sim.sysid.regression import ORDER, Regression
 
 # of the robot's foot-inertia logs, which do not record them (robot.md C6.2)
 STIFFNESS_A_per_rad, DAMPNESS_As_per_rad = 11.219, 1.634
@@ -76,6 +75,7 @@ INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing gives the sum o
 # whose disc is off centre by more than 2 % of its radius does not read.
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
 LATEST_s = 0.05  # of a command, as of the target's `LATE`: 25 of the robot's frames. A longer delay is another fault
+NARROWEST_rad_s = 0.003  # of friction's sign: below it, it is dry
 MOVES_TO_Hz = 10.0  # five times the fastest sine: above it, the angles' residual is noise
 SLOW = 5.0  # times the innovation from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
 SLOWEST_NOISE = 0.9  # largest row-to-row (12 ms) memory of the base's residual that is noise; more is an effect's
@@ -104,6 +104,7 @@ SPREAD = {
     LATE: 0.002,
     BALANCE: 0.15 * USUAL[STIFFNESS],
     CONSTANT: 0.1 * USUAL[CONSTANT],
+    SIGN_WIDTH: 0.02,
 }
 # Where only the joint is measured and the model's error is far above the noise, that error affects every value: then
 # springs and friction are free, the rest is known to about half of itself, and no value is reported as wrong.
@@ -117,6 +118,7 @@ LOOSE = {
     LATE: SPREAD[LATE],
     BALANCE: 0.01 * USUAL[STIFFNESS],
     CONSTANT: 0.01 * USUAL[CONSTANT],
+    SIGN_WIDTH: 0.02,
 }
 LOGGED_LATE_S = 0.0001  # where the log has the command itself
 # Wrong values, by the parameter whose sensitivity they have: cause, place, coefficient. The coefficient is the
@@ -254,6 +256,7 @@ class Ankle:
         Known(LATE, "s", USUAL[LATE], -0.01, 0.05, "of the target in force behind the logged one"),
         Known(BALANCE, "N m/rad", USUAL[BALANCE], -5.0, 5.0, "of the spring at the motor"),
         Known(CONSTANT, "N m/A", USUAL[CONSTANT], 0.05, 6.0, "of the motor behind the gear"),
+        Known(SIGN_WIDTH, "rad/s", USUAL[SIGN_WIDTH], NARROWEST_rad_s, 1.0, "rate about which friction changes its sign"),
     )
 
     def prepare(self, table: Table) -> AnkleRecording:
@@ -316,13 +319,15 @@ def _recording(fit: "_Fit") -> AnkleRecording:
     )
     recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
     recording.values = dict(fit.values)
-    recording.priors = {name: (fit.usual[name], spread) for name, spread in fit.spread.items()}
+    known = [name for name in PARAMETERS if not (fit.dry and name == SIGN_WIDTH)]  # dry friction has no width
+    recording.priors = {name: (fit.usual[name], each) for name, each in fit.spread.items() if name in known}
     if fit.of_program:
         recording.findings.append(_program_found(table))
     if fit.filter_s:
         recording.findings.append(_filter_found(table))
     s = recording.signals = _signals(table, fit.runs)
-    valid = fit.valid
+    # a joint that rests on a count shows one error of rounding at all of its rows
+    valid = fit.valid & ~signals.on_one_count(table, table["joint_angle_rad"], ORDER * EVERY)
     sensitivity = np.zeros((len(table), ankle_motion.STATES, len(PARAMETERS)))
     for run in fit.runs:
         slopes = ankle_motion.sensitivities(run.motion)
@@ -332,7 +337,7 @@ def _recording(fit: "_Fit") -> AnkleRecording:
     bare: dict[str, Array] = {}  # responses without the contribution of the effects in the simulation
 
     def equation(name: str, letter: str, subsystem: str, missed: Array, slopes: Array) -> None:
-        columns = {each: slopes[:, PARAMETERS.index(each)] for each in PARAMETERS}
+        columns = {each: slopes[:, PARAMETERS.index(each)] for each in known}
         response = missed + sum(fit.values[each] * column for each, column in columns.items())
         for acting in fit.acting:  # a cause in the simulation is named again, about a motion that includes it
             made = _made(recording, acting.shape, acting.effect)
@@ -496,7 +501,7 @@ class _Fit:
         self.loose, self.far, self.memory = False, FAR, MEMORY
         self.known_late = {LATE: LOGGED_LATE_S} if "command_current_A" in table else {}
         self.spread = SPREAD | self.known_late
-        self.creep_rad_s, self.filter_s = SMOOTHED, RATE_FILTER_S if of_program else 0.0
+        self.dry, self.filter_s = False, RATE_FILTER_S if of_program else 0.0
         self.all = [*PARAMETERS, *self.extra]
         self.values = dict(self.usual)
         K, D = _gains(table)
@@ -552,7 +557,7 @@ class _Fit:
         other.runs = [dataclasses.replace(run) for run in self.runs]
         other.loose, other.far, other.memory = True, FAR_LOOSE, MEMORY_LOOSE
         other.spread = LOOSE | other.known_late
-        other._made_so(SMOOTHED, self.filter_s)
+        other._made_so(False, self.filter_s)
         other.improve()
         return other
 
@@ -648,15 +653,15 @@ class _Fit:
                 found.append(self._state())
         if found:
             self._take(*min(found, key=lambda each: each[0])[1:])
-        self._if_better(creep_rad_s=STANDING)
+        self._if_better(dry=True)
         if self.filter_s:
             self._if_better(filter_s=0.0, by=CLEARLY)
         self._settle()
 
-    def _if_better(self, creep_rad_s: float | None = None, filter_s: float | None = None, by: float = 0.0) -> None:
+    def _if_better(self, dry: bool | None = None, filter_s: float | None = None, by: float = 0.0) -> None:
         """Keep another friction or law where it lowers the cost by at least `by`, each at its best values."""
-        was, old = self._state(), (self.creep_rad_s, self.filter_s)
-        self._made_so(old[0] if creep_rad_s is None else creep_rad_s, old[1] if filter_s is None else filter_s)
+        was, old = self._state(), (self.dry, self.filter_s)
+        self._made_so(old[0] if dry is None else dry, old[1] if filter_s is None else filter_s)
         moved = self._moved(self.values)
         if moved is not None:
             self._take(self.values, *moved)
@@ -665,9 +670,9 @@ class _Fit:
             self._made_so(*old)
             self._take(*was[1:])
 
-    def _made_so(self, creep_rad_s: float, filter_s: float) -> None:
-        """Set the speed over which friction changes its sign, and the filter of the rate that the law uses."""
-        self.creep_rad_s, self.filter_s = creep_rad_s, filter_s
+    def _made_so(self, dry: bool, filter_s: float) -> None:
+        """Set whether the motor stands in dry friction, and the filter of the rate that the law uses."""
+        self.dry, self.filter_s = dry, filter_s
         for run in self.runs:
             run.drive = dataclasses.replace(run.drive, filter_s=filter_s)
 
@@ -732,7 +737,7 @@ class _Fit:
                     values,
                     self._start(run.rows, values),
                     self._torques(run, values),
-                    self.creep_rad_s,
+                    self.dry,
                     run.motion.pushed,
                 )
                 for run in self.runs
@@ -759,7 +764,7 @@ class _Fit:
 
     def held_as(self, other: "_Fit") -> None:
         """Take the values of another fit, with its friction and its law."""
-        self._made_so(other.creep_rad_s, other.filter_s)
+        self._made_so(other.dry, other.filter_s)
         moved = self._moved(other.values)
         if moved is None:
             raise ModelError(f"{self.table.name}: the ankle cannot be simulated with these values")

@@ -18,28 +18,26 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy.linalg import lapack
 
 from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import body_files
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR
 from ranger_sim.sysid.dataset import Array
+from ranger_sim.sysid.machines import ankle_steps
 
 STEP_S = 0.002  # longest step: the cable's mode with the foot, 100 1/s, is within 0.4 % of its frequency
 STATES = 6  # p, u, a, w; the rate r that the law uses, the current I
-BELOW, ABOVE = 2 * STATES - 1, STATES - 1  # the matrix's bands: the states at two steps
-MOST_STEPS = 60  # iterations for the friction of one step
 MOST_ROUNDS = 30  # rounds with torques added to the base: each leaves some per cent of the change of the round before
 NEAR = 1e-6  # rad, change in the last round
-CLEAR = 19.0  # speeds over which friction changes its sign: beyond it tanh is 1
-FASTEST_rad_s, FARTHEST_rad = 1e3, 1e2  # beyond these no geared machine moves
+FARTHEST_rad = 1e2  # beyond it no geared machine moves
 
 (
-    INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG, LATE, BALANCE, CONSTANT,
+    INERTIA, STIFFNESS, TORQUE, COULOMB, VISCOUS, LOAD, CABLE, ROTOR, ZERO, LAG, LATE, BALANCE, CONSTANT, SIGN_WIDTH,
 ) = PARAMETERS = (
     "inertia_kg_m2", "return_stiffness_Nm_per_rad", "return_torque_Nm", "coulomb_friction_Nm", "viscous_friction_Nms",
     "load_friction", "cable_stiffness_Nm_per_rad", "rotor_inertia_kg_m2", "joint_zero_rad",
     "law_lag_s", "target_late_s", "motor_spring_Nm_per_rad", "torque_constant_Nm_per_A",
+    "friction_width_rad_s",
 )  # fmt: skip
 BODY = body_files.load("ranger")
 REST_rad = BODY.parameters.ankle_return_rest_rad
@@ -59,11 +57,9 @@ USUAL = {
     LATE: 0.0,
     BALANCE: 0.0,
     CONSTANT: BODY.electrics.inner_ankle.gear * BODY.electrics.inner_ankle.torque_constant_Nm_per_A,
+    SIGN_WIDTH: ANKLE_MOTOR.friction_smoothing_rad_s,
 }
 RATE_FILTER_S = 0.00775  # of the board's rate: robot.md N4.1
-# Speeds over which friction changes its sign: the simulator's, and nearly zero, for a motor that sticks in its friction
-# (chosen by us: 2 mrad/s creep by 0.5 mrad in a quarter of a second, the noise of the robot's encoders).
-SMOOTHED, STANDING = ANKLE_MOTOR.friction_smoothing_rad_s, 0.002
 
 Values = Mapping[str, float]
 
@@ -81,8 +77,8 @@ class Drive:
 
 @dataclasses.dataclass
 class Motion:
-    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: the friction's tanh,
-    all of shape (m,) at every step; slopes: rates of p, u, a, w; rows: the steps that the log has; later: change of the
+    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit,
+    -1 to 1; all of shape (m,) at every step; standing: the motor's friction is dry, and holds it; slopes: rates of p, u, a, w; rows: the steps that the log has; later: change of the
     current for a lag longer by 1 s; behind: for a target later by 1 s."""
 
     time_s: Array
@@ -91,9 +87,10 @@ class Motion:
     later: Array
     behind: Array
     sliding: Array
+    standing: np.ndarray
     rows: slice
     values: dict[str, float]
-    factors: tuple
+    steps: "_Steps"
     pushed: tuple[Array, Array] | None = None  # torques added to the base at motor and foot
 
     @property
@@ -140,17 +137,19 @@ class Motion:
         right[1:, 3] = half / self.values[INERTIA] * (at_foot[1:] + at_foot[:-1])
         if at_current is not None:
             right[1:, 5] = at_current[1:]
-        return _solved(self.factors, right.reshape(STATES * steps, count)).reshape(steps, STATES, count)
+        return self.steps.answers(self, right)
 
 
 Torques = Callable[[Motion], tuple[Array, Array]]  # (m,) at the motor and at the foot
 
 
 def sensitivities(motion: Motion) -> Array:
-    """Derivatives of the states by PARAMETERS: (m, 6, 13)."""
+    """Derivatives of the states by PARAMETERS: (m, 6, 14)."""
     none = np.zeros_like(motion.p)
     GK, k_s = motion.values[CONSTANT], none + motion.values[CABLE]
-    load = np.abs(motion.I)
+    load, width = np.abs(motion.I), motion.values[SIGN_WIDTH]
+    bound = motion.values[COULOMB] + motion.values[LOAD] * GK * load
+    bend = none if motion.steps.dry else bound * (1.0 - motion.sliding**2) * motion.u / width**2
     pushes = {  # at the motor, at the foot
         INERTIA: (none, -motion.slopes[3]),
         STIFFNESS: (none, REST_rad - motion.a),
@@ -165,6 +164,7 @@ def sensitivities(motion: Motion) -> Array:
         LATE: (none, none),
         BALANCE: (-motion.p, none),
         CONSTANT: (motion.I - motion.values[LOAD] * motion.sliding * load, none),
+        SIGN_WIDTH: (bend, none),
     }
     at_motor, at_foot = zip(*(pushes[name] for name in PARAMETERS), strict=True)
     at_current = np.zeros((len(none), len(PARAMETERS)))
@@ -178,11 +178,11 @@ def simulated(
     values: Values,
     start: Sequence[float],
     torques: Torques | None = None,
-    creep_rad_s: float = SMOOTHED,
+    dry: bool = False,
     before: tuple[Array, Array] | None = None,
 ) -> Motion:
-    """The motion under `drive` from p, u, a, w = `start`. creep_rad_s: over which friction changes its sign. before:
-    the torques of a motion near this one.
+    """The motion under `drive` from p, u, a, w = `start`. dry: the motor stands in its friction, whose sign has no
+    width. before: the torques of a motion near this one.
 
     Raise UserError when these values give a motion that no machine could make.
     """
@@ -193,16 +193,17 @@ def simulated(
     none = np.zeros_like(time_s)
     values = {**USUAL, **values}
     command = np.interp(time_s - values[LATE], drive.time_s, drive.command_A)
-    steps = _Steps(drive, values, step_s / parts, command, creep_rad_s)
+    steps = _Steps(drive, values, step_s / parts, command, dry)
     pushed: tuple[Array, Array] = before if torques and before is not None else (none, none)
-    motion = Motion(
-        time_s, steps.walked(*pushed, start), none, none, none, none, slice(None, None, parts), steps.values, ()
-    )
+    states, sliding = steps.walked(*pushed, start)
+    nowhere = np.zeros(len(none), dtype=bool)
+    rows = slice(None, None, parts)
+    motion = Motion(time_s, states, none, none, none, sliding, nowhere, rows, steps.values, steps)
     for _ in range(MOST_ROUNDS if torques else 0):
         assert torques is not None
         steps.complete(motion, *pushed)
         pushed, was = torques(motion), motion.states
-        motion.states = steps.walked(*pushed, start)
+        motion.states, motion.sliding = steps.walked(*pushed, start)
         if not np.max(np.abs(motion.states[[0, 2]] - was[[0, 2]])) > NEAR:  # or the motion has diverged
             break
     motion.pushed = pushed
@@ -211,15 +212,14 @@ def simulated(
         raise ModelError(
             "the ankle's motion cannot be simulated with " + ", ".join(f"{k} {v:.3g}" for k, v in values.items())
         )
-    motion.factors = steps.factors(motion)
     return motion
 
 
 class _Steps:
     """The equations of one step of h seconds: ends x_1 = starts x_0 + pushed - friction, six states."""
 
-    def __init__(self, drive: Drive, values: dict[str, float], h: float, command: Array, creep_rad_s: float) -> None:
-        self.drive, self.values, self.h, self.command, self.creep_rad_s = drive, values, h, command, creep_rad_s
+    def __init__(self, drive: Drive, values: dict[str, float], h: float, command: Array, dry: bool) -> None:
+        self.drive, self.values, self.h, self.command, self.dry = drive, values, h, command, dry
         k_s, k_r, rotor, inertia = values[CABLE], values[STIFFNESS], values[ROTOR], values[INERTIA]
         rates = np.zeros((4, STATES))  # of p, u, a, w by the states, without friction
         rates[0, 1] = rates[2, 3] = 1.0
@@ -248,105 +248,60 @@ class _Steps:
         bias = values[TORQUE] + values[STIFFNESS] * REST_rad
         return np.array([none, (at_motor - zero) / values[ROTOR], none, (zero + bias + at_foot) / values[INERTIA]])
 
-    def walked(self, at_motor: Array, at_foot: Array, start: Sequence[float]) -> Array:
-        """States (6, m), step by step: first without friction at a step's end, and then with it."""
-        values, drive = self.values, self.drive
+    def walked(self, at_motor: Array, at_foot: Array, start: Sequence[float]) -> tuple[Array, Array]:
+        """States (6, m), and the friction over its limit (m,), step by step."""
+        values, drive, count = self.values, self.drive, len(self.command)
         p, u, a, w = start
-        r = u
-        I = float(self.command[0]) - drive.stiffness_A_per_rad * p - drive.dampness_As_per_rad * r  # noqa: E741
+        I = float(self.command[0]) - drive.stiffness_A_per_rad * p - drive.dampness_As_per_rad * u  # noqa: E741
         rates = self.pushed(at_motor, at_foot)
-        right = np.zeros((STATES, len(self.command) - 1))
+        right = np.zeros((STATES, count - 1))
         right[:4] = 0.5 * self.h * (rates[:, 1:] + rates[:, :-1])
         right[5] = self.takes * self.command[1:]
         inverse = np.linalg.inv(self.ends)
-        forced = (inverse @ right).T.tolist()
-        (p0, p1, p2, p3, p4, p5), (u0, u1, u2, u3, u4, u5), (a0, a1, a2, a3, a4, a5), (w0, w1, w2, w3, w4, w5), (
-            r0, r1, r2, r3, r4, r5), (I0, I1, I2, I3, I4, I5) = (inverse @ self.starts).tolist()  # fmt: skip
-        by_p, by_u, by_a, by_w, by_r, by_I = (self.h / values[ROTOR] * inverse[:, 1]).tolist()  # of a torque there
-        C_0, m, creep_rad_s = values[COULOMB], values[LOAD] * values[CONSTANT], self.creep_rad_s
-        clear = CLEAR * creep_rad_s
-        out = [(p, u, a, w, r, I)]
-        for f0, f1, f2, f3, f4, f5 in forced:
-            free = u0 * p + u1 * u + u2 * a + u3 * w + u4 * r + u5 * I + f1
-            current = I0 * p + I1 * u + I2 * a + I3 * w + I4 * r + I5 * I + f5
-            # y = (C_0 + m |current - by_I y|) tanh((free - by_u y) / creep): at full slip first
-            way = 1.0 if free > 0.0 else -1.0
-            loads = m if current > by_I * way * C_0 else -m  # by the sign of the current with that friction
-            y = way * (C_0 + loads * current) / (1.0 + loads * by_I * way)
-            if way * (free - by_u * y) < clear:
-                y = _friction(free, by_u, current, -by_I, C_0, m, creep_rad_s)
-            p, u, a, w, r, I = (  # noqa: E741
-                p0 * p + p1 * u + p2 * a + p3 * w + p4 * r + p5 * I + f0 - by_p * y,
-                free - by_u * y,
-                a0 * p + a1 * u + a2 * a + a3 * w + a4 * r + a5 * I + f2 - by_a * y,
-                w0 * p + w1 * u + w2 * a + w3 * w + w4 * r + w5 * I + f3 - by_w * y,
-                r0 * p + r1 * u + r2 * a + r3 * w + r4 * r + r5 * I + f4 - by_r * y,
-                current - by_I * y,
-            )
-            if not -FASTEST_rad_s < u < FASTEST_rad_s:
-                gone = (math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
-                out += [gone] * (len(self.command) - len(out))
-                break
-            out.append((p, u, a, w, r, I))
-        return np.array(out).T
+        loads, width = values[LOAD] * values[CONSTANT], 0.0 if self.dry else values[SIGN_WIDTH]
+        states, braking = np.full((count, STATES), math.nan), np.zeros(count)
+        states[0] = p, u, a, w, u, I
+        ankle_steps.walk(
+            memoryview((inverse @ self.starts).ravel()),
+            memoryview(np.ascontiguousarray((inverse @ right).T).ravel()),
+            memoryview(self.h / values[ROTOR] * inverse[:, 1].copy()),  # of a torque there
+            memoryview(np.array([values[COULOMB], loads, width])),
+            memoryview(states.ravel()),
+            memoryview(braking),
+        )
+        braking[0] = math.nan
+        sliding = braking / np.maximum(values[COULOMB] + loads * np.abs(states[:, 5]), 1e-300)
+        sliding[0] = np.sign(u) if self.dry else math.tanh(u / width)
+        return states.T, sliding
 
     def complete(self, motion: Motion, at_motor: Array, at_foot: Array) -> None:
         """The motion's friction and rates from its states."""
         values, drive = self.values, self.drive
-        motion.sliding = np.tanh(motion.u / self.creep_rad_s)
+        motion.standing = self.dry & (motion.u == 0.0)
         bound = values[COULOMB] + values[LOAD] * values[CONSTANT] * np.abs(motion.I)
         motion.slopes = self.rates @ motion.states + self.pushed(at_motor, at_foot)
         motion.slopes[1] -= bound * motion.sliding / values[ROTOR]
+        motion.slopes[1][motion.standing] = 0.0  # also where it came to stand within the step
         asked = self.command - drive.stiffness_A_per_rad * motion.p - drive.dampness_As_per_rad * motion.states[4]
         before = np.concatenate([motion.I[:1], motion.I[:-1]])
         motion.later = self.takes**2 / self.h * (before - asked)
         motion.behind = -self.takes * np.gradient(self.command, self.h)
 
-    def factors(self, motion: Motion) -> tuple:
-        """LU factors of all steps' equations, stacked by step, the first step fixed."""
-        values, steps = self.values, len(motion.p)
-        bound = values[COULOMB] + values[LOAD] * values[CONSTANT] * np.abs(motion.I)
-        ends = np.repeat(self.ends[:, :, None], steps, axis=2)
-        ends[1, 1] += self.h / values[ROTOR] * bound * (1.0 - motion.sliding**2) / self.creep_rad_s
-        ends[1, 5] += self.h / values[ROTOR] * values[LOAD] * values[CONSTANT] * np.sign(motion.I) * motion.sliding
-        bands = np.zeros((2 * BELOW + ABOVE + 1, STATES * steps))
-        diagonal = BELOW + ABOVE
-        for row in range(STATES):
-            for column in range(STATES):
-                at = STATES * np.arange(steps) + column
-                bands[diagonal + row - column, at] = ends[row, column]
-                bands[diagonal + row - column, column] = float(row == column)
-                bands[diagonal + row - column + STATES, at[:-1]] = -self.starts[row, column]
-        factors, pivots, failed = lapack.dgbtrf(bands, BELOW, ABOVE)
-        if failed:
-            raise ModelError("the ankle's motion cannot be simulated: its equations have no answer")
-        return factors, pivots
-
-
-def _friction(free: float, v: float, current: float, by_r: float, C_0: float, m: float, creep_rad_s: float) -> float:
-    """r = (C_0 + m |current + by_r r|) tanh((free - v r) / creep) by Newton's method, with bisection where that leaves
-    the known bounds: the difference of both sides grows with r."""
-    high = (C_0 + m * abs(current)) / (1.0 - abs(m * by_r)) + 1e-12
-    low = -high
-    r = min(max(free / v, low), high)
-    for _ in range(MOST_STEPS):
-        slip = math.tanh((free - v * r) / creep_rad_s)
-        bound = C_0 + m * abs(current + by_r * r)
-        missed = r - bound * slip
-        if missed > 0.0:
-            high = r
-        else:
-            low = r
-        side = m * by_r if current + by_r * r > 0.0 else -m * by_r
-        step = missed / (1.0 - side * slip + bound * (1.0 - slip * slip) * v / creep_rad_s)
-        was, r = r, r - step
-        if not low <= r <= high:
-            r = 0.5 * (low + high)
-        if abs(r - was) < 1e-12:
-            break
-    return r
-
-
-def _solved(factors: tuple, right: Array) -> Array:
-    found, _ = lapack.dgbtrs(factors[0], BELOW, ABOVE, right, factors[1])
-    return np.asarray(found)
+    def answers(self, motion: Motion, right: Array) -> Array:
+        """Small changes (m, 6, k) of the states by what changes in each step's equations, (m, 6, k)."""
+        values, (steps, _, count) = self.values, right.shape
+        loads = values[LOAD] * values[CONSTANT]
+        bound = values[COULOMB] + loads * np.abs(motion.I)
+        width = math.inf if self.dry else values[SIGN_WIDTH]
+        steep = np.where(motion.standing, -1.0, bound * np.maximum(1.0 - motion.sliding**2, 0.0) / width)
+        bends = np.column_stack((steep, loads * np.sign(motion.I) * motion.sliding))
+        inverse = np.linalg.inv(self.ends)
+        changes = np.ascontiguousarray(inverse @ right)
+        ankle_steps.respond(
+            memoryview((inverse @ self.starts).ravel()),
+            memoryview(self.h / values[ROTOR] * inverse[:, 1].copy()),
+            memoryview(bends.ravel()),
+            count,
+            memoryview(changes.ravel()),
+        )
+        return changes

@@ -15,7 +15,7 @@ from ranger_sim.plant import body_files
 from ranger_sim.sysid.benches import ankle_sine as bench
 from ranger_sim.sysid.channels import named_for
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.machines import ankle_motion
+from ranger_sim.sysid.machines import ankle_motion, ankle_steps
 from ranger_sim.sysid.machines.ankle import Ankle, predicted
 from ranger_sim.sysid.pipeline import diagnose
 from ranger_sim.sysid.reading import open_recording as read
@@ -87,7 +87,7 @@ def test_small_torques_answer_as_the_simulation_moves():
     """The linear answer against a second simulation: sensitivities of every parameter, and of a torque."""
     t = np.arange(0.0, 2.0, 0.004)
     drive = ankle_motion.Drive(t, K * (1.05 + 0.85 * np.sin(5.0 * t)) + D * 4.25 * np.cos(5.0 * t), K, D)
-    numbers = (0.0013, 0.33, 0.03, 0.06, 0.01, 0.1, 14.0, 0.00185, 0.02, 0.001, 0.002, 0.05, 0.6)
+    numbers = (0.0013, 0.33, 0.03, 0.06, 0.01, 0.1, 14.0, 0.00185, 0.02, 0.001, 0.002, 0.05, 0.6, 0.05)
     values = dict(zip(ankle_motion.PARAMETERS, numbers, strict=True))
     start = (1.05, 4.25, 1.085, 4.15)  # the cable carries the return spring: nothing rings
     motion = ankle_motion.simulated(drive, values, start)
@@ -259,5 +259,5 @@ def test_the_friction_of_a_step_solves_its_equation():
         def missed(r, free=free, v=v, current=current, by_r=by_r, C_0=C_0, m=m, creep=creep):
             return r - (C_0 + m * abs(current + by_r * r)) * math.tanh((free - v * r) / creep)
 
-        r = ankle_motion._friction(free, v, current, by_r, C_0, m, creep)
+        r = ankle_steps.smoothed(free, v, current, by_r, C_0, m, creep)
         assert r == pytest.approx(brentq(missed, -20.0, 20.0, xtol=1e-13), abs=1e-9)

@@ -35,7 +35,7 @@ def a_motion():
     nothing = np.zeros(M_STEPS)
     sliding = np.tanh(states[1])
     rows = slice(None, None, 5)
-    return Motion(TIME_S, states, RNG.normal(size=(4, M_STEPS)), nothing, nothing, sliding, rows, values, ())
+    return Motion(TIME_S, states, RNG.normal(size=(4, M_STEPS)), nothing, nothing, sliding, sliding == 0.0, rows, values, None)
 
 
 MOTION = a_motion()

@@ -201,7 +201,7 @@ def test_the_cost_is_of_independent_rows_and_of_values_off_what_is_known():
     beside = 9.0 * (math.log(1.0 + 4.0 / 9.0) + math.log(1.0 + 16.0 / 9.0))
     assert fit.cost() == pytest.approx(40 / 4.0 * math.log(0.03) + beside)
     beside = fit._beside(fit.values)
-    assert len(beside) == 13 and sorted(np.round(beside[np.abs(beside) > 1e-9], 9)) == [-4.0, 2.0]
+    assert len(beside) == 14 and sorted(np.round(beside[np.abs(beside) > 1e-9], 9)) == [-4.0, 2.0]
 
 
 def test_the_joint_s_zero_is_what_it_shows_more_than_the_motor_on_the_mean():
@@ -229,7 +229,7 @@ def test_values_settle_at_those_that_a_motion_was_made_with():
         columns[name] = np.concatenate((course[motion.rows], np.zeros(SHORT)))
     fit = fit_of(Table(TIME_S, columns, RUNS, "made"))
     fit.improve()
-    assert (fit.creep_rad_s, fit.filter_s) == (ankle_motion.SMOOTHED, 0.0)
+    assert (fit.dry, fit.filter_s) == (False, 0.0)
     for name, value in true.items():
         assert abs(fit.values[name] - value) < 0.6 * ankle.SPREAD[name], name
     assert np.std(fit.missed) < 2e-5
@@ -260,10 +260,10 @@ def test_effects_are_put_next_to_a_fit_with_their_coefficients_free_or_fixed():
 
 def test_a_fit_holds_the_values_of_another_with_its_friction_and_its_law():
     one, other = fit_of(table()), fit_of(table())
-    other._made_so(ankle_motion.STANDING, 0.01)
+    other._made_so(True, 0.01)
     other.values = other.values | {"inertia_kg_m2": 0.002}
     one.held_as(other)
-    assert one.values == other.values and (one.creep_rad_s, one.filter_s) == (ankle_motion.STANDING, 0.01)
+    assert one.values == other.values and (one.dry, one.filter_s) == (True, 0.01)
     assert one.runs[0].drive.filter_s == 0.01
     other.values = other.values | {"rotor_inertia_kg_m2": -0.002}
     with pytest.raises(UserError, match="sine: the ankle cannot be simulated with these values"):
