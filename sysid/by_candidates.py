@@ -203,14 +203,20 @@ def _left_over(
 def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]) -> Recording:
     """A simulator's recording, linearised with known and likely effects in it, each at the shape that suits best."""
     known = likelihood.noise_of([recording], effects, had)
-    tried = naming.trials(effects, naming.refit(Regression([recording], noise=known), had))
-    seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
+    base = naming.refit(Regression([recording], noise=known), had)
+    tried = naming.trials(effects, base)
     likeliest: list[Trial] = []
-    for score, _, _, trial in likelihood.ranking(seen, len(recording.table)):
-        if score > 0.0 and not any(each.effect.excludes(trial.effect) for each in likeliest):
-            likeliest.append(trial)
+    while len(likeliest) < MOST_ACTING:  # each by what those before it leave: many resemble the same fault
+        seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
+        ranked = likelihood.ranking(seen, len(recording.table))
+        if not ranked or not ranked[0][0] > 0.0:
+            break
+        chosen = ranked[0][3]
+        likeliest.append(chosen)
+        tried = [each for each in seen if each is not chosen and not chosen.effect.excludes(each.effect)]
+        naming.take(chosen, tried, base)
     acting = [(each.effect, each.shape) for each in had]
-    acting += [(each.effect, each.shape) for each in likeliest[:MOST_ACTING]]
+    acting += [(each.effect, each.shape) for each in likeliest]
     return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
 
 
