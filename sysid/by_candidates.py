@@ -90,8 +90,7 @@ def diagnose(
         return simulations.decided(recordings, found, skews) if hasattr(machine, "surprise") else found
 
     found = selected(recordings, held, 0.25)
-    stamps = _stamps(found)
-    if stamps:
+    while stamps := _stamps(found):
         skews += stamps
         found = selected(recordings, held, 0.25)
     before = predictability.test(found.base, predictor.columns(recordings), seed)
@@ -314,10 +313,20 @@ def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
 
 
 def _stamps(found: likelihood.Selection) -> list[Named]:
-    """Named lags of less than half a sample: stamps, not causes. They are in the base from then on."""
-    limit_s = HALF_SAMPLE * found.base.recordings[0].table.step_s
-    lags = [each for each in found.named if each.effect.cause == "sensor_lag"]
-    return [each for each in lags if abs(found.with_named.values[each.coefficients[0]]) < limit_s]
+    """Lags of rows against their stamps, which are no causes; they are in the base from then on.
+
+    Named ones of less than half a sample, and those of less than a sample that held-out data refuse: two channels with
+    their own clocks are so far apart, in each recording by another time.
+    """
+    step_s = found.base.recordings[0].table.step_s
+    refused = [each for each in found.refused if each.effect.cause == "sensor_lag"]
+    with_refused = naming.refit(found.base, [*found.named, *refused])
+    return [
+        each
+        for share, lags, values in ((HALF_SAMPLE, found.named, found.with_named), (1.0, refused, with_refused))
+        for each in lags
+        if each.effect.cause == "sensor_lag" and abs(values.values[each.coefficients[0]]) < share * step_s
+    ]
 
 
 def _over(machine: Machine, regression: Regression, name: str) -> str:
