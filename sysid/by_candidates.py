@@ -38,6 +38,8 @@ from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError
 from ranger_sim.sysid.three_numbers import Held, gained
 
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
+# Of the likeliest one's score: what explains less hardly moves where the simulator ends. Chosen by us
+SMALL = 0.2
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 ABOVE_NUMERICS = 3.0  # times what numerics move it by: a named effect is at least so large
@@ -205,10 +207,12 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
     base = naming.refit(Regression([recording], noise=known), had)
     tried = naming.trials(effects, base)
     likeliest: list[Trial] = []
+    best = 0.0
     while len(likeliest) < MOST_ACTING:  # each by what those before it leave: many resemble the same fault
         seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
         ranked = likelihood.ranking(seen, len(recording.table))
-        if not ranked or not ranked[0][0] > 0.0:
+        best = max(best, ranked[0][0] if ranked else 0.0)
+        if not ranked or not ranked[0][0] > SMALL * best:
             break
         chosen = ranked[0][3]
         likeliest.append(chosen)
