@@ -38,6 +38,8 @@ from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError
 from ranger_sim.sysid.three_numbers import Held, gained
 
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
+# Of the likeliest one's score: what explains less hardly moves where the simulator ends. Chosen by us
+SMALL = 0.2
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 ABOVE_NUMERICS = 3.0  # times what numerics move it by: a named effect is at least so large
@@ -90,8 +92,7 @@ def diagnose(
         return simulations.decided(recordings, found, skews) if hasattr(machine, "surprise") else found
 
     found = selected(recordings, held, 0.25)
-    stamps = _stamps(found)
-    if stamps:
+    while stamps := _stamps(found):
         skews += stamps
         found = selected(recordings, held, 0.25)
     before = predictability.test(found.base, predictor.columns(recordings), seed)
@@ -203,14 +204,22 @@ def _left_over(
 def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect], had: Sequence[Named]) -> Recording:
     """A simulator's recording, linearised with known and likely effects in it, each at the shape that suits best."""
     known = likelihood.noise_of([recording], effects, had)
-    tried = naming.trials(effects, naming.refit(Regression([recording], noise=known), had))
-    seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
+    base = naming.refit(Regression([recording], noise=known), had)
+    tried = naming.trials(effects, base)
     likeliest: list[Trial] = []
-    for score, _, _, trial in likelihood.ranking(seen, len(recording.table)):
-        if score > 0.0 and not any(each.effect.excludes(trial.effect) for each in likeliest):
-            likeliest.append(trial)
+    best = 0.0
+    while len(likeliest) < MOST_ACTING:  # each by what those before it leave: many resemble the same fault
+        seen = [each for each in tried if likelihood.own_part(each) > likelihood.HIDDEN]
+        ranked = likelihood.ranking(seen, len(recording.table))
+        best = max(best, ranked[0][0] if ranked else 0.0)
+        if not ranked or not ranked[0][0] > SMALL * best:
+            break
+        chosen = ranked[0][3]
+        likeliest.append(chosen)
+        tried = [each for each in seen if each is not chosen and not chosen.effect.excludes(each.effect)]
+        naming.take(chosen, tried, base)
     acting = [(each.effect, each.shape) for each in had]
-    acting += [(each.effect, each.shape) for each in likeliest[:MOST_ACTING]]
+    acting += [(each.effect, each.shape) for each in likeliest]
     return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
 
 
@@ -308,10 +317,20 @@ def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
 
 
 def _stamps(found: likelihood.Selection) -> list[Named]:
-    """Named lags of less than half a sample: stamps, not causes. They are in the base from then on."""
-    limit_s = HALF_SAMPLE * found.base.recordings[0].table.step_s
-    lags = [each for each in found.named if each.effect.cause == "sensor_lag"]
-    return [each for each in lags if abs(found.with_named.values[each.coefficients[0]]) < limit_s]
+    """Lags of rows against their stamps, which are no causes; they are in the base from then on.
+
+    Named ones of less than half a sample, and those of less than a sample that held-out data refuse: two channels with
+    their own clocks are so far apart, in each recording by another time.
+    """
+    step_s = found.base.recordings[0].table.step_s
+    refused = [each for each in found.refused if each.effect.cause == "sensor_lag"]
+    with_refused = naming.refit(found.base, [*found.named, *refused])
+    return [
+        each
+        for share, lags, values in ((HALF_SAMPLE, found.named, found.with_named), (1.0, refused, with_refused))
+        for each in lags
+        if each.effect.cause == "sensor_lag" and abs(values.values[each.coefficients[0]]) < share * step_s
+    ]
 
 
 def _over(machine: Machine, regression: Regression, name: str) -> str:

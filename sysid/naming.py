@@ -123,11 +123,11 @@ def select(effects: Sequence[Effect], regression: Regression, level: float = LEV
             if each[3].effect is not trial.effect and bic - each[0] < TIE and possible(each[3])
         ]
         taken.append(Named(trial.effect, trial.shape, chi2, freedom, p, bic, tied, rivals))
-        _take(trial, all_trials, regression)
+        take(trial, all_trials, regression)
     return taken
 
 
-def _take(chosen: Trial, trials: Sequence[Trial], regression: Regression) -> None:
+def take(chosen: Trial, trials: Sequence[Trial], regression: Regression) -> None:
     """Project every trial off the chosen one as well."""
     beside = regression.full(chosen.white) - regression.z @ chosen.shadow
     values, vectors = np.linalg.eigh(chosen.gram)

@@ -367,13 +367,19 @@ class TrajectoryFit:
         if follow and self.far_off:
             self._follow()
             return
-        if (self._settled(rounds) and self.cost <= FAR_OFF) or not follow:
+        settled = self._settled(rounds)
+        if not follow or self.cost < MISSED or settled and self.cost <= FAR_OFF:
             return
         self.far_off = True
         ended, reached = self._end(), self._surprise_here()
         self._follow()
         if not self._surprise_here() <= reached:
             self.x, self.u, self.p, self.noise_y, self.predictor = ended
+
+    def settle_anew(self, rounds: int) -> None:
+        """Rounds with another way of the inputs: a fit that was far off by its way between samples alone is not."""
+        self._settled(rounds)
+        self.far_off = self.far_off and not self.cost < MISSED
 
     def _end(self) -> tuple[Array, Array, Array, Array, Predictor | None]:
         return self.x, self.u, self.p, self.noise_y, self.predictor

@@ -18,6 +18,7 @@ SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial 
 DRAWS = 8  # of noise, from which its part in free simulation is known to a tenth
 TOGETHER = 24  # responses that are computed side by side
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
+ROUNDED = 1e-10  # of the square of what an effect adds to the outputs: less is rounding, 6e-14 for such an offset
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 
 
@@ -35,14 +36,21 @@ class LinearisedRecording(SimulatedRecording):
 
     def respond(self, entries: Ports) -> Columns:
         """First-order response of the equations to an input at the ports: (n, k) each."""
-        return self._reached(self.predictor.white(self.predictor.errors(*self._forcing(entries))))
+        state, output = self._forcing(entries)
+        return self._reached(self.predictor.white(self.predictor.errors(state, output)), output)
 
     def _forcing(self, entries: Ports) -> tuple[Array, Array]:
         return forcing(self.linear, self.entering(entries), self.fit.simulator.held_ports)
 
-    def _reached(self, white: Array) -> Columns:
-        """(n, k) of each equation that has the effect."""
-        power = (white**2).sum(axis=(0, 2)) / self.predictor.unit**2
+    def _reached(self, white: Array, shown: Array) -> Columns:
+        """(n, k) of each equation that has the effect; shown: (n, o, k) what it adds to the outputs themselves.
+
+        None has what a free initial state takes up, as an offset of an output that is a state: rounding is left of it,
+        which fits anything at a size that nothing has.
+        """
+        power, direct = ((each**2).sum(axis=(0, 2)) / self.predictor.unit**2 for each in (white, shown))
+        if power.sum() <= ROUNDED * direct.sum():
+            return {}
         return {
             name: white[:, number] for number, name in enumerate(self.outputs) if power[number] > SILENT * power.sum()
         }
@@ -65,7 +73,8 @@ class LinearisedRecording(SimulatedRecording):
         white = self.predictor.white(self.predictor.errors(state, output))
         first = 0
         for (term, place, _), (each, _) in zip(made, forcings, strict=True):
-            self.free[id(term), place] = self._reached(white[:, :, first : first + each.shape[2]])
+            some = slice(first, first + each.shape[2])
+            self.free[id(term), place] = self._reached(white[:, :, some], output[:, :, some])
             first += each.shape[2]
 
 

@@ -149,7 +149,7 @@ def _chosen(fit: TrajectoryFit) -> None:
     for _ in range(len(fit.simulator.open_ways) + 2 * len(at_once)):
         if not fit.choose_way():
             break
-        fit.settle(AGAIN)
+        fit.settle_anew(AGAIN)
 
 
 def _fit(recording: Recording) -> TrajectoryFit:

@@ -66,3 +66,27 @@ def test_the_table_counts_alarms_names_and_intervals():
     table = list(rows({"battery | nothing | 1": sound, "battery | leak | 4 | 1": named}))
     assert table[2] == "| battery | leak | 4 | 1 of 1 | 0 of 1 | 100.00%, 50.00%, 100.00% | 2.0 |"
     assert table[3].startswith("| battery | nothing |  | 1 alarms in 1 |")
+
+
+@pytest.mark.parametrize("growth", [8e-7, 1e-5])
+def test_a_larger_growth_is_named_as_well(growth):
+    """At 1e-5 ohm/s most candidates alone explain a part of it."""
+    assert answer(BATTERY, "resistance grows", growth, 1)["causes"][:1] == ["resistance_growth at cell"]
+
+
+def test_a_drift_of_a_battery_is_no_offset_that_its_free_start_takes_up():
+    log = BATTERY.log(1)
+    columns = {"current_A": log["current [A]"], "voltage_V": log["voltage [V]"]}
+    recording = Battery().prepare(Table(log["t [s]"], columns, (slice(0, len(log["t [s]"])),), "battery"))
+    offset, drift = (
+        next(each for each in Battery().effects([recording]) if each.name == f"{name} at voltage_V")
+        for name in ("sensor_offset", "sensor_drift")
+    )
+    assert offset.columns(recording, {}, recording.fitted) == {}
+    assert drift.columns(recording, {}, recording.fitted).keys() == {"voltage_V"}
+
+
+def test_gravity_is_named_where_each_recording_has_other_lags_between_its_clocks():
+    found = answer(solved_machines.JOINT, "gravity", 0.01, 1)
+    assert found["causes"][:1] == ["once_per_turn at link_rate"]
+    assert found["after"] < 0.5 * found["before"]
