@@ -186,7 +186,7 @@ class TwinsEvidence:
     controller: whose twins; rate: "full", "link" (50 Hz) or "few" (hip and leg angle alone); steps: that counted;
     since_step:
     the first step with the cause, 0 for all; distance: from sound walks, over its degrees of freedom; gain: of the
-    likeliest cause; limits: of gain and distance, which one sound walk in fifty exceeds; named: None where nothing was
+    likeliest cause; limits: of gain and distance, which one sound walk in a hundred exceeds; named: None where nothing was
     detected, or what is left with the likeliest cause is not sound; refused_by_holdout: it does not explain held-out
     steps; ties: causes that explain these steps as well; never_distinguished: whose direction is the same; unusual:
     features with their distance from sound walks, in their deviations; smallest_visible: by cause the least size that
@@ -194,7 +194,8 @@ class TwinsEvidence:
     controller,
     whose values in the recording are others; other_body: the body has other numbers now than the twins had; held_out:
     distance of held-out steps without and with the cause; emulations: by which the answer is confirmed, each some walks
-    of a cause at a size; unconfirmed: why there are none, "" otherwise; note: why there is no comparison, "" where
+    of a cause at a size; habits: causes of sizes that sound robots reach, with which the walk is a sound one;
+    unconfirmed: why there are none, "" otherwise; note: why there is no comparison, "" where
     there is one.
     """
 
@@ -219,6 +220,7 @@ class TwinsEvidence:
     other_body: bool = False
     held_out: Interval | None = None
     emulations: int = 0
+    habits: tuple[TwinCause, ...] = ()
     unconfirmed: str = ""
     note: str = ""
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -98,7 +99,8 @@ def joined(made: Sequence[Rest]) -> Rest:
 
 @dataclasses.dataclass(frozen=True)
 class Asked:
-    """Walks that a comparison asks for: of a controller and body, with a cause of a size, by floor and battery."""
+    """Walks that a comparison asks for: of a controller and body, with a cause of a size, by floor and battery; repeats:
+    more of them, of bodies within tolerances."""
 
     controller: str
     body: str
@@ -108,6 +110,7 @@ class Asked:
     size: float
     floor_m: float
     voltage_V: float
+    repeats: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,6 +123,14 @@ class Emulated:
 
 
 Emulator = Callable[[Asked], Sequence[Emulated]]
+
+
+class Repeated(Protocol):
+    """Walks with a cause: two to confirm it, or repeats of bodies within tolerances."""
+
+    def __call__(
+        self, direction: Direction, size: float, floor_m: float, repeats: bool = True, /
+    ) -> Sequence[Rest]: ...  # a walk each
 
 
 def of(
@@ -143,11 +154,12 @@ def of(
     part = (0.0, 1.0 if holdout_part is None else 1.0 - holdout_part)
     found = rest_of(view, walks, part=part)
     floor_m = view.roughness(found)
-    emulate, why_not = None, unconfirmed(file, changed)
+    emulate, repeat, why_not = None, None, unconfirmed(file, changed)
     if emulator is not None and not why_not:
-        emulate = _emulate(emulator, file, rate, view, _voltage(walks))
+        repeat = _repeat(emulator, file, rate, view, _voltage(walks))
+        emulate = _emulate(repeat, view)
     with threadpool_limits(1):  # threads of the linear algebra cost more than they save, and change last digits
-        verdict = judgement.judge(view, found, step_map.outcomes(view.few), floor_m, emulate)
+        verdict = judgement.judge(view, found, step_map.outcomes(view.few), floor_m, emulate, repeat)
     if verdict is None:
         note = f"{int(found.inside.sum())} steps that can be compared are too few"
         return TwinsEvidence(controller, note=note + _fallen(datasets)), None
@@ -175,17 +187,28 @@ def _voltage(walks: Sequence[Walked]) -> float:
     return float(np.median(found)) if len(found) else float("nan")
 
 
-def _emulate(emulator: Emulator, file: TwinFile, rate: str, view: View, voltage_V: float) -> judgement.Emulate:
-    """Walks of a cause as a vector of the view."""
+def _repeat(emulator: Emulator, file: TwinFile, rate: str, view: View, voltage_V: float) -> Repeated:
+    """What the maps leave of walks with a cause."""
 
-    def emulate(direction: Direction, size: float, floor_m: float) -> judgement.Walks | None:
+    def repeat(direction: Direction, size: float, floor_m: float, repeats: bool = True) -> Sequence[Rest]:
         controller, body = file.made_of["controller"], file.made_of["body"]
-        asked = Asked(controller, body, direction.cause, direction.at, direction.parameter, size, floor_m, voltage_V)
+        cause = direction.cause, direction.at, direction.parameter
+        asked = Asked(controller, body, *cause, size, floor_m, voltage_V, repeats)
         rests = []
         for each in emulator(asked):
             found = each.full if rate == twin_file.FULL else each.link
             count = min(len(each.leg), len(found))
             rests.append(step_map.rest(view.legs, each.leg[:count], found[:count], view.few))
+        return rests
+
+    return repeat
+
+
+def _emulate(repeat: Repeated, view: View) -> judgement.Emulate:
+    """Walks of a cause as a vector of the view."""
+
+    def emulate(direction: Direction, size: float, floor_m: float) -> judgement.Walks | None:
+        rests = repeat(direction, size, floor_m, False)
         together = joined(rests) if rests else None
         mean = mean_of(together) if together is not None else None
         if together is None or mean is None:
@@ -300,6 +323,7 @@ def _evidence(
         other_parameters=tuple(changed),
         other_body=other_body,
         held_out=held,
+        habits=tuple(_cause(each) for each in verdict.habits),
         emulations=sum(len(each.knots) for each in verdict.view.directions),
         note="",
     )

@@ -1,11 +1,12 @@
 """Which cause moves a walk away from its sound twins, how far, and since which step."""
 
+import copy
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, stats
 
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins.model import Direction, Knot, Mean, View, mean_of, scatter
@@ -26,14 +27,17 @@ BEYOND = 4.0  # times the sizes that are sought, to judge which cause is worth e
 BELOW_FALL = 0.8  # of a size with which the robot falls at once
 TIE = 6.0  # of twice the log-likelihood, within which causes are not distinguished
 ALIKE = 0.95  # cosine of directions above which they never are
-ALARM = 0.98  # quantile of sound walks
+ALARM = 0.99  # quantile of sound walks that had no part: half of the aim, since tails are known by some hundred walks
+FAR = 0.98  # quantile of sound walks, on any floor
+TOLERATED = 3.0  # deviations of sound robots: a size up to them is not a fault
 SIZE_ERROR = 0.2  # of a size: 95 %, by which twins of other seeds, batteries and floors differ
 HOLDS = 3.84  # of twice the log-likelihood: 95 %
 ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, before the first, after the last
 # A later begin must gain so many times what all steps do and the limit of a sound walk: chosen by us, looking at false
 # alarms on 1 mm of roughness, of which most were begins.
 ONSET_PAYS, ONSET_LIMITS = 1.25, 3.0
-UNEXPLAINED = 1.3  # times the largest distance of a sound walk: what is left under it is sound
+FEWEST_REPEATS = 4  # walks with the named cause by whose sizes its interval is checked
+UNEXPLAINED = 1.3  # times the distance that few sound walks exceed: what is left under it is sound
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Walks:
 
 Emulate = Callable[[Direction, float, float], Walks | None]
 """(cause, size, roughness of the floor in m) to emulated walks; None when the robot falls at once."""
+Repeat = Callable[[Direction, float, float], Sequence[Rest]]
+"""The same to single walks of other seeds and of bodies within tolerances."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +74,8 @@ class Verdict:
     best first; ties, alike: names that explain as well, and that these channels can never distinguish from it; since:
     step from which on, 0 for all; distance: over its degrees of freedom; gain: of the best cause; limits: of both;
     visible: (cause, least size, unit) for every cause; unseen: causes without a size; floor_m; steps that counted;
-    unusual: (feature, deviations) of the largest; view: with the knots of what was emulated.
+    unusual: (feature, deviations) of the largest; view: with the knots of what was emulated; habits: causes of sizes
+    that a sound robot reaches, with which the walk is a sound one.
     """
 
     detected: bool
@@ -85,6 +92,7 @@ class Verdict:
     steps: int
     unusual: tuple[tuple[str, float], ...]
     view: View
+    habits: tuple[Fit, ...] = ()
 
 
 def _polynomial(each: Direction, sizes: Array) -> Array:
@@ -278,7 +286,7 @@ class Space:
 
 
 def limits_of(view: View, weights: Array) -> tuple[float, float]:
-    """Gain and distance that one sound walk in fifty exceeds on a floor: tails differ by floor."""
+    """Gain and distance that one sound walk in a hundred exceeds on a floor: tails differ by floor."""
     quantiles = [
         np.quantile(view.alarms[view.alarms[:, 2] == floor, :2], ALARM, axis=0) for floor in np.flatnonzero(weights)
     ]
@@ -288,15 +296,20 @@ def limits_of(view: View, weights: Array) -> tuple[float, float]:
 
 def sound_distance(view: View) -> float:
     """The distance up to which what a cause leaves is taken for a sound walk, on whichever floor."""
-    return UNEXPLAINED * float(np.quantile(view.alarms[:, 1], ALARM))
+    return UNEXPLAINED * float(np.quantile(view.alarms[:, 1], FAR))
 
 
 def judge(
-    view: View, found: Rest, names: Sequence[str], floor_m: float, emulate: Emulate | None = None
+    view: View,
+    found: Rest,
+    names: Sequence[str],
+    floor_m: float,
+    emulate: Emulate | None = None,
+    repeat: Repeat | None = None,
 ) -> Verdict | None:
     """The verdict about what the map leaves of a walk. names: of the features; floor_m: its roughness;
-    emulate: walks of a cause at a size, by which the likeliest causes are confirmed. None for a walk with too few
-    steps."""
+    emulate: walks of a cause at a size, by which the likeliest causes are confirmed; repeat: walks by whose sizes the
+    interval of the named cause is checked. None for a walk with too few steps."""
     mean = mean_of(found)
     if mean is None:
         return None
@@ -319,15 +332,23 @@ def judge(
             fits, since, space, mean, pays = tried, onset, later, part, tried[0].gain
     distance = float(space.value @ space.value) / space.freedom
     visible, unusual = _visible(space, gain_limit), _unusual(view, mean, weights, names)
+    limits = gain_limit, distance_limit
     detected = fits[0].gain > gain_limit or distance > distance_limit
-    if emulate is not None and detected:
-        view = confirmed(view, mean, weights, floor_m, emulate)
+    habits = habits_of(space, fits, limits) if detected else ()
+    own: Mapping[str, float] = {}
+    if emulate is not None and detected and not habits:
+        view, own = confirmed(view, mean, weights, floor_m, emulate)
         space = Space(view, mean, weights)
         fits = space.fits()
+        habits = habits_of(space, fits, limits)
+    detected = detected and not habits
     best = fits[0]
     named = None
     if detected and best.gain > gain_limit and best.left < sound_distance(view):
         named = _sized(view, mean, weights, best)
+        if repeat is not None:
+            there = _floor_without(floor_m, own.get(best.direction.name, 0.0))
+            named = as_repeated(view, named, sum(mean.steps), repeat(named.direction, named.size, there))
     scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
     ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE * scale)
     return Verdict(
@@ -338,20 +359,44 @@ def judge(
         _alike(space, best) if named else (),
         since,
         distance,
-        (gain_limit, distance_limit),
+        limits,
         *visible,
         floor_m,
         sum(mean.steps),
         unusual,
         view,
+        habits,
     )
 
 
-def confirmed(view: View, mean: Mean, weights: Array, looks_m: float, emulate: Emulate) -> View:
+def habits_of(space: Space, fits: Sequence[Fit], limits: tuple[float, float]) -> tuple[Fit, ...]:
+    """The likeliest causes one after the other, as long as a sound robot reaches their sizes by itself, until what they
+    leave is a sound walk; none when it never is. limits: of gain and distance."""
+    left, taken = copy.copy(space), list[Fit]()
+    while fits and _is_habit(fits[0]):
+        taken.append(fits[0])
+        number = next(n for n, each in enumerate(space.directions) if each is fits[0].direction)
+        left.value = left.value - left.moved(number, fits[0].size)
+        fits = [fit for fit in left.fits() if all(fit.direction is not each.direction for each in taken)]
+        gain, distance = fits[0].gain if fits else 0.0, float(left.value @ left.value) / left.freedom
+        if gain <= limits[0] and distance <= limits[1]:
+            return tuple(taken)
+    return ()
+
+
+def _is_habit(fit: Fit) -> bool:
+    """Whether a sound robot reaches this size: by its tolerance, or by itself now and then."""
+    each = fit.direction
+    return abs(fit.size) <= TOLERATED * each.tolerance or 0.0 < fit.size * each.sound <= each.sound**2
+
+
+def confirmed(
+    view: View, mean: Mean, weights: Array, looks_m: float, emulate: Emulate
+) -> tuple[View, Mapping[str, float]]:
     """The view with the likeliest causes emulated at the sizes found; what an emulation shows may bring another cause
     or size to the front. It ends when the first ones have been emulated and the best explains the walk, or after too
     many. looks_m: roughness of the log's floor by its steps, to whose scatter a cause adds: its walks are on a floor of
-    what is left."""
+    what is left. Also, by name, the square of the roughness (m2) that a cause adds."""
     middle, sound = weights @ view.middle, sound_distance(view)
     own: dict[str, float] = {}
     for _ in range(EMULATIONS):
@@ -365,7 +410,7 @@ def confirmed(view: View, mean: Mean, weights: Array, looks_m: float, emulate: E
         if not wanted:
             break
         direction, size = wanted[0].direction, wanted[0].size
-        floor_m = float(np.sqrt(max(looks_m**2 - own.get(direction.name, 0.0), 0.0)))
+        floor_m = _floor_without(looks_m, own.get(direction.name, 0.0))
         walked = emulate(direction, size, floor_m)
         moved, steps = np.zeros_like(middle), 0
         if walked is not None:
@@ -375,7 +420,32 @@ def confirmed(view: View, mean: Mean, weights: Array, looks_m: float, emulate: E
         view = dataclasses.replace(
             view, directions=tuple(renewed if each is direction else each for each in view.directions)
         )
-    return view
+    return view, own
+
+
+def _floor_without(looks_m: float, own_m2: float) -> float:
+    """Roughness of a floor by its steps, without what a cause adds to their scatter."""
+    return float(np.sqrt(max(looks_m**2 - own_m2, 0.0)))
+
+
+def as_repeated(view: View, named: Fit, steps: int, walks: Sequence[Rest]) -> Fit:
+    """A cause whose interval reaches as far as the sizes that are found in walks with it: a walk with a cause may
+    scatter more than a sound one, and a body's tolerances act otherwise there. steps: of the recording, as many count
+    here."""
+    number = next(n for n, each in enumerate(view.directions) if each is named.direction)
+    errors = []
+    for rest in walks:
+        mean = mean_of(rest, rest.step > rest.step[-1] - steps)
+        if mean is not None:
+            space = Space(view, mean, view.weights(view.roughness(rest)), without=named.direction.name)
+            errors.append(space.fit(number).size - named.size)
+    if len(errors) < FEWEST_REPEATS:
+        return named
+    reach = float(stats.t.ppf(0.975, len(errors)) * np.sqrt(np.mean(np.square(errors))))
+    low, high = min(named.low, named.size - reach), max(named.high, named.size + reach)
+    if named.size > 0.0:  # that there is something is known: the other sign was not found
+        return dataclasses.replace(named, low=max(low, min(named.low, 0.0)), high=high)
+    return dataclasses.replace(named, low=low, high=min(high, max(named.high, 0.0)))
 
 
 def _is_confirmed(fit: Fit, sound: float) -> bool:
@@ -449,7 +519,7 @@ def _least(space: Space, number: int, limit: float) -> float:
     terms = space.terms[number]
     length = np.einsum("mi,ij,mj->m", powers, terms @ terms.T, powers)
     length -= space.freedom * space.steps * np.einsum("mi,ij,mj->m", powers, each.unsure, powers)  # the error's own
-    above = np.flatnonzero(length > limit)
+    above = np.flatnonzero((length > limit) & (sizes > max(TOLERATED * each.tolerance, abs(each.sound))))
     return float(sizes[above[0]]) if len(above) else np.inf
 
 

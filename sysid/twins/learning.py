@@ -33,7 +33,7 @@ class Twinned:
 
 @dataclasses.dataclass(frozen=True)
 class Cause:
-    """What a direction is called, and its tolerance among sound robots."""
+    """What a direction is called, its tolerance among sound robots, and the size that these reach by themselves."""
 
     key: str
     cause: str
@@ -41,6 +41,7 @@ class Cause:
     parameter: str
     form: str
     tolerance: float
+    sound: float = 0.0
 
 
 def learned(twins: Sequence[Twinned], causes: Sequence[Cause], floors_m: Sequence[float], few: bool) -> View:
@@ -177,7 +178,9 @@ def _direction(view: View, cause: Cause, pairs: Sequence[tuple[Twinned, Rest]]) 
     terms[:powers] = solved * scale[:, None]
     unsure[:powers, :powers] = np.linalg.inv(basis.T @ basis) * np.outer(scale, scale)
     low, high = min(0.0, float(size.min())), max(0.0, float(size.max()))
-    return Direction(cause.cause, cause.at, cause.parameter, cause.form, low, high, cause.tolerance, terms, unsure)
+    return Direction(
+        cause.cause, cause.at, cause.parameter, cause.form, low, high, cause.tolerance, terms, unsure, sound=cause.sound
+    )
 
 
 def _alarm(view: View, twin: Twinned, rest: Rest) -> tuple[float, float, float] | None:

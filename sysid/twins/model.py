@@ -34,7 +34,8 @@ class Knot:
 class Direction:
     """How a cause moves the vector. terms: (3, 2 p) of its size, the square and the cube; unsure: (3, 3) covariance of
     these coefficients for a walk of one step; low, high: smallest and largest size that was made, which include 0;
-    tolerance: deviation of the size among sound robots; knots: what was emulated for the log, by size."""
+    tolerance: deviation of the size among sound robots; knots: what was emulated for the log, by size; sound: the
+    farthest size that a sound robot reaches by itself now and then, 0 for none."""
 
     cause: str
     at: str
@@ -46,6 +47,7 @@ class Direction:
     terms: Array
     unsure: Array
     knots: tuple[Knot, ...] = ()
+    sound: float = 0.0
 
     @property
     def name(self) -> str:

@@ -24,7 +24,7 @@ FULL, LINK, FEW = "full", "link", "few"  # the table's rate, the data link's, an
 MADE_OF = "made_of.json"
 SAME_TIME = (1980, 1, 1, 0, 0, 0)  # of every part of the file, so that its bytes say nothing but its numbers
 PARTS = ("floors_m", "middle", "deviation", "correlation", "between", "loose", "alarms")
-OF_CAUSE = ("cause", "at", "parameter", "form", "low", "high", "tolerance")
+OF_CAUSE = ("cause", "at", "parameter", "form", "low", "high", "tolerance", "sound")
 OF_LEG = ("start", "reach", "foothold", "weights", "deviation")
 
 

@@ -13,7 +13,8 @@ from ranger_sim.sysid.twins import evidence, features, judgement, learning, step
 from ranger_sim.sysid.twins.model import mean_of
 from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
 from ranger_sim.tools.twins.causes import TWINS
-from ranger_sim.tools.twins.emulation import WALKS, emulate
+from ranger_sim.tools.twins import walking
+from ranger_sim.tools.twins.emulation import REPEATS, WALKS, emulate
 
 STEP_ROWS = 300
 
@@ -258,6 +259,40 @@ def test_a_tolerance_of_sound_robots_hides_what_is_within_it(view):
     assert judged(loose, leg, found).fits[0].gain < 0.2 * judged(view, leg, found).fits[0].gain
 
 
+def changed(view, **values):
+    """The view whose first cause has other values."""
+    first, *others = view.directions
+    return dataclasses.replace(view, directions=(dataclasses.replace(first, **values), *others))
+
+
+def test_a_size_that_sound_robots_reach_by_themselves_is_not_a_fault(view):
+    walk = made_up(9710, moved=-0.3)
+    verdict = judged(changed(view, sound=-0.4), *walk)
+    assert judged(view, *walk).detected and not verdict.detected and verdict.named is None
+    assert [each.direction.cause for each in verdict.habits] == ["geometry"]
+    assert verdict.habits[0].size == pytest.approx(-0.3, abs=0.05)
+    assert next(size for each, size in verdict.visible if each.cause == "geometry") > 0.4
+
+
+@pytest.mark.parametrize(("moved", "other"), [(0.3, 0.0), (-0.6, 0.0), (-0.3, 0.4)])
+def test_what_no_sound_robot_reaches_is_a_fault(view, moved, other):
+    """The other sign, a larger size, and another cause next to such a size."""
+    verdict = judged(changed(view, sound=-0.4), *made_up(9710, moved=moved, other=other))
+    assert verdict.detected and verdict.habits == ()
+
+
+def test_a_size_within_three_deviations_of_sound_robots_is_not_a_fault(view):
+    """The tolerance counts as a line in the scatter; where an effect is steeper than its line, its size decides."""
+    steep = view.directions[0]
+    terms = steep.terms.copy()
+    terms[0], terms[2] = 0.02 * terms[0], terms[0] / 0.3**2
+    one = changed(view, terms=terms, tolerance=0.15)
+    size = 0.3
+    leg, found = made_up(9100, moved=size)
+    assert judged(changed(view, terms=terms, tolerance=0.05), leg, found).detected
+    assert not judged(one, leg, found).detected
+
+
 def bent(size):
     """An effect that grows half as fast beyond the sizes of which twins were made."""
     return size if abs(size) < 0.4 else np.sign(size) * (0.4 + 0.5 * (abs(size) - 0.4))
@@ -304,6 +339,23 @@ def test_a_sound_walk_asks_for_no_emulation(view):
     assert not verdict.detected and asked == []
 
 
+def test_an_interval_reaches_as_far_as_walks_with_the_cause_scatter(view):
+    named = judged(view, *made_up(9100, moved=0.3)).named
+    true = (0.1, 0.5, 0.15, 0.45, 0.1, 0.5)  # of walks for which the size found was asked
+
+    def walks(sizes):
+        return [step_map.rest(view.legs, *made_up(9900 + n, moved=each), few=True) for n, each in enumerate(sizes)]
+
+    wide = judgement.as_repeated(view, named, 39, walks(true))
+    rms = np.sqrt(np.mean(np.square(np.array(true) - named.size)))
+    # Student's 97.5 % of six; the sizes are found to 0.02
+    assert wide.high - named.size == pytest.approx(2.447 * rms, abs=2.447 * 0.02)
+    assert wide.size == named.size and wide.low == 0.0  # the other sign was not found
+    same = judgement.as_repeated(view, named, 39, walks([named.size] * 6))
+    assert (same.low, same.high) == (named.low, named.high)
+    assert judgement.as_repeated(view, named, 39, walks(true[:3])) is named  # the others fell
+
+
 def test_a_controller_with_other_parameters_than_candidates_is_not_emulated():
     file = twin_file.of_controller("record-2011")
     assert evidence.unconfirmed(file, ["C_F_ST_F_ANG"]) == ""
@@ -316,6 +368,18 @@ def test_walks_for_a_confirmation_are_the_same_each_time():
     assert len(first) == WALKS and all(each.full.shape[0] == len(each.leg) for each in first)
     for one, other in zip(first, again, strict=True):
         assert np.array_equal(one.full, other.full, equal_nan=True)
+
+
+def test_repeats_are_walks_of_other_bodies_and_batteries_the_same_each_time():
+    asked = evidence.Asked("record-2011", "ranger", "floor", "floor", "slope_rad", 0.004, 0.0, float("nan"), True)
+    values = walking.values_of("ranger", "record-2011")
+    key = "floor@floor@slope_rad"
+    task = walking.Task("", 910_000, "record-2011", "ranger", key, 0.004, tolerances=True)
+    cause, *loose = walking.drawn(task, values)
+    assert cause.scenario == {"slope_rad": 0.004} and len(loose) > 20
+    assert not any("slope_rad" in each.scenario for each in loose)  # the tolerance of the cause itself is not drawn
+    assert loose == walking.drawn(task, values)[1:]
+    assert asked.repeats and REPEATS >= judgement.FEWEST_REPEATS
 
 
 def test_a_robot_that_falls_at_once_or_cannot_be_made_has_no_walks():

@@ -36,6 +36,7 @@ def lines(answer: dict[str, Any]) -> list[str]:
     if found["other_body"]:
         out.append("twins: the body has other numbers than these twins had: `ranger-sim twins` makes new ones")
     if not found["detected"]:
+        out += [f"twins: a sound robot reaches this by itself: {cause(each)}" for each in found["habits"]]
         return out + visible(found)
     unusual = ", ".join(f"{name} {away:+.1f}" for name, away in found["unusual"][:3])
     out.append(f"twins: most unusual, in deviations of sound walks: {unusual}")

@@ -20,7 +20,8 @@ def built(tasks: list[Task], folder: pathlib.Path) -> TwinFile:
     walks = list(made(tasks, folder))
     first = tasks[0]
     causes = [
-        learning.Cause(each.key, each.cause, each.at, each.parameter, each.form, each.tolerance) for each in TWINS
+        learning.Cause(each.key, each.cause, each.at, each.parameter, each.form, each.tolerance, each.sound)
+        for each in TWINS
     ]
     with threadpool_limits(1):  # threads of the linear algebra change the last digits
         views = {

@@ -73,15 +73,14 @@ def columns_of(robot: Ranger) -> dict[str, Array]:
 
 
 def drawn(task: Task, values: Mapping[str, float]) -> list[Change]:
-    """The changes of a task: its cause, or every tolerance of a sound robot at random."""
-    if task.key:
-        return [BY_KEY[task.key].change(task.size, values)]
+    """The changes of a task: its cause, and every tolerance of a sound robot but this one at random."""
+    cause = [BY_KEY[task.key].change(task.size, values)] if task.key else []
     if not task.tolerances:
-        return []
-    loose = [twin for twin in TWINS if twin.tolerance]
+        return cause
+    loose = [twin for twin in TWINS if twin.tolerance and twin.key != task.key]
     draws = random_arrays.generator(task.seed, "tolerances of a twin").normal(size=len(loose))
     sizes = [float(draw) * twin.tolerance for draw, twin in zip(draws, loose, strict=True)]
-    return [twin.change(size, values) for twin, size in zip(loose, sizes, strict=True)]
+    return cause + [twin.change(size, values) for twin, size in zip(loose, sizes, strict=True)]
 
 
 def scenario_of(task: Task, folder: pathlib.Path) -> tuple[Scenario, list[tuple[str, str, Mapping[str, float]]]]:
