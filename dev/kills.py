@@ -8,8 +8,9 @@ had, and, killed again and again in one folder, ends with the results of one tha
 process of a command in turn for a while: it ends as an undisturbed one, with the same digest. A board or the body's
 process alone may be lost: the command then ends by itself, and says so.
 
-Victims and times come from the seed; what a process does at a time depends on the machine. Ends with 1 at the
-first finding.
+Victims and times come from the seed, the times as shares of what the undisturbed command took (and a little longer);
+what a process does at a time depends on the machine. A command has five minutes to end, longer only while processes
+wait for a processor. Ends with 1 at the first finding. `--first N` goes on with case N of the same seed.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ import tempfile
 from collections.abc import Sequence
 from typing import Any
 
+from dev.load import Deadline
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.tools.command_line.units import whole_number
@@ -35,7 +37,7 @@ from ranger_sim.tools.run.folder import OPEN, SUMMARY
 COMMAND = "python -m dev.kills"
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 KILLS = 200
-LATEST_S = 5.0  # from the start of a command: longer than an undisturbed one takes. Chosen by us
+LATEST = 1.2  # from the start of a command, as a share of what an undisturbed one took. Chosen by us
 LEFT_S = 5.0  # for the kernel to end what hangs on a killed process. Chosen by us
 PATIENCE_S = 300.0
 STOP_EVERY = 8
@@ -90,10 +92,11 @@ class Command:
 
     def end(self, patience_s: float = PATIENCE_S) -> int:
         """Wait for its end; returns the exit code."""
-        try:
-            return self.started.wait(patience_s)
-        except subprocess.TimeoutExpired:
-            raise Finding(f"it has not ended after {patience_s:g} s:\n{self.text()[-2000:]}") from None
+        deadline = Deadline(patience_s)
+        while (left_s := deadline.left_s()) > 0.0:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return self.started.wait(left_s)
+        raise Finding(f"it has not ended after {patience_s:g} s:\n{self.text()[-2000:]}")
 
     def close(self) -> None:
         """End whatever is left."""
@@ -123,14 +126,17 @@ class Kills:
         }
         self.shared = set(os.listdir("/dev/shm"))
         self.wanted: dict[str, Any] = {}  # of an undisturbed command: its digest, or its results
+        self.took_s: dict[str, float] = {}
 
     def prepare(self) -> None:
         """Each command once, undisturbed."""
         for name, words in self.commands.items():
             out = self.folder / "undisturbed" / name.replace(" ", "-")
+            began_s = wallclock.monotonic_s()
             with contextlib.closing(Command((*words, "--out", str(out)), "undisturbed")) as command:
                 if command.end():
                     raise Finding(f"{name}, undisturbed: code {command.started.returncode}:\n{command.text()[-2000:]}")
+            self.took_s[name] = wallclock.monotonic_s() - began_s
             self.wanted[name] = results_in(out) if name == "campaign" else digest_in(out)
 
     def case(self, number: int) -> None:
@@ -144,12 +150,12 @@ class Kills:
         try:
             where = f"case {number}: {name}"
             if stops:
-                self.stop_each(command, LATEST_S / 2 * stream.uniform())
+                self.stop_each(command, self.took_s[name] / 2 * stream.uniform())
                 self.counts["stopped"] += 1
                 if command.end():
                     raise Finding(f"{where}, stopped and continued: code {command.started.returncode}")
             else:
-                where += f", {self.kill(command, stream)}"
+                where += f", {self.kill(command, LATEST * self.took_s[name], stream)}"
             self.check(name, command, out, before, where)
         except Finding as finding:
             text = str(finding)
@@ -167,9 +173,9 @@ class Kills:
                 wallclock.sleep_s(STOPPED_S)
                 os.kill(process, signal.SIGCONT)
 
-    def kill(self, command: Command, stream: Any) -> str:
+    def kill(self, command: Command, latest_s: float, stream: Any) -> str:
         """Kill one process at a random time; returns which, and when."""
-        after_s = LATEST_S * stream.uniform()
+        after_s = latest_s * stream.uniform()
         own, choice = stream.integer(2) == 0, stream.uniform()
         with contextlib.suppress(subprocess.TimeoutExpired):
             command.started.wait(after_s)
@@ -195,9 +201,9 @@ class Kills:
     def check(self, name: str, command: Command, out: pathlib.Path, before: dict[str, Any], where: str) -> None:
         """Nothing is lost that was reported as kept, and nothing is left."""
         code = command.end()
-        end_s = wallclock.monotonic_s() + LEFT_S
+        deadline = Deadline(LEFT_S)
         while left := self.left_by(command):
-            if wallclock.monotonic_s() > end_s:
+            if deadline.left_s() < 0.0:
                 raise Finding(f"{where}: {left}")
             wallclock.sleep_s(0.01)
         text = command.text()
@@ -267,12 +273,12 @@ def remove(folder: pathlib.Path) -> None:
         shutil.rmtree(folder)
 
 
-def run(kills: int, seed: int) -> dict[str, int]:
-    """`kills` cases; the counts."""
+def run(kills: int, seed: int, first: int = 0) -> dict[str, int]:
+    """The cases from `first` to below `kills`; the counts."""
     with tempfile.TemporaryDirectory(prefix="ranger-sim-kills-") as folder:
         made = Kills(seed, pathlib.Path(folder))
         made.prepare()
-        for number in range(kills):
+        for number in range(first, kills):
             made.case(number)
         return made.counts
 
@@ -282,9 +288,10 @@ def main(arguments: list[str] | None = None) -> int:
     command = argparse.ArgumentParser(prog=COMMAND, description=(__doc__ or "").partition("\n")[0])
     command.add_argument("--kills", type=whole_number(1), default=KILLS, metavar="N", help=f"cases (default {KILLS})")
     command.add_argument("--seed", type=whole_number(0), default=1, metavar="S", help="of victims and times")
+    command.add_argument("--first", type=whole_number(0), default=0, metavar="N", help="case to begin with (0)")
     options = command.parse_args(arguments)
     try:
-        counts = run(options.kills, options.seed)
+        counts = run(options.kills, options.seed, options.first)
     except Finding as finding:
         print(f"{COMMAND}: seed {options.seed}: {finding}", file=sys.stderr)
         return 1

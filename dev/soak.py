@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 
 from dev.floods import flooders
 from dev.kills import Command, Finding, digest_in
+from dev.load import Deadline
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
@@ -166,9 +167,9 @@ def wait_s(command: Command, seconds: float) -> bool:
 
 def found_in(command: Command, pattern: str) -> re.Match[str]:
     """Wait for a line that it prints."""
-    end_s = wallclock.monotonic_s() + PATIENCE_S
+    deadline = Deadline(PATIENCE_S)
     while not (match := re.search(pattern, command.text())):
-        if wait_s(command, 0.2) or wallclock.monotonic_s() > end_s:
+        if wait_s(command, 0.2) or deadline.left_s() < 0.0:
             raise Finding(f"no {pattern!r} in:\n{command.text()[-2000:]}")
     return match
 
@@ -245,11 +246,11 @@ class Robot:
 
     def count(self, client: str) -> None:
         """Count once the clients of this name are gone; Finding where they leave descriptors for GONE_S."""
-        end_s = wallclock.monotonic_s() + GONE_S
+        deadline = Deadline(GONE_S)
         while not wait_s(self.up, PAUSE_S):
             now = (count(self.up), count(self.panel))
             extra = [each.descriptors - usual.descriptors for each, usual in zip(now, self.usual, strict=True)]
-            if max(extra) <= 0 or wallclock.monotonic_s() > end_s:
+            if max(extra) <= 0 or deadline.left_s() < 0.0:
                 break
         else:
             return

@@ -9,12 +9,22 @@ import select
 import signal
 import struct
 import sys
+import tempfile
 import termios
+from collections.abc import Iterator
 
 from ranger_sim.foundation import wallclock
 
 CTRL_C = b"\x03"
 PATIENCE_S = 120.0
+
+
+@contextlib.contextmanager
+def alone(what: str) -> Iterator[None]:
+    """One test at a time, in all processes of this machine's tests: for a command whose port is always the same."""
+    with open(pathlib.Path(tempfile.gettempdir()) / f"ranger-sim-tests-{what}", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 class Terminal:

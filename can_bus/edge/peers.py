@@ -204,6 +204,7 @@ class Peer:
         self.answers = 0  # bytes of `outgoing` that it requested
         self.gone = False  # end of stream
         self.lost = False  # it no longer reads; its earlier requests are still processed
+        self.lost_at_s = math.inf  # when that was found
         self.ending = False  # has been sent the reason, and is closed once that is written
         self.waits = False  # its last request is being executed: the next one has to wait
         self.last = 0  # the endpoint's count of requests and arrivals at its last one
@@ -246,6 +247,7 @@ class PeerServer(Generic[P]):
     """
 
     tolerated_s = PATIENCE_S
+    lost_s = math.inf  # for so long requests of a peer that no longer reads are processed
 
     def __init__(self, kind: str, listener: socket.socket | None = None) -> None:
         self.kind = kind
@@ -415,6 +417,9 @@ class PeerServer(Generic[P]):
 
     def _read_from(self, peer: P, comes: bool) -> bool:
         """Read what is allowed from one peer; True when it may have a request."""
+        if self.clock() - peer.lost_at_s > self.lost_s:
+            self.send_away(peer, STALLED)
+            return False
         if not self._is_served(peer):
             if peer.ending or not peer.waits and (comes or peer.incoming):
                 self._wait_for(peer)
@@ -466,7 +471,7 @@ class PeerServer(Generic[P]):
             if not peer.lost:
                 peer.write(self.limits.write_bytes)
         except OSError:
-            peer.lost = True
+            peer.lost, peer.lost_at_s = True, self.clock()
         if peer.lost:
             peer.outgoing.clear()
             peer.answers = 0

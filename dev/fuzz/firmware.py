@@ -31,6 +31,7 @@ import warnings
 from typing import Any
 
 from dev.fuzz import Finding
+from dev.load import waited_s
 from ranger_sim.foundation import descriptors, wallclock
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
@@ -405,10 +406,10 @@ class Fuzz:
             _walk(command, places, temporary)
         watch = os.pidfd_open(process)
         has_ended = False
-        began_s, busy_s = wallclock.monotonic_s(), _busy_s()
+        began_s, busy_s = wallclock.monotonic_s(), waited_s()
         while not has_ended:  # the time in which others had the processors does not count, as long as it is bearable
             passed_s = wallclock.monotonic_s() - began_s
-            if passed_s > LONGEST_S or passed_s - (_busy_s() - busy_s) > deadline_s + MORE_S:
+            if passed_s > LONGEST_S or passed_s - (waited_s() - busy_s) > deadline_s + MORE_S:
                 break
             has_ended = bool(descriptors.wait([watch], [], 1.0)[0])
         os.close(watch)
@@ -451,15 +452,6 @@ class Fuzz:
         if is_lost and not ("MCH" in failed and lost.get("why")):
             raise Finding(f"{where}: lost without a cause")
         self.counts["lost" if is_lost else "failed" if failed else "went_on"] += 1
-
-
-def _busy_s() -> float:
-    """For how long some process of this machine has waited for a processor, s; 0 where the kernel does not count it."""
-    try:
-        pressure = pathlib.Path("/proc/pressure/cpu").read_text(encoding="ascii")
-    except OSError:
-        return 0.0
-    return int(pressure.split("total=")[1].split()[0]) * 1e-6
 
 
 def _walk(command: list[str], places: list[pathlib.Path], temporary: pathlib.Path) -> None:

@@ -5,8 +5,12 @@ connections with the cluster's own certificate, which is made for one campaign. 
 every part (port 8787, the dashboard) require no certificate, so they are left out.
 """
 
+import contextlib
 import logging
+import signal
 import tempfile
+from collections.abc import Iterator
+from multiprocessing import resource_tracker
 from typing import Any
 
 import cryptography as _  # noqa: F401  (Dask imports it late; its absence is to be named before anything starts)
@@ -30,6 +34,24 @@ class Worker(NoPages, distributed.Worker):
     """A worker, without pages."""
 
 
+@contextlib.contextmanager
+def without_interrupts() -> Iterator[None]:
+    """Threads that start within it, and the processes that they ever start, do not see Ctrl-C or the terminal's end.
+
+    A terminal sends both to every process of the command; the workers are ended by this one, and would print where
+    they were.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # which Dask's first process would start, and which unblocks them
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class OwnCluster:
     """A scheduler in this process and `jobs` workers of one thread in separate processes."""
 
@@ -48,11 +70,12 @@ class OwnCluster:
                 "silence_logs": logging.CRITICAL,
             },
         }
-        self.cluster: Any = distributed.SpecCluster(  # type: ignore[no-untyped-call]
-            workers={number: worker for number in range(jobs)},
-            scheduler={"cls": Scheduler, "options": {**common, "port": 0, "dashboard": False}},
-            security=security,
-        )
+        with without_interrupts():
+            self.cluster: Any = distributed.SpecCluster(  # type: ignore[no-untyped-call]
+                workers={number: worker for number in range(jobs)},
+                scheduler={"cls": Scheduler, "options": {**common, "port": 0, "dashboard": False}},
+                security=security,
+            )
 
     def client(self) -> Any:
         """A client with the cluster's certificate."""

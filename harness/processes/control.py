@@ -5,7 +5,7 @@ import socket
 from collections.abc import Callable
 from typing import Any
 
-from ranger_sim.can_bus.edge.peers import LIMITS, REASONS, Peer, PeerServer, SocketStream, connected
+from ranger_sim.can_bus.edge.peers import LIMITS, PATIENCE_S, REASONS, Peer, PeerServer, SocketStream, connected
 from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import RequestError, UserError
 
@@ -32,8 +32,12 @@ class ControlServer(PeerServer[Client]):
 
     `admitted(line)` returns the request of a line, or raises UserError.
 
-    The answer to a request that is not admitted is its fault; it goes no further.
+    The answer to a request that is not admitted is its fault; it goes no further. A client that leaves while answers
+    wait for it has asked without waiting: what a socket still holds of its requests, 10,000 of them, is not carried out
+    on and on.
     """
+
+    lost_s = PATIENCE_S
 
     def __init__(self, name: str, admitted: Callable[[bytes], Any], obey: Callable[[int, Any], None]) -> None:
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)

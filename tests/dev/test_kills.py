@@ -84,12 +84,12 @@ def test_a_walk_that_is_killed_leaves_nothing_but_an_incomplete_folder(tmp_path)
 
 
 def test_the_command_ends_with_1_at_a_finding(monkeypatch, capsys):
-    def found(count, seed):
+    def found(count, seed, first):
         raise Finding(f"case {count} of {seed}")
 
     monkeypatch.setattr(kills, "run", found)
     assert kills.main(["--kills", "3", "--seed", "7"]) == 1
     assert capsys.readouterr().err == "python -m dev.kills: seed 7: case 3 of 7\n"
-    monkeypatch.setattr(kills, "run", lambda count, seed: {"cases": count, "before_its_end": seed})
-    assert kills.main(["--kills", "3", "--seed", "7"]) == 0
-    assert capsys.readouterr().out == "cases 3, before its end 7\n"
+    monkeypatch.setattr(kills, "run", lambda count, seed, first: {"cases": count - first, "before_its_end": seed})
+    assert kills.main(["--kills", "3", "--seed", "7", "--first", "2"]) == 0
+    assert capsys.readouterr().out == "cases 1, before its end 7\n"

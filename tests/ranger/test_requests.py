@@ -223,3 +223,21 @@ def test_a_second_robot_of_a_name_is_reported(robot):
     assert address(name).endswith(name)
     with pytest.raises(UserError, match=f"a robot named {name} is already running"):
         ControlServer(name, admitted, robot.obey)
+
+
+def test_requests_of_a_client_that_left_without_its_answers_are_carried_out_for_two_seconds_only(robot):
+    now_s = [100.0]
+    robot.server.clock = lambda: now_s[0]
+    client = robot.connect()
+    sent = client.send((line(do="status") + b"\n") * 5000) // len(line(do="status") + b"\n")
+    client.close()
+    for _ in range(5):
+        robot.server.poll()
+    done = len(robot.requests)
+    assert 4 * LIMIT.burst <= done < sent and len(robot.server.peers) == 1
+    now_s[0] += 1.9
+    robot.server.poll()
+    assert len(robot.requests) > done
+    now_s[0] += 0.2
+    robot.server.poll()
+    assert not robot.server.peers and not robot.server.clients and robot.server.sent_away["stalled"] == 1

@@ -1,5 +1,6 @@
 """Every command that listens: another user of this machine is refused before the first byte; nothing else listens."""
 
+import contextlib
 import os
 import socket
 import sys
@@ -9,6 +10,7 @@ import pytest
 
 from tests.firmware_sim.gdb.machine import compiler_is_there
 from tests.system import listeners
+from tests.terminals import alone
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="the system's lists are those of Linux"),
@@ -28,7 +30,10 @@ def test_another_user_is_refused_before_the_first_byte(name, folder):
     command = listeners.COMMANDS[name]
     if command.module.endswith("gdb.machine") and not compiler_is_there():
         pytest.skip("no cross compiler (apt-get install gcc-arm-none-eabi)")
-    with listeners.listening(command, folder) as found:
+    with (
+        alone("trace-open") if name == "trace open" else contextlib.nullcontext(),
+        listeners.listening(command, folder) as found,
+    ):
         assert listeners.kinds(found) == command.listens, found
         got = dict(zip(found, listeners.answers(found), strict=True))
         assert not {place: answer for place, answer in got.items() if answer not in listeners.REFUSALS}

@@ -44,6 +44,9 @@ def run(options: argparse.Namespace) -> int:
     json_file = json_target(options.json)
     chosen = profile.load(options.profile)
     table = bus_schedule.robots_table()
+    screen = terminal.console(stderr=True, quiet=options.json == "-")
+    if screen.is_terminal:
+        screen.print(f"listening for {options.listen:g} s on each bus", highlight=False)
     found = [check(chosen, name, table, options.listen) for name in chosen.buses]
     ready = all(finding["ok"] is not False for bus in found for finding in bus["findings"])
     text = json.dumps({"profile": chosen.path, "ready": ready, "buses": found}, indent=2)

@@ -84,6 +84,9 @@ def run(options: argparse.Namespace) -> int:
 
 def seen(robot: Ranger, names: list[str], options: argparse.Namespace) -> dict[str, SlotView]:
     """Run the robot with these boards recorded."""
+    screen = terminal.console(stderr=True, quiet=options.json == "-")
+    if screen.is_terminal:
+        screen.print("the robot runs", highlight=False)
     robot.run_for(FIRST_SECONDS)
     views: dict[str, SlotView] = {name: robot.slots(name) for name in names}  # type: ignore[arg-type]
     if options.steps is not None:
