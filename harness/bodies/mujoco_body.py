@@ -161,6 +161,7 @@ class Winding:
         self.decay = math.exp(-step_s * drive.resistance_ohm / drive.inductance_H)
         self.mean = (1.0 - self.decay) * drive.inductance_H / drive.resistance_ohm / step_s
         self.follow = 1.0 - math.exp(-step_s / drive.lag_s) if drive.lag_s > 0.0 else 1.0
+        self.behind = self.follow * drive.lag_s / step_s  # share of the step's first lagging force in its mean
         self.current_A = self.lagging = 0.0
 
     def force(self, duty: float, rate: float) -> float:
@@ -168,8 +169,10 @@ class Winding:
         final_A = (duty * self.supply_V - self.emf_Vs * rate) / self.resistance_ohm
         off_A = self.current_A - final_A
         self.current_A = final_A + off_A * self.decay
-        self.lagging += self.follow * (self.per_A * (final_A + off_A * self.mean) - self.lagging)
-        return min(self.most, max(-self.most, self.lagging))
+        wanted = self.per_A * (final_A + off_A * self.mean)
+        off = self.lagging - wanted
+        self.lagging += self.follow * (wanted - self.lagging)
+        return min(self.most, max(-self.most, wanted + off * self.behind))
 
 
 def read(file: str | pathlib.Path) -> Any:

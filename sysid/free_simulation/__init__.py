@@ -27,13 +27,14 @@ A user's machine is a subclass of `SimulatedMachine` (`declared.py`, `terms.py`,
 can have: `candidates.py`); `examples/servo_arm.py` is a complete one.
 """
 
+from ranger_sim.sysid.free_simulation.candidates import filtered
 from ranger_sim.sysid.free_simulation.integration import Quantities, held, runge_kutta, standing
 from ranger_sim.sysid.free_simulation.machine import SimulatedMachine
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
-from ranger_sim.sysid.free_simulation.terms import Joint, Output, Port, Ports, Shape, SimulatedEffect, Term
+from ranger_sim.sysid.free_simulation.terms import Joint, Output, Port, Ports, Shape, SimulatedEffect, Term, into
 
 # for machines, which need nothing else
 __all__ = [
     "Joint", "Output", "Port", "Ports", "Quantities", "Shape", "SimulatedEffect", "SimulatedMachine",
-    "SimulatedRecording", "Term", "held", "runge_kutta", "standing",
+    "SimulatedRecording", "Term", "filtered", "held", "into", "runge_kutta", "standing",
 ]  # fmt: skip

@@ -28,11 +28,13 @@ class DeclaredMachine(abc.ABC):
     ports: tuple[Port, ...] = ()
     joints: tuple[Joint, ...] = ()  # where friction is sought, without a port or a term
     free_candidates: bool = True  # what every machine can have (candidates.py), next to its own terms
+    impossible: Collection[str] = ()  # causes among these that this machine is known not to have
     # Inputs with noise, by name: its standard deviation, or None for the channel's own estimate
     noisy_inputs: Mapping[str, float | None] = {}
     # From one sample to the next inputs and ports are straight lines, but for those that a converter holds, and for
     # inputs that stay at a value and jump, in these data
     held_inputs: Collection[str] = ()
+    mean_inputs: Collection[str] = ()  # a row has the mean of the step that ends there, as an averaging logger writes
     parts: int = 2  # steps from one sample to the next, each with the inputs of its own middle
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
     shortest_s: float = 2.0  # least duration of a usable recording

@@ -12,7 +12,7 @@ from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation import acting as effects
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
-from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.simulator import Simulator
 from ranger_sim.sysid.free_simulation.terms import Acting, into, sensed
@@ -201,7 +201,7 @@ class TrajectoryFit:
             slopes = effects.fed_back(each, enter, seen, values, own, dict(zip(states, self.size_x, strict=True)))
             for (number, name), slope in slopes.items():
                 back[:, number, states.index(name)] += slope
-            state, output = forcing(lin, enter, simulator.held_ports)
+            state, output = simulator.forcing(lin, enter)
             lin.f_p, lin.h_p = np.concatenate((lin.f_p, state), axis=2), np.concatenate((lin.h_p, output), axis=2)
         if np.any(back):
             after = np.concatenate((back[1:], back[-1:]))  # a step has the mean of its two ends

@@ -8,7 +8,7 @@ import numpy as np
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.free_simulation.fit import AWAY, TrajectoryFit
-from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor, forcing
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.terms import Port, Ports, Shape, Term
 from ranger_sim.sysid.machine import Columns, Entry, Equation
@@ -40,7 +40,7 @@ class LinearisedRecording(SimulatedRecording):
         return self._reached(self.predictor.white(self.predictor.errors(state, output)), output)
 
     def _forcing(self, entries: Ports) -> tuple[Array, Array]:
-        return forcing(self.linear, self.entering(entries), self.fit.simulator.held_ports)
+        return self.fit.simulator.forcing(self.linear, self.entering(entries))
 
     def _reached(self, white: Array, shown: Array) -> Columns:
         """(n, k) of each equation that has the effect; shown: (n, o, k) what it adds to the outputs themselves.

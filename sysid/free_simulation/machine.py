@@ -51,7 +51,9 @@ class SimulatedMachine(DeclaredMachine):
 
         def columns(recording: Recording, shape: Shape, values: Values, term: Term) -> Columns:
             here = cast(LinearisedRecording, recording)
-            return here.of_free(free, term, shape) if term.independent else here.respond(term.make(here, shape, values))
+            if term.independent and any(term is each for each in free):
+                return here.of_free(free, term, shape)
+            return here.respond(term.make(here, shape, values))
 
         return [
             SimulatedEffect(
@@ -77,7 +79,11 @@ class SimulatedMachine(DeclaredMachine):
             return []
         inputs = list(recordings[0].fit.simulator.inputs)
         named = {(each.cause, each.at) for each in own}
-        made = [each for each in candidates(self, inputs, recordings) if (each.cause, each.at) not in named]
+        made = [
+            each
+            for each in candidates(self, inputs, recordings)
+            if (each.cause, each.at) not in named and each.cause not in self.impossible
+        ]
         first, values = recordings[0], recordings[0].fitted
         known = [_direction(first.respond(each.make(first, shape, values)), first)
                  for each in own for shape in each.shapes if len(each.coefficients) == 1]  # fmt: skip

@@ -165,14 +165,19 @@ def between(column: Array) -> Array:
     return np.asarray(0.5 * (column + after))
 
 
-def forcing(lin: Jacobians, entering: Mapping[int, Array], held: Collection[int]) -> tuple[Array, Array]:
+def forcing(
+    lin: Jacobians, entering: Mapping[int, Array], held: Collection[int], means: Collection[int] = ()
+) -> tuple[Array, Array]:
     """((n, s, k), (n, o, k)) forcings of what enters, (n, k) by number of its port; held: ports that hold a sample's
-    value until the next."""
+    value until the next; means: those in which the next sample's value is the step's."""
     n, s = lin.next_state.shape
     count = next(iter(entering.values())).shape[1]
     state, output = np.zeros((n, s, count)), np.zeros((n, lin.output.shape[1], count))
     for number, column in entering.items():
-        through = column if number in held else between(column)
+        if number in means:
+            through = np.concatenate((column[1:], column[-1:]))
+        else:
+            through = column if number in held else between(column)
         state += lin.f_q[:, :, number, None] * through[:, None]
         output += lin.h_q[:, :, number, None] * column[:, None]
     return state, output

@@ -2,7 +2,7 @@
 
 import copy
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.integration import Quantities
-from ranger_sim.sysid.free_simulation.predictor import Jacobians
+from ranger_sim.sysid.free_simulation.predictor import Jacobians, forcing
 from ranger_sim.sysid.free_simulation.terms import Joint, Port, into, on, shown
 
 NUDGE = 1e-6  # of a quantity's size: step of a central difference
@@ -34,6 +34,11 @@ class Numerics:
     def held_ports(self) -> frozenset[str]:
         """Ports of the inputs that are held."""
         return frozenset(into(name) for name in self.held)
+
+    @property
+    def mean_ports(self) -> frozenset[str]:
+        """Ports of the inputs whose rows are means."""
+        return frozenset(into(name) for name in self.means)
 
     @property
     def open_jumps(self) -> frozenset[str]:
@@ -68,11 +73,13 @@ class Simulator:
         """inputs: (n,) by name."""
         self.machine, self.table, self.step_s = machine, table, table.step_s
         self.inputs = inputs
-        self.staying = {name for name in inputs if signals.stays(table, inputs[name])} - {*machine.held_inputs}
+        known = {*machine.held_inputs, *machine.mean_inputs}
+        self.staying = {name for name in inputs if signals.stays(table, inputs[name])} - known
         held = {*machine.held_inputs, *self.staying}
-        curved = {name for name in inputs if name not in held and signals.is_smooth(table, inputs[name])}
-        self.numerics = Numerics(machine.parts, frozenset(held), frozenset(curved))
-        self.open_ways = [name for name in inputs if name not in held and name not in curved]
+        settled = held | known
+        curved = {name for name in inputs if name not in settled and signals.is_smooth(table, inputs[name])}
+        self.numerics = Numerics(machine.parts, frozenset(held), frozenset(curved), frozenset(machine.mean_inputs))
+        self.open_ways = [name for name in inputs if name not in settled and name not in curved]
         self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
         for run in table.runs:
             self.inside[run.start + 1 : run.stop - 2] = 1.0
@@ -90,7 +97,18 @@ class Simulator:
     @property
     def held_ports(self) -> frozenset[int]:
         """Numbers of the ports of the inputs that are held."""
-        names = self.numerics.held_ports
+        return self._numbers(self.numerics.held_ports)
+
+    @property
+    def mean_ports(self) -> frozenset[int]:
+        """Numbers of the ports of the inputs whose rows are means."""
+        return self._numbers(self.numerics.mean_ports)
+
+    def forcing(self, lin: Jacobians, entering: Mapping[int, Array]) -> tuple[Array, Array]:
+        """((n, s, k), (n, o, k)) forcings of what enters, (n, k) by number of its port."""
+        return forcing(lin, entering, self.held_ports, self.mean_ports)
+
+    def _numbers(self, names: frozenset[str]) -> frozenset[int]:
         return frozenset(number for number, port in enumerate(self.ports) if port.name in names)
 
     def shown_at_once(self, u: Array, p: Array) -> list[str]:
@@ -177,7 +195,7 @@ class Simulator:
         if name in self.numerics.held or name in self.numerics.held_ports:
             return lambda share: c
         after = np.concatenate((c[:, 1:], c[:, -1:]), axis=1)
-        if name in self.numerics.means:
+        if name in self.numerics.means or name in self.numerics.mean_ports:
             return lambda share: after
         rise = after - c
         if name not in self.numerics.curved:
