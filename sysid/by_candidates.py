@@ -317,7 +317,7 @@ def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
 
 
 def _stamps(found: likelihood.Selection) -> list[Named]:
-    """Lags of rows against their stamps, which are no causes; they are in the base from then on.
+    """Lags of rows against their stamps, which are not causes; they are in the base from then on.
 
     Named ones of less than half a sample, and for a simulator those of less than a sample that held-out data refuse:
     an input and an output with their own clocks are so far apart, in each recording by another time.
