@@ -317,13 +317,14 @@ def _others(effects: Sequence[Effect], skews: Sequence[Named]) -> list[Effect]:
 
 
 def _stamps(found: likelihood.Selection) -> list[Named]:
-    """Lags of rows against their stamps, which are no causes; they are in the base from then on.
+    """Lags of rows against their stamps, which are not causes; they are in the base from then on.
 
-    Named ones of less than half a sample, and those of less than a sample that held-out data refuse: two channels with
-    their own clocks are so far apart, in each recording by another time.
+    Named ones of less than half a sample, and for a simulator those of less than a sample that held-out data refuse:
+    an input and an output with their own clocks are so far apart, in each recording by another time.
     """
     step_s = found.base.recordings[0].table.step_s
-    refused = [each for each in found.refused if each.effect.cause == "sensor_lag"]
+    simulated = any(each.entries for each in found.base.recordings)
+    refused = [each for each in found.refused if simulated and each.effect.cause == "sensor_lag"]
     with_refused = naming.refit(found.base, [*found.named, *refused])
     return [
         each

@@ -74,7 +74,7 @@ def test_a_larger_growth_is_named_as_well(growth):
     assert answer(BATTERY, "resistance grows", growth, 1)["causes"][:1] == ["resistance_growth at cell"]
 
 
-def test_a_drift_of_a_battery_is_no_offset_that_its_free_start_takes_up():
+def test_an_offset_that_a_free_start_takes_up_is_not_a_candidate_and_a_drift_is():
     log = BATTERY.log(1)
     columns = {"current_A": log["current [A]"], "voltage_V": log["voltage [V]"]}
     recording = Battery().prepare(Table(log["t [s]"], columns, (slice(0, len(log["t [s]"])),), "battery"))
