@@ -92,6 +92,7 @@ def _ranges(where: str, given: Ranges, highest: int, bits: int) -> list[tuple[in
     for each in given:
         first, last = each if isinstance(each, tuple) else (each, each)
         if not 0 <= first <= last <= highest:
-            raise BusError(f"{where}: {first:#x} to {last:#x} is no range of {bits}-bit identifiers, 0 to {highest:#x}")
+            shown = f"{first:#x} to {last:#x}"
+            raise BusError(f"{where}: {shown} is not a range of {bits}-bit identifiers, 0 to {highest:#x}")
         found.append((first, last))
     return found

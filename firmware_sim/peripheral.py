@@ -58,7 +58,7 @@ class Peripheral:
         return None
 
     def filter_bytes(self) -> bytes | None:
-        """The acceptance filter of a CAN controller; None: every frame passes, or it is no controller."""
+        """The acceptance filter of a CAN controller; None: every frame passes, or it is not a controller."""
         return None
 
 

@@ -733,7 +733,7 @@ def accepted_by_controller(rows: list[tuple[int, int, int]]) -> dict[int, tuple[
         first, last = first & ~EXTENDED, last & ~EXTENDED
         if not first <= last <= (HIGHEST_EXTENDED if extended else HIGHEST_STANDARD):
             raise FirmwareError(
-                f"range {row}: {first:#x} to {last:#x} is no range of {29 if extended else 11}-bit identifiers"
+                f"range {row}: {first:#x} to {last:#x} is not a range of {29 if extended else 11}-bit identifiers"
             )
         if (controller, first) <= before[extended]:
             raise FirmwareError(

@@ -7,7 +7,7 @@ Three transmit buffers: a request goes out as CAN_REQUEST. Its end comes as CAN_
 `ends` beforehand, and the controller takes it in when a register that depends on it is read; then it is a message only
 where an interrupt or a caller of `report_end` waits for it. Transmit and abort in one command is single shot.
 Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data overrun and lost.
-Acceptance filter (AFMR, SFF_sa ... ENDofTable): `accept` states which identifiers pass; until then it is in bypass. A
+Acceptance filter (AFMR, SFF_sa ... ENDofTable): `accept` states which identifiers pass; before that it is in bypass. A
 frame under way while it changes passes when both filters let it through.
 Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors, each if CxIER allows it.
 Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.

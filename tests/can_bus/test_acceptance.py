@@ -90,9 +90,9 @@ def test_a_frame_that_is_simulated_bit_by_bit_passes_the_same_filter():
 @pytest.mark.parametrize(
     ("identifiers", "reported"),
     [
-        ({"standard": [0x800]}, "B1: 0x800 to 0x800 is no range of 11-bit identifiers, 0 to 0x7ff"),
-        ({"standard": [(5, 4)]}, "B1: 0x5 to 0x4 is no range of 11-bit identifiers"),
-        ({"extended": [-1]}, "B1: -0x1 to -0x1 is no range of 29-bit identifiers, 0 to 0x1fffffff"),
+        ({"standard": [0x800]}, "B1: 0x800 to 0x800 is not a range of 11-bit identifiers, 0 to 0x7ff"),
+        ({"standard": [(5, 4)]}, "B1: 0x5 to 0x4 is not a range of 11-bit identifiers"),
+        ({"extended": [-1]}, "B1: -0x1 to -0x1 is not a range of 29-bit identifiers, 0 to 0x1fffffff"),
         ({"extended": range(0, 448, 2)}, "B1: 224 ranges of 29-bit identifiers, at most 223 fit"),
     ],
 )

@@ -134,8 +134,8 @@ def test_the_bus_gets_the_filter_from_the_start_of_the_program(tmp_path):
         ([(1, 0, 9), (1, 9, 12)], "range 1: 0x9 of controller 1 does not follow the range before it"),
         ([(2, 1, 1), (1, 2, 2)], "range 1: 0x2 of controller 1 does not follow the range before it"),
         ([(0, 1, 1)], "range 0: CAN controller 0 is not 1 ... 4"),
-        ([(1, 0x700, 0x800)], "range 0: 0x700 to 0x800 is no range of 11-bit identifiers"),
-        ([(1, 2, 1)], "range 0: 0x2 to 0x1 is no range of 11-bit identifiers"),
+        ([(1, 0x700, 0x800)], "range 0: 0x700 to 0x800 is not a range of 11-bit identifiers"),
+        ([(1, 2, 1)], "range 0: 0x2 to 0x1 is not a range of 11-bit identifiers"),
         ([(1, 1, 0x8000_0002)], "range 0: 0x1 to 0x80000002: FW_CAN_EXTENDED is set in one of the two"),
         ([(1, n, n) for n in range(0, 2046)][:1025], "1025 ranges, at most 1024 fit into the filter's table"),
         (
