@@ -123,6 +123,11 @@ class SatelliteBoard(FirmwareBoard):
         )
         self.can.attach(receive_slot=CAN_RECEIVE_SLOT, error_slot=error_slot)
 
+    def filter_frames(self) -> None:
+        """Set the acceptance filter where the board has one: its receive list is complete."""
+        if self.quirks.acceptance_filter:
+            self.can.filter_frames()
+
     def counters(self) -> object:
         """What the board counted, by name."""
         return counters.of_board(self, [counters.of_can_link(self.can)])

@@ -300,6 +300,7 @@ class MotorBoard(SatelliteBoard):
 
     def start_slots(self, phase_ns) -> None:
         """Start the scheduler; the first slot comes when the start values are set."""
+        self.filter_frames()
         self.start(self.schedule(), phase_ns + SLOTS_BEGIN_NS)
 
     # --- start-up ---------------------------------------------------------------------------------------

@@ -92,6 +92,9 @@ class Quirks:
     full_receive_ring_kills: bool = switch(True, True, YES_OR_NO)
     """A satellite whose receive ring is full serves that interrupt for ever. Appendix: nothing."""
 
+    acceptance_filter: bool = switch(False, False, YES_OR_NO)
+    """A satellite's CAN controller refuses what its receive list has not. Robot: in bypass, the program looks up."""
+
     errors_reported_one_late: bool = switch(False, True, YES_OR_NO)
     """Router and main brain. Firmware: each report carries the error before it, the first one is 0."""
 

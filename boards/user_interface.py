@@ -116,6 +116,7 @@ class UserInterfaceBoard(SatelliteBoard):
         self.sync_light = SyncLight(self.gpio, self.keypad, self.leds)
         self.subscribe()
         self.on_timer_tick = self.lcd_tick
+        self.filter_frames()
         self.start(self.schedule(), phase_ns)
 
     def subscribe(self) -> None:

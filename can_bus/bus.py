@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import cython
 
+from ranger_sim.can_bus.acceptance import Acceptance
 from ranger_sim.can_bus.bit_level import BitLevel
 from ranger_sim.can_bus.bit_timing import SAMPLE_POINT, BitTiming
 from ranger_sim.can_bus.bus_counters import BusCounters
@@ -123,6 +124,7 @@ if TYPE_CHECKING:
 # kinds of the messages in `Bus.commands`
 COMMAND_ABORT: Final = 1
 COMMAND_MODE: Final = 2
+COMMAND_FILTER: Final = 3
 
 SECOND_NS: Final = 1_000_000_000
 FD_FLAGS: Final = 1792  # FLAG_FD, FLAG_BRS and FLAG_ESI
@@ -565,10 +567,17 @@ class Bus:
             raise ValueError(f"bus {self.name}: mode {mode} is neither 0 (operating) nor 1 (reset)")
         self._command(node, mode, time, COMMAND_MODE)
 
-    def _command(self, node, value, time, kind) -> None:
+    def set_filter(self, node, filter_bytes, time) -> None:
+        """Acceptance filter of a node for frames that start after `time` (ns), as CAN_FILTER messages carry.
+
+        filter_bytes: of `acceptance.packed`; None: every frame is accepted.
+        """
+        self._command(node, 0, time, COMMAND_FILTER, None if filter_bytes is None else Acceptance(filter_bytes))
+
+    def _command(self, node, value, time, kind, ref=None) -> None:
         if node < 0 or node >= len(self.nodes):
             raise ValueError(f"bus {self.name}: node {node} does not exist")
-        self.commands.push(max(time, self.advanced), 0, kind, node, value)
+        self.commands.push(max(time, self.advanced), 0, kind, node, value, 0, 0, 0, 0, ref)
         self._note_changes()
         self.next_time = min(self.next_time, self.commands.head_time)
         self.wakes[self.wake_place] = min(self.wakes[self.wake_place], self.next_time)
@@ -723,13 +732,15 @@ class Bus:
         return first
 
     def _execute(self) -> None:
-        """Carry out the first abort or mode change."""
+        """Carry out the first abort, mode change or change of a filter."""
         node: Node
         commands: EventQueue = self.commands
         commands.take()
         node = self.nodes[commands.a]
         if commands.kind == COMMAND_ABORT:
             self._abort(node, commands.b, commands.time)
+        elif commands.kind == COMMAND_FILTER:
+            node.acceptance = commands.ref
         elif commands.b == RESET:
             self._reset(node, commands.time)
         elif (node.mode == RESET or node.mode == BUS_OFF) and commands.time >= node.off_ns:
@@ -896,8 +907,9 @@ class Bus:
                     node.count_reception()
                     self._confine(node, self.edge_ns(end - ACK_DELIMITER_FROM_END), 0)  # behind the ACK slot
                 if node.listening:
-                    node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
-                    node.received += 1
+                    if node.acceptance is None or node.takes(identifier, flags):
+                        node.inbox.put(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0)
+                        node.received += 1
                     any_received = True
             node = node.following
         if not any_received:
@@ -969,8 +981,11 @@ class Bus:
                     # behind the ACK slot
                     self._confine(node, self.edge_ns(end - ACK_DELIMITER_FROM_END * self.bit_ticks), 0)
                 if node.listening:
-                    node.inbox.push(received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0, data)
-                    node.received += 1
+                    if node.takes(identifier, flags):
+                        node.inbox.push(
+                            received, node.order, CAN_RX, node.controller, identifier, flags, lo, hi, 0, data
+                        )
+                        node.received += 1
                     any_received = True
             node = node.following
         if not any_received:
@@ -1248,15 +1263,18 @@ class Bus:
         time: cython.longlong = self.edge_ns(bit)
         if met & MET_RECEIVED and node.listening and (self.tampering is None or self.tampering.receives(machine, time)):
             flags = machine.flags
-            if flags & FLAG_FD:
+            if not node.takes(machine.identifier, flags):
+                pass
+            elif flags & FLAG_FD:
                 data = bytes(machine.payload)
                 lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:8], "little")
                 node.inbox.push(time, node.order, CAN_RX, node.controller, machine.identifier, flags, lo, hi, 0, data)
+                node.received += 1
             else:
                 node.inbox.put(
                     time, node.order, CAN_RX, node.controller, machine.identifier, flags, machine.lo, machine.hi, 0
                 )
-            node.received += 1
+                node.received += 1
             self.bit_level.received_bit = bit
             self._note_result(time)
         if met & MET_SENT:

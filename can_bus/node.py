@@ -10,6 +10,7 @@ from typing import Final
 
 import cython
 
+from ranger_sim.can_bus.acceptance import Acceptance
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
 from ranger_sim.foundation.events import CAN_STATUS, CAN_TX_DONE, EventQueue
 
@@ -58,7 +59,8 @@ class Node:
     """A controller on a bus, with its error counters and statistics.
 
     `following`: the next node of the bus; the last is followed by the first. `listening`: it wants received frames (a
-    node that does not still acknowledges). `silent`: it drives nothing, not even an acknowledgement (`Bus.set_silent`).
+    node that does not still acknowledges). `acceptance`: the frames that its acceptance filter lets through, None: all;
+    the others are counted in `filtered`. `silent`: it drives nothing, not even an acknowledgement (`Bus.set_silent`).
     `flushed`: frames that waited when it went bus-off. `refused`: requests into an occupied buffer or while off the
     bus. `ends`: where the ends of its transmissions are written, unless they shall be messages. `suspend_bit`: it sends
     nothing before that bit. `off_ns`: when it went bus-off last; earlier requests of its program do not bring it back.
@@ -78,10 +80,12 @@ class Node:
     transmit_errors: cython.longlong
     receive_errors: cython.longlong
     listening: cython.bint
+    acceptance: Acceptance
     passive: cython.bint
     silent: cython.bint
     sent: cython.longlong
     received: cython.longlong
+    filtered: cython.longlong
     warning: cython.bint
     name: str
     sequences_left: cython.longlong
@@ -107,6 +111,8 @@ class Node:
         self.controller = controller
         self.mode = OPERATING
         self.listening = True
+        self.acceptance = None
+        self.filtered = 0
         self.silent = False
         self.sent = 0
         self.received = 0
@@ -141,6 +147,15 @@ class Node:
         """The transmission from `buffer` ends at `time` (ns) without success: TX_ABORTED or TX_LOST."""
         if not self.ends.write(buffer, time, status):
             self.inbox.push(time, self.order, CAN_TX_DONE, self.controller, buffer, status)
+
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    def takes(self, identifier: cython.longlong, flags: cython.longlong) -> cython.bint:
+        """Whether its acceptance filter lets a frame through; counts it otherwise."""
+        if self.acceptance is None or self.acceptance.accepts(identifier, flags):
+            return True
+        self.filtered += 1
+        return False
 
     # ---- error counters
 
@@ -210,6 +225,7 @@ class Node:
         self.passive = other.passive
         self.warning = other.warning
         self.listening = other.listening
+        self.acceptance = other.acceptance
         self.silent = other.silent
         self.off_ns = other.off_ns
         self.fdf = other.fdf

@@ -114,6 +114,10 @@ class Board:
         """The buffer for the ends of a CAN controller's transmissions; None: the bus sends them as messages."""
         return None
 
+    def filter_of(self, controller) -> bytes | None:
+        """The acceptance filter of a CAN controller (bytes of `can_bus.acceptance`); None: it accepts every frame."""
+        return None
+
     def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:
         """The old name of `connect_edges`."""
         renamed("Board.listen_to_edges", "connect_edges")

@@ -38,7 +38,7 @@ from ranger_sim.firmware_sim.scheduler import (
 )
 from ranger_sim.firmware_sim.vic import FIQ, FIRST_FIQ, SLOT_TIMER, InterruptController, InterruptSource
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
-from ranger_sim.foundation.events import CAN_TX_DONE, NEVER, PIN_EDGE, EventQueue
+from ranger_sim.foundation.events import CAN_RX, CAN_TX_DONE, NEVER, PIN_EDGE, EventQueue
 from ranger_sim.foundation.user_error import FirmwareError
 
 MESSAGE_KINDS: Final = 32  # to a board
@@ -172,6 +172,10 @@ class Microcontroller(Chip):
         """The buffer in which this CAN controller finds its transmissions' ends; None: it needs messages."""
         owner: Peripheral = self.message_table[controller * MESSAGE_KINDS + CAN_TX_DONE]
         return owner.transmit_ends()
+
+    def filter_of(self, controller) -> bytes | None:
+        """The acceptance filter of this CAN controller; None: every frame, or no such controller."""
+        return self.message_table[controller * MESSAGE_KINDS + CAN_RX].filter_bytes()
 
     def latest_slot(self) -> cython.longlong:
         """Start of its latest slot (ns); 0 before the first."""

@@ -57,6 +57,10 @@ class Peripheral:
         """Where a bus writes the ends of a CAN controller's transmissions; None: they come as messages."""
         return None
 
+    def filter_bytes(self) -> bytes | None:
+        """The acceptance filter of a CAN controller; None: every frame passes, or it is not a controller."""
+        return None
+
 
 @cython.final
 @cython.cclass

@@ -43,6 +43,7 @@ PIN_OUTPUT: Final = 36  # a pin, b level
 SSP_START: Final = 37  # a 0, ref SspSegment sent by the master; the exchange starts at the stamp
 SSP_LOAD: Final = 38  # a 0, ref SspSegment that the slave will send in the next exchange
 UART_OUTPUT: Final = 39  # a UART number, b byte; the stamp is the end of its last bit
+CAN_FILTER: Final = 40  # a controller, b 0 every frame / 1 those of ref: bytes of `can_bus.acceptance`
 
 # Flags of a frame: bits 0-3 data length code, then:
 FLAG_REMOTE: Final = 16

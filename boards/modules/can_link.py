@@ -158,6 +158,10 @@ class CanLink(Sender):
         if receiver is self.time:
             self.time_identifier = identifier
 
+    def filter_frames(self) -> None:
+        """Let the controller's acceptance filter refuse what the receive list has not."""
+        self.controller.accept([each for each in range(IDENTIFIERS) if self.receivers[each] is not None])
+
     def listen(self, identifier, receiver: Receiver) -> None:
         """The old name of `subscribe`."""
         renamed("CanLink.listen", "subscribe")

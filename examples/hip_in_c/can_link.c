@@ -38,11 +38,33 @@ static uint32_t queued_read;
 static fw_can_frame built;
 static int is_built;
 
+#if ACCEPTANCE_FILTER
+#define MOST_ACCEPTED 32u
+
+/* The receive list in ascending order is the acceptance filter's table. */
+static void accept_list(void)
+{
+    static fw_can_range accepted[MOST_ACCEPTED];
+    uint32_t count, place;
+    for (count = 0; count < receiver_count && count < MOST_ACCEPTED; count++) {
+        const uint32_t identifier = receivers[count].identifier;
+        for (place = count; place > 0 && accepted[place - 1].first > identifier; place--)
+            accepted[place] = accepted[place - 1];
+        accepted[place].controller = CONTROLLER;
+        accepted[place].first = accepted[place].last = identifier;
+    }
+    fw_can_accept(accepted, count);
+}
+#endif
+
 void can_link_start(const struct can_receiver *list, uint32_t count)
 {
     receivers = list;
     receiver_count = count;
     fw_can_start(CONTROLLER, BTR_3_MBIT_S, INTERRUPTS);
+#if ACCEPTANCE_FILTER
+    accept_list();
+#endif
 }
 
 /* --- receiving --- */

@@ -65,5 +65,8 @@
 #ifndef FULL_RECEIVE_RING_KILLS
 #define FULL_RECEIVE_RING_KILLS 1
 #endif
+#ifndef ACCEPTANCE_FILTER
+#define ACCEPTANCE_FILTER 0 /* 1: frames that the receive list has not cost no interrupt */
+#endif
 
 #endif

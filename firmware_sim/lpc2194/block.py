@@ -47,6 +47,7 @@ class Block(Peripheral):
 
     # {offset: (name, "r", "w" or "rw")}: what the reference lists, and a test holds against `read` and `write`
     REGISTERS: dict[int, tuple[str, ...]] = {}
+    MEMORY = 0  # bytes from `base` on that only keep what is written; REGISTERS has the first word
     READ_ACTS: frozenset[int] = frozenset()  # offsets at which a read does something: a debugger does not look there
 
     def __init__(self, chip, clocks, name, base, mask=0) -> None:

@@ -28,7 +28,7 @@ from ranger_sim.firmware_sim.counters import BoardCounters, CanCounters, Process
 from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.lpc2194.address_map import AddressedBoard, AddressMap
 from ranger_sim.firmware_sim.lpc2194.block import Block, Clocks
-from ranger_sim.firmware_sim.lpc2194.can import AFMR_BYPASS, CanBlock, CanFilterBlock
+from ranger_sim.firmware_sim.lpc2194.can import AFMR_OFF, CanBlock, CanFilterBlock, CanFilterRam
 from ranger_sim.firmware_sim.lpc2194.converter import ConverterBlock
 from ranger_sim.firmware_sim.lpc2194.hardware import BoardHardware
 from ranger_sim.firmware_sim.lpc2194.image import Image
@@ -196,6 +196,7 @@ class ImageBoard(AddressedBoard):
             self.converter,
             *self.can_blocks,
             self.acceptance,
+            CanFilterRam(self, clocks, self.acceptance),
         ]
         for block in blocks:
             self.map.add(block)
@@ -532,7 +533,7 @@ class ImageBoard(AddressedBoard):
                 cython.cast(Peripheral, self.followers[queue.a]).on_level(queue.a, queue.b)
             self.pin_select.on_pin(queue.a, queue.b, queue.time)
         elif 0 <= queue.kind < MESSAGE_KINDS and 0 <= queue.a < INDICES_PER_KIND:
-            if queue.kind != CAN_RX or self.acceptance.mode & AFMR_BYPASS:
+            if queue.kind != CAN_RX or self.acceptance.mode != AFMR_OFF:
                 cython.cast(Peripheral, self.message_table[queue.a * MESSAGE_KINDS + queue.kind]).on_message(queue)
         else:
             self.others.on_message(queue)

@@ -1,13 +1,15 @@
 """The four CAN controllers' registers, and what they share: acceptance filter and central status.
 
-LPC2194 user manual, CAN controllers and acceptance filter. The filter is off or in bypass (CxRFS has its bit BP then);
-its tables are not modelled. The controllers are peripherals/can_controller.py.
+LPC2194 user manual, CAN controllers and acceptance filter. The filter is off, in bypass (CxRFS has its bit BP then), or
+looks identifiers up in its table; which entry it was, the index in CxRFS, is 0. The controllers are
+peripherals/can_controller.py.
 """
 
 from typing import Final
 
 import cython
 
+from ranger_sim.can_bus.acceptance import packed
 from ranger_sim.can_bus.node import WARNING_LIMIT
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.lpc2194.vic import CAN1_RX_INPUT, CAN1_TX_INPUT, CAN_INPUT
@@ -15,12 +17,20 @@ from ranger_sim.firmware_sim.peripherals.can_controller import (
     CMR_SRR,
     ICR_RI,
     MOD_RESET,
+    TABLE_BYTES,
     CanController,
 )
 from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.user_error import BusError
 
 AFMR_OFF: Final = 1
 AFMR_BYPASS: Final = 2
+# an entry of the table: 16 bits for an identifier of 11, 32 for one of 29
+SFF_IDENTIFIER: Final = 0x7FF
+SFF_DISABLED: Final = 0x1000
+SFF_CONTROLLER_SHIFT: Final = 13
+EFF_IDENTIFIER: Final = 0x1FFFFFFF
+EFF_CONTROLLER_SHIFT: Final = 29
 RFS_BP: Final = 0x400  # the frame was received in bypass
 TX_BITS: Final = 0x602  # TI1, TI2, TI3 in CxICR and CxIER
 MOD_KNOWN: Final = 0x09  # CxMOD: reset mode, and transmit priority by the PRIO of the buffers
@@ -49,11 +59,12 @@ NAMES = {
 @cython.final
 @cython.cclass
 class CanFilterBlock(Block):
-    """Acceptance filter: AFMR, and the table's registers, which keep what is written."""
+    """Acceptance filter: AFMR, and the starts of the table's sections. `ram`: the words of the table."""
 
     controllers: list
     mode: cython.longlong
     table: cython.longlong[8]
+    ram: list
 
     REGISTERS = {
         0x00: ("AFMR", "rw"),
@@ -71,6 +82,7 @@ class CanFilterBlock(Block):
         self.controllers = []  # the four CanBlocks, whose errors share this line
         self.mode = 1  # AFMR_OFF
         self.table = [0] * 8
+        self.ram = [0] * (TABLE_BYTES // 4)
 
     def requests(self) -> cython.longlong:
         block: CanBlock
@@ -92,13 +104,79 @@ class CanFilterBlock(Block):
 
     def write(self, offset: cython.longlong, value: cython.longlong) -> cython.int:
         if offset == 0:
-            if value & 3 == 0:
-                self.not_modelled("AFMR 0, the acceptance filter's tables: bypass (2) and off (1) are; 0")
+            if value & ~3:
+                self.not_modelled(f"AFMR {value:#x}: frames that the filter stores by itself")
             self.mode = value & 3
+            self._set_filters()
         elif 0 < offset < 0x18:
             self.table[offset >> 2] = value
         else:
             self.unknown(offset, True)
+        return 0
+
+    def _set_filters(self) -> None:
+        """Let the table act where the mode is 0; no filter of a controller has an effect otherwise."""
+        for place, block in enumerate(self.controllers):
+            if self.mode == 0:
+                block.can.set_filter(self._filter_of(place))
+            elif block.can.filter_bytes() is not None:
+                block.can.set_filter(None)
+
+    def _filter_of(self, controller) -> bytes:
+        """What the table lets through to controller 0 ... 3."""
+        _, sff, sff_groups, eff, eff_groups, end = (self.table[place] >> 2 for place in range(6))
+        if not sff <= sff_groups <= eff <= eff_groups <= end <= TABLE_BYTES // 4:
+            self.not_modelled("a table whose sections do not follow each other within its 2 KB")
+        halves = [half for word in self.ram[sff:sff_groups] for half in (word >> 16, word & 0xFFFF)]
+        groups = [(word >> 16, word & 0xFFFF) for word in self.ram[sff_groups:eff]]
+        words = self.ram[eff_groups:end]
+        standard = [
+            (first & SFF_IDENTIFIER, last & SFF_IDENTIFIER)
+            for first, last in [*((half, half) for half in halves), *groups]
+            if first >> SFF_CONTROLLER_SHIFT == controller and not first & SFF_DISABLED
+        ]
+        extended = [
+            (first & EFF_IDENTIFIER, last & EFF_IDENTIFIER)
+            for first, last in [
+                *((word, word) for word in self.ram[eff:eff_groups]),
+                *zip(words[::2], words[1::2], strict=False),
+            ]
+            if first >> EFF_CONTROLLER_SHIFT == controller
+        ]
+        try:
+            return packed(self.name, standard, extended)
+        except BusError as error:
+            self.not_modelled(f"its table: {error};")
+            raise
+
+
+@cython.final
+@cython.cclass
+class CanFilterRam(Block):
+    """The lookup table of the acceptance filter, in words."""
+
+    filter: CanFilterBlock
+
+    REGISTERS = {0: ("AFRAM", "rw")}
+    MEMORY = TABLE_BYTES
+
+    def __init__(self, chip, clocks, acceptance) -> None:
+        Block.__init__(self, chip, clocks, "CAN acceptance filter RAM", 0xE0038000)
+        self.filter = acceptance
+
+    def read(self, offset: cython.longlong) -> cython.longlong:
+        self.steady = True
+        if offset >= TABLE_BYTES:
+            return self.unknown(offset, False)
+        return self.filter.ram[offset >> 2]
+
+    def write(self, offset: cython.longlong, value: cython.longlong) -> cython.int:
+        if offset >= TABLE_BYTES:
+            self.unknown(offset, True)
+        elif self.filter.mode == 0:
+            self.not_modelled("writing the table while it is in use (AFMR 0)")
+        else:
+            self.filter.ram[offset >> 2] = value & 0xFFFF_FFFF
         return 0
 
 

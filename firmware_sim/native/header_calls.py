@@ -8,6 +8,7 @@ from typing import Final
 
 import cython
 
+from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.native.functions import Function
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
@@ -15,7 +16,7 @@ from ranger_sim.firmware_sim.native.program import answer_by, pointer
 from ranger_sim.firmware_sim.native.started import Started
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller import CanController
+from ranger_sim.firmware_sim.peripherals.can_controller import TABLE_BYTES, CanController, table_bytes
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
@@ -34,6 +35,7 @@ from ranger_sim.foundation.user_error import FirmwareError
 CMR_AT: Final = 0x2  # CxCMR
 CMR_CDO: Final = 0x8
 CMR_STB1: Final = 0x20
+EXTENDED: Final = 0x8000_0000  # FW_CAN_EXTENDED
 WORD: Final = 0xFFFF_FFFF
 HOSTS: set[int] = set()  # addresses that programs may call with; those of ended boards stay, a number each
 _latest: cython.ulonglong = 0  # the address that was called with last: one of HOSTS
@@ -101,6 +103,7 @@ CALL_CAN_WRITE_MOD: Final = 58
 CALL_CAN_WRITE_IER: Final = 59
 CALL_SSP_START_WORDS: Final = 60
 CALL_SSP_WORD: Final = 61
+CALL_CAN_ACCEPT: Final = 62
 NAMES = (
     "attach detach request spend idle slot_cycles cycles pin_write pin_toggle IOPIN IOSET IOCLR timer_start "
     "capture_connect timer_CCR timer_write_CCR timer_CR timer_IR timer_clear_IR timer_TC pwm_start pwm_MR "
@@ -108,7 +111,8 @@ NAMES = (
     "adcx_write adcx_busy adcx_result spi_start spi_transfer spi_SPSR spi_SPDR ssp_start ssp_exchange ssp_load "
     "ssp_take uart_start uart_RBR uart_THR uart_LSR uart_IIR can_start can_transmit can_buffer_free can_abort "
     "can_read can_release can_clear_overrun can_GSR can_SR can_ICR can_MOD can_write_MOD can_write_IER "
-    "ssp_start_words ssp_word"
+    "ssp_start_words ssp_word "
+    "can_accept"
 ).split()
 
 
@@ -132,6 +136,7 @@ class Calls:
     masters: object
     uarts: object
     cans: object
+    accepted: object
 
     def __init__(self, board, library: Library, hardware, phase_ns) -> None:
         self.board = board
@@ -152,6 +157,7 @@ class Calls:
         self.masters = Started("SSP as a master of words")
         self.uarts = Started("UART")
         self.cans = Started("CAN controller")
+        self.accepted = None  # by controller, what its filter lets through; None: the filter is in bypass
 
     @cython.ccall
     def answer(
@@ -288,6 +294,8 @@ class Calls:
             self.ssp_start_words(a, b)
         elif call == CALL_SSP_WORD:
             return self.ssp_word(a)
+        elif call == CALL_CAN_ACCEPT:
+            return self.can_accept(a, b)
         return 0
 
     @cython.ccall
@@ -618,6 +626,8 @@ class Calls:
     def can_start(self, controller: cython.longlong, BTR: cython.longlong, IER: cython.longlong) -> None:
         self.new(self.cans, controller)
         self.cans[controller] = CanController(self.chip, controller, BTR, IER)
+        if self.accepted is not None:
+            self.cans[controller].accept(*self.accepted[controller])
 
     @cython.ccall
     def can_transmit(
@@ -689,6 +699,52 @@ class Calls:
     @cython.ccall
     def can_write_IER(self, controller: cython.longlong, value: cython.longlong) -> None:
         self.cans[controller].write_IER(value)
+
+    @cython.ccall
+    def can_accept(self, address: cython.longlong, count: cython.longlong) -> cython.longlong:
+        if count == 0:
+            self.accepted = None
+            for can in self.cans.values():
+                can.accept_all()
+            return 1
+        if count > TABLE_BYTES // 2:
+            raise FirmwareError(f"{count} ranges, at most {TABLE_BYTES // 2} fit into the filter's table")
+        ranges = ffi.cast("fw_can_range *", address)
+        rows = [(ranges[row].controller, ranges[row].first, ranges[row].last) for row in range(count)]
+        self.accepted = accepted_by_controller(rows)
+        for number, can in self.cans.items():
+            can.accept(*self.accepted[number])
+        return 1
+
+
+def accepted_by_controller(rows: list[tuple[int, int, int]]) -> dict[int, tuple[list, list]]:
+    """By controller 1 ... 4, the identifiers of 11 and of 29 bits in the rows of `fw_can_range`.
+
+    FirmwareError for what the chip's table cannot hold, by the number of the range.
+    """
+    accepted: dict[int, tuple[list, list]] = {number: ([], []) for number in range(1, 5)}
+    before = [(0, -1), (0, -1)]  # controller and last identifier, of 11 and of 29 bits
+    for row, (controller, first, last) in enumerate(rows):
+        extended = int(bool(first & EXTENDED))
+        if not 1 <= controller <= 4:
+            raise FirmwareError(f"range {row}: CAN controller {controller} is not 1 ... 4")
+        if bool(last & EXTENDED) != bool(extended):
+            raise FirmwareError(f"range {row}: {first:#x} to {last:#x}: FW_CAN_EXTENDED is set in one of the two")
+        first, last = first & ~EXTENDED, last & ~EXTENDED
+        if not first <= last <= (HIGHEST_EXTENDED if extended else HIGHEST_STANDARD):
+            raise FirmwareError(
+                f"range {row}: {first:#x} to {last:#x} is not a range of {29 if extended else 11}-bit identifiers"
+            )
+        if (controller, first) <= before[extended]:
+            raise FirmwareError(
+                f"range {row}: {first:#x} of controller {controller} does not follow the range before it"
+            )
+        before[extended] = (controller, last)
+        accepted[controller][extended].append(first if first == last else (first, last))
+    used = table_bytes(*([each for pair in accepted.values() for each in pair[kind]] for kind in (0, 1)))
+    if used > TABLE_BYTES:
+        raise FirmwareError(f"the ranges take {used} bytes of the filter's table, which has {TABLE_BYTES}")
+    return accepted
 
 
 @cython.cfunc

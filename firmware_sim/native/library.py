@@ -40,6 +40,7 @@ typedef struct { uint32_t slot_ns; uint32_t divider; uint32_t tick_cost; int32_t
                  fw_call on_tick; fw_call on_overrun; fw_call on_limit; fw_call on_near_limit; } fw_schedule;
 typedef struct { int kind; uint32_t index; fw_work handler; const char *name; uint32_t cost; uint32_t per_item;
                  int32_t vic_slot; int32_t latency; } fw_interrupt;
+typedef struct { uint32_t controller; uint32_t first; uint32_t last; } fw_can_range;
 typedef int64_t (*host_call)(void *, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
 
 void firmware_start(void);

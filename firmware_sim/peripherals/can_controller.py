@@ -7,6 +7,8 @@ Three transmit buffers: a request goes out as CAN_REQUEST. Its end comes as CAN_
 `ends` beforehand, and the controller takes it in when a register that depends on it is read; then it is a message only
 where an interrupt or a caller of `report_end` waits for it. Transmit and abort in one command is single shot.
 Receive: two hardware buffers, the older in RFS ... RDB; a third frame is a data overrun and lost.
+Acceptance filter (AFMR, SFF_sa ... ENDofTable): `accept` states which identifiers pass; before that it is in bypass. A
+frame under way while it changes passes when both filters let it through.
 Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, n) for errors, each if CxIER allows it.
 Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
 """
@@ -14,6 +16,8 @@ Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery
 from typing import Annotated, Final
 
 import cython
+
+from ranger_sim.can_bus.acceptance import Acceptance, Ranges, packed
 
 # handed on to the boards, which see the controller and not the bus
 from ranger_sim.can_bus.node import ICR_BUS_ERROR as ICR_BUS_ERROR  # noqa: PLC0414
@@ -26,6 +30,7 @@ from ranger_sim.firmware_sim.peripheral import Peripheral
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.events import (
     CAN_ABORT,
+    CAN_FILTER,
     CAN_MODE,
     CAN_RX,
     CAN_STATUS,
@@ -40,6 +45,8 @@ from ranger_sim.foundation.events import (
 from ranger_sim.foundation.user_error import FirmwareError
 
 MOD_RESET: Final = 0x1  # CxMOD: reset mode
+
+TABLE_BYTES: Final = 2048  # of the acceptance filter's lookup table
 
 # CxCMR
 CMR_TR: Final = 0x1  # transmission request
@@ -120,6 +127,13 @@ def frame_word(flags: cython.longlong) -> cython.longlong:
     return (flags & DLC_MASK) << DLC_SHIFT | (flags & FLAG_REMOTE) << RTR_SHIFT | (flags & FLAG_EXTENDED) << FF_SHIFT
 
 
+def table_bytes(standard: Ranges, extended: Ranges) -> int:
+    """Bytes of the acceptance filter's lookup table that these identifiers take; UM10114, section on its RAM."""
+    half_words = sum(not isinstance(each, tuple) for each in standard)
+    words = (half_words + 1) // 2 + sum(isinstance(each, tuple) for each in standard)
+    return 4 * words + sum(8 if isinstance(each, tuple) else 4 for each in extended)
+
+
 @cython.cfunc
 @cython.exceptval(check=False)
 def buffers_of(word: cython.longlong) -> cython.longlong:
@@ -141,6 +155,7 @@ class CanController(Peripheral):
     MOD: cython.longlong
     ends: TransmitEnds
     IER: Annotated[cython.longlong, "readonly"]
+    acceptance: Acceptance
     end_interrupts: cython.longlong
     ended: cython.longlong
     noted: cython.longlong
@@ -182,6 +197,7 @@ class CanController(Peripheral):
             raise FirmwareError(f"{chip.name}: CAN controller {number} is not 1 ... 4")
         self.number = number
         self.ends = TransmitEnds()
+        self.acceptance = None
         self.MOD = 0
         self.IER = IER
         self.end_interrupts = buffers_of(IER)  # by buffer, bits 1 ... 3
@@ -224,6 +240,37 @@ class CanController(Peripheral):
     def transmit_ends(self) -> object:
         """Where a bus writes the ends of its transmissions."""
         return self.ends
+
+    # --- acceptance filter --------------------------------------------------------------------------------
+
+    def accept(self, standard: Ranges = (), extended: Ranges = ()) -> None:
+        """Let only frames with these identifiers, of 11 and of 29 bits, pass: single ones, or (first, last).
+
+        The others cost the board nothing, and no simulation either. The lookup table is that of the chip, shared by its
+        controllers: FirmwareError where one of them alone takes more than its 2 KB.
+        """
+        where = f"{self.chip.name}: CAN controller {self.number}"
+        standard, extended = tuple(standard), tuple(extended)
+        used = table_bytes(standard, extended)
+        data = packed(where, standard, extended)
+        if used > TABLE_BYTES:
+            raise FirmwareError(
+                f"{where}: its acceptance filter takes {used} bytes of the table, which has {TABLE_BYTES}"
+            )
+        self.set_filter(data)
+
+    def accept_all(self) -> None:
+        """Let every frame pass: the filter is in bypass."""
+        self.set_filter(None)
+
+    def set_filter(self, data: bytes | None) -> None:
+        """Set the filter by the bytes of `can_bus.acceptance`; None: bypass."""
+        self.acceptance = None if data is None else Acceptance(data)
+        self.chip.outbox.push(self.chip.now, 0, CAN_FILTER, self.number, int(data is not None), 0, 0, 0, 0, data)
+
+    def filter_bytes(self) -> bytes | None:
+        """What `set_filter` was called with last."""
+        return None if self.acceptance is None else self.acceptance.data
 
     @cython.ccall
     def bit_rate(self) -> cython.double:
@@ -383,6 +430,8 @@ class CanController(Peripheral):
         buffer: cython.longlong
         if queue.kind == CAN_RX:
             if self.MOD & MOD_RESET:
+                return None
+            if self.acceptance is not None and not self.acceptance.accepts(queue.b, queue.c):
                 return None
             if self.rx_count == 0:
                 self.rx_count = 1

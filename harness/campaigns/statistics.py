@@ -16,10 +16,10 @@ chapter 9 for repeated intervals.
 import dataclasses
 import functools
 import math
+import statistics
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import optimize, stats
 
 from ranger_sim.foundation.user_error import CampaignError
 
@@ -56,16 +56,18 @@ def _check(count: int, total: int, confidence: float) -> None:
 def clopper_pearson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
     """Exact interval: a share outside gives a count this extreme with at most (1 - confidence) / 2."""
     _check(count, total, confidence)
+    from scipy import special  # here and below: scipy takes longer to import than a small campaign to run
+
     tail = (1.0 - confidence) / 2.0
-    low = 0.0 if count == 0 else float(stats.beta.ppf(tail, count, total - count + 1))
-    high = 1.0 if count == total else float(stats.beta.ppf(1.0 - tail, count + 1, total - count))
+    low = 0.0 if count == 0 else float(special.betaincinv(count, total - count + 1, tail))
+    high = 1.0 if count == total else float(special.betaincinv(count + 1, total - count, 1.0 - tail))
     return Share(count, total, low, high, confidence)
 
 
 def wilson(count: int, total: int, confidence: float = CONFIDENCE) -> Share:
     """Wilson's score interval."""
     _check(count, total, confidence)
-    low, high = _score_interval(count, total, float(stats.norm.ppf(0.5 + confidence / 2.0)))
+    low, high = _score_interval(count, total, statistics.NormalDist().inv_cdf(0.5 + confidence / 2.0))
     return Share(count, total, low, high, confidence)
 
 
@@ -100,9 +102,12 @@ def tolerance_place(total: int, share: float, confidence: float) -> int | None:
     for name, value in (("share", share), ("confidence", confidence)):
         if not 0.0 < value < 1.0:
             raise CampaignError(f"tolerance: {name} is {value!r}, allowed is above 0 and below 1")
-    if total == 0 or stats.binom.cdf(total - 1, total, share) < confidence:
+    if total == 0:
         return None
-    return int(stats.binom.ppf(confidence, total, share)) + 1
+    from scipy import special
+
+    enough = np.flatnonzero(special.bdtr(np.arange(total), total, share) >= confidence)
+    return int(enough[0]) + 1 if len(enough) else None
 
 
 def shown_to_miss(within: int, total: int, share: float, confidence: float) -> bool:
@@ -110,7 +115,9 @@ def shown_to_miss(within: int, total: int, share: float, confidence: float) -> b
 
     At exactly `share`, this few have a probability of at most 1 - confidence: Clopper and Pearson, one side.
     """
-    return bool(stats.binom.cdf(within, total, share) <= 1.0 - confidence)
+    from scipy import special
+
+    return bool(special.bdtr(within, total, share) <= 1.0 - confidence)
 
 
 def values_needed(share: float, confidence: float) -> int:
@@ -133,13 +140,18 @@ def crossing_probability(bounds: Sequence[float]) -> float:
         edge = min(bound, WIDEST_Z) * math.sqrt(k)
         grid = np.linspace(-edge, edge, GRID_POINTS)
         if k == 1:
-            here = stats.norm.pdf(grid)
+            here = _normal_density(grid)
         else:
             weights = _simpson(points)
-            here = stats.norm.pdf(grid[:, None] - points[None, :]) @ (weights * density)
+            here = _normal_density(grid[:, None] - points[None, :]) @ (weights * density)
         points, density = grid, here
         inside = float(_simpson(points) @ density)
     return 1.0 - inside
+
+
+def _normal_density(values: np.ndarray) -> np.ndarray:
+    density: np.ndarray = np.exp(-0.5 * values**2) / math.sqrt(2.0 * math.pi)
+    return density
 
 
 def _simpson(points: np.ndarray) -> np.ndarray:
@@ -163,6 +175,8 @@ def _bounds(shape: list[float], error: float) -> list[float]:
         raise CampaignError(f"stopping rule: {len(shape)} looks, allowed are 1 to 50")
     if not 0.0 < error < 0.5:
         raise CampaignError(f"stopping rule: an error of {error!r}, allowed is above 0 and below 0.5")
+    from scipy import optimize
+
     constant = optimize.brentq(
         lambda c: crossing_probability([c * each for each in shape]) - error, 0.5, WIDEST_Z, xtol=1e-6
     )

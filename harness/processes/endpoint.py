@@ -13,6 +13,7 @@ from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.scheduler import SlotScheduler
 from ranger_sim.foundation import wallclock
 from ranger_sim.foundation.events import (
+    CAN_FILTER,
     CAN_MODE,
     CAN_REQUEST,
     CAN_RX,
@@ -276,7 +277,7 @@ class Endpoint:
             if out.take():
                 if out.time < self.promised:
                     self.broke_its_promise()
-                if not frames_only or CAN_REQUEST <= out.kind <= CAN_MODE:
+                if not frames_only or CAN_REQUEST <= out.kind <= CAN_MODE or out.kind == CAN_FILTER:
                     self.from_board.put(out)
             elif self.pending.take():
                 self.from_board.put(self.pending)

@@ -41,6 +41,7 @@ KINDS = {
     events.CAN_REQUEST: Kind("CAN_REQUEST", FROM_BOARD, (CONTROLLER, BUFFER, IDENTIFIER, (0, 127), WORD, WORD)),
     events.CAN_ABORT: Kind("CAN_ABORT", FROM_BOARD, (CONTROLLER, BUFFER, NONE, NONE, NONE, NONE)),
     events.CAN_MODE: Kind("CAN_MODE", FROM_BOARD, (CONTROLLER, LEVEL, NONE, NONE, NONE, NONE)),
+    events.CAN_FILTER: Kind("CAN_FILTER", FROM_BOARD, (CONTROLLER, LEVEL, NONE, NONE, NONE, NONE)),
     events.PWM_UPDATE: Kind("PWM_UPDATE", FROM_BOARD, (WORD, WORD, (1, 0xFFFFFFFF), NONE, NONE, NONE)),
     events.PIN_OUTPUT: Kind("PIN_OUTPUT", FROM_BOARD, (PIN, LEVEL, NONE, NONE, NONE, NONE)),
     events.SSP_START: Kind("SSP_START", FROM_BOARD, (PORT, NONE, NONE, NONE, NONE, NONE)),
@@ -54,10 +55,11 @@ PAYLOADS = {
     events.SSP_SEGMENT: SSP_WORDS,
     events.SSP_START: SSP_WORDS,
     events.SSP_LOAD: SSP_WORDS,
+    events.CAN_FILTER: NOTE_WORDS,
     events.UART_OUTPUT: NOTE_WORDS,  # bytes of a whole transfer; a single byte carries none
     NOTE: NOTE_WORDS,
 }
-OPTIONAL = (events.UART_OUTPUT,)  # kinds that may come without their payload
+OPTIONAL = (events.CAN_FILTER, events.UART_OUTPUT)  # kinds that may come without their payload
 FIELDS = ("a", "b", "c", "d", "e", "f")
 
 

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 import cython
 
+from ranger_sim.can_bus.acceptance import Acceptance
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.events import (
     CAN_ABORT,
+    CAN_FILTER,
     CAN_MODE,
     CAN_REQUEST,
     ORDER_INTERRUPTS,
@@ -171,7 +173,10 @@ class BoardWires(Outbox):
     def _connect_ends(self, controller) -> None:
         bus = self.buses[controller]
         if bus is not None:
-            bus.nodes[self.nodes[controller]].connect(self.board.transmit_ends(controller))
+            node = bus.nodes[self.nodes[controller]]
+            node.connect(self.board.transmit_ends(controller))
+            filter_bytes = self.board.filter_of(controller)
+            node.acceptance = None if filter_bytes is None else Acceptance(filter_bytes)
 
     def lead_from(self, board) -> None:
         """Connect `board` to these wires from now on."""
@@ -236,6 +241,8 @@ class BoardWires(Outbox):
                 self.buses[a].abort(self.nodes[a], b, time)
             else:
                 self.buses[a].set_mode(self.nodes[a], b, time)
+        elif kind == CAN_FILTER:
+            self._set_filter(time, a, ref if b else None)
         elif kind == SSP_START:
             self.link.start(time, ref)
             self.board.stop_at(time + self.link.exchange_ns + self.window_ns)
@@ -278,9 +285,16 @@ class BoardWires(Outbox):
             if time + self.window_ns < self.board.horizon:
                 self.board.stop_at(time + self.window_ns)
 
-    def _check_early_transmit(self, time) -> None:
+    def _set_filter(self, time, controller, filter_bytes) -> None:
+        """Forward the acceptance filter of a controller to its bus."""
+        if time < self.silent_until:
+            self._check_early_transmit(time, "an acceptance filter was changed")
+        if self.buses[controller] is not None:
+            self.buses[controller].set_filter(self.nodes[controller], filter_bytes, time)
+
+    def _check_early_transmit(self, time, what="a frame was sent") -> None:
         raise UserError(
-            f"{self.board.name}: a frame was sent at {time} ns, but by its schedule's `transmitters` none could be "
+            f"{self.board.name}: {what} at {time} ns, but by its schedule's `transmitters` none could be "
             f"before {self.silent_until} ns: name the task that sends there; for a handler that sends, leave "
             "`transmitters` out"
         )

@@ -28,6 +28,7 @@ from ranger_sim.firmware_sim.native.trial import tried
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import (
     CAN_ABORT,
+    CAN_FILTER,
     CAN_MODE,
     CAN_REQUEST,
     CAN_RX,
@@ -331,6 +332,8 @@ class Outputs(Outbox):
             bench.buses_of[a][0].abort(bench.buses_of[a][1], b, time)
         elif kind == CAN_MODE:
             bench.buses_of[a][0].set_mode(bench.buses_of[a][1], b, time)
+        elif kind == CAN_FILTER:
+            bench.buses_of[a][0].set_filter(bench.buses_of[a][1], ref if b else None, time)
         elif kind == PWM_UPDATE:
             bench.pwm_log.append((time * 1e-9, (a - b) / c))
         elif kind == PIN_OUTPUT:

@@ -167,3 +167,10 @@ def test_twelve_boards_in_c_and_in_python_put_the_same_on_their_bus_ahead_or_not
         for ahead in (True, False)
     }
     assert len(set(found.values())) == 1
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler here")
+def test_twelve_boards_with_acceptance_filters_put_the_same_on_their_bus_in_c_in_python_and_as_processes():
+    ways = ({}, {"ahead": True}, {"in_c": False}, {"ahead": True, "processes": True})
+    found = {twelve_boards.measure(0.05, filtered=True, **how)["digest"] for how in ways}
+    assert len(found) == 1

@@ -18,6 +18,7 @@ from ranger_sim.foundation import wallclock
 
 SIMULATED = "simulated s per CPU s"
 FRAMES = "frames per CPU s"
+RUNS = "runs per CPU s"
 YARDSTICK = "virtual"  # measures the machine: every figure is also given as a ratio to it
 BUS_FRAMES_PER_S, VIRTUAL_FRAMES_PER_S = 50_000, 1_000  # frames for each second of --seconds, about as much work
 INTERPRETED_SHARE = 10  # the plain sources take at least this many times as long, and get less work in proportion
@@ -104,11 +105,19 @@ def fmu(seconds: float, plant_steps: int = 4, exchanged: bool = True) -> dict:
     return co_simulation.measure(seconds, plant_steps, exchanged)
 
 
-def twelve_boards(seconds: float, in_c: bool = True, ahead: bool = False, processes: bool = False) -> dict:
-    """Twelve boards on one bus, eleven with an encoder."""
+def twelve_boards(seconds: float, **how: bool) -> dict:
+    """Twelve boards on one bus, eleven with an encoder; `how` as for `twelve_boards.measure`."""
     from ranger_sim.tools.bench import twelve_boards as part
 
-    return part.measure(seconds, in_c, ahead, processes)
+    return part.measure(seconds, **how)
+
+
+def waiting(function: str, *arguments: Any, **how: Any) -> dict:
+    """A measurement of `waiting`."""
+    from ranger_sim.tools.bench import waiting as part
+
+    found: dict = getattr(part, function)(*arguments, **how)
+    return found
 
 
 CASES = {
@@ -133,6 +142,32 @@ CASES = {
     "boards-in-c-processes": Case(
         "in C, ahead, a process for each board", SIMULATED, lambda s: twelve_boards(s, ahead=True, processes=True)
     ),
+    "boards-in-c-filtered": Case(
+        "in C, ahead, with acceptance filters", SIMULATED, lambda s: twelve_boards(s, ahead=True, filtered=True)
+    ),
+    "boards-in-python-filtered": Case(
+        "in Python, ahead, with acceptance filters",
+        SIMULATED,
+        lambda s: twelve_boards(s, in_c=False, ahead=True, filtered=True),
+    ),
+    "boards-in-c-filtered-processes": Case(
+        "in C, ahead, with filters, as processes",
+        SIMULATED,
+        lambda s: twelve_boards(s, ahead=True, processes=True, filtered=True),
+    ),
+    "start-python": Case("the bare interpreter", RUNS, lambda s: waiting("start", s, "python")),
+    "start-version": Case("ranger-sim --version", RUNS, lambda s: waiting("start", s, "version")),
+    "start-info": Case("ranger-sim info", RUNS, lambda s: waiting("start", s, "info")),
+    "start-robot": Case("a first Ranger()", RUNS, lambda s: waiting("start", s, "robot")),
+    "start-pytest": Case("pytest collects one test", RUNS, lambda s: waiting("start", s, "pytest")),
+    "campaign": Case("campaign of `new`, start included", RUNS, lambda _: waiting("campaign")),
+    "campaign-bare": Case("its machine alone, for as long", RUNS, lambda _: waiting("campaign", bare=True)),
+    "images": Case("a board as an image", SIMULATED, lambda s: waiting("image", s / 10)),
+    "images-native": Case("its program for this computer", SIMULATED, lambda s: waiting("image", s, native=True)),
+    "walk": Case("a walk, start included", SIMULATED, lambda s: waiting("walk", s)),
+    "walk-trace": Case("the same with its trace", SIMULATED, lambda s: waiting("walk", s, trace=True)),
+    "rebuild": Case("build of one module", RUNS, lambda _: waiting("rebuild")),
+    "rebuild-nothing": Case("build with nothing to do", RUNS, lambda _: waiting("rebuild", nothing=True)),
     "robot-interpreted": Case("whole robot, interpreted", SIMULATED, robot, interpreted=True),
     "plant-interpreted": Case("body alone, interpreted", SIMULATED, plant, interpreted=True),
     "bus-interpreted": Case("four full buses, interpreted", FRAMES, bus, interpreted=True),

@@ -19,13 +19,13 @@ from typing import Any
 
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
-from ranger_sim.tools.bench.cases import CASES, FRAMES, SIMULATED, YARDSTICK, measured
+from ranger_sim.tools.bench.cases import CASES, FRAMES, RUNS, SIMULATED, YARDSTICK, measured
 from ranger_sim.tools.command_line import streams
 from ranger_sim.tools.command_line.files import json_target, replace_file
 from ranger_sim.tools.command_line.help_text import named_lines
 from ranger_sim.tools.command_line.units import whole_number
 
-SHOWN = {SIMULATED: "x real time", FRAMES: "frames"}
+SHOWN = {SIMULATED: "x real time", FRAMES: "frames", RUNS: "runs"}
 EXIT_EXCEEDED = 1  # a response came later than its bound
 
 
@@ -82,7 +82,37 @@ PARTS = {
     ),
     "boards-in-c": Part(
         "twelve boards in C on one bus: in one process, as processes, and the same in Python",
-        ("boards-in-c", "boards-in-c-ahead", "boards-in-python", "boards-in-python-ahead", "boards-in-c-processes"),
+        (
+            "boards-in-c",
+            "boards-in-c-ahead",
+            "boards-in-c-filtered",
+            "boards-in-python",
+            "boards-in-python-ahead",
+            "boards-in-python-filtered",
+            "boards-in-c-processes",
+            "boards-in-c-filtered-processes",
+        ),
+        only_named=True,
+    ),
+    "start": Part(
+        "starts of the command, of a first robot, of pytest with the plugin, and of the bare interpreter",
+        ("start-python", "start-version", "start-info", "start-robot", "start-pytest"),
+        only_named=True,
+    ),
+    "campaign": Part(
+        "runs of a small machine's campaign with its start, and the machine alone",
+        ("campaign", "campaign-bare"),
+        only_named=True,
+    ),
+    "images": Part(
+        "a board as an image of the chip, and its program for this computer (needs arm-none-eabi-gcc)",
+        ("images", "images-native"),
+        only_named=True,
+    ),
+    "trace": Part("a walk without a trace and with one", ("walk", "walk-trace"), only_named=True),
+    "rebuild": Part(
+        "in a checkout: the build after one module was removed, and with nothing to do",
+        ("rebuild", "rebuild-nothing"),
         only_named=True,
     ),
     "bus": Part("four CAN buses alone: full, a quarter full, of eight boards", ("bus", "bus-quarter", "bus-eight")),
@@ -214,7 +244,8 @@ def lines_of(figures: dict, runs: int) -> list[str]:
     ]
     for name, figure in figures.items():
         ratio = figure["ratio_to_virtual"]
-        compared = f"{ratio:.3g} times" if figure["unit"] == FRAMES else f"1 s costs {1.0 / ratio:,.0f} of its frames"
+        one = "1 run" if figure["unit"] == RUNS else "1 s"
+        compared = f"{ratio:.3g} times" if figure["unit"] == FRAMES else f"{one} costs {1.0 / ratio:,.0f} of its frames"
         numbers = " ".join(f"{three_digits(figure[key]):>9}" for key in ("median", "min", "max"))
         line = f"  {CASES[name].title:38} {numbers}  {SHOWN[figure['unit']]:11}"
         lines.append(line.rstrip() if name == YARDSTICK else f"{line}  {compared}")

@@ -2,7 +2,8 @@
 
 Each sends twice in five slots of 1 ms, 4,400 frames a second, and every frame interrupts all others. `ahead`: their
 schedules name the tasks that send and the machine lets frames wait for slots, so that boards run ahead; no result
-changes.
+changes. `filtered`: their acceptance filters let only the target through, which changes the interrupts and
+so the times of tasks.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ class Wheels(Plant):
 class PythonBoard(Microcontroller):
     """The program of wheel.c in Python."""
 
-    def __init__(self, node: int, crystal: Any, phase_ns: int, ahead: bool) -> None:
+    def __init__(self, node: int, crystal: Any, phase_ns: int, ahead: bool, filtered: bool) -> None:
         Microcontroller.__init__(self, f"B{node}", crystal=crystal)
         self.node, self.ms = node, 0
         self.edges = self.edges_before = self.rate = self.target = self.duty = self.integral = 0
@@ -81,6 +82,8 @@ class PythonBoard(Microcontroller):
         self.timer.use_channel(0, ENCODER_A)
         self.pwm = Pwm(self, period=PWM_PERIOD, phase_ns=phase_ns)
         self.can = CanController(self, 1, BTR_1_MBIT)
+        if filtered:
+            self.can.accept([TARGET])
         self.vic.attach(PIN_EDGE, ENCODER_A, self.on_edge, 90, slot=FIQ)
         self.vic.attach(CAN_RX, 1, self.on_frame, 180)
         rows = ((Task(self.send_rate, 260, 400),), (), (Task(self.send_angle, 260, 400),), (), ())
@@ -125,10 +128,10 @@ Maker = Callable[[int, Any, int], Any]
 
 
 @contextlib.contextmanager
-def makers(in_c: bool, ahead: bool) -> Iterator[Maker]:
+def makers(in_c: bool, ahead: bool, filtered: bool = False) -> Iterator[Maker]:
     """What makes a board from its number, its crystal, and its power-up (ns)."""
     if not in_c:
-        yield functools.partial(PythonBoard, ahead=ahead)
+        yield functools.partial(PythonBoard, ahead=ahead, filtered=filtered)
         return
     from ranger_sim.firmware_sim.native import build, manifest
     from ranger_sim.firmware_sim.native.native_board import NativeBoard
@@ -137,7 +140,7 @@ def makers(in_c: bool, ahead: bool) -> Iterator[Maker]:
         folder = pathlib.Path(made) / "wheel"
         shutil.copytree(SOURCE, folder, ignore=shutil.ignore_patterns("build"))
         with (folder / manifest.FILE).open("a", encoding="utf-8") as file:
-            file.write(f"[defines]\nAHEAD = {int(ahead)}\n")
+            file.write(f"[defines]\nAHEAD = {int(ahead)}\nFILTER = {int(filtered)}\n")
         library = build.build(manifest.load(folder)).path
 
         def native(node: int, crystal: Any, phase_ns: int) -> Any:
@@ -164,13 +167,15 @@ def machine(maker: Maker, ahead: bool, mode: InProcess) -> Machine:
     return Machine(Wheels(), boards, {"can1": BIT_RATE}, wiring, seed=1, mode=mode)
 
 
-def measure(seconds: float, in_c: bool = True, ahead: bool = False, processes: bool = False) -> dict:
+def measure(
+    seconds: float, in_c: bool = True, ahead: bool = False, processes: bool = False, filtered: bool = False
+) -> dict:
     """All twelve for `seconds`: simulated seconds per second of processor time, and the digest of their trace.
 
     processes: each board in its own, whose processor time counts from the start of the process on.
     """
     mode = OwnProcesses() if processes else InProcess()
-    with makers(in_c, ahead) as maker:
+    with makers(in_c, ahead, filtered) as maker:
         with contextlib.closing(machine(maker, ahead, mode)) as twelve:
             twelve.run(StopRule(time_s=WARM_UP_S), WARM_UP_S)
             started, others = wallclock.process_cpu_s(), ended_processes_s()

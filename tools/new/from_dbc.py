@@ -333,8 +333,25 @@ def program(network: Network, node: str) -> str:
     for each in (one for one in (*sent, *received) if one.has_signals):
         lines += [f"    {each.c_name}_init(&{_short(network, each)});"]
         lines += [f"    {_short(network, each)}.{member} = {value};" for member, value in each.multiplexers]
-    lines += ["}", "", f"BOARD_PROGRAM(sent, {len(sent)}, on_frame, board_start)", ""]
+    lines += ["}", "", *_filter(received)]
+    lines += [f"BOARD_PROGRAM(sent, {len(sent)}, on_frame, board_start, accepted, {len(received)})", ""]
     return "\n".join(lines)
+
+
+def _filter(received: list[DbcMessage]) -> list[str]:
+    """The board's acceptance filter, ascending: its received messages."""
+    rows = sorted((each.extended, each.identifier) for each in received)
+    lines = ["/* What it receives: other frames cost no interrupt. */"]
+    lines += [f"static const fw_can_range accepted[{max(1, len(rows))}] = {{"]
+    lines += (
+        []
+        if rows
+        else ["    FW_CAN_ONE(1, 0u), /* C has no empty arrays; the count is 0, and every frame is received */"]
+    )
+    for extended, identifier in rows:
+        flag = " | FW_CAN_EXTENDED" if extended else ""
+        lines += [f"    FW_CAN_ONE(1, 0x{identifier:X}u{flag}),"]
+    return [*lines, "};", ""]
 
 
 def _short(network: Network, message: DbcMessage) -> str:

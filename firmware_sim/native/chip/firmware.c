@@ -639,6 +639,8 @@ uint32_t fw_uart_IIR(uint32_t number) { return UxIIR(number); }
 
 /* --- CAN --- */
 
+static int filtering; /* the acceptance filter has a table */
+
 void fw_can_start(uint32_t controller, uint32_t BTR, uint32_t IER)
 {
     /* RD1 and RD2, TD2; TD1 has a pin of its own */
@@ -649,7 +651,8 @@ void fw_can_start(uint32_t controller, uint32_t BTR, uint32_t IER)
         select_function(24, 1);
     }
     CxMOD(controller) = FW_MOD_RESET;
-    AFMR = AFMR_BYPASS;
+    if (!filtering)
+        AFMR = AFMR_BYPASS;
     CxCMR(controller) = CMR_AT | CMR_RRB | CMR_CDO;
     CxBTR(controller) = BTR;
     CxIER(controller) = IER;
@@ -691,3 +694,88 @@ uint32_t fw_can_ICR(uint32_t controller) { return CxICR(controller); }
 uint32_t fw_can_MOD(uint32_t controller) { return CxMOD(controller); }
 void fw_can_write_MOD(uint32_t controller, uint32_t value) { CxMOD(controller) = value; }
 void fw_can_write_IER(uint32_t controller, uint32_t value) { CxIER(controller) = value; }
+
+#define FILTER_IDENTIFIER 0x1FFFFFFFu
+#define FILTER_LAST_STANDARD 0x7FFu
+#define FILTER_UNUSED 0x1000u /* of a half-word: disabled */
+
+/* Whether a range is of the section: one of 11 or of 29 bits, a single identifier or more. */
+static int in_section(const fw_can_range *range, int extended, int group)
+{
+    return !(range->first & FW_CAN_EXTENDED) == !extended && (range->first == range->last) == !group;
+}
+
+/* Whether the table can hold the ranges. */
+static int ranges_fit(const fw_can_range *ranges, uint32_t count)
+{
+    uint32_t half_words = 0, bytes = 0, before[2] = {0, 0};
+    for (uint32_t i = 0; i < count; i++) {
+        const fw_can_range *range = &ranges[i];
+        const int extended = (range->first & FW_CAN_EXTENDED) != 0;
+        const uint32_t most = extended ? FILTER_IDENTIFIER : FILTER_LAST_STANDARD;
+        const uint32_t first = range->first & ~FW_CAN_EXTENDED, last = range->last & ~FW_CAN_EXTENDED;
+        const uint32_t controller = (range->controller - 1u) << 29;
+        if (range->controller < 1 || range->controller > 4 || ((range->first ^ range->last) & FW_CAN_EXTENDED)
+            || first > last || last > most || (controller | first) + 1u <= before[extended])
+            return 0;
+        before[extended] = (controller | last) + 1u;
+        if (in_section(range, 0, 0))
+            half_words++;
+        else
+            bytes += in_section(range, 1, 1) ? 8u : 4u;
+    }
+    return (half_words + 1u) / 2u * 4u + bytes <= AFRAM_BYTES;
+}
+
+/* Write a section of the table from `at` on; returns its end. */
+static uint32_t write_section(uint32_t at, const fw_can_range *ranges, uint32_t count, int extended, int group)
+{
+    uint32_t upper = 0, halves = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t controller = (ranges[i].controller - 1u) << 29;
+        const uint32_t first = ranges[i].first & FILTER_IDENTIFIER, last = ranges[i].last & FILTER_IDENTIFIER;
+        if (!in_section(&ranges[i], extended, group))
+            continue;
+        if (extended) {
+            AFRAM(at) = controller | first;
+            at += 4;
+            if (group) {
+                AFRAM(at) = controller | last;
+                at += 4;
+            }
+        } else if (group) {
+            AFRAM(at) = controller | first << 16 | controller >> 16 | last;
+            at += 4;
+        } else if (halves++ & 1u) {
+            AFRAM(at) = upper | controller >> 16 | first;
+            at += 4;
+        } else {
+            upper = controller | first << 16;
+        }
+    }
+    if (halves & 1u) {
+        AFRAM(at) = upper | upper >> 16 | FILTER_UNUSED;
+        at += 4;
+    }
+    return at;
+}
+
+uint32_t fw_can_accept(const fw_can_range *ranges, uint32_t count)
+{
+    uint32_t end;
+    if (!ranges_fit(ranges, count))
+        return 0;
+    AFMR = AFMR_OFF;
+    filtering = count > 0;
+    if (!filtering) {
+        AFMR = AFMR_BYPASS;
+        return 1;
+    }
+    SFF_sa = 0; /* no identifiers of the chips that store frames by themselves come before */
+    SFF_GRP_sa = end = write_section(0, ranges, count, 0, 0);
+    EFF_sa = end = write_section(end, ranges, count, 0, 1);
+    EFF_GRP_sa = end = write_section(end, ranges, count, 1, 0);
+    ENDofTable = write_section(end, ranges, count, 1, 1);
+    AFMR = 0;
+    return 1;
+}

@@ -79,7 +79,15 @@
 
 /* CAN: acceptance filter, controllers 1 ... 4 */
 #define AFMR REGISTER(0xE003C000u)
+#define AFMR_OFF 1u
 #define AFMR_BYPASS 2u
+#define SFF_sa REGISTER(0xE003C004u)
+#define SFF_GRP_sa REGISTER(0xE003C008u)
+#define EFF_sa REGISTER(0xE003C00Cu)
+#define EFF_GRP_sa REGISTER(0xE003C010u)
+#define ENDofTable REGISTER(0xE003C014u)
+#define AFRAM(offset) REGISTER(0xE0038000u + (offset)) /* the lookup table */
+#define AFRAM_BYTES 2048u
 #define CAN(controller) (0xE0040000u + 0x4000u * (controller))
 #define CxMOD(n) REGISTER(CAN(n) + 0x00)
 #define CxCMR(n) REGISTER(CAN(n) + 0x04)

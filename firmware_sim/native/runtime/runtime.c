@@ -35,7 +35,8 @@
     CALL(can_start) CALL(can_transmit) CALL(can_buffer_free) CALL(can_abort) CALL(can_read) CALL(can_release) \
     CALL(can_clear_overrun) CALL(can_GSR) CALL(can_SR) CALL(can_ICR) CALL(can_MOD) CALL(can_write_MOD) \
     CALL(can_write_IER) \
-    CALL(ssp_start_words) CALL(ssp_word)
+    CALL(ssp_start_words) CALL(ssp_word) \
+    CALL(can_accept)
 
 /* One of the two a program leaves out. */
 void firmware_main(void) __attribute__((weak));
@@ -269,6 +270,10 @@ uint32_t fw_can_ICR(uint32_t controller) { return (uint32_t)HOST1(can_ICR, contr
 uint32_t fw_can_MOD(uint32_t controller) { return (uint32_t)HOST1(can_MOD, controller); }
 void fw_can_write_MOD(uint32_t controller, uint32_t value) { HOST2(can_write_MOD, controller, value); }
 void fw_can_write_IER(uint32_t controller, uint32_t value) { HOST2(can_write_IER, controller, value); }
+uint32_t fw_can_accept(const fw_can_range *ranges, uint32_t count)
+{
+    return (uint32_t)HOST2(can_accept, (int64_t)(intptr_t)ranges, count);
+}
 
 /* --- where the program was when a signal ended its process --- */
 

@@ -333,7 +333,7 @@ def test_the_pll_takes_over_when_it_was_fed_locked_and_fed_again():
     ("address", "value", "why"),
     [
         (T0 + 0x70, 1, "timer 0: CTCR) as a word at pc 0x00000000: counting edges at a pin (CTCR) is not modelled"),
-        (FILTER, 0, "CAN acceptance filter: AFMR"),
+        (FILTER, 4, "CAN acceptance filter: AFMR"),
         (CAN1 + 0x04, 0x10, "CAN1: CMR"),
         (SYSTEM + 0x40, 2, "MEMMAP 2: vectors elsewhere than in flash is not modelled"),
         (SPI0 + 0x100, 0, "no register is modelled there"),

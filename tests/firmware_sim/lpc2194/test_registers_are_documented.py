@@ -37,6 +37,9 @@ def test_what_the_page_has_answers_and_what_it_has_not_is_refused(number):
                 assert block.read(offset) >= 0, name
             if name not in NEEDS_SETTING_UP:
                 block.write(offset, 0)
+        elif offset < block.MEMORY:
+            block.write(offset, offset)
+            assert block.read(offset) == offset
         else:
             with pytest.raises(NotModelledError):
                 block.read(offset)

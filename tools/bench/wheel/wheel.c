@@ -1,5 +1,6 @@
 /* A board of twelve on one bus: it counts the edges of its encoder and sends rate and angle; board 0 sends the target.
- * Four straps at P1.16 ... P1.19 have its number. AHEAD: its schedule names the tasks that send (none of every slot). */
+ * Four straps at P1.16 ... P1.19 have its number. AHEAD: its schedule names the tasks that send (none of every slot).
+ * FILTER: its acceptance filter lets only the target through. */
 #include <ranger_sim/firmware.h>
 
 #define ENCODER_A FW_P0(22) /* CAP0.0 */
@@ -92,6 +93,10 @@ static const fw_interrupt interrupts[] = {
     {FW_CAN_RX, 1, on_frame, "on_frame", 180, 0, 0, FW_USUAL_LATENCY},
 };
 
+#if FILTER
+static const fw_can_range accepted[] = {FW_CAN_ONE(1, TARGET)};
+#endif
+
 void firmware_start(void)
 {
     fw_timer_start(0, 0xFFFFFFFFu, 0);
@@ -99,6 +104,9 @@ void firmware_start(void)
     fw_timer_write_CCR(0, FW_CCR_RISING(0) | FW_CCR_FALLING(0) | FW_CCR_INTERRUPT(0));
     fw_pwm_start(PWM_PERIOD);
     fw_can_start(1, BTR_1_MBIT, FW_ICR_RI);
+#if FILTER
+    fw_can_accept(accepted, 1);
+#endif
     fw_attach(&interrupts[0]);
     fw_attach(&interrupts[1]);
 }

@@ -353,6 +353,21 @@ uint32_t fw_can_MOD(uint32_t controller);
 void fw_can_write_MOD(uint32_t controller, uint32_t value);
 void fw_can_write_IER(uint32_t controller, uint32_t value);
 
+/* The acceptance filter of all four controllers (AFMR, SFF_sa, SFF_GRP_sa, EFF_sa, EFF_GRP_sa, ENDofTable, and the RAM
+ * of its lookup table). Identifiers first ... last of a controller, of 29 bits where both have FW_CAN_EXTENDED. */
+typedef struct fw_can_range {
+    uint32_t controller;
+    uint32_t first;
+    uint32_t last;
+} fw_can_range;
+
+#define FW_CAN_ONE(controller, id) { (controller), (id), (id) }
+/* From now on only frames in one of the ranges are received; others cost no interrupt. The ranges ascend: for 11 and for
+ * 29 bits by controller and identifier, without an overlap. count 0: every frame is received again (bypass), as before
+ * the first call. On the chip 0, and nothing is done, for ranges that do not ascend or take more than the table's 2 KB: two
+ * bytes for a single identifier, four for a range, twice as many for 29 bits. Here such a call ends the run. */
+uint32_t fw_can_accept(const fw_can_range *ranges, uint32_t count);
+
 #ifdef __cplusplus
 }
 #endif
