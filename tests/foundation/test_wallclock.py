@@ -1,4 +1,4 @@
-"""The clock that people set: only stamps for other programs and dates of records come from it, so a jump loses nothing."""
+"""The clock that people set gives only stamps for other programs and dates of records: a jump loses nothing."""
 
 import ast
 import pathlib
