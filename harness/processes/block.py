@@ -32,6 +32,7 @@ from ranger_sim.harness.processes.places import (
 )
 
 MAGIC = 0x52414E4745523031  # "RANGER01"
+OVERWRITTEN = "the program wrote over the message about its end"
 F_SEAL_FUTURE_WRITE = 0x0010  # linux/fcntl.h, from Linux 5.1 on; pidfds, which boards as processes need, came with 5.3
 
 
@@ -91,14 +92,16 @@ class Block:
         return self.words[TABLE : TABLE + self.table_words]
 
     def fault(self) -> str:
-        """The board process's message about its end."""
-        length = max(0, min(self.words[FAULT_TEXT], 8 * (FAULT_WORDS - 1)))
-        text = self.words[FAULT_TEXT + 1 : FAULT_TEXT + FAULT_WORDS].tobytes()[:length]
-        return printable(text.decode("utf-8", "replace"))
+        """The board process's message about its end; a program in C can write over it."""
+        length = self.words[FAULT_TEXT]
+        text = self.words[FAULT_TEXT + 1 : FAULT_TEXT + FAULT_WORDS].tobytes()
+        left = text[: max(0, length)].decode(errors="replace")
+        is_whole = 0 <= length <= len(text) and "\ufffd" not in left
+        return printable(left) if is_whole and left.replace("\n", "").isprintable() else OVERWRITTEN
 
     def leave_fault(self, text: str) -> None:
         """Write it, cut to what fits."""
-        data = text.encode()[: 8 * (FAULT_WORDS - 1)]
+        data = text.encode()[: 8 * (FAULT_WORDS - 1)].decode(errors="ignore").encode()  # whole characters
         padded = memoryview(data + bytes(-len(data) % 8)).cast("q")
         self.words[FAULT_TEXT + 1 : FAULT_TEXT + 1 + len(padded)] = padded
         self.words[FAULT_TEXT] = len(data)

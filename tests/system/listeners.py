@@ -84,11 +84,14 @@ REFUSALS = ("closed", "not permitted", "silent", "certificate required")
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """words: of the command line; shown: what it prints once it listens; listens: {kind: number of endpoints}."""
+    """words: of the command line; shown: what it prints once it listens; listens: {kind: number of endpoints}; what:
+    {kind: which they are}, for the document.
+    """
 
     words: tuple[str, ...]
     shown: str
     listens: dict[str, int]
+    what: dict[str, str]
     settles_s: float = 0.5  # after which it has opened the rest; chosen by us
     module: str = "ranger_sim"
 
@@ -98,28 +101,42 @@ COMMANDS = {
         ("bus", "demo", "--name", "listened-bus", "--slcan", "demo", "--socketcand", "0"),
         "Ctrl-C ends",
         {"unix": 1, "tcp": 1, "terminal": 1},
+        {"unix": "attach", "tcp": "socketcand", "terminal": "slcan"},
     ),
     "up": Command(
         ("up", "--name", "listened-up", "--speed", "0.1", "--no-real-time", "--slcan", "can1", "--socketcand", "0")
         + ("--xcp-udp", "0", "--daq-port", "pty", "--imu-offer", "pty", "--out", "kept"),
         "steps",
-        # unix: attach, requests, feed; tcp: socketcand
         {"unix": 3, "tcp": 1, "udp": 1, "terminal": 3},
+        {
+            "unix": "attach, `ctl`, feed",
+            "tcp": "socketcand",
+            "udp": "XCP",
+            "terminal": "slcan, data link, inertial unit",
+        },
         3.0,
     ),
-    "panel of a recording": Command(("panel", "recording.csv", "--http-port", "0"), "token=", {"tcp": 1}),
-    "panel --walk": Command(("panel", "--walk", "--http-port", "0"), "token=", {"unix": 3, "tcp": 1}),
-    "trace open": Command(("trace", "open", "run.pftrace", "--no-browser"), "http", {"tcp": 1}),
+    "panel of a recording": Command(
+        ("panel", "recording.csv", "--http-port", "0"), "token=", {"tcp": 1}, {"tcp": "HTTP"}
+    ),
+    "panel --walk": Command(
+        ("panel", "--walk", "--http-port", "0"),
+        "token=",
+        {"unix": 3, "tcp": 1},
+        {"unix": "attach, `ctl`, feed", "tcp": "HTTP"},
+    ),
+    "trace open": Command(("trace", "open", "run.pftrace", "--no-browser"), "http", {"tcp": 1}, {"tcp": "HTTP"}),
     "campaign, of processes": Command(
-        ("campaign", str(ROOT / "campaigns" / "sensors.toml"), "--pool", "local", "--out", "kept"), "0/", {}
+        ("campaign", str(ROOT / "campaigns" / "sensors.toml"), "--pool", "local", "--out", "kept"), "0/", {}, {}
     ),
     "campaign, of Dask": Command(
         ("campaign", str(ROOT / "campaigns" / "sensors.toml"), "--pool", "dask", "--jobs", "1", "--out", "kept"),
         "0/",
-        {"tcp": 3},  # scheduler, worker and its nanny
+        {"tcp": 3},
+        {"tcp": "scheduler, worker, nanny (TLS)"},
         3.0,
     ),
-    "a debugger's port": Command(("0",), " at ", {"tcp": 1}, module="tests.firmware_sim.gdb.machine"),
+    "a debugger's port": Command(("0",), " at ", {"tcp": 1}, {"tcp": "gdb"}, module="tests.firmware_sim.gdb.machine"),
 }
 
 # Modules that open an endpoint, and the entry above that starts them.
@@ -195,6 +212,28 @@ def prepare(folder):
     subprocess.run([sys.executable, "-m", "ranger_sim", *trace], cwd=folder, check=True, capture_output=True)
 
 
+KINDS = {"unix": "local socket", "tcp": "TCP port", "udp": "UDP port", "terminal": "pseudo-terminal"}
+SHOWN = {"silent": "no answer", "certificate required": "a certificate is required, of root as well"}
+DOCUMENT = ROOT / "docs" / "interfaces.md"
+
+
+def rows(title, found, got):
+    """The rows of a command in the document: found: its endpoints; got: what another user got at each."""
+    command = COMMANDS[title]
+    made = []
+    for kind, count in kinds(found).items():
+        here = sorted({SHOWN.get(answer, answer) for (of, _), answer in zip(found, got, strict=True) if of == kind})
+        plural = "s" if count > 1 else ""
+        made.append(f"| {title} | {count} {KINDS[kind]}{plural} | {command.what[kind]} | {'; '.join(here)} |")
+    return made or [f"| {title} | none | | |"]
+
+
+def documented(title):
+    """The rows that the document has for a command."""
+    lines = DOCUMENT.read_text(encoding="utf-8").splitlines()
+    return [line for line in lines if line.startswith(f"| {title} | ")]
+
+
 def kinds(found):
     """{kind: how many}"""
     return dict(collections.Counter(kind for kind, _ in found))
@@ -239,10 +278,9 @@ if __name__ == "__main__":
 
     with tempfile.TemporaryDirectory() as name:
         prepare(pathlib.Path(name))
-        print("| command | endpoint | another user gets | root gets |\n|---|---|---|---|")
+        print("| command | listens on | | another user gets |\n|---|---|---|---|")
         for title, command in COMMANDS.items():
             with listening(command, pathlib.Path(name)) as found:
-                strangers = answers(found)
-                roots = answers(found, 0)
-                for (kind, place), one, two in zip(found, strangers, roots, strict=True):
-                    print(f"| {title} | {kind} {place} | {one} | {two} |", flush=True)
+                print("\n".join(rows(title, found, answers(found))), flush=True)
+                if refused := [where for where, got in zip(found, answers(found, 0), strict=True) if got in REFUSALS]:
+                    print(f"(root is refused at {refused})", file=sys.stderr)

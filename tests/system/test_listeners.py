@@ -37,6 +37,7 @@ def test_another_user_is_refused_before_the_first_byte(name, folder):
         assert listeners.kinds(found) == command.listens, found
         got = dict(zip(found, listeners.answers(found), strict=True))
         assert not {place: answer for place, answer in got.items() if answer not in listeners.REFUSALS}
+        assert listeners.documented(name) == listeners.rows(name, found, got.values())
 
 
 def test_every_module_that_opens_an_endpoint_is_started_by_a_command_of_the_table():

@@ -333,3 +333,21 @@ def test_every_message_kind_of_the_foundation_may_travel():
         if name.isupper() and name.partition("_")[0] in ("PIN", "CAN", "UART", "SSP", "PWM") and isinstance(value, int)
     }
     assert named <= set(kinds.KINDS)
+
+
+def test_a_message_about_an_end_is_read_as_it_was_left_and_is_cut_between_characters():
+    with contextlib.closing(Block("MCH", 0, 0)) as block:
+        assert block.fault() == ""
+        block.leave_fault("it exceeded 5 µs in control() at small.c:9")
+        assert block.fault() == "it exceeded 5 µs in control() at small.c:9"
+        most = 8 * (places.FAULT_WORDS - 1)
+        block.leave_fault("x" * (most - 1) + "µ")  # of two bytes, of which one would fit
+        assert block.fault() == "x" * (most - 1)
+
+
+@pytest.mark.parametrize("value", [-1, 1, 0x7FFFFFFF, 0x00000000FFFFFF7F, (1 << 63) - 1])
+def test_a_message_that_a_program_wrote_over_is_named_and_not_shown(value):
+    with contextlib.closing(Block("MCH", 0, 0)) as block:
+        for word in range(places.FAULT_TEXT, places.FAULT_TEXT + places.FAULT_WORDS):
+            block.words[word] = value
+        assert block.fault() == "the program wrote over the message about its end"
