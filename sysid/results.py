@@ -186,9 +186,10 @@ class TwinsEvidence:
     controller: whose twins; rate: "full", "link" (50 Hz) or "few" (hip and leg angle alone); steps: that counted;
     since_step:
     the first step with the cause, 0 for all; distance: from sound walks, over its degrees of freedom; gain: of the
-    likeliest cause; limits: of gain and distance, which one sound walk in a hundred exceeds; named: None where nothing was
-    detected, or what is left with the likeliest cause is not sound; refused_by_holdout: it does not explain held-out
-    steps; ties: causes that explain these steps as well; never_distinguished: whose direction is the same; unusual:
+    likeliest cause; limits: of gain and distance, which one sound walk in a hundred exceeds; named: None where
+    nothing was detected, or what is left with the likeliest cause is not sound; refused_by_holdout: it does not
+    explain held-out steps; ties: causes that explain these steps as well; never_distinguished: whose direction is the
+    same; unusual:
     features with their distance from sound walks, in their deviations; smallest_visible: by cause the least size that
     would have been detected; cannot_be_seen: causes that these channels do not show; other_parameters: of the
     controller,

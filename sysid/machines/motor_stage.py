@@ -46,6 +46,7 @@ FEWEST_HOLDS, FEWEST_MOVING, FEWEST_BLOCKS = 5, 50, 10
 LEAST_W, SHARE = 0.02, 0.06  # deviation of a hold about the law: that of the meter, and the part of P of the brushes
 NOT_IN_THE_LAW = 0.02  # of the factor: the ripple of a moving joint, stamps
 CHANGED_W = 0.06  # between recordings at rest: five counts of the robot's meters
+BEYOND = 1.2  # times the largest current of a fit: further out its prediction is named as such
 LAW = ("gates", "R", "V_c", "switching")
 NAMED_LEVEL = 0.01  # of all comparisons of all boards together
 UNITS = {
@@ -424,7 +425,7 @@ def diagnose(data: Sequence[Dataset], holdout: Sequence[Dataset] = (), body: Bod
         stages[board] = stage(board, groups, motor, tests)
         kept = [each for dataset in holdout if (each := samples(dataset, board)) is not None]
         if kept:
-            _predict(stages[board], kept, motor)
+            _predict(stages[board], kept, motor, holds(groups))
     if not stages:
         text = f"fewer than {FEWEST_SAMPLES} samples of power or current of {', '.join(boards)}"
         raise DataError(f"{', '.join(each.name for each in data)}: {text}")
@@ -561,8 +562,9 @@ def _move(
     result.values["lag"] = Value("lag", "s", lag, lag - NEAR, lag + NEAR, None)
 
 
-def _predict(stage: Stage, kept: Sequence[Samples], motor: MotorParameters | None) -> None:
-    """Holds of recordings that were left aside: errors of the simulation's law and of the one found."""
+def _predict(stage: Stage, kept: Sequence[Samples], motor: MotorParameters | None, of_fit: Holds) -> None:
+    """Holds of recordings that were left aside: errors of the simulation's law and of the one found. of_fit: the holds
+    that it was found in; what lies far beyond their currents is named: R and V_c replace each other among them."""
     zero = stage.values["current_zero"].value if "current_zero" in stage.values else 0.0
     found = holds(kept, zero)
     if "R" not in stage.values:
@@ -573,6 +575,15 @@ def _predict(stage: Stage, kept: Sequence[Samples], motor: MotorParameters | Non
     after = law(found, values, motor) - found.power
     stage.held_out_holds = len(found)
     stage.held_out_after_W = float(np.sqrt(np.mean(after**2)))
+    most = float(np.max(of_fit.size[of_fit.loaded], initial=0.0))
+    beyond = found.size > BEYOND * most
+    if "R" in stage.values and np.any(beyond):
+        rest = after[~beyond]
+        others = f"; that of the others is {np.sqrt(np.mean(rest**2)):.2f} W" if len(rest) else ""
+        stage.notes.append(
+            f"held-out holds of up to {np.max(found.size):.2f} A exceed the {most:.2f} A of these recordings, where "
+            f"R and V_c replace each other: their error is {np.sqrt(np.mean(after[beyond] ** 2)):.2f} W{others}"
+        )
     stage.held_out_inside = float(np.mean(np.abs(after) < 2.0 * np.hypot(2.0 * LEAST_W, SHARE * found.power)))
     if motor is not None:
         stage.held_out_before_W = float(np.sqrt(np.mean((law(found, simulated_of(motor), motor) - found.power) ** 2)))

@@ -99,8 +99,8 @@ def joined(made: Sequence[Rest]) -> Rest:
 
 @dataclasses.dataclass(frozen=True)
 class Asked:
-    """Walks that a comparison asks for: of a controller and body, with a cause of a size, by floor and battery; repeats:
-    more of them, of bodies within tolerances."""
+    """Walks that a comparison asks for: of a controller and body, with a cause of a size, by floor and battery;
+    repeats: more of them, of bodies within tolerances."""
 
     controller: str
     body: str

@@ -192,3 +192,17 @@ def test_logs_that_were_left_aside_are_predicted_better_than_by_the_bench():
         assert stage.held_out_holds >= 8
         assert stage.held_out_after_W < 0.7 * stage.held_out_before_W
     assert motor_stage.diagnose(data, held, body_files.load("appendix")).stages["MCFO"].held_out_after_W < 0.05
+
+
+@measured
+def test_a_hold_far_beyond_the_currents_of_a_fit_is_named_with_its_own_error():
+    """The logs of 7 August end at 2.4 A; one of 20 August has a hold at 4.07 A, which decides the whole error."""
+    paths = sorted(LOGS.glob("*.csv"))
+    august = [motor_stage.read_long(path) for path in paths if path.name.startswith("2015-08-07")]
+    later = [motor_stage.read_long(path) for path in paths if not path.name.startswith("2015-08-07")]
+    found = motor_stage.diagnose(august, later).stages["MCH"]
+    note = next(each for each in found.notes if "exceed" in each)
+    assert "4.07 A" in note and "2.41 A" in note
+    assert found.held_out_after_W > 1.0  # of all holds
+    assert float(note.rpartition("others is ")[2].removesuffix(" W")) < 0.3
+    assert not any("exceed" in each for each in motor_stage.diagnose(later, august).stages["MCH"].notes)

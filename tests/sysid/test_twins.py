@@ -12,8 +12,8 @@ from ranger_sim.sysid.results import TwinCause, TwinsEvidence, Value
 from ranger_sim.sysid.twins import evidence, features, judgement, learning, step_map, steps, twin_file
 from ranger_sim.sysid.twins.model import mean_of
 from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
-from ranger_sim.tools.twins.causes import TWINS
 from ranger_sim.tools.twins import walking
+from ranger_sim.tools.twins.causes import TWINS
 from ranger_sim.tools.twins.emulation import REPEATS, WALKS, emulate
 
 STEP_ROWS = 300

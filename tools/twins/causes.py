@@ -9,8 +9,9 @@ from typing import Any
 
 Values = Mapping[str, float]
 # What a sound robot's boards do to their motor angles: 20 % (outer) and 5 % (inner) of the cable's stretch is taken for
-# an error of the motor's encoder when the task meets the foot's turning point near its upper stop, where the ankle stands
-# still for a moment while the motor already pulls. Seen: -11.9 and -5.4 mrad outside, -4.9 inside; reserves chosen by us.
+# an error of the motor's encoder when the task meets the foot's turning point near its upper stop, where the ankle has
+# no rate for a moment while the motor already pulls. Seen: -11.9 and -5.4 mrad outside, -4.9 inside; reserves chosen by
+# us.
 OUTER_JUMP_RAD, INNER_JUMP_RAD = -0.015, -0.006
 
 
