@@ -13,9 +13,9 @@ The fit's free parameters are those that differ between ankles: foot, springs, f
 cable, rotor, torque constant, the zero of one angle against the other, the delays of the law and of its target. Each
 has a prior with the spread of sound ankles (`SPREAD`): a parameter that the angles do not determine keeps its prior
 value, and one that they contradict is reported as a wrong value (`WRONG`). The motor either creeps inside its friction,
-as in the simulator, or rests, as a real machine does. A command that is held and jumps between two slow rows does so at
-a time that is fitted. The law uses the rate behind the board's filter, or the
-unfiltered rate. The fit keeps the better of each.
+as in the simulator, or rests, as a real machine does; the law uses the rate behind the board's filter, or the
+unfiltered rate. The fit keeps the better of each. A held command that jumps between two slow rows does so at a time
+that is fitted.
 
 The response is that difference plus the fitted values times their sensitivities, so that the regression returns values
 and not changes.
@@ -47,11 +47,11 @@ from ranger_sim.sysid.machines.ankle_motion import (
     PARAMETERS,
     RATE_FILTER_S,
     ROTOR,
+    SIGN_WIDTH,
     STIFFNESS,
     TORQUE,
     USUAL,
     VISCOUS,
-    SIGN_WIDTH,
     ZERO,
     Drive,
     Motion,

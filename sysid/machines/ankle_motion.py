@@ -113,9 +113,10 @@ class Drive:
 
 @dataclasses.dataclass
 class Motion:
-    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit,
-    -1 to 1; all of shape (m,) at every step; standing: the motor's friction is dry, and holds it; slopes: rates of p, u, a, w; rows: the steps that the log has; later: change of the
-    current for a lag longer by 1 s; behind: for a target later by 1 s."""
+    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit, -1 to
+    1; all of shape (m,) at every step; standing: dry friction holds the motor; slopes: rates of p, u, a, w; rows: the
+    steps that the log has; later: change of the current for a lag longer by 1 s; behind: for a target later by 1 s.
+    """
 
     time_s: Array
     states: Array  # (6, m)
@@ -329,7 +330,7 @@ class _Steps:
 
     def answers(self, motion: Motion, right: Array) -> Array:
         """Small changes (m, 6, k) of the states by what changes in each step's equations, (m, 6, k)."""
-        values, (steps, _, count) = self.values, right.shape
+        values, count = self.values, right.shape[2]
         loads = values[LOAD] * values[CONSTANT]
         bound = values[COULOMB] + loads * np.abs(motion.I)
         width = math.inf if self.dry else values[SIGN_WIDTH]

@@ -107,9 +107,9 @@ def test_stamps_that_are_off_by_less_than_a_hundredth_of_a_step_count_as_even(sh
 
 
 def test_a_channel_that_rests_on_a_count_is_found_and_one_that_moves_or_has_no_counts_is_not():
-    """0.3 s at rest, next to a count's edge so that it flickers between two, between motions at 20 counts a row."""
+    """0.3 s at rest, next to a count's edge so that it flickers between two, between motions at 0.7 counts a row."""
     time_s = np.arange(0.0, 0.9, 0.001)
-    moves = np.interp(time_s, [0.0, 0.3, 0.6, 0.9], [0.0, 6000.49, 6000.49, 12000.0])
+    moves = np.interp(time_s, [0.0, 0.3, 0.6, 0.9], [0.0, 210.49, 210.49, 421.0])
     flicker = generator(1, "flicker").normal(scale=0.05, size=len(time_s))
     table = Table(time_s, {}, (slice(0, len(time_s)),), "counts")
     rests = signals.on_one_count(table, 0.002 * np.round(moves + flicker), 24)
