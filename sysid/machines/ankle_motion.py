@@ -113,9 +113,9 @@ class Drive:
 
 @dataclasses.dataclass
 class Motion:
-    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit, -1 to
-    1; all of shape (m,) at every step; standing: dry friction holds the motor; slopes: rates of p, u, a, w; rows: the
-    steps that the log has; later: change of the current for a lag longer by 1 s; behind: for a target later by 1 s.
+    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit, -1
+    to 1; all of shape (m,) at every step; standing: dry friction holds the motor; slopes: rates of p, u, a, w; rows:
+    the steps that the log has; later: change of the current for a lag longer by 1 s; behind: for a target later by 1 s.
     """
 
     time_s: Array
