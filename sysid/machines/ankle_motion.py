@@ -15,7 +15,8 @@ best known, fixes that factor.
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
+from typing import cast
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -303,12 +304,12 @@ class _Steps:
         states, braking = np.full((count, STATES), math.nan), np.zeros(count)
         states[0] = p, u, a, w, u, I
         ankle_steps.walk(
-            memoryview((inverse @ self.starts).ravel()),
-            memoryview(np.ascontiguousarray((inverse @ right).T).ravel()),
-            memoryview(self.h / values[ROTOR] * inverse[:, 1].copy()),  # of a torque there
-            memoryview(np.array([values[COULOMB], loads, width])),
-            memoryview(states.ravel()),
-            memoryview(braking),
+            _flat(inverse @ self.starts),
+            _flat(np.ascontiguousarray((inverse @ right).T)),
+            _flat(self.h / values[ROTOR] * inverse[:, 1]),  # of a torque there
+            _flat(np.array([values[COULOMB], loads, width])),
+            _flat(states),
+            _flat(braking),
         )
         braking[0] = math.nan
         sliding = braking / np.maximum(values[COULOMB] + loads * np.abs(states[:, 5]), 1e-300)
@@ -339,10 +340,15 @@ class _Steps:
         inverse = np.linalg.inv(self.ends)
         changes = np.ascontiguousarray(inverse @ right)
         ankle_steps.respond(
-            memoryview((inverse @ self.starts).ravel()),
-            memoryview(self.h / values[ROTOR] * inverse[:, 1].copy()),
-            memoryview(bends.ravel()),
+            _flat(inverse @ self.starts),
+            _flat(self.h / values[ROTOR] * inverse[:, 1]),
+            _flat(bends),
             count,
-            memoryview(changes.ravel()),
+            _flat(changes),
         )
         return changes
+
+
+def _flat(numbers: Array) -> MutableSequence[float]:
+    """The memory of an array without gaps, row by row, for the loops over time: what they write is in the array."""
+    return cast(MutableSequence[float], numbers.ravel().data)
