@@ -306,7 +306,7 @@ class _Steps:
         ankle_steps.walk(
             _flat(inverse @ self.starts),
             _flat(np.ascontiguousarray((inverse @ right).T)),
-            _flat(self.h / values[ROTOR] * inverse[:, 1]),  # of a torque there
+            _flat(np.asarray(self.h / values[ROTOR] * inverse[:, 1], dtype=float)),  # of a torque there
             _flat(np.array([values[COULOMB], loads, width])),
             _flat(states),
             _flat(braking),
@@ -341,7 +341,7 @@ class _Steps:
         changes = np.ascontiguousarray(inverse @ right)
         ankle_steps.respond(
             _flat(inverse @ self.starts),
-            _flat(self.h / values[ROTOR] * inverse[:, 1]),
+            _flat(np.asarray(self.h / values[ROTOR] * inverse[:, 1], dtype=float)),
             _flat(bends),
             count,
             _flat(changes),
