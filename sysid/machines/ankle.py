@@ -14,7 +14,8 @@ cable, rotor, torque constant, the zero of one angle against the other, the dela
 has a prior with the spread of sound ankles (`SPREAD`): a parameter that the angles do not determine keeps its prior
 value, and one that they contradict is reported as a wrong value (`WRONG`). The motor either creeps inside its friction,
 as in the simulator, or rests, as a real machine does; the law uses the rate behind the board's filter, or the
-unfiltered rate. The fit keeps the better of each.
+unfiltered rate. The fit keeps the better of each. A held command that jumps between two slow rows does so at a time
+that is fitted.
 
 The response is that difference plus the fitted values times their sensitivities, so that the regression returns values
 and not changes.
@@ -46,11 +47,11 @@ from ranger_sim.sysid.machines.ankle_motion import (
     PARAMETERS,
     RATE_FILTER_S,
     ROTOR,
+    SIGN_WIDTH,
     STIFFNESS,
     TORQUE,
     USUAL,
     VISCOUS,
-    SIGN_WIDTH,
     ZERO,
     Drive,
     Motion,
@@ -64,7 +65,9 @@ STIFFNESS_A_per_rad, DAMPNESS_As_per_rad = 11.219, 1.634
 SETTLED_S = 0.5  # from a run's start, whose state is not known exactly: the law's slow pole is K / D = 7 to 15 1/s
 SHORTEST_S = 1.0  # least duration of a run
 FEWEST = 50  # least rows of a run
-EVERY, WIDTH = 3, 1.5  # samples: spacing of the rows that count, and the Gaussian that smooths both sides
+# Spacing in samples of the rows that count, at most; the Gaussian that smooths both sides has half of it. Slower logs
+# keep more: memory of the noise is known only from well above what the machine moves to.
+EVERY, KEPT_Hz = 3, 80.0
 MOST_STEPS, MOST_TRIES = 25, 8  # steps of the fit, and attempts at one step's damping
 # The robot's program limits the target from below and feeds forward its own value of the return spring: the sine logs
 # record I_0 (docs/ankle-measured.md). A log of targets alone may come from this program or from the plain law.
@@ -75,6 +78,8 @@ INERTIA_STARTS = (1.0, 2.5)  # of its value: the cable's ringing gives the sum o
 # whose disc is off centre by more than 2 % of its radius does not read.
 LARGEST_RIPPLE, LARGEST_COGGING_Nm, LARGEST_ECCENTRICITY_rad = 0.5, 0.1, 0.02
 LATEST_s = 0.05  # of a command, as of the target's `LATE`: 25 of the robot's frames. A longer delay is another fault
+FRAME_s = 0.002  # from one target to the next: robot.md N4.2
+MOST_JUMPS = 100  # of a held command whose times are fitted
 NARROWEST_rad_s = 0.003  # of friction's sign: below it, it is dry
 MOVES_TO_Hz = 10.0  # five times the fastest sine: above it, the angles' residual is noise
 SLOW = 5.0  # times the innovation from row to row: noise of these encoders has 1.1 to 1.4, on blind recordings
@@ -256,7 +261,9 @@ class Ankle:
         Known(LATE, "s", USUAL[LATE], -0.01, 0.05, "of the target in force behind the logged one"),
         Known(BALANCE, "N m/rad", USUAL[BALANCE], -5.0, 5.0, "of the spring at the motor"),
         Known(CONSTANT, "N m/A", USUAL[CONSTANT], 0.05, 6.0, "of the motor behind the gear"),
-        Known(SIGN_WIDTH, "rad/s", USUAL[SIGN_WIDTH], NARROWEST_rad_s, 1.0, "rate about which friction changes its sign"),
+        Known(
+            SIGN_WIDTH, "rad/s", USUAL[SIGN_WIDTH], NARROWEST_rad_s, 1.0, "rate about which friction changes its sign"
+        ),
     )
 
     def prepare(self, table: Table) -> AnkleRecording:
@@ -305,12 +312,13 @@ class Ankle:
 def _recording(fit: "_Fit") -> AnkleRecording:
     """Equations about the fitted motion."""
     table = fit.table
+    every = min(EVERY, max(1, int(1.0 / (KEPT_Hz * table.step_s))))
     recording = AnkleRecording(
         table,
         {},
         {},
-        width=WIDTH,
-        every=EVERY,
+        width=0.5 * every,
+        every=every,
         left_over=True,
         noise_by_candidates=False,
         simulated=fit.runs,
@@ -319,7 +327,7 @@ def _recording(fit: "_Fit") -> AnkleRecording:
     )
     recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
     recording.values = dict(fit.values)
-    known = [name for name in PARAMETERS if not (fit.dry and name == SIGN_WIDTH)]  # dry friction has no width
+    known = [name for name in fit.base if not (fit.dry and name == SIGN_WIDTH)]  # dry friction has no width
     recording.priors = {name: (fit.usual[name], each) for name, each in fit.spread.items() if name in known}
     if fit.of_program:
         recording.findings.append(_program_found(table))
@@ -327,17 +335,17 @@ def _recording(fit: "_Fit") -> AnkleRecording:
         recording.findings.append(_filter_found(table))
     s = recording.signals = _signals(table, fit.runs)
     # a joint that rests on a count shows one error of rounding at all of its rows
-    valid = fit.valid & ~signals.on_one_count(table, table["joint_angle_rad"], ORDER * EVERY)
-    sensitivity = np.zeros((len(table), ankle_motion.STATES, len(PARAMETERS)))
-    for run in fit.runs:
-        slopes = ankle_motion.sensitivities(run.motion)
+    valid = fit.valid & ~signals.on_one_count(table, table["joint_angle_rad"], ORDER * every)
+    sensitivity = np.zeros((len(table), ankle_motion.STATES, len(fit.base)))
+    for number, run in enumerate(fit.runs):
+        slopes = fit.sensitivities(number)
         slopes[:, 3] = run.shown(slopes[:, 3])
         sensitivity[run.rows] = slopes[run.motion.rows]
 
     bare: dict[str, Array] = {}  # responses without the contribution of the effects in the simulation
 
     def equation(name: str, letter: str, subsystem: str, missed: Array, slopes: Array) -> None:
-        columns = {each: slopes[:, PARAMETERS.index(each)] for each in known}
+        columns = {each: slopes[:, fit.base.index(each)] for each in known}
         response = missed + sum(fit.values[each] * column for each, column in columns.items())
         for acting in fit.acting:  # a cause in the simulation is named again, about a motion that includes it
             made = _made(recording, acting.shape, acting.effect)
@@ -370,7 +378,9 @@ def _recording(fit: "_Fit") -> AnkleRecording:
         (plausibility.slowness(left, name) or 0.0) < SLOW for name in left.equations
     )
     recording.memory = SLOWEST_NOISE
-    recording.noise_above = MOVES_TO_Hz * EVERY * table.step_s
+    # The times of jumps take a part of the fast noise with them: then all of the residual shows the noise
+    jumps = len(fit.base) > len(PARAMETERS)
+    recording.noise_above = 0.0 if jumps else MOVES_TO_Hz * every * table.step_s
     return recording
 
 
@@ -499,12 +509,13 @@ class _Fit:
         self.usual |= {name: 0.0 for name in self.extra}
         self.limits |= {name: (-math.inf, math.inf) for name in self.extra}
         self.loose, self.far, self.memory = False, FAR, MEMORY
-        self.known_late = {LATE: LOGGED_LATE_S} if "command_current_A" in table else {}
-        self.spread = SPREAD | self.known_late
+        self.known = {LATE: LOGGED_LATE_S} if "command_current_A" in table else {}
+        self.spread = SPREAD | self.known
         self.dry, self.filter_s = False, RATE_FILTER_S if of_program else 0.0
-        self.all = [*PARAMETERS, *self.extra]
-        self.values = dict(self.usual)
+        self.base: list[str] = list(PARAMETERS)  # and times of jumps
         K, D = _gains(table)
+        self.usual = dict(self.usual)
+        self.values = dict(self.usual)
         self.valid = np.zeros(len(table), dtype=bool)
         self.runs: list[Run] = []
         for rows in table.runs:
@@ -521,13 +532,42 @@ class _Fit:
                 command = K * target + D * table["target_rate_rad_per_s"][rows]
                 if of_program:
                     command = command + FORWARD_A_per_rad * (target - FORWARD_REST_rad)
-            drive = Drive(t, command, K, D, self.filter_s)
+            jumps = self._jumps(rows, command)
+            bent = not jumps and signals.is_smooth(Table(t, {}, (slice(0, len(t)),)), command)
+            drive = Drive(t, command, K, D, self.filter_s, bent, jumps)
             motion = ankle_motion.simulated(drive, self.values, self._start(rows, self.values))
             target, target_rate = self._target(rows, command / K)
             self.runs.append(Run(rows, drive, motion, *(np.interp(motion.time_s, t, x) for x in (target, target_rate))))
+        self.all = [*self.base, *self.extra]
         if not self.runs:
             raise ModelError(f"{table.name}: ankle needs a stretch of {SHORTEST_S:g} s without a gap")
         self.missed = self._missed([run.motion for run in self.runs], self.values)
+
+    def _jumps(self, rows: slice, command: Array) -> dict[str, int]:
+        """Rows before which a held command jumps, by the names of the jumps' times, which are free within a row's step.
+
+        None where rows follow each other as fast as targets do, or where the command does not stay between jumps.
+        """
+        step_s = self.table.step_s
+        changes = np.flatnonzero(np.diff(command)) + 1
+        if step_s <= FRAME_s or not 0 < len(changes) <= MOST_JUMPS or np.min(np.diff(changes), initial=2) < 2:
+            return {}
+        made = {f"jump@{self.table.time_s[rows][at]:.4f} s": int(at) for at in changes}
+        self.base += made
+        self.usual |= dict.fromkeys(made, 0.0)
+        self.values |= dict.fromkeys(made, 0.0)
+        self.limits |= dict.fromkeys(made, (-0.5 * step_s, 0.5 * step_s))
+        self.known = self.known | dict.fromkeys(made, step_s / math.sqrt(12.0))  # anywhere between the two rows
+        self.spread = self.spread | self.known
+        return made
+
+    def sensitivities(self, number: int) -> Array:
+        """Derivatives of a run's states (m, 6, n) by the values of `base`; other runs' jumps do not move it."""
+        run = self.runs[number]
+        slopes = ankle_motion.sensitivities(run.motion)
+        out = np.zeros((*slopes.shape[:2], len(self.base)))
+        out[:, :, [self.base.index(name) for name in (*PARAMETERS, *run.drive.jumps)]] = slopes
+        return out
 
     def _start(self, rows: slice, values: Values) -> tuple[float, float, float, float]:
         """States at a run's start, with the cable torque that the foot needs: a foot that starts off balance would ring
@@ -556,7 +596,7 @@ class _Fit:
         other = copy.copy(self)
         other.runs = [dataclasses.replace(run) for run in self.runs]
         other.loose, other.far, other.memory = True, FAR_LOOSE, MEMORY_LOOSE
-        other.spread = LOOSE | other.known_late
+        other.spread = LOOSE | other.known
         other._made_so(False, self.filter_s)
         other.improve()
         return other
@@ -572,7 +612,7 @@ class _Fit:
                 names = tuple(f"{effect.name}: {name}" for name in effect.coefficients)
                 other.acting.append(Acting(effect, shape, names))
                 acting |= dict(zip(names, coefficients, strict=True))
-        other.all = [*PARAMETERS, *self.extra, *(() if fixed else acting)]
+        other.all = [*self.base, *self.extra, *(() if fixed else acting)]
         other.limits = self.limits | {name: (-math.inf, math.inf) for name in acting}
         for values in ({**self.usual, ZERO: self._zero()}, self.values):
             moved = other._moved(values | acting)
@@ -622,7 +662,7 @@ class _Fit:
     def _slopes(self) -> Array:
         def part(number: int) -> tuple[Array, Array]:
             motion = self.runs[number].motion
-            slopes = ankle_motion.sensitivities(motion)[motion.rows]
+            slopes = self.sensitivities(number)[motion.rows]
             if self.extra:
                 pushed = np.column_stack([torque(motion) for torque in self.extra.values()])
                 slopes = np.concatenate([slopes, motion.answer(np.zeros_like(pushed), pushed)[motion.rows]], axis=2)
@@ -765,10 +805,12 @@ class _Fit:
     def held_as(self, other: "_Fit") -> None:
         """Take the values of another fit, with its friction and its law."""
         self._made_so(other.dry, other.filter_s)
-        moved = self._moved(other.values)
+        values = {name: self.values.get(name, value) if "@" in name else value for name, value in other.values.items()}
+        values |= {name: self.values[name] for name in self.base if name not in values}  # times of its own jumps
+        moved = self._moved(values)
         if moved is None:
             raise ModelError(f"{self.table.name}: the ankle cannot be simulated with these values")
-        self._take(other.values, *moved)
+        self._take(values, *moved)
 
     def _take(self, values: Mapping[str, float], motions: Sequence[Motion], missed: Array) -> None:
         self.values, self.missed = dict(values), missed
@@ -1064,7 +1106,7 @@ def _law(recordings: Sequence[Recording]) -> list[Effect]:
 
     def later(run: Run, _: Shape) -> Array:
         m = run.motion
-        return -np.gradient(np.interp(m.time_s, run.drive.time_s, run.drive.command_A), m.time_s)
+        return -np.gradient(run.drive.command(m.time_s, run.motion.values), m.time_s)
 
     def floor(run: Run, shape: Shape) -> Array:
         return run.drive.stiffness_A_per_rad * np.maximum(shape["floor_rad"] - run.target_rad, 0.0)

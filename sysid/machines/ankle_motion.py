@@ -15,9 +15,11 @@ best known, fixes that factor.
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
+from typing import cast
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.plant import body_files
@@ -66,20 +68,56 @@ Values = Mapping[str, float]
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """Inputs of a run: the law's numbers and I_0 at even times. time_s, command_A: shape (n,)."""
+    """Inputs of a run: the law's numbers and I_0 at even times. time_s, command_A: shape (n,).
+
+    Between rows the command goes straight, or along a cubic spline where it is `bent`. `jumps` has the rows before
+    which it jumps, by the names of the jumps' times among the values: seconds after the middle between the two rows.
+    """
 
     time_s: Array
     command_A: Array
     stiffness_A_per_rad: float
     dampness_As_per_rad: float
     filter_s: float = 0.0  # time constant of the filter through which the law reads the rate
+    bent: bool = False
+    jumps: Mapping[str, int] = dataclasses.field(default_factory=dict)
+
+    def command(self, time_s: Array, values: "Values") -> Array:
+        """I_0 at even times (m,), late by `LATE`; a jump within a step counts by its part of the step."""
+        late_s = np.clip(time_s - values[LATE], self.time_s[0], self.time_s[-1])
+        if self.bent:
+            return np.asarray(CubicSpline(self.time_s, self.command_A)(late_s))
+        sizes = self._sizes()
+        level = np.zeros_like(self.command_A)
+        for name, row in self.jumps.items():
+            level[row:] += sizes[name]
+        found = np.interp(late_s, self.time_s, self.command_A - level)
+        for name, row in self.jumps.items():
+            found += sizes[name] * np.clip(self._passed(name, row, time_s, values), 0.0, 1.0)
+        return found
+
+    def by_jumps(self, time_s: Array, values: "Values") -> Array:
+        """(m, jumps): change of `command` for a jump later by 1 s."""
+        sizes, step_s = self._sizes(), time_s[1] - time_s[0]
+        passed = (self._passed(name, row, time_s, values) for name, row in self.jumps.items())
+        columns = [-size / step_s * ((0.0 < t) & (t <= 1.0)) for size, t in zip(sizes.values(), passed, strict=True)]
+        return np.column_stack(columns) if columns else np.zeros((len(time_s), 0))
+
+    def _sizes(self) -> dict[str, float]:
+        return {name: float(self.command_A[row] - self.command_A[row - 1]) for name, row in self.jumps.items()}
+
+    def _passed(self, name: str, row: int, time_s: Array, values: "Values") -> Array:
+        """Steps since a jump."""
+        middle_s = 0.5 * (self.time_s[row] + self.time_s[row - 1])
+        return np.asarray((time_s - values[LATE] - middle_s - values[name]) / (time_s[1] - time_s[0]))
 
 
 @dataclasses.dataclass
 class Motion:
-    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit,
-    -1 to 1; all of shape (m,) at every step; standing: the motor's friction is dry, and holds it; slopes: rates of p, u, a, w; rows: the steps that the log has; later: change of the
-    current for a lag longer by 1 s; behind: for a target later by 1 s."""
+    """A simulated run. p, u, a, w: angle and rate of motor and joint; I: current; sliding: friction over its limit, -1
+    to 1; all of shape (m,) at every step; standing: dry friction holds the motor; slopes: rates of p, u, a, w; rows:
+    the steps that the log has; later: change of the current for a lag longer by 1 s; behind: for a target later by 1 s.
+    """
 
     time_s: Array
     states: Array  # (6, m)
@@ -144,7 +182,7 @@ Torques = Callable[[Motion], tuple[Array, Array]]  # (m,) at the motor and at th
 
 
 def sensitivities(motion: Motion) -> Array:
-    """Derivatives of the states by PARAMETERS: (m, 6, 14)."""
+    """Derivatives of the states by PARAMETERS and by the times of the drive's jumps: (m, 6, 14 + jumps)."""
     none = np.zeros_like(motion.p)
     GK, k_s = motion.values[CONSTANT], none + motion.values[CABLE]
     load, width = np.abs(motion.I), motion.values[SIGN_WIDTH]
@@ -166,11 +204,15 @@ def sensitivities(motion: Motion) -> Array:
         CONSTANT: (motion.I - motion.values[LOAD] * motion.sliding * load, none),
         SIGN_WIDTH: (bend, none),
     }
-    at_motor, at_foot = zip(*(pushes[name] for name in PARAMETERS), strict=True)
-    at_current = np.zeros((len(none), len(PARAMETERS)))
+    by_jumps = motion.steps.takes * motion.steps.drive.by_jumps(motion.time_s, motion.values)
+    count = len(PARAMETERS) + by_jumps.shape[1]
+    at_motor, at_foot, at_current = (np.zeros((len(none), count)) for _ in range(3))
+    for number, name in enumerate(PARAMETERS):
+        at_motor[:, number], at_foot[:, number] = pushes[name]
     at_current[:, PARAMETERS.index(LAG)] = motion.later
     at_current[:, PARAMETERS.index(LATE)] = motion.behind
-    return motion.answer(np.column_stack(at_motor), np.column_stack(at_foot), at_current)
+    at_current[:, len(PARAMETERS) :] = by_jumps
+    return motion.answer(at_motor, at_foot, at_current)
 
 
 def simulated(
@@ -192,7 +234,7 @@ def simulated(
     time_s = drive.time_s[0] + step_s / parts * np.arange((n - 1) * parts + 1)
     none = np.zeros_like(time_s)
     values = {**USUAL, **values}
-    command = np.interp(time_s - values[LATE], drive.time_s, drive.command_A)
+    command = drive.command(time_s, values)
     steps = _Steps(drive, values, step_s / parts, command, dry)
     pushed: tuple[Array, Array] = before if torques and before is not None else (none, none)
     states, sliding = steps.walked(*pushed, start)
@@ -262,12 +304,12 @@ class _Steps:
         states, braking = np.full((count, STATES), math.nan), np.zeros(count)
         states[0] = p, u, a, w, u, I
         ankle_steps.walk(
-            memoryview((inverse @ self.starts).ravel()),
-            memoryview(np.ascontiguousarray((inverse @ right).T).ravel()),
-            memoryview(self.h / values[ROTOR] * inverse[:, 1].copy()),  # of a torque there
-            memoryview(np.array([values[COULOMB], loads, width])),
-            memoryview(states.ravel()),
-            memoryview(braking),
+            _flat(inverse @ self.starts),
+            _flat(np.ascontiguousarray((inverse @ right).T)),
+            _flat(np.asarray(self.h / values[ROTOR] * inverse[:, 1], dtype=float)),  # of a torque there
+            _flat(np.array([values[COULOMB], loads, width])),
+            _flat(states),
+            _flat(braking),
         )
         braking[0] = math.nan
         sliding = braking / np.maximum(values[COULOMB] + loads * np.abs(states[:, 5]), 1e-300)
@@ -289,7 +331,7 @@ class _Steps:
 
     def answers(self, motion: Motion, right: Array) -> Array:
         """Small changes (m, 6, k) of the states by what changes in each step's equations, (m, 6, k)."""
-        values, (steps, _, count) = self.values, right.shape
+        values, count = self.values, right.shape[2]
         loads = values[LOAD] * values[CONSTANT]
         bound = values[COULOMB] + loads * np.abs(motion.I)
         width = math.inf if self.dry else values[SIGN_WIDTH]
@@ -298,10 +340,15 @@ class _Steps:
         inverse = np.linalg.inv(self.ends)
         changes = np.ascontiguousarray(inverse @ right)
         ankle_steps.respond(
-            memoryview((inverse @ self.starts).ravel()),
-            memoryview(self.h / values[ROTOR] * inverse[:, 1].copy()),
-            memoryview(bends.ravel()),
+            _flat(inverse @ self.starts),
+            _flat(np.asarray(self.h / values[ROTOR] * inverse[:, 1], dtype=float)),
+            _flat(bends),
             count,
-            memoryview(changes.ravel()),
+            _flat(changes),
         )
         return changes
+
+
+def _flat(numbers: Array) -> MutableSequence[float]:
+    """The memory of an array without gaps, row by row, for the loops over time: what they write is in the array."""
+    return cast(MutableSequence[float], numbers.ravel().data)

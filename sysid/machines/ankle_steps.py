@@ -3,8 +3,8 @@
 """An ankle's motion step by step, with the friction of its motor: the loops of `ankle_motion.py` over time.
 
 Each step is linear but for the friction y on the motor: x_1 = K x_0 + f - b y, six states p, u, a, w, r, I. Friction
-is implicit. With a width c of its sign y = (C_0 + m |I_1|) tanh(u_1 / c); without one it is dry: the motor stands, u_1 =
-0, while the y that this takes is within C_0 + m |I_1|, and slips with y at that limit otherwise.
+is implicit. With a width c of its sign y = (C_0 + m |I_1|) tanh(u_1 / c). Without one it is dry: the motor stands,
+u_1 = 0, while the y that this takes is within C_0 + m |I_1|, and slips with y at that limit otherwise.
 """
 
 import cython

@@ -225,7 +225,9 @@ def test_sensitivities_are_those_of_whole_simulations_also_of_a_motor_that_stand
 @pytest.mark.parametrize("width", [0.0, 0.05])
 def test_the_loop_over_time_is_the_same_interpreted(width, monkeypatch):
     source = str(Path(ankle_motion.__file__).with_name("ankle_steps.py"))
-    spec = importlib.util.spec_from_loader("ankle_steps_interpreted", SourceFileLoader("ankle_steps_interpreted", source))
+    spec = importlib.util.spec_from_loader(
+        "ankle_steps_interpreted", SourceFileLoader("ankle_steps_interpreted", source)
+    )
     plain = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(plain)
     values = {**VALUES, "friction_width_rad_s": width or 0.3}
@@ -234,3 +236,42 @@ def test_the_loop_over_time_is_the_same_interpreted(width, monkeypatch):
     interpreted = simulated(Drive(T, jumps(T), K, D), values, START, dry=not width)
     assert compiled.states.tobytes() == interpreted.states.tobytes()
     assert compiled.sliding.tobytes() == interpreted.sliding.tobytes()
+
+
+def test_a_command_is_a_cubic_where_it_is_bent_and_a_straight_line_elsewhere():
+    time_s = np.arange(0.0, 1.0, 0.01)
+    values = {"target_late_s": 0.004}
+    fine_s = np.arange(0.1, 0.9, 0.001)
+    true = np.sin(19.0 * (fine_s - 0.004))
+    bent = Drive(time_s, np.sin(19.0 * time_s), K, D, bent=True).command(fine_s, values)
+    straight = Drive(time_s, np.sin(19.0 * time_s), K, D).command(fine_s, values)
+    # a chord is below its arc by (19 h)^2 / 8, a cubic by some (19 h)^4 / 384
+    assert np.abs(bent - true).max() < 1e-5 < 4e-3 < np.abs(straight - true).max() < 5e-3
+
+
+def test_a_command_jumps_between_its_rows_where_its_time_says():
+    """Its mean over each step: the part of the step after the jump."""
+    time_s = np.arange(0.0, 0.1, 0.01)
+    drive = Drive(time_s, np.where(time_s > 0.045, 3.0, 1.0), K, D, jumps={"first": 5})
+    fine_s = np.arange(0.0, 0.09, 0.002)
+    for offset_s, late_s in ((0.0, 0.0), (-0.0031, 0.0), (0.0042, 0.0), (0.0007, 0.003)):
+        values = {"target_late_s": late_s, "first": offset_s}
+        at_s = 0.045 + offset_s + late_s
+        after = np.clip(fine_s - at_s, 0.0, 0.002) / 0.002
+        assert drive.command(fine_s, values) == pytest.approx(1.0 + 2.0 * after, abs=1e-9)
+        # by a jump later by 1 s: what a step has less, and in all two for 2 ms
+        moved = drive.command(fine_s, {**values, "first": offset_s + 1e-6})
+        change = (moved - drive.command(fine_s, values)) / 1e-6
+        assert drive.by_jumps(fine_s, values)[:, 0] == pytest.approx(change, rel=1e-6, abs=1e-6)
+        assert np.sum(change) * 0.002 == pytest.approx(-2.0, rel=1e-6)
+
+
+def test_the_time_of_a_jump_moves_a_simulation_as_its_sensitivity_says():
+    time_s = np.arange(0.0, 0.8, 0.01)
+    drive = Drive(time_s, np.where(time_s > 0.2, 2.5, 1.2), K, D, jumps={"jump": 21})
+    base = simulated(drive, {**VALUES, "jump": 0.001}, START)
+    slopes = ankle_motion.sensitivities(base)
+    assert slopes.shape[2] == len(PARAMETERS) + 1
+    ends = [simulated(drive, {**VALUES, "jump": 0.001 + way * 2e-5}, START) for way in (1.0, -1.0)]
+    change = (ends[0].a - ends[1].a) / 4e-5
+    assert np.abs(slopes[:, 2, -1] - change).max() < 0.02 * np.abs(change).max()

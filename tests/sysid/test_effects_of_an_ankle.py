@@ -35,7 +35,8 @@ def a_motion():
     nothing = np.zeros(M_STEPS)
     sliding = np.tanh(states[1])
     rows = slice(None, None, 5)
-    return Motion(TIME_S, states, RNG.normal(size=(4, M_STEPS)), nothing, nothing, sliding, sliding == 0.0, rows, values, None)
+    slopes, stands = RNG.normal(size=(4, M_STEPS)), sliding == 0.0
+    return Motion(TIME_S, states, slopes, nothing, nothing, sliding, stands, rows, values, None)
 
 
 MOTION = a_motion()

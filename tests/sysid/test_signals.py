@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Table
 
@@ -103,3 +104,14 @@ def test_stamps_that_are_off_by_less_than_a_hundredth_of_a_step_count_as_even(sh
     stamps = one.time_s.copy()
     stamps[50:] += shift * STEP_S
     assert (signals.uniform(moved := Table(stamps, one.columns, one.runs, "made", {})) is moved) == same
+
+
+def test_a_channel_that_rests_on_a_count_is_found_and_one_that_moves_or_has_no_counts_is_not():
+    """0.3 s at rest, next to a count's edge so that it flickers between two, between motions at 0.7 counts a row."""
+    time_s = np.arange(0.0, 0.9, 0.001)
+    moves = np.interp(time_s, [0.0, 0.3, 0.6, 0.9], [0.0, 210.49, 210.49, 421.0])
+    flicker = generator(1, "flicker").normal(scale=0.05, size=len(time_s))
+    table = Table(time_s, {}, (slice(0, len(time_s)),), "counts")
+    rests = signals.on_one_count(table, 0.002 * np.round(moves + flicker), 24)
+    assert np.all(rests[315:585]) and not np.any(rests[:285]) and not np.any(rests[615:])
+    assert not np.any(signals.on_one_count(table, 0.002 * (moves + flicker), 24))
