@@ -10,11 +10,8 @@ import math
 import pathlib
 from typing import Any
 
-import fmpy
-
 from ranger_sim.can_bus import bounds
 from ranger_sim.foundation.user_error import ModelError, UserError
-from ranger_sim.harness.bodies.fmu_body import STEP_NS, FmuBody
 from ranger_sim.harness.bodies.mapping import Input, Mapping
 from ranger_sim.harness.bodies.names import identifier
 from ranger_sim.tools.new.from_dbc import filled, timing_register
@@ -91,6 +88,8 @@ class Unit:
 
 def read(file: pathlib.Path) -> Unit:
     """Read a unit and run it by itself. UserError for one without a real input or output, or with too many."""
+    import fmpy  # only here: what a project is made of is known without it
+
     try:
         description = fmpy.read_model_description(str(file))
     except Exception as error:  # FMPy raises Exception itself for what a description lacks
@@ -140,6 +139,8 @@ def actuated(variable: Any, board: str) -> Actuated:
 
 def ranges(file: pathlib.Path, inputs: list[Actuated]) -> dict[str, tuple[float, float]]:
     """(least, largest) of each output, by name as a quantity, while the inputs move as the main board moves them."""
+    from ranger_sim.harness.bodies.fmu_body import STEP_NS, FmuBody
+
     body = FmuBody(file, Mapping([Input(each.variable, each.most, each.low, each.high) for each in inputs]))
     row = [0.0] * len(body.sample_names)
     low, high = [math.inf] * len(row), [-math.inf] * len(row)
