@@ -98,7 +98,7 @@ def test_a_missing_library_and_an_unknown_kind_are_refused_by_name(tmp_path, cap
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_is_no_unit_is_refused_with_its_name(tmp_path, capsys):
+def test_a_text_instead_of_a_unit_is_refused_with_the_files_name(tmp_path, capsys):
     pytest.importorskip("fmpy")
     (tmp_path / "text.fmu").write_text("no unit")
     assert cli.main(["new", str(tmp_path / "a"), "--plant", "fmu", str(tmp_path / "text.fmu")]) == 2
