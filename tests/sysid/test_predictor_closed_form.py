@@ -138,6 +138,8 @@ def test_what_enters_at_several_ports_adds_up():
     state, output = forcing(lin, {0: one, 1: two}, {1})
     assert state == pytest.approx(np.einsum("ns,nk->nsk", lin.f_x[:, :, 0], middle + 3.0 * two))
     assert output == pytest.approx(np.einsum("no,nk->nok", lin.h_x[:, :, 0], one + two))
+    mean, _ = forcing(lin, {1: two}, (), {1})  # rows are means: the next row's belongs to the step
+    assert mean == pytest.approx(np.einsum("ns,nk->nsk", 3.0 * lin.f_x[:, :, 0], np.concatenate((two[1:], two[-1:]))))
 
 
 def test_dry_friction_brings_a_rate_to_rest_and_not_beyond():

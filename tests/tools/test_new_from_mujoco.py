@@ -109,7 +109,7 @@ def test_actuators_that_do_not_act_on_a_joint_are_left_out_by_name(tmp_path, cap
     ("asked", "line"),
     [
         (["mujoco", "none.xml"], r"none.xml: MuJoCo cannot read it: "),
-        (["mojuco", "arm.xml"], r"new --plant mojuco: allowed is mujoco"),
+        (["mojuco", "arm.xml"], r"new --plant mojuco: allowed are mujoco and fmu"),
         (["mujoco", "still.xml"], r"still.xml: no actuator at a hinge or slide joint, and no such joint to drive"),
         (["mujoco", "many.xml"], r"many.xml: 30 actuators, at most 29 boards fit on one bus"),
     ],

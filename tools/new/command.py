@@ -1,6 +1,7 @@
 """`ranger-sim new DIR`: a project for a user's own machine, whose first test passes at once."""
 
 import argparse
+import importlib.util
 import pathlib
 import re
 import shutil
@@ -57,8 +58,9 @@ def register(commands: Any) -> None:
     command.add_argument(
         "--plant",
         nargs=2,
-        metavar=("mujoco", "FILE"),
-        help="a board for each actuator of a robot's MJCF or URDF model, and a main board",
+        metavar=("mujoco|fmu", "FILE"),
+        help="mujoco: a board for each actuator of a robot's MJCF or URDF model, and a main board; fmu: boards at the "
+        "inputs and outputs of a unit of FMI 2.0 or 3.0 for co-simulation, and a main board",
     )
     command.add_argument(
         "--drive",
@@ -136,8 +138,10 @@ def generate_table(project: pathlib.Path) -> None:
 
 def files_of_model(kind: str, model: str, name: str) -> dict[str, bytes]:
     """The files of a project for the actuators of a robot's model."""
+    if kind == "fmu":
+        return files_of_unit(model, name)
     if kind != "mujoco":
-        raise UserError(f"new --plant {kind}: allowed is mujoco")
+        raise UserError(f"new --plant {kind}: allowed are mujoco and fmu")
     from ranger_sim.tools.new import from_mujoco
 
     robot = from_mujoco.read(pathlib.Path(model))
@@ -146,6 +150,19 @@ def files_of_model(kind: str, model: str, name: str) -> dict[str, bytes]:
     for line in robot.left_out:
         print(f"{model}: left out: {line}")
     return made
+
+
+def files_of_unit(file: str, name: str) -> dict[str, bytes]:
+    """The files of a project for the inputs and outputs of an FMI unit."""
+    if importlib.util.find_spec("fmpy") is None:
+        raise UserError("new --plant fmu: needs FMPy: pip install fmpy")
+    from ranger_sim.tools.new import from_fmu
+
+    unit = from_fmu.read(pathlib.Path(file))
+    print(f"{file}: {len(unit.inputs)} inputs, {len(unit.outputs)} outputs")
+    for line in unit.left_out:
+        print(f"{file}: left out: {line}")
+    return from_fmu.files(unit, name)
 
 
 def files_of_drives(protocol: str, plant: list[str] | None, name: str) -> dict[str, bytes]:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from ranger_sim.tools.new.from_dbc import filled, timing_register
+from ranger_sim.tools.new.words import single
 
 HERE = pathlib.Path(__file__).resolve().parent / "drive"
 PROTOCOLS = ("cia402", "odrive")
@@ -359,12 +360,6 @@ def numbers_of(axis: Axis) -> dict[str, int]:
         "FOLLOWING_COUNTS": round(BEHIND[axis.unit] * counts),
         "MOST_COUNTS_PER_S": round(FASTEST[axis.unit] * counts),
     }
-
-
-def single(value: float) -> str:
-    """A number as a float of C, without its suffix."""
-    text = f"{value:.8g}"
-    return text if "." in text or "e" in text else f"{text}.0"
 
 
 def board_words(axis: Axis, node: int, protocol: str) -> dict[str, str]:

@@ -7,10 +7,8 @@ joint's board follow from the model's own law or from the inertia at the joint.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import pathlib
-import re
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -25,6 +23,7 @@ from ranger_sim.harness.bodies.mujoco_body import HINGE, TURNS, MujocoBody
 from ranger_sim.harness.bodies.names import identifier
 from ranger_sim.tools.new import drives
 from ranger_sim.tools.new.from_dbc import filled, timing_register
+from ranger_sim.tools.new.words import board_name, quoted, single
 
 HERE = pathlib.Path(__file__).resolve().parent / "mujoco"
 BIT_RATE = 1_000_000
@@ -40,8 +39,6 @@ LOOP_RAD_PER_S, LOOP_DAMPING = 20.0, 0.8  # of a joint without a law in the mode
 SPRING_SHARE = 5.0  # in addition, in stiffnesses of the spring that the model has at the joint
 NO_LIMIT_SHARE = 1.0  # a position actuator without a limit gets the force of this error, rad or m
 FREQUENCIES_HZ = (0.5, 3.1)
-LONGEST_NAME = 8  # of a board, by the master table
-SILENT_WORDS = {"MOTOR", "ACTUATOR", "JOINT", "TORQUE", "SERVO", "DRIVE"}
 WORDS = {"MAIN", "ERROR", "RANGER", "CAN1"}  # taken by the project itself
 FOLDERS = {"main", "table", "build", "runs", "machine", "common", "joint", "record", "experiment", "conftest"}
 
@@ -104,24 +101,6 @@ def read(file: pathlib.Path) -> Robot:
     used = {joint for _, joint in wanted}
     others = tuple(each.name for each in spec.joints if each.name not in used)
     return Robot(file, tuple(joints), others, tuple(left_out))
-
-
-def board_name(name: str, taken: set[str]) -> str:
-    """A name of at most 8 letters, digits and underscores that is not taken: FL_KNEE of front_left_knee_motor."""
-    words = [each for each in re.split(r"[\W_]+", name.upper(), flags=re.ASCII) if each]
-    while len(words) > 1 and words[-1] in SILENT_WORDS:
-        words.pop()
-    if len("_".join(words)) > LONGEST_NAME and len(words) > 1:
-        words = ["".join(each[0] for each in words[:-1]), words[-1]]
-    short = "_".join(words)[:LONGEST_NAME].strip("_")
-    short = short if short[:1].isalpha() else f"J{short}"[:LONGEST_NAME]
-    for number in itertools.count(1):
-        end = "" if number == 1 else str(number)
-        found = f"{short[: LONGEST_NAME - len(end)]}{end}"
-        if found not in taken:
-            break
-    taken.add(found)
-    return found
 
 
 def driven(spec: Any) -> tuple[list[tuple[str, str]], list[str]]:
@@ -247,6 +226,7 @@ def files(robot: Robot, name: str) -> dict[str, bytes]:
     words = {
         "name": name,
         "model": model,
+        "last_error": "JOINT_SILENT",
         "load": f"{100 * load:.0f}",
         "load_limit": f"{load + 0.05:.2f}",
         "btr": f"0x{timing_register(BIT_RATE):08X}u",
@@ -341,17 +321,6 @@ def jitters(robot: Robot, responses_us: list[int]) -> Iterable[tuple[str, int]]:
 def quantity(joint: Joint) -> str:
     """The joint's position among the quantities of the body."""
     return f"{identifier(joint.joint)}_{joint.unit}"
-
-
-def quoted(text: str) -> str:
-    """A string of Python."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
-def single(value: float) -> str:
-    """A number as a float of C, without its suffix."""
-    text = f"{value:.8g}"
-    return text if "." in text or "e" in text else f"{text}.0"
 
 
 def readme_row(joint: Joint) -> str:

@@ -62,7 +62,9 @@ def test_a_lag_of_the_drive_delays_its_force_and_not_its_current():
     body = pendulum(locked=("hinge",), lag_s=0.02, inductance_H=1e-30)
     passed(body, 40, duty=0.05)
     assert body.readings()[0] == pytest.approx(1.0)
-    assert body.data.actuator_force[0] == pytest.approx(0.4 * (1.0 - math.exp(-1.0)))
+    # the mean of 1 - exp(-t / lag) from 19.5 to 20 ms
+    missing = math.exp(-19.5 / 20.0) * (20.0 / 0.5) * (1.0 - math.exp(-0.5 / 20.0))
+    assert body.data.actuator_force[0] == pytest.approx(0.4 * (1.0 - missing))
 
 
 def test_the_encoders_edges_count_the_joints_angle():
