@@ -10,6 +10,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+from typing import Any
 
 from ranger_sim import loading
 from ranger_sim.foundation import wallclock
@@ -100,6 +101,7 @@ def image(seconds: float, native: bool = False) -> dict:
             file.write("[defines]\nAHEAD = 0\nFILTER = 0\n")
         given = manifest.load(folder)
         crystal = Crystal(10_000_000)
+        board: Any  # its outbox is a queue, which the declared type does not say
         if native:
             from ranger_sim.firmware_sim.native.native_board import NativeBoard
 
