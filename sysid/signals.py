@@ -14,6 +14,7 @@ from scipy import ndimage
 from scipy.signal import lfilter, savgol_filter
 
 from ranger_sim.sysid.dataset import Array, Table
+from ranger_sim.sysid.sanity import lattice_step
 
 Rows = NDArray[np.bool_]
 
@@ -119,25 +120,6 @@ def resting(table: Table, rate: Array, share: float = 0.01, shortest_s: float = 
             if (last - first) * table.step_s >= shortest_s:
                 out[run.start + first : run.start + last] = True
     return out
-
-
-def lattice_step(value: Array) -> float:
-    """The finest step of a quantised or printed channel; 0 when its values are not on a lattice."""
-    different = np.unique(value[np.isfinite(value)])
-    if len(different) < 4:
-        return 0.0
-    different = different[:20_000]
-    gaps = np.diff(different)
-    gaps = gaps[gaps > 1e-9 * (different[-1] - different[0])]
-    small = gaps[gaps < 1.5 * np.percentile(gaps, 5.0)]
-    step = float(np.median(small))
-    counts = np.concatenate(([0.0], np.cumsum(np.round(gaps / step))))
-    if (np.round(gaps / step) < 1.0).any():
-        return 0.0
-    places = np.concatenate(([0.0], np.cumsum(gaps)))
-    step = float(counts @ places / (counts @ counts))
-    off = places / step - counts
-    return step if float(np.sqrt(np.mean((off - off.mean()) ** 2))) < 0.15 else 0.0
 
 
 def on_one_count(table: Table, column: Array, rows: int) -> np.ndarray:

@@ -711,7 +711,7 @@ class _Fit:
             self._take(*was[1:])
 
     def _made_so(self, dry: bool, filter_s: float) -> None:
-        """Set whether the motor stands in dry friction, and the filter of the rate that the law uses."""
+        """Set whether dry friction holds the motor, and the filter of the rate that the law uses."""
         self.dry, self.filter_s = dry, filter_s
         for run in self.runs:
             run.drive = dataclasses.replace(run.drive, filter_s=filter_s)

@@ -223,7 +223,7 @@ def simulated(
     dry: bool = False,
     before: tuple[Array, Array] | None = None,
 ) -> Motion:
-    """The motion under `drive` from p, u, a, w = `start`. dry: the motor stands in its friction, whose sign has no
+    """The motion under `drive` from p, u, a, w = `start`. dry: the motor is held by its friction, whose sign has no
     width. before: the torques of a motion near this one.
 
     Raise UserError when these values give a motion that no machine could make.

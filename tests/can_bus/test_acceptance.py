@@ -47,7 +47,7 @@ def test_a_refused_frame_is_acknowledged_counted_and_reaches_no_inbox():
     assert (wired.bus.counters.frames, wired.bus.counters.lost, wired.bus.counters.errors) == (4, 0, 0)
 
 
-def test_identifiers_of_11_and_29_bits_are_told_apart():
+def test_identifiers_of_11_and_29_bits_are_not_confused():
     wired = filtered(Wired(2), 1, standard=[0x123], extended=[(0x1000, 0x1FFF)])
     for place, (identifier, flags) in enumerate(((0x123, 0), (0x123, FLAG_EXTENDED), (0x1200, FLAG_EXTENDED))):
         wired.send(0, identifier, 1_000 + 200_000 * place, buffer=place + 1, flags=8 | flags)

@@ -5,12 +5,14 @@ The disk is a small file system in memory that only the command sees.
 
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
+HIP = ROOT / "examples" / "hip_in_c"
 MOUNT = 'mount -t tmpfs -o size="$1" none "$2" && cd "$2" && shift 2 && "$@"; code=$?; cp -r . "$KEPT"; exit $code'
 
 
@@ -31,7 +33,7 @@ COMMANDS = {
     "a timeline": (["walk", "--time", "1s", "--trace", "a.pftrace", "--json", "-"], "64k", "rows of the timeline"),
     "slots": (["slots", "MCH", "--json", "s.json"], "4k", "s.json"),
     "a project": (["new", "my"], "16k", "my"),
-    "a firmware's program": (["firmware", "build", ROOT / "examples" / "hip_in_c"], "64k", ""),
+    "a firmware's program": (["firmware", "build", "PROGRAM"], "64k", ""),
     "a body as FMU": (["fmu", "body.fmu"], "16k", ""),
 }
 WHOLE = {".json": b"}", ".html": b"</html>", ".log": b"\n"}
@@ -42,6 +44,9 @@ def test_a_full_disk_is_reported_and_leaves_no_half_written_file(name, tmp_path)
     words, size, place = COMMANDS[name]
     disk, kept = tmp_path / "disk", tmp_path / "kept"
     disk.mkdir()
+    if "PROGRAM" in words:  # in the tree it may be built already
+        program = shutil.copytree(HIP, tmp_path / "program", ignore=shutil.ignore_patterns("build"))
+        words = [program if word == "PROGRAM" else word for word in words]
     done = subprocess.run(
         ["unshare", "-m", "sh", "-c", MOUNT, "sh", size, disk, sys.executable, "-m", "ranger_sim", *map(str, words)],
         env={"PATH": "/usr/bin:/bin:/usr/local/bin", "PYTHONPATH": str(ROOT), "KEPT": str(kept), "TMPDIR": str(disk)},

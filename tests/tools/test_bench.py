@@ -70,7 +70,10 @@ def test_a_case_is_timed_in_its_own_process(monkeypatch):
 def test_every_case_does_something(name):
     if name.startswith("fmu"):
         pytest.importorskip("pythonfmu3")
-    done = cases.CASES[name].measure(0.05)
+    if name.startswith("rebuild"):
+        pytest.skip("it removes a library of this checkout, which other tests load: by command only")
+    # a campaign's machine is imported by name: of others in this process there may be one of the same name
+    done = cases.measured(name, 0.05) if name.startswith("campaign") else cases.CASES[name].measure(0.05)
     assert done["figure"] > 0.0
     assert done.get("lost", 0) == done.get("out_of_order", 0) == 0
 

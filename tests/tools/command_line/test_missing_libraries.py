@@ -51,7 +51,6 @@ NEEDED = {
     "scipy": [
         "diagnose run.csv --experiment motor-bench",
         "identify all --out f",
-        "campaign few.toml --out c",
         "causes --experiment motor-bench --channels angle",
     ],
     "serial": ["up --time 50ms --daq-port /dev/nowhere"],
