@@ -26,33 +26,33 @@ exec 9>/ports/control
 mount -t 9p -o trans=virtio,version=9p2000.L,cache=loose,msize=512000,ro root /lower || exit
 mount -t tmpfs -o size=75% tmpfs /upper
 mkdir /upper/data /upper/work
-mount -t overlay -o lowerdir=/lower,upperdir=/upper/data,workdir=/upper/work overlay /root || exit
+mount -t overlay -o lowerdir=/lower,upperdir=/upper/data,workdir=/upper/work overlay /merged || exit
 @FOLDERS@
-mount -t sysfs sysfs /root/sys
-mount -t devtmpfs devtmpfs /root/dev
-mkdir -p /root/dev/pts /root/dev/shm
-mount -t devpts -o ptmxmode=666 devpts /root/dev/pts
-mount -t tmpfs tmpfs /root/dev/shm
-mount -t tmpfs tmpfs /root/run
-ln -sf /proc/self/fd /root/dev/fd
-ln -sf /proc/self/fd/0 /root/dev/stdin
-ln -sf /proc/self/fd/1 /root/dev/stdout
-ln -sf /proc/self/fd/2 /root/dev/stderr
-cat /command >/root/run/ranger-sim-vm
+mount -t sysfs sysfs /merged/sys
+mount -t devtmpfs devtmpfs /merged/dev
+mkdir -p /merged/dev/pts /merged/dev/shm
+mount -t devpts -o ptmxmode=666 devpts /merged/dev/pts
+mount -t tmpfs tmpfs /merged/dev/shm
+mount -t tmpfs tmpfs /merged/run
+ln -sf /proc/self/fd /merged/dev/fd
+ln -sf /proc/self/fd/0 /merged/dev/stdin
+ln -sf /proc/self/fd/1 /merged/dev/stdout
+ln -sf /proc/self/fd/2 /merged/dev/stderr
+cat /command >/merged/run/ranger-sim-vm
 mkfifo /output /errors
 (cat /output; printf %s "$END") >/ports/output &
 (cat /errors; printf %s "$END") >/ports/errors &
 (
   exec 9>&-
-  chroot /root /bin/sh -c '
+  chroot /merged /bin/sh -c '
     export PATH=/usr/sbin:/usr/bin:/sbin:/bin
     ip link set lo up
     for i in 0 1 2 3; do ip link add vcan$i type vcan && ip link set vcan$i up; done'
 ) || echo "cannot make vcan0 ... vcan3"
 echo ready >&9
 unshare -p -f sh -c '
-  mount -t proc proc /root/proc
-  chroot /root /bin/sh /run/ranger-sim-vm
+  mount -t proc proc /merged/proc
+  chroot /merged /bin/sh /run/ranger-sim-vm
   exit $?' 9>&- >/output 2>/errors </dev/null
 echo "exit $?" >&9
 wait
@@ -63,8 +63,8 @@ while true; do cat /ports/control; done
 def init_script(end: str, shared: Mapping[str, str]) -> str:
     """The first process's script. `end`: closes both streams; `shared`: {tag: folder that the guest may write}."""
     folders = [
-        f"mkdir -p /root{shlex.quote(folder)} && mount -t 9p "
-        f"-o trans=virtio,version=9p2000.L,msize=512000 {tag} /root{shlex.quote(folder)} || exit"
+        f"mkdir -p /merged{shlex.quote(folder)} && mount -t 9p "
+        f"-o trans=virtio,version=9p2000.L,msize=512000 {tag} /merged{shlex.quote(folder)} || exit"
         for tag, folder in shared.items()
     ]
     return INIT.replace("@FOLDERS@", "\n".join(folders)).replace("$END", end)
@@ -81,7 +81,7 @@ def command_script(command: Sequence[str], folder: str, environment: Mapping[str
 def build(busybox: pathlib.Path, modules: tuple[tuple[str, bytes], ...], init: str, command: str) -> bytes:
     """The archive that the kernel unpacks, uncompressed: under emulation unpacking costs more than reading."""
     archive = Archive()
-    for folder in ("bin", "dev", "lower", "modules", "ports", "proc", "root", "sys", "upper"):
+    for folder in ("bin", "dev", "lower", "merged", "modules", "ports", "proc", "sys", "upper"):
         archive.add(folder, stat.S_IFDIR | 0o755)
     archive.add("bin/busybox", stat.S_IFREG | 0o755, busybox.read_bytes())
     for name in APPLETS:

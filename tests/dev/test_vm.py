@@ -240,7 +240,7 @@ def test_the_child_asks_to_die_with_its_parent():
 
 def test_a_folder_of_shared_files_is_mounted_where_it_is():
     script = ramdisk.init_script("end", {"shared0": "/tmp/a b"})
-    assert "shared0 /root'/tmp/a b'" in script
+    assert "shared0 /merged'/tmp/a b'" in script
     assert "@FOLDERS@" not in script
 
 
