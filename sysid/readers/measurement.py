@@ -138,7 +138,7 @@ def _silence() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         logger.setLevel(logging.CRITICAL + 1)
-        sys.unraisablehook = lambda _: None
+        sys.unraisablehook = lambda failure: hook(failure) if failure.exc_type is KeyboardInterrupt else None
         try:
             yield
         finally:

@@ -1,15 +1,20 @@
 """Ctrl-C, and the signals by which a system ends programs or a terminal hangs up: they count as Ctrl-C."""
 
+import _thread
 import contextlib
 import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
+from ranger_sim.foundation import wallclock
+
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 EXIT_INTERRUPTED = 130
+AGAIN_AFTER_S = 0.01  # long enough that the callback that lost an interrupt has returned
 
 
 def end_in_order() -> None:
@@ -17,16 +22,35 @@ def end_in_order() -> None:
 
     The second ends this process at once, without a message.
     """
+    received: list[int] = []
+    others = sys.unraisablehook
 
-    def note(_number: int, _frame: FrameType | None) -> None:
+    def note(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
         end_at_once()
-        # an object that was half made when the signal arrived fails when it is deleted (an event loop), or warns
-        # (a coroutine that no loop had taken yet)
-        sys.unraisablehook = lambda _failure: None
+        # a coroutine that no loop had taken yet
         warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         raise KeyboardInterrupt
 
+    def unraisable(failure: Any) -> None:
+        if received and failure.exc_type is KeyboardInterrupt and not sys.is_finalizing():
+            # it was raised in a callback of the garbage collector or a finalizer, where Python drops it
+            _set(note)
+            _thread.start_new_thread(_again, (received[-1],))
+        elif not received:  # else an object that was half made when the signal arrived (an event loop)
+            others(failure)
+
+    sys.unraisablehook = unraisable
     _set(note)
+
+
+def _again(number: int) -> None:
+    """Raise in the main thread what the signal raised there; in a separate thread."""
+    wallclock.sleep_s(AGAIN_AFTER_S)
+    if hasattr(signal, "pthread_kill"):  # also ends a wait, which interrupt_main does not
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        _thread.interrupt_main(number)
 
 
 def end_at_once() -> None:
