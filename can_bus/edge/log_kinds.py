@@ -3,14 +3,17 @@
 import pathlib
 import re
 
-from ranger_sim.can_bus.edge import pcap
-
 SNIFFED_BYTES = 4096
 SNIFFED_LINES = 3
 BLF, SQLITE, ASC, TRC = "BLF", "python-can's SQLite", "ASC", "TRC"
 CANDUMP, SCREEN, BUSMASTER = "candump", "candump's screen output", "BUSMASTER"
 PYTHON_CAN, SAVVYCAN, PCAP = "python-can's CSV", "SavvyCAN's CSV", "packet capture"
-MAGIC = {b"LOGG": BLF, b"SQLite format 3\0": SQLITE} | dict.fromkeys(pcap.BEGINNINGS, PCAP)
+# Packet captures of libpcap in us and in ns, little-endian and big-endian, and the one of pcapng.
+CAPTURE_US, CAPTURE_NS, CAPTURE_NG = 0xA1B2C3D4, 0xA1B23C4D, 0x0A0D0D0A
+CAPTURES = tuple(magic.to_bytes(4, order) for magic in (CAPTURE_US, CAPTURE_NS) for order in ("little", "big")) + (
+    CAPTURE_NG.to_bytes(4, "big"),
+)
+MAGIC = {b"LOGG": BLF, b"SQLite format 3\0": SQLITE} | dict.fromkeys(CAPTURES, PCAP)
 FIRST_LINES = {
     PYTHON_CAN: re.compile(r"timestamp,arbitration_id,extended,remote,error,dlc,data\s*$"),
     SAVVYCAN: re.compile(r"time stamp,id,extended,", re.IGNORECASE),

@@ -10,13 +10,10 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from ranger_sim.can_bus.edge.candump import FD_BRS, FD_ESI
+from ranger_sim.can_bus.edge.log_kinds import CAPTURE_NG, CAPTURE_NS, CAPTURES
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_ESI
 from ranger_sim.foundation.user_error import DataError
 
-MAGIC_US, MAGIC_NS, MAGIC_NG = 0xA1B2C3D4, 0xA1B23C4D, 0x0A0D0D0A
-BEGINNINGS = tuple(magic.to_bytes(4, order) for magic in (MAGIC_US, MAGIC_NS) for order in ("little", "big")) + (
-    MAGIC_NG.to_bytes(4, "big"),
-)
 BYTE_ORDER = 0x1A2B3C4D  # in the first block of a pcapng file
 INTERFACE, SIMPLE, ENHANCED = 1, 3, 6  # types of blocks
 OPTION_NAME, OPTION_RESOLUTION, OPTION_OFFSET = 2, 9, 14  # of an interface
@@ -59,7 +56,7 @@ def packets(file: BinaryIO, name: str) -> Iterator[Packet]:
     DataError for a capture of another kind; CutOffError where the file ends within a packet.
     """
     first = file.read(4)
-    yield from (_next_generation(file, name) if first == BEGINNINGS[-1] else _classic(file, name, first))
+    yield from (_next_generation(file, name) if first == CAPTURES[-1] else _classic(file, name, first))
 
 
 def _exactly(file: BinaryIO, count: int) -> bytes:
@@ -70,8 +67,8 @@ def _exactly(file: BinaryIO, count: int) -> bytes:
 
 
 def _classic(file: BinaryIO, name: str, magic: bytes) -> Iterator[Packet]:
-    order = "<" if magic in BEGINNINGS[0::2] else ">"
-    nanoseconds = struct.unpack(order + "I", magic)[0] == MAGIC_NS
+    order = "<" if magic in CAPTURES[0::2] else ">"
+    nanoseconds = struct.unpack(order + "I", magic)[0] == CAPTURE_NS
     link = struct.unpack(order + "HHiIII", _exactly(file, 20))[5] & 0xFFFF
     interface = _Interface(link, "", per_second=SECOND_NS if nanoseconds else 1_000_000)
     _check_link(name, link)
@@ -92,11 +89,11 @@ def _content(file: BinaryIO, name: str, size: int) -> bytes:
 
 
 def _next_generation(file: BinaryIO, name: str) -> Iterator[Packet]:
-    kind, order = MAGIC_NG, "<"
+    kind, order = CAPTURE_NG, "<"
     interfaces: list[_Interface] = []
     while True:
         length_bytes = _exactly(file, 4)
-        if kind == MAGIC_NG:  # a section; its byte order is in its body
+        if kind == CAPTURE_NG:  # a section; its byte order is in its body
             mark = _exactly(file, 4)
             order = "<" if int.from_bytes(mark, "little") == BYTE_ORDER else ">"
             interfaces = []

@@ -43,3 +43,7 @@ def test_version_help_and_a_mistyped_command_load_nothing_of_a_robot():
 def test_the_options_of_a_command_load_no_other_command():
     others = ["ranger_sim.tools.diagnose.command", "ranger_sim.tools.panel.command", "ranger_sim.tools.run.up"]
     assert loaded([*others, "ranger_sim.tools.run.walk"], "walk", "--help") == "ranger_sim.tools.run.walk"
+
+
+def test_the_options_of_a_diagnosis_load_no_can_library_and_no_reader_of_another_format():
+    assert loaded(["can", "asammdf", "pandas", "scipy"], "diagnose", "--help") == ""
