@@ -2,8 +2,9 @@
 
 `walk` walks `--distance` (default 10 km). `up` runs the robot as processes for `--minutes` of its time (default 60)
 with every interface open and a panel, while clients come, go, flood and are killed, one round after the other; none of
-them changes the run. The digest of `up` has to be that of the same walk alone; that of `walk`, the digest given with
-`--digest`, or what the walk has without being counted and stopped now and then (`--twice`).
+them changes the run. A robot that a busy machine slows down is interrupted after `--wall-minutes`. The digest of `up`
+has to be that of the same walk alone; that of `walk`, the digest given with `--digest`, or what the walk has without
+being counted and stopped now and then (`--twice`).
 
 Counted are the processes, their open descriptors and their memory (proportional set size), after each round when the
 clients are gone. Flat: from the second quarter of the run to its last one neither processes nor descriptors grow, and
@@ -34,6 +35,7 @@ from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.processes import control
 from ranger_sim.tools.command_line.files import json_target, replace_file
+from ranger_sim.tools.command_line.interrupts import EXIT_INTERRUPTED
 from ranger_sim.tools.command_line.units import number, whole_number
 from ranger_sim.tools.run.folder import SUMMARY
 
@@ -174,9 +176,9 @@ def found_in(command: Command, pattern: str) -> re.Match[str]:
     return match
 
 
-def ended_well(command: Command, out: pathlib.Path, who: str) -> str:
-    """The digest of a run that has ended; Finding where it has not ended with 0."""
-    if code := command.end():
+def ended_well(command: Command, out: pathlib.Path, who: str, was_interrupted: bool = False) -> str:
+    """The digest of a run that has ended; Finding where it has not ended with 0, or as an interrupted one does."""
+    if (code := command.end()) != (EXIT_INTERRUPTED if was_interrupted else 0):
         raise Finding(f"{who}: code {code}:\n{command.text()[-2000:]}")
     return digest_in(out)
 
@@ -270,22 +272,30 @@ class Robot:
         return 0.0
 
 
-def soak_up(minutes: float, speed: float, seed: int, folder: pathlib.Path, report: Callable[[str], None]) -> dict:
-    """A robot as processes for so many minutes of its time, in rounds of clients drawn with the seed."""
-    run = ("--time", f"{60.0 * minutes:g}s", "--seed", str(SEED), "--quiet", "--out")
-    with started("walk", *run, str(folder / "alone")) as command:
-        command.end(float("inf"))
-        alone = ended_well(command, folder / "alone", "the walk alone")
+def soak_up(
+    minutes: float, wall_minutes: float, speed: float, seed: int, folder: pathlib.Path, report: Callable[[str], None]
+) -> dict:
+    """A robot as processes for so many minutes of its time, in rounds of clients drawn with the seed.
+
+    After `wall_minutes` of the wall clock it is interrupted, and compared with a walk that ends there.
+    """
+    run = ("--seed", str(SEED), "--out")
     name = f"soak-{os.getpid()}"
-    words = ["up", *run[:-2], "--out", str(folder / "up"), "--name", name, "--speed", f"{speed:g}", "--no-real-time"]
+    words = ["up", "--time", f"{60.0 * minutes:g}s", *run, str(folder / "up"), "--name", name]
+    words += ["--speed", f"{speed:g}", "--no-real-time"]
     words += ["--slcan", "can1", "--socketcand", "0", "--daq-port", "pty", "--xcp-udp", "0"]
+    is_over = False
     stream: Any = RandomStream(seed, "soak")
     rounds: dict[str, int] = {}
     with started(*words) as up:
         found_in(up, f"name {name}")
         with started("panel", "--name", name, "--http-port", "0") as panel:
             robot = Robot(up, panel, name)
+            began_s = wallclock.monotonic_s()
             while not robot.has_ended():
+                if is_over := wallclock.monotonic_s() - began_s > 60.0 * wall_minutes:
+                    up.started.send_signal(signal.SIGINT)
+                    break
                 client = CLIENTS[int(stream.integer(len(CLIENTS)))]
                 with flooders.flooded(client, robot.endpoints):  # killed at its end
                     wait_s(up, ROUND_S * (0.5 + stream.uniform()))
@@ -294,14 +304,20 @@ def soak_up(minutes: float, speed: float, seed: int, folder: pathlib.Path, repor
                 if sum(rounds.values()) % STOP_EVERY == 0:
                     counted = robot.counts["up"][-1:]
                     report(f"{sum(rounds.values())} rounds, {robot.time_s():.0f} s of the robot, {counted}")
-            seen = ended_well(up, folder / "up", "up")
+            seen = ended_well(up, folder / "up", "up", is_over)
+            wall_s = wallclock.monotonic_s() - began_s
             panel.started.send_signal(signal.SIGINT)
             if code := panel.end():
                 raise Finding(f"the panel ends with {code}:\n{panel.text()[-2000:]}")
+    summary = json.loads((folder / "up" / SUMMARY).read_text(encoding="utf-8"))
+    with started("walk", "--time", f"{summary['time_s']}s", "--quiet", *run, str(folder / "alone")) as command:
+        command.end(float("inf"))
+        alone = ended_well(command, folder / "alone", "the walk alone")
     if seen != alone:
         raise Finding(f"with clients the digest is {seen}, alone {alone}")
     return {
-        "robot_s": 60.0 * minutes,
+        "robot_s": summary["time_s"],
+        "wall_s": round(wall_s, 1),
         "speed": speed,
         "rounds": sum(rounds.values()),
         "kinds": len(rounds),
@@ -330,6 +346,12 @@ def parser() -> argparse.ArgumentParser:
         "--minutes", type=number(above=0.0), default=MINUTES, help=f"up: of the robot's time (default {MINUTES:g})"
     )
     command.add_argument(
+        "--wall-minutes",
+        type=number(above=0.0),
+        default=float("inf"),
+        help="up: interrupt it after so many minutes of the wall clock (default: none)",
+    )
+    command.add_argument(
         "--speed", type=number(above=0.0), default=1.0, help="up: times real time of the robot (default 1)"
     )
     command.add_argument("--seed", type=whole_number(0), default=1, help="up: of the order of the clients (default 1)")
@@ -348,7 +370,7 @@ def main(arguments: list[str] | None = None) -> int:
             if options.kind == "walk":
                 figures = soak_walk(options.distance, options.digest, options.twice, place, report)
             else:
-                figures = soak_up(options.minutes, options.speed, options.seed, place, report)
+                figures = soak_up(options.minutes, options.wall_minutes, options.speed, options.seed, place, report)
     except UserError as mistake:
         print(f"{COMMAND}: {mistake}", file=sys.stderr)
         return 2
