@@ -1,5 +1,6 @@
 """Puts mutants into a copy of the repository, one at a time, and runs the tests that reach them."""
 
+import ast
 import contextlib
 import dataclasses
 import hashlib
@@ -26,6 +27,7 @@ from ranger_sim.loading import (
     RECORD,
     RUNS_COMPILED,
     RUNS_INTERPRETED_BECAUSE,
+    packages,
 )
 
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent.toml")
@@ -260,7 +262,8 @@ class TestsOf:
 
     __test__ = False  # pytest: not a test
 
-    def __init__(self, found: dict[str, dict[str, Any]]) -> None:
+    def __init__(self, found: dict[str, dict[str, Any]], importers: dict[str, set[str]] | None = None) -> None:
+        self.importers = importers or {}
         self.tests: dict[str, dict] = {name: test for each in found.values() for name, test in each["tests"].items()}
         self.known = set(self.tests) | {name for each in found.values() for name in each["late"]}
         self.tables = {name for name in self.tests if name.partition("::")[0] in TABLES}
@@ -292,16 +295,21 @@ class TestsOf:
     def of(self, mutant: Mutant, limit_s: float) -> tuple[list[str], int]:
         """Tests that can detect it, cheapest first, and the number of further ones.
 
-        Those that reach it in their own process come first, as many as fit into `limit_s` (at least one); after them
-        those that start processes, for which the map does not see the functions run there, as many as fit into it
-        again.
+        Those that reach it in their own process come first, as many as fit into `limit_s` (at least one). After them,
+        as many as fit into it again: for what runs at import, those of modules that import this one, which may read a
+        constant of it; and those that start processes, for which the map does not see the functions run there.
         """
         place = f"{mutant.path}:{mutant.first_line}"
         late = not self.at_import(mutant)
         reach = self.by_function.get(place, set()) if late else self.by_module.get(mutant.path, set()) | self.tables
+        of_readers: set[str] = set()
+        if not late:
+            of_readers = of_readers.union(
+                *(self.by_module.get(path, ()) for path in self.importers.get(mutant.path, ()))
+            )
         chosen: list[str] = []
         left = len(self.late.get(place, ()))
-        for names in (reach, self.starting - reach):
+        for names in (reach, of_readers - reach, self.starting - reach - of_readers):
             total = 0.0
             for name in sorted(names, key=lambda each: (self.tests[each]["seconds"], each)):
                 total += self.tests[name]["seconds"]
@@ -389,7 +397,26 @@ def reach_of(
     late = [name for each in found.values() for name in each["late"]]
     if late:
         say(f"{room}: {len(late)} tests last longer than {LIMIT_TEST_S:g} s and are not run: {', '.join(late[:3])} ...")
-    return TestsOf(found)
+    return TestsOf(found, importers_in(copy.folder))
+
+
+def importers_in(folder: pathlib.Path) -> dict[str, set[str]]:
+    """{module: modules that import it or from it}, as paths; folder: the checkout or a copy of it."""
+    importers: dict[str, set[str]] = {}
+    for room in packages():
+        for path in (folder / room).rglob("*.py"):
+            reader = path.relative_to(folder).as_posix()
+            for node in ast.walk(ast.parse(path.read_bytes())):
+                names = []
+                if isinstance(node, ast.Import):
+                    names = [each.name for each in node.names]
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    names = [node.module, *(f"{node.module}.{each.name}" for each in node.names)]
+                for name in names:
+                    module = name.removeprefix(f"{PACKAGE.name}.").replace(".", "/") + ".py"
+                    if (folder / module).is_file():
+                        importers.setdefault(module, set()).add(reader)
+    return importers
 
 
 def state_of(folder: pathlib.Path, room: str, tests: pathlib.Path) -> str:

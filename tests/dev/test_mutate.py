@@ -124,6 +124,34 @@ def test_tests_that_reach_a_mutant_run_cheapest_first_and_within_the_limit():
     assert work.TestsOf(found).of(mutant, 0.2) == (["t/y.py::elsewhere"], 2)
 
 
+def test_a_constant_is_shown_to_the_tests_of_the_modules_that_import_it_after_those_of_its_own_module():
+    [mutant] = mutants("LIMIT = 5\n", "a/numbers.py")[:1]
+    every = {
+        "t::own": {"seconds": 3.0, "functions": ["a/numbers.py:9"], "starts": False},
+        "t::reader": {"seconds": 0.5, "functions": ["b/reader.py:3"], "starts": False},
+        "t::apart": {"seconds": 0.1, "functions": ["b/apart.py:3"], "starts": False},
+    }
+    found = {"t": work.NOTHING | {"tests": every}}
+    readers = {"a/numbers.py": {"b/reader.py"}}
+    assert work.TestsOf(found, readers).of(mutant, 9.0) == (["t::own", "t::reader"], 0)
+    del every["t::own"]
+    assert work.TestsOf(found, readers).of(mutant, 9.0) == (["t::reader"], 0)
+    assert work.TestsOf(found).of(mutant, 9.0) == ([], 0)
+
+
+def test_the_readers_of_a_module_are_those_that_import_it_or_from_it(tmp_path):
+    for name, text in {
+        "plant/size.py": "LEG = 1.0\n",
+        "boards/one.py": "from ranger_sim.plant.size import LEG\n",
+        "boards/two.py": "def it():\n    from ranger_sim.plant import size\n    return size.LEG\n",
+        "boards/three.py": "import ranger_sim.plant.size\n",
+        "boards/four.py": "import math\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert work.importers_in(tmp_path) == {"plant/size.py": {"boards/one.py", "boards/two.py", "boards/three.py"}}
+
+
 def test_tests_that_last_too_long_or_start_processes_count_for_what_they_may_notice():
     mutant = next(each for each in mutants(SOURCE, "a/valve.py") if each.operator == "sign")
     place = f"a/valve.py:{mutant.first_line}"
