@@ -53,7 +53,7 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
         try:
             in_here: dict[str, Any] = json.loads(json.dumps(work()))
         except Exception as error:
-            raise BranchError("crashed", _raised(error)) from None
+            raise BranchError("crashed", raised(error)) from None
         return in_here
     sys.stdout.flush()
     sys.stderr.flush()
@@ -86,7 +86,7 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     return result
 
 
-def _raised(error: BaseException) -> str:
+def raised(error: BaseException) -> str:
     """An exception in one line, with its place."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"
@@ -106,7 +106,7 @@ def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int
         try:
             answer = json.dumps(work())
         except BaseException as error:
-            answer = json.dumps({"raised": _raised(error)})
+            answer = json.dumps({"raised": raised(error)})
         with os.fdopen(writing, "w", encoding="utf-8") as pipe:
             pipe.write(answer)
         code = 0

@@ -19,9 +19,11 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy.ma  # noqa: F401  (numpy's `unique` loads it late: every branch would, for as long as a small machine runs)
+
 from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import CampaignError, UserError
-from ranger_sim.harness.branching import BranchError, branch, die_with
+from ranger_sim.harness.branching import BranchError, branch, die_with, raised
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band
 from ranger_sim.harness.faults import text as typed_text
@@ -103,10 +105,21 @@ def walk_until(robot: Machine, end_ns: int) -> None:
 
 
 class Golden:
-    """The golden run of a group: its record, the time of each start, and its gait from there on."""
+    """The golden run of a group: its record, the time of each start, and its gait from there on.
+
+    CampaignError where the machine raises an exception: no other run can be compared with it.
+    """
 
     def __init__(self, settings: Settings, starts: set[str], watch: Watch) -> None:
         self.subject = settings.subject
+        try:
+            self._walk(settings, starts, watch)
+        except UserError:
+            raise
+        except Exception as error:
+            raise CampaignError(f"campaign: a run without a fault raised {raised(error)}") from error
+
+    def _walk(self, settings: Settings, starts: set[str], watch: Watch) -> None:
         robot = settings.robot()
         evidence = Evidence(robot)
         probes = {text: Probe(robot, text) for text in sorted(starts)}

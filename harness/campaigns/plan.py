@@ -16,6 +16,7 @@ from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.quantities import in_base_units, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
 from ranger_sim.foundation.user_error import CampaignError, UserError
+from ranger_sim.harness.branching import raised
 from ranger_sim.harness.campaigns.cases import Case, Settings
 from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, severity
@@ -366,6 +367,8 @@ def check_settings(settings: Settings, where: str) -> None:
         settings.robot().close()
     except UserError as error:
         raise CampaignError(f"{where}: {error}") from None
+    except Exception as error:  # whatever a user's program raises
+        raise CampaignError(f"{where}: it raised {raised(error)}") from error
 
 
 def check_axes(plan: Plan) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.user_error import CampaignError, UserError
+from ranger_sim.harness.branching import raised
 from ranger_sim.harness.faults.evidence import Record
 from ranger_sim.harness.faults.proof import Proof
 
@@ -111,8 +112,13 @@ class OwnMachine:
     @functools.cached_property
     def shown(self) -> Any:
         """One of them, never run, for their common properties."""
-        machine = self.machine({})
-        machine.close()
+        try:
+            machine = self.machine({})
+            machine.close()
+        except UserError:
+            raise
+        except Exception as error:  # whatever a user's program raises
+            raise CampaignError(f"machine {self.file.name}:{self.name}: it raised {raised(error)}") from error
         return machine
 
     @property

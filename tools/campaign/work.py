@@ -17,12 +17,12 @@ from ranger_sim import loading
 from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.campaigns import engine, group, plan, pools, summary
-from ranger_sim.ranger.walks import REFERENCE
 from ranger_sim.tools.campaign import page
 from ranger_sim.tools.campaign.words import proof_text
 from ranger_sim.tools.command_line import interrupts, streams, terminal
 from ranger_sim.tools.command_line.files import json_target, replace_file, writable_folder
 
+RANGER = "ranger_sim.ranger.walks:WALKS"  # of a plan without [machine]; loaded for such a plan only
 PROGRESS_EVERY_S = 10.0  # where there is no terminal for a progress bar
 TABLES_BEGIN = "<!-- written by ranger-sim campaign --document: begin -->\n"
 TABLES_END = "<!-- end -->\n"
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     json_file = json_target(options.json)
     if options.replay and options.json:
         raise UserError("--json: --replay prints one run; its result is in results.jsonl of the folder")
-    wanted = plan.load(options.file, REFERENCE)
+    wanted = plan.load(options.file, RANGER)
     if options.seed is not None:
         wanted = wanted.with_seed(options.seed)
     check_scheduler(options)

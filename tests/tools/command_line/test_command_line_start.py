@@ -47,3 +47,15 @@ def test_the_options_of_a_command_load_no_other_command():
 
 def test_the_options_of_a_diagnosis_load_no_can_library_and_no_reader_of_another_format():
     assert loaded(["can", "asammdf", "pandas", "scipy"], "diagnose", "--help") == ""
+
+
+def test_a_campaign_of_a_users_machine_loads_nothing_of_the_robot(tmp_path):
+    (tmp_path / "servo.py").write_text("def new():\n    raise ValueError\n", encoding="utf-8")
+    plan = tmp_path / "plan.toml"
+    plan.write_text('title = "none"\n[machine]\nmake = "servo.py:new"\n[vary]\nseed = [1]\n', encoding="utf-8")
+    names = "ranger_sim.ranger ranger_sim.boards ranger_sim.plant.ranger scipy ranger_sim.harness.campaigns.plan"
+    done = subprocess.run(
+        [sys.executable, "-c", LINE, names, "campaign", str(plan), "--replay", "x"],
+        capture_output=True, text=True, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.stderr == "ranger_sim.harness.campaigns.plan"
