@@ -1,6 +1,8 @@
 """The exceptions for mistakes of a user: `UserError`, and a class of it for each kind of thing that is wrong."""
 
 import difflib
+import os
+import traceback
 from collections.abc import Iterable
 
 LONGEST_NAME = 100  # letters of a name that is compared with others
@@ -15,6 +17,15 @@ def printable(text: str) -> str:
     So neither a file's name nor a line of an external file can colour, hide or fake a message.
     """
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode("ascii") for each in text)
+
+
+def raised(error: BaseException, file: str = "") -> str:
+    """An exception in one line, with its place: the innermost one in `file`, where it passed that, or of all."""
+    if isinstance(error, SyntaxError):  # its text has the place
+        return f"{type(error).__name__}: {error}"
+    frames = traceback.extract_tb(error.__traceback__)
+    place = ([each for each in frames if each.filename == file] or frames)[-1]
+    return f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"
 
 
 class UserError(Exception):

@@ -9,12 +9,12 @@ import json
 import os
 import signal
 import sys
-import traceback
 import warnings
 from collections.abc import Callable
 from typing import Any
 
 from ranger_sim.foundation import descriptors, systems, wallclock
+from ranger_sim.foundation.user_error import raised
 
 CHUNK = 1 << 16
 
@@ -84,12 +84,6 @@ def branch(work: Callable[[], dict[str, Any]], cpu_s: float, wall_s: float) -> d
     if "raised" in result:
         raise BranchError("crashed", result["raised"])
     return result
-
-
-def raised(error: BaseException) -> str:
-    """An exception in one line, with its place."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}:{place.lineno})"
 
 
 def _be_the_branch(work: Callable[[], dict[str, Any]], parent: int, reading: int, writing: int, cpu_s: float) -> None:

@@ -22,8 +22,8 @@ from typing import Any
 import numpy.ma  # noqa: F401  (numpy's `unique` loads it late: every branch would, for as long as a small machine runs)
 
 from ranger_sim.foundation import systems, wallclock
-from ranger_sim.foundation.user_error import CampaignError, UserError
-from ranger_sim.harness.branching import BranchError, branch, die_with, raised
+from ranger_sim.foundation.user_error import CampaignError, UserError, raised
+from ranger_sim.harness.branching import BranchError, branch, die_with
 from ranger_sim.harness.campaigns.cases import Case, Settings, version
 from ranger_sim.harness.campaigns.outcomes import Band
 from ranger_sim.harness.faults import text as typed_text

@@ -15,8 +15,7 @@ from typing import Any
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.quantities import in_base_units, nanoseconds
 from ranger_sim.foundation.random_stream import RandomStream
-from ranger_sim.foundation.user_error import CampaignError, UserError
-from ranger_sim.harness.branching import raised
+from ranger_sim.foundation.user_error import CampaignError, UserError, raised
 from ranger_sim.harness.campaigns.cases import Case, Settings
 from ranger_sim.harness.campaigns.group import Watch, digest_of, rounded, start_of
 from ranger_sim.harness.campaigns.outcomes import OUTCOMES, severity

@@ -19,8 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ranger_sim.foundation.user_error import CampaignError, UserError
-from ranger_sim.harness.branching import raised
+from ranger_sim.foundation.user_error import CampaignError, UserError, raised
 from ranger_sim.harness.faults.evidence import Record
 from ranger_sim.harness.faults.proof import Proof
 

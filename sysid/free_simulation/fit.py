@@ -11,6 +11,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation import acting as effects
+from ranger_sim.sysid.free_simulation.contract import check_columns, check_methods
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
@@ -50,6 +51,7 @@ class TrajectoryFit:
         """count: samples averaged into one, also for the machine's own signals."""
         table = _marked(machine, table)
         given, guess = machine.inputs(table), machine.first_guess(table)
+        check_columns(machine, table, given, guess)
         if count > 1:
             whole = dataclasses.replace(table, columns=table.columns | given | {f"first {n}": guess[n] for n in guess})
             table = signals.averaged(whole, count)
@@ -82,6 +84,9 @@ class TrajectoryFit:
         self.shown_y = self.noise_y
         self.u = np.column_stack([given[name] for name in noisy]) if noisy else np.zeros((len(table), 0))
         self.measured_u = self.u.copy()
+        driven = self.simulator.driven(self.u, np.zeros((len(table), len(self.simulator.ports))))
+        values = {name: self.p[None, None, i] for i, name in enumerate(self.simulator.names)}
+        check_methods(machine, self.x, driven, values, self.step_s / machine.parts)
         self.size_x, self.size_u = (np.maximum(np.sqrt(np.mean(each**2, axis=0)), 1e-9) for each in (self.x, self.u))
         self.size_p = np.where(self.p != 0.0, np.abs(self.p), 0.01 * np.minimum(self.high - self.low, 1e6))
         self.lin: Jacobians  # of the last round

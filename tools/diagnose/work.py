@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table as RichTable
 
-from ranger_sim.foundation.user_error import UserError, printable
+from ranger_sim.foundation.user_error import ModelError, UserError, printable, raised
 from ranger_sim.sysid import answer, machines, predicted_ties
 from ranger_sim.sysid.api import diagnosis
 from ranger_sim.sysid.diagnosis import Diagnosis
@@ -89,18 +89,32 @@ def of_options(options: argparse.Namespace, progress: Progressed = lambda what, 
     """The diagnosis for a command line."""
     machine = machines.machine_of(machine_of(options.experiment), options.gear)  # before any file is read
     data, held = ([datasets.open_with(options, path) for path in paths] for paths in (options.data, options.holdout))
-    return diagnosis(
-        data,
-        machine,
-        holdout=held,
-        holdout_part=options.holdout_part,
-        model=options.model,
-        repair=options.repair,
-        accept_loss=options.accept_loss,
-        seed=options.seed,
-        progress=progress,
-        emulator=emulate,
-    )
+    try:
+        return diagnosis(
+            data,
+            machine,
+            holdout=held,
+            holdout_part=options.holdout_part,
+            model=options.model,
+            repair=options.repair,
+            accept_loss=options.accept_loss,
+            seed=options.seed,
+            progress=progress,
+            emulator=emulate,
+        )
+    except (UserError, OSError, MemoryError):
+        raise
+    except Exception as error:
+        file = file_of_users(machine)
+        if not file or options.verbose:
+            raise
+        text = f"{raised(error, file)}; --verbose prints the traceback"
+        raise ModelError(f"--experiment {options.experiment}: it raised {text}") from error
+
+
+def file_of_users(machine: Machine) -> str:
+    """The file that defines a machine of the user's own; "" for one of this package."""
+    return "" if machines.is_ours(machine) else getattr(sys.modules[type(machine).__module__], "__file__", None) or ""
 
 
 def machine_of(experiment: str) -> str | Machine:
@@ -112,9 +126,13 @@ def machine_of(experiment: str) -> str | Machine:
         sys.path.insert(0, "")  # a user's module is in the folder where the command is started
     try:
         found = getattr(importlib.import_module(module_name), name)
+        machine = found() if isinstance(found, type) else found
     except (ImportError, AttributeError) as error:
         raise UserError(f"--experiment {experiment}: {error}") from None
-    machine = found() if isinstance(found, type) else found
+    except UserError:
+        raise
+    except Exception as error:  # whatever a user's program raises
+        raise ModelError(f"--experiment {experiment}: it raised {raised(error)}") from error
     if missing := missing_members(machine):
         raise UserError(f"--experiment {experiment}: it has no {', '.join(missing)} (sysid/machine.py has its members)")
     return machine
