@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import pathlib
+import shlex
 import sys
 
 from ranger_sim.datatable.model import Table, Variable
@@ -85,7 +86,7 @@ def run_copy(arguments: argparse.Namespace) -> int:
                 shutil.copyfile(path, folder / path.name)
     except OSError as error:
         raise TableError(f"{error.filename or folder}: {error.strerror}: the copy needs a new folder") from error
-    print(f"{folder}: change variables.csv, then ranger-sim table generate --master {folder}")
+    print(f"{folder}: change variables.csv, then ranger-sim table generate --master {shlex.quote(str(folder))}")
     print(f"every program with this variable uses it: RANGER_SIM_TABLE={folder}")
     return EXIT_DONE
 

@@ -87,6 +87,10 @@ class Channel:
                 "both must be one row of the same length"
             )
 
+    def shown(self, value: float, digits: int = 6) -> str:
+        """A value of it in so many digits, with its unit where it has one."""
+        return f"{value:.{digits}g} {self.unit}".rstrip()
+
     @property
     def read(self) -> int:
         """Samples that were read of it: what is kept and what is left out."""

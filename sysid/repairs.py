@@ -125,7 +125,7 @@ def _unwrapped(channel: Channel, found: wraps.Wraps, repairs: list[Repair]) -> C
     places = np.array(found.places)
     turns[places + 1] = np.sign(np.diff(channel.value)[places])
     mended = channel.value - found.span * np.cumsum(turns)
-    text = f"{found.span:.6g} {channel.unit} taken out at {len(found.places)} places: {found.meaning}"
+    text = f"{channel.shown(found.span)} taken out at {len(found.places)} places: {found.meaning}"
     steps = np.diff(mended)
     around = np.stack([np.clip(places + away, 0, len(steps) - 1) for away in (-1, 1)])
     off = steps[places] - steps[around].mean(axis=0)  # the motion goes on as around the place
@@ -152,8 +152,8 @@ def _without_clipped(channel: Channel, limits: list[float], repairs: list[Repair
     mask = np.isin(channel.value, limits)
     if not limits or not mask.any():
         return channel
-    at = ", ".join(f"{each:.6g}" for each in limits)
-    text = f"{int(mask.sum())} values are left out: cut off at {at} {channel.unit}"
+    at = ", ".join(map(channel.shown, limits))
+    text = f"{int(mask.sum())} values are left out: cut off at {at}"
     repairs.append(Repair(channel.name, "clipped", int(mask.sum()), text))
     return channel.without(mask, CLIPPED)
 

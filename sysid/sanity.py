@@ -376,7 +376,7 @@ def _values(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Find
     overruns = wraps_of(channel)
     for place in overruns.places[:NAMED_PLACES]:
         size = abs(float(value[place + 1] - value[place]))
-        text = f"it jumps by {size:.6g} {channel.unit} against its motion: {overruns.meaning}"
+        text = f"it jumps by {channel.shown(size)} against its motion: {overruns.meaning}"
         yield Finding(
             channel.name, "wrap", float(time_s[place]), float(time_s[place + 1]), size, channel.unit, text
         )  # fmt: skip
@@ -391,11 +391,11 @@ def _size(channel: Channel) -> Iterator[Finding]:
     ends = float(channel.time_s[0]), float(channel.time_s[-1])
     typical = float(np.median(np.abs(channel.value)))
     if top < SMALLEST:
-        text = f"values up to {top:.4g} {channel.unit}: below what any instrument shows"
+        text = f"values up to {channel.shown(top, 4)}: below what any instrument shows"
         yield Finding(channel.name, "wrong_unit", *ends, top, channel.unit, text)
     for end, largest, rather in LARGEST:
         if channel.name.endswith(end) and typical > largest:
-            text = f"values around {typical:.4g} {channel.unit}: they are probably {rather}"
+            text = f"values around {channel.shown(typical, 4)}: they are probably {rather}"
             yield Finding(channel.name, "wrong_unit", *ends, typical, channel.unit, text)
     if channel.unit == "rad" and any(word in channel.name for word in JOINTS) and "motor" not in channel.name:
         if top > LARGEST_JOINT_RAD:
@@ -439,10 +439,11 @@ def _spikes(channel: Channel, overruns: Sequence[int]) -> Iterator[Finding]:
         blur = np.abs(value[places + 1] - value[places - 1]) + 2.0 * step
         if np.all(np.abs(np.abs(sizes) - step * 2.0**powers) <= blur) and powers.min() >= 3:
             bits = ", ".join(str(int(each)) for each in sorted(set(powers))[:8])
-            text = f"{len(places)} single values are wrong by one bit ({bits}) of steps of {step:.4g} {channel.unit}"
+            text = f"{len(places)} single values are wrong by one bit ({bits}) of steps of {channel.shown(step, 4)}"
             yield Finding(channel.name, "bit_flip", *ends, abs(worst), channel.unit, text)
             return
-    text = f"{len(places)} single values are off, by up to {abs(worst):.4g} {channel.unit}"
+    are = "value is" if len(places) == 1 else "values are"
+    text = f"{len(places)} single {are} off, by up to {channel.shown(abs(worst), 4)}"
     yield Finding(channel.name, "spike", *ends, abs(worst), channel.unit, text)
 
 
@@ -477,7 +478,7 @@ def _stuck(channel: Channel, all_channels: dict[str, Channel]) -> Iterator[Findi
             moving.append(other.name)
     if moving:
         value = float(channel.value[starts[longest]])
-        stays = f"it stays at {value:.6g} {channel.unit}".rstrip() + f" for {end - begin:.4g} s while "
+        stays = f"it stays at {channel.shown(value)} for {end - begin:.4g} s while "
         stays += f"{', '.join(moving[:3])} {'moves' if len(moving) == 1 else 'move'}"
         where = (float(begin), float(end), float(end - begin), "s")
         if value == 0.0 and all(_is_small(all_channels[name], begin, end) for name in moving):
@@ -527,9 +528,9 @@ def _saturation(channel: Channel) -> Iterator[Finding]:
         if len(fast) < CLIPPED_RUNS or len(fast) < 0.5 * len(runs) or _rests_at(value, limit):
             continue
         ends = float(time_s[starts[fast[0]]]), float(time_s[starts[fast[-1]] + lengths[fast[-1]] - 1])
-        text = f"{count} values are cut off at {limit:.6g} {channel.unit}, in {len(runs)} stretches"
+        text = f"{count} values are cut off at {channel.shown(limit)}, in {len(runs)} stretches"
         if channel.limits_are_true:
-            text = f"{count} values are at the limit {limit:.6g} {channel.unit}, which is assumed to be a true one"
+            text = f"{count} values are at the limit {channel.shown(limit)}, which is assumed to be a true one"
         severity = NOTE if channel.limits_are_true else WARNING
         yield Finding(channel.name, "saturation", *ends, limit, channel.unit, text, severity)
 
@@ -553,7 +554,7 @@ def _quantised(channel: Channel) -> Iterator[Finding]:
         return
     ends = float(channel.time_s[0]), float(channel.time_s[-1])
     text = (
-        f"its values are in steps of {step:.4g} {channel.unit}: from sample to sample that is {noise:.3g} "
+        f"its values are in steps of {channel.shown(step, 4)}: from sample to sample that is {noise:.3g} "
         f"{channel.unit}/s of noise in its derivative, which is {rate:.3g} {channel.unit}/s in all"
     )
     yield Finding(channel.name, "quantised", *ends, step, channel.unit, text, NOTE)

@@ -9,6 +9,7 @@ cell is a time without a sample of this channel; a cell that is not a number bec
 import dataclasses
 import pathlib
 import re
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -387,8 +388,8 @@ def _marks(path: pathlib.Path, rows: _Rows, progress: Progress, every: bool = Fa
         raise DataError(
             f"{path}: cells such as {cell!r} are {first} with a decimal point and {second} with a decimal comma, and "
             "no row decides:",
-            f"  ranger-sim read {path} --assume decimal=point",
-            f"  ranger-sim read {path} --assume decimal=comma",
+            f"  ranger-sim read {shlex.quote(str(path))} --assume decimal=point",
+            f"  ranger-sim read {shlex.quote(str(path))} --assume decimal=comma",
         )
     found = [evidence.of_column(column, mark) for column in range(width)]
     if not all(found):
@@ -503,11 +504,11 @@ def _channels(
         many = column.odd > HEXADECIMAL * column.rows and column.first_odd and HEX.fullmatch(column.first_odd[2])
         if says_hex or many:
             example = column.first_odd[2] if many and column.first_odd else column.first
-            text = f"{name}: hexadecimal numbers such as {example!r} are not read, left out"
+            text = f"hexadecimal numbers such as {example!r} are not read, left out"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text))
             continue
         if not np.isfinite(value[kept]).any():
-            text = f"{name}: has no number in it, left out"
+            text = "it has no number in it, left out"
             severity = "warning" if present.any() or not name.lower().startswith(REMARKS) else "note"
             dataset.findings.append(Finding(named.name, "empty", *columns.ends(time_s), 0.0, "", text, severity))
             continue

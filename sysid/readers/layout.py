@@ -9,6 +9,7 @@ import csv
 import dataclasses
 import pathlib
 import re
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
@@ -264,7 +265,7 @@ def _best(path: pathlib.Path, kept: list[tuple[int, str]]) -> _Attempt:
             signs = [name for name, sign in SEPARATORS.items() if sign in (best.separator, other.separator)]
             raise DataError(
                 f"{path}: its cells can be separated in two ways, {best.count} or {other.count} in a row:",
-                *(f"  ranger-sim read {path} --assume separator={name}" for name in signs),
+                *(f"  ranger-sim read {shlex.quote(str(path))} --assume separator={name}" for name in signs),
             )
     if best.share == 0.0:  # no row of numbers: as its first line is
         best = max(tried, key=lambda each: (len(each.rows[0][1]) > 1, each.separator != " ", each.count))
@@ -413,8 +414,8 @@ def several_tables(path: pathlib.Path, first: int, second: int) -> tuple[str, ..
     """The lines of the error for a file with several tables."""
     return (
         f"{path}: there are several tables, with names in line {first} and in line {second}; one is read at a time:",
-        f"  ranger-sim read {path} --assume names={first}",
-        f"  ranger-sim read {path} --assume names={second}",
+        f"  ranger-sim read {shlex.quote(str(path))} --assume names={first}",
+        f"  ranger-sim read {shlex.quote(str(path))} --assume names={second}",
     )
 
 

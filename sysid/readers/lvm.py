@@ -207,7 +207,7 @@ def read(path: pathlib.Path, mapping: Mapping[str, str] | None = None) -> Datase
             ends = columns.ends(time_s)
             dataset.findings.append(Finding(named.name, "unreadable", *ends, float(samples.odd), "samples", text))
         if not np.isfinite(value).any():
-            text = f"{name}: has no number in it, left out"
+            text = "it has no number in it, left out"
             dataset.findings.append(Finding(named.name, "empty", 0.0, 0.0, 0.0, "", text, "note"))
             continue
         columns.add(dataset, name, named, time_s, value, losses=lost)

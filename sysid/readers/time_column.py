@@ -143,7 +143,10 @@ def _assumed(dataset: Dataset, path: str, name: str, stamps: Array) -> units.Uni
             raise DataError(
                 f"{path}: {name}: nothing says the unit of the stamps; "
                 f"in seconds samples would be {usual:.6g} s apart, {others}:",
-                *(f"  ranger-sim read {path} --time-unit {unit}" for unit in (*sorted(likely, key=slow), "s")),
+                *(
+                    f"  ranger-sim read {shlex.quote(str(path))} --time-unit {unit}"
+                    for unit in (*sorted(likely, key=slow), "s")
+                ),
             )
         text += f", which are {usual:.6g} s apart"
         if likely:

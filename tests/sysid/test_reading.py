@@ -243,6 +243,22 @@ def test_marks_of_no_value_and_hexadecimal_columns_are_not_numbers(written):
     assert any("hexadecimal numbers such as '10E0'" in each.text for each in measurement.matters)
 
 
+@pytest.mark.parametrize(
+    ("text", "commands"),
+    [
+        ("time,a\n" + "".join(f"{k},{k * k}\n" for k in range(200)), 2),
+        ("t_s,a\n" + "".join(f"{0.01 * k:.2f},1.{k % 7}23\n" for k in range(200)) + "t_s,b\n" + "0.01,1\n" * 200, 2),
+    ],
+)
+def test_a_command_in_a_message_can_be_copied_whatever_the_file_is_called(text, commands, tmp_path):
+    path = tmp_path / "run 1; of Monday.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        open_recording(path)
+    found = [shlex.split(line) for line in caught.value.args if line.startswith("  ranger-sim read")]
+    assert [words[2] for words in found] == [str(path)] * commands
+
+
 def test_an_assumption_is_checked():
     for text, line in (
         ("decimal=x", "decimal is point or comma"), ("colour=red", "key=value is expected"), ("names=x", "number of"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import pathlib
+import shlex
 import urllib.parse
 import webbrowser
 from typing import TYPE_CHECKING, Any
@@ -87,7 +88,9 @@ def write(timeline: Timeline | None, given: argparse.Namespace, console: Console
             timeline.write(path)
     timeline.close()
     for path in paths_of(given):
-        console.print(f"timeline: {path} (ranger-sim trace open {path})", highlight=False, soft_wrap=True)
+        console.print(
+            f"timeline: {path} (ranger-sim trace open {shlex.quote(str(path))})", highlight=False, soft_wrap=True
+        )
 
 
 def register(commands: Any) -> None:
