@@ -134,7 +134,7 @@ def test_the_catalogue_names_the_data_rate_and_the_number_of_values(tmp_path):
         (
             "firmware = false",
             "firmware = true",
-            "ARM buses: CAN1 is a CAN FD bus; a board with firmware has the classic",
+            "ARM buses: CAN1 is a CAN FD bus, whose frames a classic controller destroys by error frames",
         ),
         (
             "data_bit_rate = 2_000_000",
