@@ -172,6 +172,10 @@ class Table:
                 return board
         raise TableError(unknown("board", name, (board.name for board in self.boards)))
 
+    def rates(self, bus: str) -> int | tuple[int, int]:
+        """The bit rate of a bus, bit/s; of a CAN FD bus that and the data's, as `harness.machine.Machine` has them."""
+        return (self.bit_rates[bus], self.data_bit_rates[bus]) if bus in self.data_bit_rates else self.bit_rates[bus]
+
     def with_role(self, role: str) -> tuple[Board, ...]:
         """All boards of a role."""
         return tuple(board for board in self.boards if board.role == role)

@@ -6,6 +6,7 @@ whose codec is in `Mailbox` (channel.py). Meanings of the fields: foundation/eve
 
 from typing import NamedTuple
 
+from ranger_sim.can_bus.fd_frame import FD_SENDABLE
 from ranger_sim.foundation import events
 from ranger_sim.harness.processes.places import FRAME_WORDS, LIMIT_SIZE, NOTE_WORDS, SSP_WORDS
 
@@ -14,7 +15,8 @@ WORD = (0, 0xFFFFFFFF)
 NONE = (0, 0)
 CONTROLLER, BUFFER, PIN, LEVEL, PORT, BYTE = (1, 4), (1, 3), (0, 63), (0, 1), (0, 15), (0, 255)
 IDENTIFIER = (0, 0x1FFFFFFF)
-FLAGS = (0, 0x7FF)  # of a frame; those above 127 only with the data of a CAN FD frame
+FLAGS = (0, 0x7FF)  # of a frame
+REQUESTED = (0, FD_SENDABLE)  # those of a frame to send; those of CAN FD only with its data
 
 # Kinds between the processes only: no chip sees them.
 NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, or of activity.py here, cut into parts)
@@ -39,7 +41,7 @@ KINDS = {
     events.CAN_STATUS: Kind("CAN_STATUS", TO_BOARD, (CONTROLLER, WORD, WORD, WORD, LEVEL, NONE)),
     events.UART_BYTE: Kind("UART_BYTE", TO_BOARD, (PORT, BYTE, (0, 8), WORD, WORD, NONE)),
     events.SSP_SEGMENT: Kind("SSP_SEGMENT", TO_BOARD, (PORT, NONE, NONE, NONE, NONE, NONE)),
-    events.CAN_REQUEST: Kind("CAN_REQUEST", FROM_BOARD, (CONTROLLER, BUFFER, IDENTIFIER, FLAGS, WORD, WORD)),
+    events.CAN_REQUEST: Kind("CAN_REQUEST", FROM_BOARD, (CONTROLLER, BUFFER, IDENTIFIER, REQUESTED, WORD, WORD)),
     events.CAN_ABORT: Kind("CAN_ABORT", FROM_BOARD, (CONTROLLER, BUFFER, NONE, NONE, NONE, NONE)),
     events.CAN_MODE: Kind("CAN_MODE", FROM_BOARD, (CONTROLLER, LEVEL, NONE, NONE, NONE, NONE)),
     events.CAN_FILTER: Kind("CAN_FILTER", FROM_BOARD, (CONTROLLER, LEVEL, NONE, NONE, NONE, NONE)),

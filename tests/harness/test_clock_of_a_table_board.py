@@ -1,4 +1,4 @@
-"""The clock of a board with firmware in C: that of its master table, or of its manifest, not both."""
+"""Clock and CAN controllers of a board with firmware in C: those of its master table, or of its manifest, not both."""
 
 import dataclasses
 import pathlib
@@ -43,3 +43,13 @@ def test_two_different_clocks_are_refused(tmp_path):
 def test_firmware_without_a_table_keeps_its_hardware():
     alone = SimpleNamespace(folder=pathlib.Path("arm"), manifest=SimpleNamespace(master=None))
     assert as_the_table_has_it("ARM", alone, Hardware()) == Hardware()
+
+
+def test_a_board_has_the_controllers_of_its_table_and_two_kinds_are_refused(tmp_path):
+    at = "slot_us = 1000\nrows = [["
+    table(tmp_path, BOARDS.replace(at, f'can = "fd"\n{at}', 1))
+    with_fd = SimpleNamespace(folder=pathlib.Path("arm"), manifest=SimpleNamespace(master=tmp_path))
+    assert as_the_table_has_it("ARM", with_fd, Hardware()).can == "fd"
+    assert as_the_table_has_it("DESK", with_fd, Hardware(can="fd")).can == "fd"  # the table states nothing
+    with pytest.raises(FirmwareError, match=r"^arm: hardware.can is classic, and can of ARM in .* is fd$"):
+        as_the_table_has_it("ARM", with_fd, Hardware(can="classic"))
