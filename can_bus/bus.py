@@ -1352,7 +1352,8 @@ class Bus:
         if level.error_is_over():
             level.in_error = level.counted = False
             end = self.edge_ns(level.bit)
-            self.log.add(end, level.identifier, level.flags, level.error_field, level.error_position, level.sender)
+            flags = level.flags if self.log.stream is None else level.flags & 0xFF  # of a stream's row, without FD's
+            self.log.add(end, level.identifier, flags, level.error_field, level.error_position, level.sender)
             if self.log.times is not None:
                 begun = self.edge_ns(level.error_begun)
                 sender = level.sender + 1 << SENDER_SHIFT | level.flags

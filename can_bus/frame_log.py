@@ -103,8 +103,8 @@ class FrameLog:
     def add_fd(self, time, identifier, flags, data, node) -> None:
         """Record a CAN FD frame: `hi` holds all bytes from the fifth on."""
         if self.stream is not None:
-            raise ValueError("a stream of frames holds classic frames only")
-        if len(self.frames) < self.capacity:
+            self.stream.add_fd(time, identifier, flags, data)
+        elif len(self.frames) < self.capacity:
             lo, hi = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
             self.frames.append((time, identifier, flags, lo, hi, node))
         else:

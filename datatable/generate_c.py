@@ -22,7 +22,7 @@ COMMON = f"""{HEADER}
 /* Of this state of the table: another one has another number (CRC-32 of the other generated C files). */
 #define RANGER_TABLE_VERSION VERSION_OF_TABLEu
 
-/* Type of the value word, bytes 0-3 of a frame; bytes 4-7 are a uint32_t of milliseconds. */
+/* Type of the value word, bytes 0-3 of a frame; bytes 4-7 are a uint32_t of milliseconds.SEVERAL */
 enum ranger_type {{ RANGER_F32 = 0, RANGER_I32 = 1, RANGER_U32 = 2 }};
 
 /* One entry of a send or receive list: which id, of which type, and where in the board's structure. */
@@ -30,9 +30,17 @@ struct ranger_entry {{
     uint16_t id;
     uint8_t type;
     size_t offset;
-}};
+LENGTHS}};
 
 #endif
+"""
+
+
+# of a table with a CAN FD bus
+SEVERAL = """ A frame of CAN FD
+ * has `count` values, four bytes each, the milliseconds behind them, and zeros up to its `bytes`."""
+LENGTHS = """    uint8_t count;
+    uint8_t bytes;
 """
 
 
@@ -52,11 +60,19 @@ def comment(variable: Variable) -> str:
     return f"/* {variable.id}{unit} {variable.description} */"
 
 
-def list_lines(board: str, which: str, variables: list[Variable]) -> list[str]:
+def initial(variable: Variable) -> str:
+    """The initial value as C writes it, of several values in braces."""
+    number = c_number(variable)
+    return number if variable.count == 1 else f"{{{', '.join([number] * variable.count)}}}"
+
+
+def list_lines(board: str, which: str, variables: list[Variable], has_fd: bool) -> list[str]:
     entries = [
-        f"    {{ {v.name}, {KINDS[v.type]}, offsetof(struct {board}_data, {v.name.lower()}) }}," for v in variables
+        f"    {{ {v.name}, {KINDS[v.type]}, offsetof(struct {board}_data, {v.name.lower()})"
+        f"{f', {v.count}, {v.frame_bytes}' if has_fd else ''} }},"
+        for v in variables
     ]
-    nothing = ["    { 0, 0, 0 },"]  # C has no empty arrays; the count is 0
+    nothing = ["    { 0, 0, 0, 0, 0 }," if has_fd else "    { 0, 0, 0 },"]  # C has no empty arrays; the count is 0
     return [f"const struct ranger_entry {board}_{which}[] = {{", *(entries or nothing), "};"]
 
 
@@ -80,13 +96,17 @@ def board_header(table: Table, board: Board) -> str:
         f"#define {board.name}_ROWS {len(board.rows)}",
         f"#define {board.name}_SEND_COUNT {len(send)}",
         f"#define {board.name}_RECEIVE_COUNT {len(receive)}",
+        *rates(table, board),
         "",
         "/* ids */",
         *(f"#define {variable.name} {variable.id}" for variable in known),
         "",
         "/* the board's copy of the values */",
         f"struct {small}_data {{",
-        *(f"    {C_TYPES[v.type]} {v.name.lower()}; {comment(v)}" for v in known),
+        *(
+            f"    {C_TYPES[v.type]} {v.name.lower()}{f'[{v.count}]' if v.count > 1 else ''}; {comment(v)}"
+            for v in known
+        ),
         "};",
         "",
         f"extern const struct {small}_data {small}_initial;",
@@ -99,6 +119,17 @@ def board_header(table: Table, board: Board) -> str:
     return "\n".join([*lines, "", "#endif", ""])
 
 
+def rates(table: Table, board: Board) -> list[str]:
+    """The bit rates of a board's CAN FD bus."""
+    bus = next((bus for bus in board.buses if bus in table.data_bit_rates), None)
+    if bus is None:
+        return []
+    return [
+        f"#define {board.name}_BIT_RATE {table.bit_rates[bus]}",
+        f"#define {board.name}_DATA_BIT_RATE {table.data_bit_rates[bus]}",
+    ]
+
+
 def board_source(table: Table, board: Board) -> str:
     """Definitions of one board."""
     small = board.name.lower()
@@ -107,12 +138,12 @@ def board_source(table: Table, board: Board) -> str:
         f'#include "{small}_table.h"',
         "",
         f"const struct {small}_data {small}_initial = {{",
-        *(f"    .{variable.name.lower()} = {c_number(variable)}," for variable in known_to(table, board)),
+        *(f"    .{variable.name.lower()} = {initial(variable)}," for variable in known_to(table, board)),
         "};",
         "",
-        *list_lines(small, "send", sent_by(table, board)),
+        *list_lines(small, "send", sent_by(table, board), bool(table.data_bit_rates)),
         "",
-        *list_lines(small, "receive", received_by(table, board)),
+        *list_lines(small, "receive", received_by(table, board), bool(table.data_bit_rates)),
     ]
     if board.role == "router":
         masks = destination_masks(table)
@@ -137,4 +168,6 @@ def c_files(table: Table) -> dict[str, str]:
             files[f"{board.name.lower()}_table.h"] = board_header(table, board)
             files[f"{board.name.lower()}_table.c"] = board_source(table, board)
     version = zlib.crc32("".join(files[name] for name in sorted(files)).encode())
-    return {"ranger_table.h": COMMON.replace("VERSION_OF_TABLE", f"0x{version:08X}"), **files}
+    common = COMMON.replace("VERSION_OF_TABLE", f"0x{version:08X}")
+    common = common.replace("SEVERAL", SEVERAL if table.data_bit_rates else "")
+    return {"ranger_table.h": common.replace("LENGTHS", LENGTHS if table.data_bit_rates else ""), **files}

@@ -18,6 +18,7 @@ from typing import Any
 
 from ranger_sim.datatable.addresses import XCP_IDS
 from ranger_sim.datatable.model import (
+    CAN_KINDS,
     LARGEST_CAN_ID,
     LARGEST_ID,
     LIMITS,
@@ -75,7 +76,7 @@ RESERVED_NAMES = frozenset(
     "BO_ SG_ CM_ BA_ BU_ EV_ VAL_ BS_ NS_ NS_DESC_ VAL_TABLE_ BA_DEF_ BA_DEF_DEF_ SIG_VALTYPE_".split()
 )
 RESERVED_PREFIXES = ("ERR_", "RANGER_")
-RESERVED_SUFFIXES = ("_BOARD_NUMBER", "_SLOT_US", "_ROWS", "_SEND_COUNT", "_RECEIVE_COUNT", "_TABLE_H")
+RESERVED_SUFFIXES = ("_BOARD_NUMBER", "_SLOT_US", "_ROWS", "_SEND_COUNT", "_RECEIVE_COUNT", "_BIT_RATE", "_TABLE_H")
 RESERVED_ERRORS = frozenset(("LAST", "NAMES", "DESCRIPTIONS", "NORMAL_PER_S", "NORMAL_AT_START"))
 RESERVED_BOARDS = frozenset(("ERRORS", "ROUTES", "RANGER"))
 
@@ -259,9 +260,14 @@ def board_of(
     clock_hz = reader.take_whole("clock_hz", 0, 10**10, 0)
     if firmware and processor:
         _check_processor(processor, clock_hz, report)
+    can = _can_kind(reader, firmware, processor, report)
     for bus in buses if firmware else ():
-        if bus in fd_buses:
-            report("buses", f"{bus} is a CAN FD bus; a board with firmware has the classic controllers of an LPC2194")
+        if bus in fd_buses and can != "fd":
+            report(
+                "buses",
+                f"{bus} is a CAN FD bus, whose frames a classic controller destroys by error frames; "
+                'can = "fd" gives the board CAN FD controllers',
+            )
     board = Board(
         name=name,
         number=reader.take_whole("number", 0, 63),
@@ -279,9 +285,24 @@ def board_of(
         rows=rows,
         occasional=occasional,
         occasional_row=occasional_row,
+        can=can,
     )
     reader.finish()
     return board
+
+
+def _can_kind(reader: BoardReader, firmware: bool, processor: str, report: Callable[[str, str], None]) -> str:
+    """The kind of a board's CAN controllers; empty where the table states none."""
+    if not firmware:
+        return ""
+    can: str = reader.take("can", str, "")
+    if can not in ("", *CAN_KINDS):
+        report("can", f"is {shown(can)}, not one of {', '.join(CAN_KINDS)}")
+    elif can == "fd" and processor:
+        report(
+            "can", f"is 'fd', and an {processor} has classic controllers; leave out processor for a chip with CAN FD"
+        )
+    return can
 
 
 def _check_processor(processor: str, clock_hz: int, report: Callable[[str, str], None]) -> None:

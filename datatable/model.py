@@ -25,6 +25,7 @@ ROUTER, MAIN_BRAIN = "router", "main brain"
 ROLES = ("satellite", ROUTER, MAIN_BRAIN, "computer")
 # Models of processors that a board with firmware may name, and their highest clocks in Hz (user manuals UM10114 and
 # UM10326). Without a name it has the LPC2194's devices at any clock.
+CAN_KINDS = ("classic", "fd")
 PROCESSORS = {"LPC2194": 60_000_000, "LPC2194/01": 60_000_000, "LPC3250": 208_000_000}
 
 
@@ -71,6 +72,7 @@ class Board:
     rows: tuple[tuple[str, ...], ...]
     occasional: tuple[str, ...]
     occasional_row: int | None
+    can: str = ""  # its CAN controllers, of a board with firmware: "fd", or "classic" as those of an LPC2194
 
     def sends_per_s(self) -> dict[str, Fraction]:
         """How often per second the schedule sends each variable, exact.
@@ -169,6 +171,10 @@ class Table:
             if board.name == name:
                 return board
         raise TableError(unknown("board", name, (board.name for board in self.boards)))
+
+    def rates(self, bus: str) -> int | tuple[int, int]:
+        """The bit rate of a bus, bit/s; of a CAN FD bus that and the data's, as `harness.machine.Machine` has them."""
+        return (self.bit_rates[bus], self.data_bit_rates[bus]) if bus in self.data_bit_rates else self.bit_rates[bus]
 
     def with_role(self, role: str) -> tuple[Board, ...]:
         """All boards of a role."""

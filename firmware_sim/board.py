@@ -12,6 +12,7 @@ from ranger_sim.firmware_sim.analog import AnalogPins
 from ranger_sim.foundation.edge_buffer import EdgeBuffer
 from ranger_sim.foundation.events import NEVER, EventQueue, Outbox
 from ranger_sim.foundation.renamed import renamed
+from ranger_sim.foundation.user_error import FirmwareError
 
 WORDS = 16
 EVERY_KIND = 0xFFFF  # bits of the message kinds to a board
@@ -116,6 +117,14 @@ class Board:
 
     def filter_of(self, controller) -> bytes | None:
         """The acceptance filter of a CAN controller (bytes of `can_bus.acceptance`); None: it accepts every frame."""
+        return None
+
+    def refuse_output(self, text) -> None:
+        """Take what was wrong with an output that nothing outside can take: its program's mistake. FirmwareError."""
+        raise FirmwareError(f"{self.name}: {text}")
+
+    def can_rates(self, controller) -> tuple[int, int] | None:
+        """Both bit rates of a CAN FD controller, bit/s; None: it is a classic one, or there is none."""
         return None
 
     def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:

@@ -177,6 +177,10 @@ class Microcontroller(Chip):
         """The acceptance filter of this CAN controller; None: every frame, or no such controller."""
         return self.message_table[controller * MESSAGE_KINDS + CAN_RX].filter_bytes()
 
+    def can_rates(self, controller) -> tuple[int, int] | None:
+        """Both bit rates of this CAN FD controller, bit/s; None: it is a classic one, or there is none."""
+        return self.message_table[controller * MESSAGE_KINDS + CAN_RX].can_rates()
+
     def latest_slot(self) -> cython.longlong:
         """Start of its latest slot (ns); 0 before the first."""
         return self.scheduler.slot_time

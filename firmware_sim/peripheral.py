@@ -61,6 +61,10 @@ class Peripheral:
         """The acceptance filter of a CAN controller; None: every frame passes, or it is not a controller."""
         return None
 
+    def can_rates(self) -> tuple[int, int] | None:
+        """Both bit rates of a CAN FD controller, bit/s; None: it is another peripheral."""
+        return None
+
 
 @cython.final
 @cython.cclass

@@ -10,6 +10,8 @@ import cython
 
 # BLAKE2b (RFC 7693): as strong as SHA-256, in half the time on processors without instructions for that
 DIGEST_BYTES = 32
+FD_FLAGS_SHIFT = 44  # in the second number of a frame's row: its flags from bit 8 on
+FURTHER = 1 << 47  # there, too: a row of further data of the frame before
 
 
 @cython.cclass
@@ -74,7 +76,8 @@ class FrameStream(RowStream):
     """The frames of bus `bus` (0 ... 15), hashed: three numbers a row, in order of their start.
 
     They are: the time (ns) at which receivers have the frame; word 0 << 12 | flags << 4 | bus; word 1 << 29 |
-    identifier.
+    identifier. Flags above 255, of CAN FD, are bits 44 ... 46 of the second number. Each eight bytes more of such a
+    frame are a further row of the same time and identifier, with FURTHER in its second number; all are in one block.
     """
 
     def __init__(self, bus) -> None:
@@ -98,3 +101,17 @@ class FrameStream(RowStream):
         self.last_time_ns = time_ns
         if self.used == self.capacity:
             self.flush()
+
+    def add_fd(self, time_ns, identifier, flags, data) -> None:
+        """Add a CAN FD frame with these data (bytes)."""
+        words = [int.from_bytes(data[at : at + 4], "little") for at in range(0, max(len(data), 8), 4)]
+        if len(words) % 2:
+            words.append(0)
+        if self.used + self.columns * (len(words) // 2) > self.capacity:
+            self.flush()
+        marks = (flags & 0xFF) << 4 | flags >> 8 << FD_FLAGS_SHIFT | self.number
+        for at in range(0, len(words), 2):
+            self.integers[self.used] = time_ns
+            self.integers[self.used + 1] = words[at] << 12 | (marks if at == 0 else FURTHER | self.number)
+            self.integers[self.used + 2] = words[at + 1] << 29 | identifier
+            self.finish_row(time_ns)

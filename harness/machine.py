@@ -37,7 +37,7 @@ from ranger_sim.harness.records.recorder import Recorder
 from ranger_sim.harness.records.sampler import Sampler
 from ranger_sim.harness.stop_rule import StopRule
 from ranger_sim.harness.waiting import Condition, ConditionNotMetError, Waiting, Wanted
-from ranger_sim.harness.wiring.wires import Wiring
+from ranger_sim.harness.wiring.wires import CanWire, Wiring
 
 GRID_NS = 20_000_000  # actions from outside happen on this grid, so that a run does not depend on how it is sliced
 
@@ -45,9 +45,10 @@ GRID_NS = 20_000_000  # actions from outside happen on this grid, so that a run 
 class Machine:
     """One machine. Same parts and seed, same bytes. Close it when done (or use contextlib.closing).
 
-    boards: {name: Board}, in the order in which they run and are sorted within one time. buses: {name: bit/s}, with
-    names can1, can2, ...; seed: of crystals, noise and faults, as far as the parts take it from here; log: "none",
-    "window" (the last seconds in memory) or "full" (on disk), `logbook`'s frames and samples.
+    boards: {name: Board}, in the order in which they run and are sorted within one time. buses: {name: bit/s}, or of a
+    CAN FD bus {name: (bit/s, bit/s of the data)}, with names can1, can2, ...; seed: of crystals, noise and faults, as
+    far as the parts take it from here; log: "none", "window" (the last seconds in memory) or "full" (on disk),
+    `logbook`'s frames and samples.
     words: (how many, board): the memory of a board that the log keeps as well. names: of frames and errors, as
     `Names.of(load_table(folder))` has them; without, frames have only numbers. places: where faults can be.
     mode: where its boards run.
@@ -64,7 +65,7 @@ class Machine:
         self,
         plant: Any,
         boards: Mapping[str, Any],
-        buses: Mapping[str, int],
+        buses: Mapping[str, int | tuple[int, int]],
         wiring: Wiring,
         seed: int = 0,
         log: str = "none",
@@ -87,7 +88,7 @@ class Machine:
             if board.name != name:
                 raise UserError(f"machine: board {name!r} is named {board.name!r}")
         self.recorder = Recorder(len(buses), len(plant.sample_names), words[0])
-        self.buses: list[Any] = [Bus(name, rate, seed, log_capacity=0) for name, rate in buses.items()]
+        self.buses: list[Any] = [bus_of(name, rates, seed) for name, rates in buses.items()]
         for bus, stream in zip(self.buses, self.recorder.frames, strict=True):
             bus.log.stream = stream
             bus.reset_statistics(self.start_ns)  # loads count from the start of the run
@@ -142,6 +143,8 @@ class Machine:
             bus = self.buses[can_wire.bus - 1]
             order = STAGE_BUS * 256 + 16 * place[can_wire.board] + can_wire.controller
             node = bus.add_node(can_wire.board, board.inbox, can_wire.controller, order)
+            if bus.is_fd:
+                self._check_rates(can_wire, bus, node)
             loop.wires[place[can_wire.board]].connect_bus(can_wire.controller, bus, node)
         for bridge in wiring.bridges:
             self._wired(bridge.board)
@@ -154,6 +157,17 @@ class Machine:
 
             board = self._wired(imu.board)
             loop.connect_serial_device(ImuWire(self.plant.imu, board, imu.uart), board, imu.uart)
+
+    def _check_rates(self, wire: CanWire, bus: Any, node: int) -> None:
+        """Compare the bit rates of a controller on a CAN FD bus with the bus's; a classic one is a classic node."""
+        rates = self.boards[wire.board].can_rates(wire.controller)
+        if rates is None:
+            bus.set_classic(node)
+        elif rates != (bus.bitrate, bus.data_bitrate):
+            raise UserError(
+                f"wiring: {wire.board} starts its CAN FD controller {wire.controller} with {rates[0]} and {rates[1]} "
+                f"bit/s, and {bus.name} has {bus.bitrate} and {bus.data_bitrate}"
+            )
 
     def waits_for_slots(self, board: Any) -> bool:
         """Whether a board in `receive_in_slots` has a program that is known to wait for its tasks."""
@@ -415,6 +429,15 @@ class Machine:
         for fault in self.faults:
             if fault.twin is not None:
                 fault.twin.close()
+
+
+def bus_of(name: str, rates: int | tuple[int, int], seed: int) -> Bus:
+    """A bus of `rates` bit/s, or, with two of them, a CAN FD bus. UserError for rates that a bus cannot have."""
+    nominal, data = rates if isinstance(rates, tuple) else (rates, 0)
+    try:
+        return Bus(name, nominal, seed, log_capacity=0, data_bitrate=data)
+    except ValueError as error:
+        raise UserError(f"machine: {error}") from None
 
 
 def accept_lists(plant: Any) -> None:

@@ -22,6 +22,7 @@ class Names:
 
     variables: Mapping[int, str] = dataclasses.field(default_factory=dict)
     types: Mapping[int, str] = dataclasses.field(default_factory=dict)
+    counts: Mapping[int, int] = dataclasses.field(default_factory=dict)  # of values in one frame, where above 1
     boards: Mapping[int, str] = dataclasses.field(default_factory=dict)
     errors: Mapping[int, str] = dataclasses.field(default_factory=dict)
     descriptions: Mapping[int, str] = dataclasses.field(default_factory=dict)
@@ -41,6 +42,7 @@ class Names:
         return cls(
             variables={each.id: each.name for each in table.variables},
             types={each.id: each.type for each in table.variables},
+            counts={each.id: each.count for each in table.variables if each.count > 1},
             boards={each.number: each.name for each in table.boards},
             errors={each.id: each.name for each in table.errors},
             descriptions={each.id: each.description for each in table.errors},

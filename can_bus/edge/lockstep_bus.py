@@ -20,13 +20,18 @@ SLICE_NS = 100_000  # virtual time between two looks at the bus; chosen by us: t
 
 
 class LockstepBus(can.BusABC):
-    """One more controller on bus `bus` of a machine in this process. Stamps are the machine's time since power-up."""
+    """One more controller on bus `bus` of a machine in this process. Stamps are the machine's time since power-up.
+
+    On a CAN FD bus of the machine it sends and receives messages of both kinds.
+    """
 
     def __init__(self, machine: Any, bus: str = "can1", **options: Any) -> None:
         buses = {each.name: each for each in machine.buses}
         if bus not in buses:
             raise BusError(unknown("bus", bus, buses))
         self.machine = machine
+        self.is_fd = bool(buses[bus].is_fd)
+        self._can_protocol = can.CanProtocol.CAN_FD if self.is_fd else can.CanProtocol.CAN_20
         self.taps = Taps(buses[bus])
         self.taps.time = machine.loop.time
         self.tap = self.taps.add("driver")
@@ -37,10 +42,10 @@ class LockstepBus(can.BusABC):
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Queue a message; it is sent while time passes. can.CanOperationError for one that the bus does not take."""
         try:
-            frame = frame_of_message(msg)
+            frame = frame_of_message(msg, self.is_fd)
         except UserError as fault:
             raise can.CanOperationError(str(fault)) from None
-        text = fault_of_frame(*frame)
+        text = fault_of_frame(*frame, fd=self.is_fd)
         if text:
             raise can.CanOperationError(text)
         answer = self.tap.offer(*frame)

@@ -8,7 +8,8 @@ from typing import Final
 
 import cython
 
-from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
+from ranger_sim.can_bus.fd_frame import LONGEST
+from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.native.functions import Function
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
@@ -17,6 +18,7 @@ from ranger_sim.firmware_sim.native.started import Started
 from ranger_sim.firmware_sim.peripherals.adc_external import Ads7871
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
 from ranger_sim.firmware_sim.peripherals.can_controller import TABLE_BYTES, CanController, table_bytes
+from ranger_sim.firmware_sim.peripherals.can_fd_controller import CanFdController
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.pwm import Pwm
 from ranger_sim.firmware_sim.peripherals.spi_encoder import SpiEncoder
@@ -30,12 +32,20 @@ from ranger_sim.firmware_sim.peripherals.ssp import (
 )
 from ranger_sim.firmware_sim.peripherals.timer_capture import TimerCapture
 from ranger_sim.firmware_sim.peripherals.uart import Uart
+from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import FirmwareError
 
 CMR_AT: Final = 0x2  # CxCMR
 CMR_CDO: Final = 0x8
 CMR_STB1: Final = 0x20
 EXTENDED: Final = 0x8000_0000  # FW_CAN_EXTENDED
+REMOTE: Final = 0x4000_0000  # FW_CAN_REMOTE
+# flags of fw_canfd_frame, and how far they are from FLAG_FD, and from FLAG_BRS and FLAG_ESI
+CANFD_FLAGS: Final = 7
+CANFD_BRS_ESI: Final = 3
+CANFD_FDF: Final = 4
+FDF_SHIFT: Final = 6
+BRS_SHIFT: Final = 9
 WORD: Final = 0xFFFF_FFFF
 HOSTS: set[int] = set()  # addresses that programs may call with; those of ended boards stay, a number each
 _latest: cython.ulonglong = 0  # the address that was called with last: one of HOSTS
@@ -104,6 +114,17 @@ CALL_CAN_WRITE_IER: Final = 59
 CALL_SSP_START_WORDS: Final = 60
 CALL_SSP_WORD: Final = 61
 CALL_CAN_ACCEPT: Final = 62
+CALL_CANFD_START: Final = 63
+CALL_CANFD_TRANSMIT: Final = 64
+CALL_CANFD_BUFFER_FREE: Final = 65
+CALL_CANFD_ABORT: Final = 66
+CALL_CANFD_RECEIVE: Final = 67
+CALL_CANFD_CLEAR_OVERRUN: Final = 68
+CALL_CANFD_GSR: Final = 69
+CALL_CANFD_ICR: Final = 70
+CALL_CANFD_MOD: Final = 71
+CALL_CANFD_WRITE_MOD: Final = 72
+CALL_CANFD_WRITE_IER: Final = 73
 NAMES = (
     "attach detach request spend idle slot_cycles cycles pin_write pin_toggle IOPIN IOSET IOCLR timer_start "
     "capture_connect timer_CCR timer_write_CCR timer_CR timer_IR timer_clear_IR timer_TC pwm_start pwm_MR "
@@ -112,7 +133,8 @@ NAMES = (
     "ssp_take uart_start uart_RBR uart_THR uart_LSR uart_IIR can_start can_transmit can_buffer_free can_abort "
     "can_read can_release can_clear_overrun can_GSR can_SR can_ICR can_MOD can_write_MOD can_write_IER "
     "ssp_start_words ssp_word "
-    "can_accept"
+    "can_accept canfd_start canfd_transmit canfd_buffer_free canfd_abort canfd_receive canfd_clear_overrun canfd_GSR "
+    "canfd_ICR canfd_MOD canfd_write_MOD canfd_write_IER"
 ).split()
 
 
@@ -136,6 +158,8 @@ class Calls:
     masters: object
     uarts: object
     cans: object
+    fds: object
+    canfd_mail: object
     accepted: object
 
     def __init__(self, board, library: Library, hardware, phase_ns) -> None:
@@ -157,6 +181,8 @@ class Calls:
         self.masters = Started("SSP as a master of words")
         self.uarts = Started("UART")
         self.cans = Started("CAN controller")
+        self.fds = Started("CAN FD controller")
+        self.canfd_mail = library.code.fw_canfd_mail
         self.accepted = None  # by controller, what its filter lets through; None: the filter is in bypass
 
     @cython.ccall
@@ -296,6 +322,28 @@ class Calls:
             return self.ssp_word(a)
         elif call == CALL_CAN_ACCEPT:
             return self.can_accept(a, b)
+        elif call == CALL_CANFD_START:
+            self.canfd_start(a, b, c, d)
+        elif call == CALL_CANFD_TRANSMIT:
+            return self.canfd_transmit(a, b)
+        elif call == CALL_CANFD_BUFFER_FREE:
+            return self.fds[a].buffer_free(self.buffer(b))
+        elif call == CALL_CANFD_ABORT:
+            self.fds[a].abort(self.buffer(b))
+        elif call == CALL_CANFD_RECEIVE:
+            return self.canfd_receive(a)
+        elif call == CALL_CANFD_CLEAR_OVERRUN:
+            self.fds[a].clear_overrun()
+        elif call == CALL_CANFD_GSR:
+            return self.fds[a].GSR()
+        elif call == CALL_CANFD_ICR:
+            return self.fds[a].read_ICR()
+        elif call == CALL_CANFD_MOD:
+            return self.fds[a].MOD
+        elif call == CALL_CANFD_WRITE_MOD:
+            self.fds[a].write_MOD(b)
+        elif call == CALL_CANFD_WRITE_IER:
+            self.fds[a].write_IER(b)
         return 0
 
     @cython.ccall
@@ -624,6 +672,8 @@ class Calls:
 
     @cython.ccall
     def can_start(self, controller: cython.longlong, BTR: cython.longlong, IER: cython.longlong) -> None:
+        if self.hardware.can == "fd":
+            raise FirmwareError("this board has CAN FD controllers: fw_canfd_start starts one")
         self.new(self.cans, controller)
         self.cans[controller] = CanController(self.chip, controller, BTR, IER)
         if self.accepted is not None:
@@ -704,7 +754,7 @@ class Calls:
     def can_accept(self, address: cython.longlong, count: cython.longlong) -> cython.longlong:
         if count == 0:
             self.accepted = None
-            for can in self.cans.values():
+            for can in (*self.cans.values(), *self.fds.values()):
                 can.accept_all()
             return 1
         if count > TABLE_BYTES // 2:
@@ -712,8 +762,45 @@ class Calls:
         ranges = ffi.cast("fw_can_range *", address)
         rows = [(ranges[row].controller, ranges[row].first, ranges[row].last) for row in range(count)]
         self.accepted = accepted_by_controller(rows)
-        for number, can in self.cans.items():
+        for number, can in (*self.cans.items(), *self.fds.items()):
             can.accept(*self.accepted[number])
+        return 1
+
+    # --- CAN FD -------------------------------------------------------------------------------------------
+
+    def canfd_start(self, controller, bit_rate, data_bit_rate, IER) -> None:
+        if self.hardware.can != "fd":
+            raise FirmwareError(
+                'this board has the classic CAN controllers of an LPC2194 (can = "fd" in boards.toml, or without a '
+                "master table in firmware.toml, gives it CAN FD)"
+            )
+        self.new(self.fds, controller)
+        self.fds[controller] = CanFdController(self.chip, controller, bit_rate, data_bit_rate, IER)
+        if self.accepted is not None:
+            self.fds[controller].accept(*self.accepted[controller])
+
+    def canfd_transmit(self, controller, buffer) -> int:
+        frame = self.canfd_mail
+        can: CanFdController = self.fds[controller]
+        if frame.flags & ~CANFD_FLAGS:
+            raise FirmwareError(f"frame {frame.ID:#x}: flags {frame.flags:#x} do not exist")
+        if frame.length > LONGEST:
+            raise FirmwareError(f"frame {frame.ID:#x}: length {frame.length} is above {LONGEST}")
+        flags = (frame.flags & CANFD_FDF) << FDF_SHIFT | (frame.flags & CANFD_BRS_ESI) << BRS_SHIFT
+        flags |= (FLAG_EXTENDED if frame.ID & EXTENDED else 0) | (FLAG_REMOTE if frame.ID & REMOTE else 0)
+        data = bytes(ffi.buffer(frame.data, frame.length))
+        return int(can.transmit(self.buffer(buffer), frame.ID & ~(EXTENDED | REMOTE), flags, data))
+
+    def canfd_receive(self, controller) -> int:
+        found = self.fds[controller].receive()
+        if found is None:
+            return 0
+        identifier, flags, data = found
+        frame = self.canfd_mail
+        frame.ID = identifier | (EXTENDED if flags & FLAG_EXTENDED else 0) | (REMOTE if flags & FLAG_REMOTE else 0)
+        frame.length = flags & LENGTH_CODE if flags & FLAG_REMOTE else len(data)
+        frame.flags = flags >> FDF_SHIFT & CANFD_FDF | flags >> BRS_SHIFT & CANFD_BRS_ESI
+        ffi.memmove(frame.data, data + bytes(LONGEST - len(data)), LONGEST)
         return 1
 
 

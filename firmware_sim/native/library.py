@@ -41,6 +41,7 @@ typedef struct { uint32_t slot_ns; uint32_t divider; uint32_t tick_cost; int32_t
 typedef struct { int kind; uint32_t index; fw_work handler; const char *name; uint32_t cost; uint32_t per_item;
                  int32_t vic_slot; int32_t latency; } fw_interrupt;
 typedef struct { uint32_t controller; uint32_t first; uint32_t last; } fw_can_range;
+typedef struct { uint32_t ID; uint8_t length; uint8_t flags; uint8_t reserved[2]; uint8_t data[64]; } fw_canfd_frame;
 typedef int64_t (*host_call)(void *, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
 
 void firmware_start(void);
@@ -58,6 +59,7 @@ extern host_call fw_answer;
 extern void *fw_host;
 extern const int64_t *fw_pin_levels;
 extern int64_t fw_mail[32];
+extern fw_canfd_frame fw_canfd_mail;
 int64_t fw_turn(void);
 extern uint32_t fw_turns;
 int32_t fw_watch(int64_t *record, int32_t limit_s, const char *message);

@@ -11,6 +11,7 @@ options = ["-O2"]            # more for the compiler, behind ours
 REZERO = 1                   # -DREZERO=1
 [hardware]                   # all of it may be left out
 hz = 60000000
+can = "fd"                   # its CAN controllers: "classic" of the LPC2194, or "fd"; left out: as the master table's
 [hardware.external]          # ADS7871: eint, conversion_ns, reference_V, scale, offset_counts, inputs
 inputs = { 2 = 0, 1 = 1 }    # multiplexer code = analog place
 [hardware.internal]          # reference_V, scale, offset_counts, inputs
@@ -22,7 +23,7 @@ import pathlib
 import re
 from typing import Any
 
-from ranger_sim.firmware_sim.native.hardware import ExternalConverter, Hardware, InternalConverter, SpiDevice
+from ranger_sim.firmware_sim.native.hardware import CAN_KINDS, ExternalConverter, Hardware, InternalConverter, SpiDevice
 from ranger_sim.foundation import toml_file
 from ranger_sim.foundation.user_error import FirmwareError
 
@@ -138,12 +139,16 @@ def _defines(path: pathlib.Path, found: dict) -> tuple[tuple[str, str], ...]:
 
 
 def _hardware(path: pathlib.Path, found: dict) -> Hardware:
-    _known(path, "hardware.", found, ("hz", "external", "internal", "spi"))
+    _known(path, "hardware.", found, ("hz", "can", "external", "internal", "spi"))
     given: dict[str, Any] = {}
     if "hz" in found:
         given["hz"] = _number(path, "hardware.hz", found["hz"], int)
         if given["hz"] < 1:
             raise FirmwareError(f"{path}: hardware.hz {given['hz']} must be above 0")
+    if "can" in found:
+        if found["can"] not in CAN_KINDS:
+            raise FirmwareError(f"{path}: hardware.can is {found['can']!r}, allowed are {', '.join(CAN_KINDS)}")
+        given["can"] = found["can"]
     for key, kind in (("external", ExternalConverter), ("internal", InternalConverter)):
         if key in found:
             given[key] = _record(path, f"hardware.{key}", _table(path, found, key, "hardware."), kind)

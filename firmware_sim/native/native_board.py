@@ -282,5 +282,5 @@ class NativeBoard(Microcontroller):
         """Of each controller that the program has started."""
         return [
             CanCounters(number, can.received, can.sent, can.data_overruns, receive_lost=0, queue_full=0)
-            for number, can in sorted(self.devices.cans.items())
+            for number, can in sorted({**self.devices.cans, **self.devices.fds}.items())
         ]

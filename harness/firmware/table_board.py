@@ -27,7 +27,7 @@ class TableBoard(NativeBoard):
             given = hardware
         elif hardware is not None:  # a manifest cannot describe what a person sees of the board
             given = dataclasses.replace(given, panel=hardware.panel)
-        given = at_the_tables_clock(name, firmware, given if given is not None else Hardware())
+        given = as_the_table_has_it(name, firmware, given if given is not None else Hardware())
         NativeBoard.__init__(self, name, firmware.library, crystal, power_up_ns, given, record)
         wanted = table_version(firmware.table) if version is None and firmware.table is not None else version
         compiled = self.library.table_version()
@@ -36,25 +36,28 @@ class TableBoard(NativeBoard):
                 f"{firmware.library}: compiled with version 0x{compiled:08X} of the master table, "
                 f"this robot has 0x{wanted:08X}: build it again"
             )
-        if controller and controller not in self.devices.cans:
+        if controller and controller not in self.devices.cans and controller not in self.devices.fds:
+            call, kind = ("fw_canfd_start", "CAN FD") if given.can == "fd" else ("fw_can_start", "CAN")
             raise FirmwareError(
-                f"{firmware.library}: firmware_start() does not start CAN controller {controller}, "
-                f"on which {name}'s bus hangs (fw_can_start)"
+                f"{firmware.library}: firmware_start() does not start {kind} controller {controller}, "
+                f"on which {name}'s bus hangs ({call})"
             )
 
 
-def at_the_tables_clock(name: str, firmware: Firmware, hardware: Hardware) -> Hardware:
-    """`hardware` with the clock that the firmware's master table gives the board, if it gives one.
+def as_the_table_has_it(name: str, firmware: Firmware, hardware: Hardware) -> Hardware:
+    """`hardware` with the clock and the kind of CAN controllers that the firmware's master table gives the board.
 
-    UserError where the manifest gives another one.
+    UserError where the manifest gives others.
     """
     master = firmware.manifest.master
     boards = () if master is None else load_table(master).boards
-    clock_hz = next((board.clock_hz for board in boards if board.name == name), 0)
-    if not clock_hz or hardware.hz == clock_hz:
+    board = next((board for board in boards if board.name == name), None)
+    if board is None:
         return hardware
-    if hardware.hz:
-        raise FirmwareError(
-            f"{firmware.folder}: hardware.hz is {hardware.hz}, and clock_hz of {name} in {master} is {clock_hz}"
-        )
-    return dataclasses.replace(hardware, hz=clock_hz)
+    for key, given, wanted in (("hz", hardware.hz, board.clock_hz), ("can", hardware.can, board.can)):
+        if given and wanted and given != wanted:
+            of_the_table = "clock_hz" if key == "hz" else key
+            raise FirmwareError(
+                f"{firmware.folder}: hardware.{key} is {given}, and {of_the_table} of {name} in {master} is {wanted}"
+            )
+    return dataclasses.replace(hardware, hz=hardware.hz or board.clock_hz, can=hardware.can or board.can)

@@ -23,8 +23,10 @@ from typing import Final
 
 import cython
 
+from ranger_sim.can_bus.fd_frame import FD_SENDABLE, LENGTHS
+from ranger_sim.can_bus.frame import LENGTH_CODE
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
-from ranger_sim.foundation.events import CAN_REQUEST, FLAG_EXTENDED, EventQueue, Outbox
+from ranger_sim.foundation.events import CAN_REQUEST, FLAG_EXTENDED, FLAG_FD, EventQueue, Outbox
 from ranger_sim.harness.processes.kinds import FIELDS, KINDS, PAYLOADS, limits
 from ranger_sim.harness.processes.places import (
     DIRECTION,
@@ -57,6 +59,7 @@ PAYLOAD_MASK: Final = 0xFFFF
 NUMBER_SHIFT: Final = 32
 NUMBER_MASK: Final = 0xFFFFFF
 LAST_STANDARD_ID: Final = 0x7FF
+LAST_CLASSIC_FLAGS: Final = 127
 FARTHEST_NS: Final = 1_000_000_000  # between a stamp and the time of its turn
 
 # What can be wrong with a message; FIELD_WRONG + i: field i is out of range.
@@ -67,6 +70,7 @@ CHECK_WRONG: Final = 4
 NO_IDENTIFIER: Final = 5
 BAD_PAYLOAD: Final = 6
 OUT_OF_TIME: Final = 7
+NO_FRAME: Final = 8
 FIELD_WRONG: Final = 16
 
 FAULTS = {
@@ -75,6 +79,7 @@ FAULTS = {
     TOO_LONG: "its length does not fit its kind",
     CHECK_WRONG: "its check is wrong",
     NO_IDENTIFIER: "its identifier does not fit in 11 bits",
+    NO_FRAME: "its flags and its number of data bytes are not those of a frame",
     BAD_PAYLOAD: "its payload is out of range",
     OUT_OF_TIME: "its stamp is more than a second from the turn's time",
 }
@@ -130,6 +135,7 @@ class Mailbox:
 
     words: cython.longlong[::1]
     limits: cython.longlong[::1]
+    lengths: cython.longlong[::1]
     name: str
     first: cython.longlong
     slots: cython.longlong
@@ -149,6 +155,7 @@ class Mailbox:
     def __init__(self, words, name, first, slots, used_word, direction) -> None:
         self.words = words
         self.limits = array.array("q", limits())
+        self.lengths = array.array("q", LENGTHS)
         self.name = name
         self.first = first
         self.slots = slots
@@ -318,6 +325,7 @@ class Mailbox:
         row: cython.longlong = kind * LIMIT_SIZE
         body: cython.longlong = at + SLOT_WORDS
         i: cython.longlong
+        flags: cython.longlong
         if kind > LAST_KIND or self.limits[row + DIRECTION] != self.direction:
             return OF_UNKNOWN_KIND
         if (head >> VERSION_SHIFT & KIND_MASK) != VERSION or head < 0:
@@ -339,12 +347,12 @@ class Mailbox:
             if self.words[at + FIELDS_WORD + i] > self.limits[row + RANGES + 2 * i + 1]:
                 return FIELD_WRONG + i
         # fields c and d: identifier and flags
-        if (
-            kind == CAN_REQUEST
-            and self.words[at + FIELDS_WORD + 2] > LAST_STANDARD_ID
-            and not self.words[at + FIELDS_WORD + 3] & FLAG_EXTENDED
-        ):
-            return NO_IDENTIFIER
+        if kind == CAN_REQUEST:
+            flags = self.words[at + FIELDS_WORD + 3]
+            if self.words[at + FIELDS_WORD + 2] > LAST_STANDARD_ID and not flags & FLAG_EXTENDED:
+                return NO_IDENTIFIER
+            if (flags > LAST_CLASSIC_FLAGS or payload > 0) and not self._is_fd_request(flags, payload, body):
+                return NO_FRAME
         if payload > 0:
             if self.limits[row + MOST_PAYLOAD] == SSP_WORDS:
                 if payload != SSP_WORDS or self.words[body + SSP_USED] < 0 or self.words[body + SSP_USED] > SSP_USED:
@@ -355,6 +363,17 @@ class Mailbox:
             elif self.words[body] < 0 or self.words[body] > 8 * (payload - 1):
                 return BAD_PAYLOAD
         return 0
+
+    @cython.cfunc
+    @cython.exceptval(check=False)
+    def _is_fd_request(self, flags: cython.longlong, payload: cython.longlong, body: cython.longlong) -> cython.bint:
+        """Whether these are the flags and the number of data bytes of a CAN FD frame; its data begin at word `body`."""
+        return (
+            payload > 0
+            and flags & FLAG_FD != 0
+            and flags & ~FD_SENDABLE == 0
+            and self.words[body] == self.lengths[flags & LENGTH_CODE]
+        )
 
     def explain(self, at, fault) -> str:
         """Text for the fault of the message at word `at`."""
@@ -367,6 +386,10 @@ class Mailbox:
             value = self.words[at + FIELDS_WORD + field]
             return f"{name}: field {FIELDS[field]} is {value}, allowed are {least} to {largest}"
         return f"{name}: {FAULTS[fault]}"
+
+    def note_damage(self, text) -> None:
+        """Count a message that no receiver can take, and keep its description."""
+        self._damage(text)
 
     def _damage(self, text) -> None:
         """Count an unreadable message, and keep its description."""

@@ -6,14 +6,17 @@ whose codec is in `Mailbox` (channel.py). Meanings of the fields: foundation/eve
 
 from typing import NamedTuple
 
+from ranger_sim.can_bus.fd_frame import FD_SENDABLE
 from ranger_sim.foundation import events
-from ranger_sim.harness.processes.places import LIMIT_SIZE, NOTE_WORDS, SSP_WORDS
+from ranger_sim.harness.processes.places import FRAME_WORDS, LIMIT_SIZE, NOTE_WORDS, SSP_WORDS
 
 TO_BOARD, FROM_BOARD = 0, 1
 WORD = (0, 0xFFFFFFFF)
 NONE = (0, 0)
 CONTROLLER, BUFFER, PIN, LEVEL, PORT, BYTE = (1, 4), (1, 3), (0, 63), (0, 1), (0, 15), (0, 255)
 IDENTIFIER = (0, 0x1FFFFFFF)
+FLAGS = (0, 0x7FF)  # of a frame
+REQUESTED = (0, FD_SENDABLE)  # those of a frame to send; those of CAN FD only with its data
 
 # Kinds between the processes only: no chip sees them.
 NOTE = 64  # a NOTE_*, b part, c parts, ref bytes (UTF-8 of JSON, or of activity.py here, cut into parts)
@@ -33,12 +36,12 @@ class Kind(NamedTuple):
 
 KINDS = {
     events.PIN_EDGE: Kind("PIN_EDGE", TO_BOARD, (PIN, LEVEL, (-1, 63), LEVEL, NONE, NONE)),
-    events.CAN_RX: Kind("CAN_RX", TO_BOARD, (CONTROLLER, IDENTIFIER, BYTE, WORD, WORD, NONE)),
+    events.CAN_RX: Kind("CAN_RX", TO_BOARD, (CONTROLLER, IDENTIFIER, FLAGS, WORD, WORD, NONE)),
     events.CAN_TX_DONE: Kind("CAN_TX_DONE", TO_BOARD, (CONTROLLER, BUFFER, (0, 2), NONE, NONE, NONE)),
     events.CAN_STATUS: Kind("CAN_STATUS", TO_BOARD, (CONTROLLER, WORD, WORD, WORD, LEVEL, NONE)),
     events.UART_BYTE: Kind("UART_BYTE", TO_BOARD, (PORT, BYTE, (0, 8), WORD, WORD, NONE)),
     events.SSP_SEGMENT: Kind("SSP_SEGMENT", TO_BOARD, (PORT, NONE, NONE, NONE, NONE, NONE)),
-    events.CAN_REQUEST: Kind("CAN_REQUEST", FROM_BOARD, (CONTROLLER, BUFFER, IDENTIFIER, (0, 127), WORD, WORD)),
+    events.CAN_REQUEST: Kind("CAN_REQUEST", FROM_BOARD, (CONTROLLER, BUFFER, IDENTIFIER, REQUESTED, WORD, WORD)),
     events.CAN_ABORT: Kind("CAN_ABORT", FROM_BOARD, (CONTROLLER, BUFFER, NONE, NONE, NONE, NONE)),
     events.CAN_MODE: Kind("CAN_MODE", FROM_BOARD, (CONTROLLER, LEVEL, NONE, NONE, NONE, NONE)),
     events.CAN_FILTER: Kind("CAN_FILTER", FROM_BOARD, (CONTROLLER, LEVEL, NONE, NONE, NONE, NONE)),
@@ -55,11 +58,18 @@ PAYLOADS = {
     events.SSP_SEGMENT: SSP_WORDS,
     events.SSP_START: SSP_WORDS,
     events.SSP_LOAD: SSP_WORDS,
+    events.CAN_RX: FRAME_WORDS,  # the data of a CAN FD frame; a classic one carries none
+    events.CAN_REQUEST: FRAME_WORDS,
     events.CAN_FILTER: NOTE_WORDS,
     events.UART_OUTPUT: NOTE_WORDS,  # bytes of a whole transfer; a single byte carries none
     NOTE: NOTE_WORDS,
 }
-OPTIONAL = (events.CAN_FILTER, events.UART_OUTPUT)  # kinds that may come without their payload
+OPTIONAL = (
+    events.CAN_RX,
+    events.CAN_REQUEST,
+    events.CAN_FILTER,
+    events.UART_OUTPUT,
+)  # kinds that may come without their payload
 FIELDS = ("a", "b", "c", "d", "e", "f")
 
 

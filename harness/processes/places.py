@@ -105,6 +105,7 @@ MOST_VOLTAGES: Final = 32
 SSP_WORDS: Final = 32  # 31 half-words of a segment, and how many are used:
 SSP_USED: Final = 31  # the place of that number
 NOTE_WORDS: Final = 256  # 2 KB: a length in bytes and the bytes
+FRAME_WORDS: Final = 9  # 64 bytes of a CAN FD frame, and how many are used
 
 # --- the row of a kind in kinds.limits()
 DIRECTION: Final = 0  # TO_BOARD, FROM_BOARD, or -1 for an unknown kind

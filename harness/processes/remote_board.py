@@ -176,6 +176,10 @@ class RemoteBoard(Board):
         """Start of its latest slot (ns), as of the end of its latest turn."""
         return self.slot_time
 
+    def refuse_output(self, text) -> None:
+        """Count it as damage: what is in another process must not end this one."""
+        self.from_board.note_damage(text)
+
     def begin(self, until: cython.longlong) -> cython.void:
         """Ask the board to run everything before `until` (ns), if that can matter already."""
         if self.posted:

@@ -1,6 +1,7 @@
 """The records that a run keeps for its files: none, the last seconds, or all (spooled to disk)."""
 
 import collections
+import os
 import tempfile
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -8,24 +9,39 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.foundation.events import NEVER
+from ranger_sim.foundation.row_stream import FD_FLAGS_SHIFT, FURTHER, FrameStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.records.recorder import Recorder
 
 WINDOW_S = 10.0  # default window of the logs: some 16 steps
 READ_ROWS = 4096  # of a spooled stream at a time
+ROW_BYTES = 24  # of a stream of frames
 
 
 def decoded(rows: Any) -> dict:
-    """Frames of rows of a frame stream (foundation/row_stream.py): dict of arrays, as in `Logbook.frames`."""
+    """Frames of rows of a frame stream (foundation/row_stream.py): dict of arrays, as in `Logbook.frames`.
+
+    Of a CAN FD frame word0 and word1 are its first eight bytes.
+    """
+    rows = rows[rows[:, 1] & FURTHER == 0]
     first, second, third = rows[:, 0], rows[:, 1], rows[:, 2]
     return {
         "time_ns": first,
         "bus": second & 15,
-        "flags": (second >> 4) & 255,
-        "word0": second >> 12,
+        "flags": (second >> 4) & 255 | (second >> FD_FLAGS_SHIFT & 7) << 8,
+        "word0": second >> 12 & 0xFFFFFFFF,
         "identifier": third & 0x1FFFFFFF,
         "word1": third >> 29,
     }
+
+
+def _further_rows(spool: Any) -> bytes:
+    """What follows in a spooled stream of frames and belongs to the frame before."""
+    found = b""
+    while (row := spool.read(ROW_BYTES)) and int.from_bytes(row[8:16], "little") & FURTHER:
+        found += row
+    spool.seek(-len(row), os.SEEK_CUR)
+    return found
 
 
 class Logbook:
@@ -97,6 +113,8 @@ class Logbook:
             spool = self.spools[name]
             spool.seek(0)
             while block := spool.read(8 * stream.columns * READ_ROWS):
+                if isinstance(stream, FrameStream):
+                    block += _further_rows(spool)
                 yield self._as_rows(name, block)
             spool.seek(0, 2)
         else:

@@ -5,16 +5,23 @@ import functools
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
-from ranger_sim.foundation.events import FLAG_ERROR
+from ranger_sim.can_bus.fd_frame import LONGEST, fd_data_length
+from ranger_sim.can_bus.frame import data_length
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_FD
+from ranger_sim.foundation.row_stream import FD_FLAGS_SHIFT, FURTHER
 from ranger_sim.foundation.user_error import UserError, unknown
 from ranger_sim.harness.names import Names
 
 WINDOW_S = 20.0  # how much is kept: some 30 steps of a walk, 16 MB for all four buses (chosen by us)
-ROW = 3  # numbers per frame in a stream: see foundation/row_stream.py
+ROW = 3  # numbers per row of a stream, a frame but for CAN FD: see foundation/row_stream.py
+WORD = 0xFFFFFFFF
 
 
 class Words(NamedTuple):
-    """The parts of a frame; `time_ns` is when receivers had it, in the machine's time."""
+    """The parts of a frame; `time_ns` is when receivers had it, in the machine's time.
+
+    `lo`: bytes 0-3; `hi`: bytes 4-7, of a CAN FD frame all bytes from the fifth on.
+    """
 
     time_ns: int
     bus: str
@@ -45,9 +52,23 @@ class Frame(Words):
         return self.names.value(self.identifier, self.lo)
 
     @property
+    def values(self) -> tuple[float, ...]:
+        """Every value that it carries: several of a variable such as f32[12]."""
+        count = self.names.counts.get(self.identifier, 1)
+        words = [self.lo, *(self.hi >> 32 * place & WORD for place in range(count - 1))]
+        return tuple(self.names.value(self.identifier, word) for word in words)
+
+    @property
+    def data(self) -> bytes:
+        """Its data bytes."""
+        if self.flags & FLAG_FD:
+            return (self.lo | self.hi << 32).to_bytes(LONGEST, "little")[: fd_data_length(self.flags)]
+        return (self.lo | self.hi << 32).to_bytes(8, "little")[: data_length(self.flags)]
+
+    @property
     def stamp_ms(self) -> int:
-        """The time word: network time of the value, ms."""
-        return self.hi
+        """The time word, behind its values: network time of the value, ms."""
+        return self.hi >> 32 * (self.names.counts.get(self.identifier, 1) - 1) & WORD
 
     @property
     def is_error(self) -> bool:
@@ -61,7 +82,8 @@ class Frame(Words):
         line = f"{self.time_s:12.6f} s  {self.bus}  {self.identifier:03X} {self.name}"
         if self.name.startswith("ERROR_"):
             return f"{line} {self.names.error_text(self.lo)}"
-        return f"{line} {self.value:.6g} (stamp {self.stamp_ms})"
+        shown = ", ".join(f"{value:.6g}" for value in self.values)
+        return f"{line} {shown} (stamp {self.stamp_ms})"
 
 
 @functools.cache
@@ -152,8 +174,23 @@ def frames_of(
     for at in range(0, len(rows), ROW):
         third = rows[at + 2]
         identifier = third & 0x1FFFFFFF
+        if rows[at + 1] & FURTHER:
+            continue
         if rows[at] < since_ns or (identifiers is not None and identifier not in identifiers):
             continue
         second = rows[at + 1]
-        found.append(frame(rows[at], bus, identifier, second >> 4 & 0xFF, second >> 12 & 0xFFFFFFFF, third >> 29))
+        flags = second >> 4 & 0xFF | (second >> FD_FLAGS_SHIFT & 7) << 8
+        hi = third >> 29
+        if flags & FLAG_FD:
+            hi |= _further(rows, at + ROW)
+        found.append(frame(rows[at], bus, identifier, flags, second >> 12 & WORD, hi))
+    return found
+
+
+def _further(rows: Any, at: int) -> int:
+    """The bytes of a CAN FD frame behind the eighth, in the rows from place `at` on, at their place in `hi`."""
+    found, shift = 0, 32
+    while at < len(rows) and rows[at + 1] & FURTHER:
+        found |= (rows[at + 1] >> 12 & WORD | rows[at + 2] >> 29 << 32) << shift
+        at, shift = at + ROW, shift + 64
     return found

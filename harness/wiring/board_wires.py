@@ -12,6 +12,7 @@ import cython
 
 from ranger_sim.can_bus.acceptance import Acceptance
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.node import FDF_KNOWN
 from ranger_sim.firmware_sim.peripherals.ssp import SspSegment
 from ranger_sim.foundation.events import (
     CAN_ABORT,
@@ -233,7 +234,10 @@ class BoardWires(Outbox):
             if self.drive is not None:
                 self.drive.write_pwm(time, a, b, c)
         elif kind == CAN_REQUEST:
-            self.request(time, a, b, c, d, e, f)
+            if ref is None:
+                self.request(time, a, b, c, d, e, f)
+            else:
+                self._request_fd(time, a, b, c, d, ref)
         elif kind == CAN_ABORT or kind == CAN_MODE:
             if self.buses[a] is None:
                 self._to_bus_outside(kind, time, a, b, c, d, e, f)
@@ -284,6 +288,26 @@ class BoardWires(Outbox):
             )
             if time + self.window_ns < self.board.horizon:
                 self.board.stop_at(time + self.window_ns)
+
+    def _request_fd(self, time, controller, buffer, identifier, flags, data) -> None:
+        """Forward a CAN FD frame to its bus."""
+        if time < self.silent_until:
+            self._check_early_transmit(time)
+        bus = self.buses[controller]
+        why = ""
+        if bus is None:
+            why = "its bus is outside, where only classic frames go" if controller in self.can_lines else ""
+        elif not bus.is_fd:
+            why = f"{bus.name} is classic CAN (a bus of the machine with two bit rates is CAN FD)"
+        elif bus.nodes[self.nodes[controller]].fdf != FDF_KNOWN:
+            why = "its program has not started it as a CAN FD controller in firmware_start()"
+        if why:
+            self.board.refuse_output(f"CAN FD frame {identifier:#x} of controller {controller}: {why}")
+        if why or bus is None:
+            return
+        bus.request_fd(self.nodes[controller], buffer, time, identifier, flags, data)
+        if time + self.window_ns < self.board.horizon:
+            self.board.stop_at(time + self.window_ns)
 
     def _set_filter(self, time, controller, filter_bytes) -> None:
         """Forward the acceptance filter of a controller to its bus."""

@@ -2,13 +2,16 @@
 
 import json
 import struct
+import subprocess
 
 import cantools
 import pytest
 
 from ranger_sim.datatable import generate
 from ranger_sim.datatable.loader import load_table
+from ranger_sim.firmware_sim.native.compiler import compiler
 from ranger_sim.foundation.user_error import TableError
+from tests.firmware_sim.native.support import COMPILER
 
 BOARDS = """\
 [buses]
@@ -89,7 +92,7 @@ def test_a_processor_without_a_model_and_a_clock_above_its_highest_are_refused(t
     assert table(tmp_path, elsewhere).board("ARM").processor == "STM32F4"
 
 
-# ---- CAN FD buses: between boards that run somewhere else
+# ---- CAN FD buses
 
 FD_BOARDS = (
     BOARDS.replace("bit_rate = 500_000", "bit_rate = 500_000, data_bit_rate = 2_000_000")
@@ -134,7 +137,7 @@ def test_the_catalogue_names_the_data_rate_and_the_number_of_values(tmp_path):
         (
             "firmware = false",
             "firmware = true",
-            "ARM buses: CAN1 is a CAN FD bus; a board with firmware has the classic",
+            "ARM buses: CAN1 is a CAN FD bus, whose frames a classic controller destroys by error frames",
         ),
         (
             "data_bit_rate = 2_000_000",
@@ -156,3 +159,52 @@ def test_what_a_can_fd_bus_cannot_have_is_refused_by_name(tmp_path, old, new, ru
     assert (boards, rows) != (FD_BOARDS, FD_ROWS)
     with pytest.raises(TableError, match=rule):
         table(tmp_path, boards, rows)
+
+
+FIRMWARE_BOARDS = FD_BOARDS.replace("firmware = false", 'firmware = true\ncan = "fd"')
+
+
+def test_a_board_with_can_fd_controllers_gets_arrays_lengths_and_rates_in_c(tmp_path):
+    files = generate.generated_files(table(tmp_path, FIRMWARE_BOARDS, FD_ROWS.replace("rad,0,", "rad,0.5,")))
+    header, source = files["c/arm_table.h"], files["c/arm_table.c"]
+    assert "#define ARM_BIT_RATE 500000\n#define ARM_DATA_BIT_RATE 2000000\n" in header
+    assert "float arm_angles[12]; /* 1 [rad] angles */" in header
+    assert ".arm_angles = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f}," in source
+    assert "{ ARM_ANGLES, RANGER_F32, offsetof(struct arm_data, arm_angles), 12, 64 }," in source
+    assert "{ ARM_STATE, RANGER_U32, offsetof(struct arm_data, arm_state), 1, 8 }," in source
+    assert "uint8_t count;\n    uint8_t bytes;\n};" in files["c/ranger_table.h"]
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
+def test_the_generated_c_of_a_can_fd_table_compiles_without_a_warning(tmp_path):
+    for name, text in generate.generated_files(table(tmp_path, FIRMWARE_BOARDS, FD_ROWS)).items():
+        if name.startswith("c/"):
+            (tmp_path / name).parent.mkdir(exist_ok=True)
+            (tmp_path / name).write_text(text, encoding="utf-8")
+    for board in ("arm", "desk"):
+        command = [compiler(), "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"c/{board}_table.c"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_header_of_a_classic_table_has_nothing_of_can_fd(tmp_path):
+    files = generate.generated_files(table(tmp_path))
+    assert files["c/ranger_table.h"].endswith("    size_t offset;\n};\n\n#endif\n")
+    assert not [name for name, text in files.items() if "count;" in text or "BIT_RATE" in text]
+
+
+@pytest.mark.parametrize(
+    ("new", "rule"),
+    [
+        ('firmware = true\ncan = "xl"', "ARM can: is 'xl', not one of classic, fd"),
+        ('firmware = true\ncan = "classic"', "ARM buses: CAN1 is a CAN FD bus"),
+        (
+            'firmware = true\ncan = "fd"\nprocessor = "LPC2194"',
+            "ARM can: is 'fd', and an LPC2194 has classic controllers",
+        ),
+        ('firmware = false\ncan = "fd"', "'can': is not a key of a board"),
+    ],
+)
+def test_controllers_that_a_board_cannot_have_are_refused_by_name(tmp_path, new, rule):
+    with pytest.raises(TableError, match=rule):
+        table(tmp_path, FD_BOARDS.replace("firmware = false", new), FD_ROWS)

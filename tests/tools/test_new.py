@@ -121,3 +121,49 @@ def test_the_editors_configuration_debugs_a_boards_c_while_the_tests_run(tmp_pat
     assert "hit Breakpoint 1" in done.stdout and "wheel.c" in done.stdout, done.stdout + done.stderr
     assert "$1 = 6" in done.stdout and "$2 = 7" in done.stdout, done.stdout
     assert "3 passed" in done.stdout, done.stdout
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
+def test_a_project_on_a_can_fd_bus_passes_at_once_and_its_dbc_file_decodes_its_frames(tmp_path):
+    """cantools decodes a frame of 64 bytes that the C program of the wheel packed."""
+    import cantools
+
+    assert cli.main(["new", "--fd", str(tmp_path / "wheel")]) == 0
+    project = tmp_path / "wheel"
+    assert not [path for path in everything(project) if (project / path).is_file() and "[%" in read(project / path)]
+    database = cantools.database.load_file(project / "table" / "generated" / "can1.dbc")
+    assert {(each.name, each.is_fd, each.length) for each in database.messages} == {
+        ("ERROR_WHEEL", True, 8),
+        ("ERROR_PANEL", True, 8),
+        ("PANEL_TARGET_RATE", True, 8),
+        ("WHEEL_STATE", True, 64),
+    }
+    (project / "test_cantools.py").write_text(
+        "import cantools\n\n\ndef test_cantools_reads_what_the_wheel_sends(machine):\n"
+        "    state = cantools.database.load_file('table/generated/can1.dbc').get_message_by_name('WHEEL_STATE')\n"
+        "    machine.run_for(0.8)\n"
+        "    frame = machine.wire().frames('WHEEL_STATE')[-1]\n"
+        "    decoded = state.decode(frame.data)\n"
+        "    assert decoded['time_ms'] == frame.stamp_ms\n"
+        "    assert [decoded[f'value_{place}'] for place in range(12)] == list(frame.values)\n"
+        "    assert abs(decoded['value_0'] - 10.0) < 0.5 and decoded['value_4'] == decoded['value_0']\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *how_to_find_the_plugin(), "."],
+        cwd=project,
+        env=environment() | {"PYTHONPATH": str(pathlib.Path(__file__).resolve().parents[2])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0 and "5 passed" in done.stdout, done.stdout + done.stderr
+
+
+def read(path):
+    return path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("option", [["--from", "net.dbc"], ["--plant", "mujoco", "robot.xml"], ["--drive", "odrive"]])
+def test_can_fd_is_refused_with_what_makes_classic_boards(tmp_path, capsys, option):
+    assert cli.main(["new", str(tmp_path / "wheel"), "--fd", *option]) == 2
+    assert "--fd excludes --from, --plant and --drive" in capsys.readouterr().err and everything(tmp_path) == []

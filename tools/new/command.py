@@ -68,6 +68,9 @@ def register(commands: Any) -> None:
         help="joints' drives that a robot's own driver talks to: CiA 402 over CANopen, or ODrive's CAN protocol; with "
         "--plant mujoco at each actuator of the model",
     )
+    command.add_argument(
+        "--fd", action="store_true", help="boards with CAN FD controllers, and frames of up to 64 bytes on their bus"
+    )
     command.set_defaults(run=run)
 
 
@@ -86,6 +89,8 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("new: --plant and --from exclude each other")
     if options.drive is not None and options.dbc is not None:
         raise UserError("new: --drive and --from exclude each other")
+    if options.fd and (options.dbc, options.plant, options.drive) != (None, None, None):
+        raise UserError("new: --fd excludes --from, --plant and --drive, whose boards are classic")
     files = {}
     if options.dbc is not None:
         files = files_of_dbc(options.dbc, options.bit_rate, name)
@@ -97,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
         folder.resolve().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".ranger-sim-new-", dir=folder.resolve().parent) as making:
             project = pathlib.Path(making) / "project"
-            write_files(project, files or own_files(name))
+            write_files(project, files or own_files(name, options.fd))
             if (project / "table").is_dir():
                 generate_table(project)
             check(folder)
@@ -116,11 +121,17 @@ def check(folder: pathlib.Path) -> None:
         raise UserError(f"new {folder}: the folder is not empty; give one that is not there yet")
 
 
-def own_files(name: str) -> dict[str, bytes]:
-    """The files of the project with a wheel."""
+def variant(text: str, fd: bool) -> str:
+    """The lines of a template for this kind of bus: some begin with the one that they are for."""
+    left_out, marked = ("[% classic %]", "[% fd %]") if fd else ("[% fd %]", "[% classic %]")
+    lines = [line.removeprefix(marked) for line in text.splitlines(keepends=True) if not line.startswith(left_out)]
+    return "".join(lines)
+
+
+def own_files(name: str, fd: bool = False) -> dict[str, bytes]:
+    """The files of the project with a wheel; `fd`: on a CAN FD bus."""
     return {
-        path: (HERE / template)
-        .read_text(encoding="utf-8")
+        path: variant((HERE / template).read_text(encoding="utf-8"), fd)
         .replace("[% name %]", name)
         .replace("[% board %]", board)
         .encode("utf-8")

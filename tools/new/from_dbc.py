@@ -121,7 +121,7 @@ def _usable(database: Database) -> tuple[list[Any], list[str]]:
         key = (each.frame_id, each.is_extended_frame)
         name = camel_to_snake_case(each.name)
         if each.is_fd or each.length > 8:
-            left_out.append(f"{each.name}: {each.length} bytes, CAN FD is not emulated")
+            left_out.append(f"{each.name}: {each.length} bytes, CAN FD, and its boards are classic")
         elif key in taken:
             left_out.append(f"{each.name}: another message has its identifier 0x{each.frame_id:X}")
         elif name in names:

@@ -36,7 +36,10 @@
     CALL(can_clear_overrun) CALL(can_GSR) CALL(can_SR) CALL(can_ICR) CALL(can_MOD) CALL(can_write_MOD) \
     CALL(can_write_IER) \
     CALL(ssp_start_words) CALL(ssp_word) \
-    CALL(can_accept)
+    CALL(can_accept) \
+    CALL(canfd_start) CALL(canfd_transmit) CALL(canfd_buffer_free) CALL(canfd_abort) CALL(canfd_receive) \
+    CALL(canfd_clear_overrun) CALL(canfd_GSR) CALL(canfd_ICR) CALL(canfd_MOD) CALL(canfd_write_MOD) \
+    CALL(canfd_write_IER)
 
 /* One of the two a program leaves out. */
 void firmware_main(void) __attribute__((weak));
@@ -55,6 +58,7 @@ EXPORTED host_call fw_answer;
 EXPORTED void *fw_host;
 EXPORTED const int64_t *fw_pin_levels; /* of the chip's 64 pins */
 EXPORTED int64_t fw_mail[32];          /* what does not fit into five numbers, both ways */
+EXPORTED fw_canfd_frame fw_canfd_mail; /* the same, of a CAN FD frame */
 
 /* --- the main loop's own stack --- */
 
@@ -145,6 +149,7 @@ static int64_t host(enum call asked, int64_t a, int64_t b, int64_t c, int64_t d,
 #define HOST1(name, a) host(CALL_##name, a, 0, 0, 0, 0)
 #define HOST2(name, a, b) host(CALL_##name, a, b, 0, 0, 0)
 #define HOST3(name, a, b, c) host(CALL_##name, a, b, c, 0, 0)
+#define HOST4(name, a, b, c, d) host(CALL_##name, a, b, c, d, 0)
 #define HOST5(name, a, b, c, d, e) host(CALL_##name, a, b, c, d, e)
 
 /* --- the calls of the header --- */
@@ -274,6 +279,34 @@ uint32_t fw_can_accept(const fw_can_range *ranges, uint32_t count)
 {
     return (uint32_t)HOST2(can_accept, (int64_t)(intptr_t)ranges, count);
 }
+
+void fw_canfd_start(uint32_t controller, uint32_t bit_rate, uint32_t data_bit_rate, uint32_t IER)
+{
+    HOST4(canfd_start, controller, bit_rate, data_bit_rate, IER);
+}
+uint32_t fw_canfd_transmit(uint32_t controller, uint32_t buffer, const fw_canfd_frame *frame)
+{
+    fw_canfd_mail = *frame;
+    return (uint32_t)HOST2(canfd_transmit, controller, buffer);
+}
+uint32_t fw_canfd_buffer_free(uint32_t controller, uint32_t buffer)
+{
+    return (uint32_t)HOST2(canfd_buffer_free, controller, buffer);
+}
+void fw_canfd_abort(uint32_t controller, uint32_t buffer) { HOST2(canfd_abort, controller, buffer); }
+uint32_t fw_canfd_receive(uint32_t controller, fw_canfd_frame *frame)
+{
+    uint32_t came = (uint32_t)HOST1(canfd_receive, controller);
+    if (came)
+        *frame = fw_canfd_mail;
+    return came;
+}
+void fw_canfd_clear_overrun(uint32_t controller) { HOST1(canfd_clear_overrun, controller); }
+uint32_t fw_canfd_GSR(uint32_t controller) { return (uint32_t)HOST1(canfd_GSR, controller); }
+uint32_t fw_canfd_ICR(uint32_t controller) { return (uint32_t)HOST1(canfd_ICR, controller); }
+uint32_t fw_canfd_MOD(uint32_t controller) { return (uint32_t)HOST1(canfd_MOD, controller); }
+void fw_canfd_write_MOD(uint32_t controller, uint32_t value) { HOST2(canfd_write_MOD, controller, value); }
+void fw_canfd_write_IER(uint32_t controller, uint32_t value) { HOST2(canfd_write_IER, controller, value); }
 
 /* --- where the program was when a signal ended its process --- */
 

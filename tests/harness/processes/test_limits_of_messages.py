@@ -3,13 +3,14 @@
 import pytest
 
 from ranger_sim.foundation import events
-from ranger_sim.foundation.events import FLAG_EXTENDED
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.harness.processes.channel import SLOT_WORDS
 from ranger_sim.harness.processes.kinds import FIELDS, FROM_BOARD, KINDS, NOTE, PAYLOADS, TO_BOARD
 from ranger_sim.harness.processes.places import NOTE_WORDS, SSP_USED, SSP_WORDS
 from tests.harness.processes.test_channel import NEAR, Pair
 
 SECOND = 1_000_000_000
+LONG_FRAME = [64, *[0] * 8]
 SEGMENTS = (events.SSP_SEGMENT, events.SSP_START, events.SSP_LOAD)
 
 
@@ -24,6 +25,8 @@ class Line:
             values[FIELDS.index(field)] = value
         if payload is None:
             payload = [0] * SSP_WORDS if kind in SEGMENTS else [3, 0] if kind in PAYLOADS else []
+            if kind == events.CAN_REQUEST:  # a classic frame has none
+                payload = LONG_FRAME if values[3] & FLAG_FD else []
         words = [kind | version << 8 | len(payload) << 16 | top, time_ns, order, *values, 0, 0]
         check = 1
         for word in [*words, *payload]:
@@ -71,6 +74,30 @@ def test_a_stamp_lies_within_a_second_of_the_turn(kind):
 def test_an_identifier_of_more_than_eleven_bits_is_an_extended_ones(identifier, flags, whole):
     count, damage = Line(events.CAN_REQUEST, {"c": identifier, "d": flags | 8}).read()
     assert count == (1 if whole else 0) and ("does not fit in 11 bits" in damage) is not whole
+
+
+FAST = FLAG_FD | FLAG_BRS
+
+
+@pytest.mark.parametrize(
+    ("flags", "payload", "whole"),
+    [
+        (8, [], True),
+        (FAST | 15, LONG_FRAME, True),
+        (FLAG_FD, [0], True),
+        (FAST | 9, [12, 1, 2], True),
+        (FAST | 15, [], False),  # no data
+        (FAST | 9, LONG_FRAME, False),  # a length code of twelve bytes
+        (8, [8, 1], False),  # data of a classic frame are in its words
+        (FLAG_BRS | 8, [8, 1], False),
+        (FAST | FLAG_REMOTE, [0], False),
+        (128, [], False),
+        (FAST | 15, [64, 0], False),  # more bytes than its words hold
+    ],
+)
+def test_only_a_can_fd_frame_has_data_and_as_many_as_its_length_code_means(flags, payload, whole):
+    count, damage = Line(events.CAN_REQUEST, {"d": flags}, payload=payload).read()
+    assert count == (1 if whole else 0) and bool(damage) is not whole
 
 
 def test_only_this_version_and_no_other_number_is_read():

@@ -2,7 +2,7 @@
  *
  * One source, two builds. For this computer `ranger-sim firmware build` compiles it with an implementation that leads
  * to the simulator's models of the devices; for the chip it is compiled with one that reads and writes the registers
- * named here. Nothing here could not be done on the chip.
+ * named here. Nothing here could not be done on the chip, but for CAN FD, which needs another one.
  *
  * How time passes. With a schedule: a task or an interrupt handler takes effect at its start; then the processor is
  * busy for its cost, per_item times what it returned, and what it gave to fw_spend. With a main loop of its own: only
@@ -367,6 +367,42 @@ typedef struct fw_can_range {
  * the first call. On the chip 0, and nothing is done, for ranges that do not ascend or take more than the table's 2 KB: two
  * bytes for a single identifier, four for a range, twice as many for 29 bits. Here such a call ends the run. */
 uint32_t fw_can_accept(const fw_can_range *ranges, uint32_t count);
+
+/* --- CAN FD controllers 1 ... 4 --------------------------------------------------------------------------------------
+ * Not of the LPC2194, whose controllers are classic, but of no particular chip: a board has either these or those, as the
+ * master table says (can = "fd" in boards.toml; without a table in firmware.toml). Not in an image for the LPC2194.
+ * Interrupt sources, fw_can_accept, and the bits of CxGSR, CxICR, CxIER and CxMOD are those above. */
+#define FW_CANFD_BRS 1u /* flags of a frame: its data are sent at the data bit rate */
+#define FW_CANFD_ESI 2u /* received: its sender was error passive. Sent: as a gateway does; otherwise the controller sets it */
+#define FW_CANFD_FDF 4u /* a CAN FD frame; without it a classic one */
+
+typedef struct fw_canfd_frame {
+    uint32_t ID;      /* with FW_CAN_EXTENDED one of 29 bits; with FW_CAN_REMOTE a remote frame, which CAN FD has not */
+    uint8_t length;   /* data bytes: 0 ... 8, in a CAN FD frame also 12, 16, 20, 24, 32, 48, 64 */
+    uint8_t flags;
+    uint8_t reserved[2];
+    uint8_t data[64];
+} fw_canfd_frame;
+
+/* Bit rates of both phases in bit/s, those of the bus; data_bit_rate 0: classic CAN only. To be called in
+ * firmware_start. */
+void fw_canfd_start(uint32_t controller, uint32_t bit_rate, uint32_t data_bit_rate, uint32_t IER);
+/* Fill transmit buffer 1 ... 3 and request it. 0, and nothing is done, while it is not free or the controller resets. A
+ * frame that does not exist, such as one of nine bytes, ends the run. */
+uint32_t fw_canfd_transmit(uint32_t controller, uint32_t buffer, const fw_canfd_frame *frame);
+uint32_t fw_canfd_buffer_free(uint32_t controller, uint32_t buffer);
+void fw_canfd_abort(uint32_t controller, uint32_t buffer);
+/* Take the oldest frame out of the receive queue of 32; 0 when it is empty. While frames are left, the interrupt is asked
+ * for again. */
+uint32_t fw_canfd_receive(uint32_t controller, fw_canfd_frame *frame);
+void fw_canfd_clear_overrun(uint32_t controller);
+uint32_t fw_canfd_GSR(uint32_t controller);
+/* Reading clears all but the receive bit. */
+uint32_t fw_canfd_ICR(uint32_t controller);
+uint32_t fw_canfd_MOD(uint32_t controller);
+/* FW_MOD_RESET or 0; after bus-off, 0 begins the recovery. */
+void fw_canfd_write_MOD(uint32_t controller, uint32_t value);
+void fw_canfd_write_IER(uint32_t controller, uint32_t value);
 
 #ifdef __cplusplus
 }
