@@ -124,7 +124,7 @@ class Board:
         raise FirmwareError(f"{self.name}: {text}")
 
     def can_rates(self, controller) -> tuple[int, int] | None:
-        """Both bit rates of a CAN FD controller, bit/s; None: it is a classic one, or there is none."""
+        """Both bit rates of a CAN FD controller, bit/s; None: a classic one, or no such controller."""
         return None
 
     def listen_to_edges(self, buffer: EdgeBuffer, pin, partner_pin) -> None:

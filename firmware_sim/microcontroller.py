@@ -178,7 +178,7 @@ class Microcontroller(Chip):
         return self.message_table[controller * MESSAGE_KINDS + CAN_RX].filter_bytes()
 
     def can_rates(self, controller) -> tuple[int, int] | None:
-        """Both bit rates of this CAN FD controller, bit/s; None: it is a classic one, or there is none."""
+        """Both bit rates of this CAN FD controller, bit/s; None: a classic one, or no such controller."""
         return self.message_table[controller * MESSAGE_KINDS + CAN_RX].can_rates()
 
     def latest_slot(self) -> cython.longlong:

@@ -71,6 +71,10 @@ def tool(name: str) -> str:
 def build_image(manifest: Manifest, addition: Addition | None = None) -> Image:
     """Compile unless it is up to date; UserError with a line for each error of the compiler."""
     addition = addition if addition is not None else Addition()
+    if manifest.hardware is not None and manifest.hardware.can == "fd":
+        raise FirmwareError(
+            f"{manifest.folder}: hardware.can is 'fd', and an image is for an LPC2194, whose controllers are classic"
+        )
     gcc, objcopy, size = tool("gcc"), tool("objcopy"), tool("size")
     options = [
         *OPTIONS,

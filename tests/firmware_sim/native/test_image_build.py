@@ -115,3 +115,14 @@ def test_without_the_cross_compiler_the_package_to_install_is_named(tmp_path, mo
 def test_the_chips_files_are_where_the_package_looks_for_them():
     names = {each.name for each in pathlib.Path(image_build.CHIP).iterdir()}
     assert {"startup.S", "lpc2194.ld", "firmware.c", "scheduler.c", "support.c"} <= names
+
+
+def test_a_board_with_can_fd_controllers_has_no_image(tmp_path):
+    manifest = "[firmware]\nname = 'small'\n[hardware]\ncan = 'fd'\n"
+    folder = folder_with(tmp_path / "small", TIMER + START + SCHEDULE, manifest)
+    assert lines(folder)[0].endswith(
+        "hardware.can is 'fd', and an image is for an LPC2194, whose CAN controllers are classic"
+    )
+    (folder / "firmware.toml").write_text(manifest.replace("'fd'", "'xl'"), encoding="utf-8")
+    with pytest.raises(UserError, match="hardware.can is 'xl', allowed are classic, fd"):
+        load(folder)
