@@ -140,6 +140,10 @@ WRONG = (
     (ZERO, "sensor_offset", "joint_angle_rad", "offset_rad", "sensor", "what the joint's encoder shows too much"),
 )
 
+# Beside a torque of another form over the joint's angle these two are only a part of one spring, and what sound ankles
+# have is that of the whole: they have neither prior nor limits of their own then, and plausibility.py judges both together
+WHOLE_SPRING = (STIFFNESS, TORQUE)
+
 Shape = Mapping[str, float]
 
 
@@ -613,7 +617,9 @@ class _Fit:
                 other.acting.append(Acting(effect, shape, names))
                 acting |= dict(zip(names, coefficients, strict=True))
         other.all = [*self.base, *self.extra, *(() if fixed else acting)]
-        other.limits = self.limits | {name: (-math.inf, math.inf) for name in acting}
+        whole = WHOLE_SPRING if any(_by_the_foot(each.effect) for each in other.acting) else ()
+        other.spread = {name: each for name, each in self.spread.items() if name not in whole}
+        other.limits = self.limits | {name: (-math.inf, math.inf) for name in (*acting, *whole)}
         for values in ({**self.usual, ZERO: self._zero()}, self.values):
             moved = other._moved(values | acting)
             if moved is not None:
@@ -928,6 +934,11 @@ def _wrong() -> list[Effect]:
     ]
 
 
+def _by_the_foot(effect: Effect) -> bool:
+    """True for a torque that depends on the joint's angle alone, as the return spring's does."""
+    return effect.at == "inner_ankle" and effect.cause in ("return_spring", "once_per_turn")
+
+
 def _springs() -> list[Effect]:
     M, at = "mechanical", "inner_ankle"
     return [
@@ -935,6 +946,10 @@ def _springs() -> list[Effect]:
                 form="square"),
         _effect("return_spring", at, M, ("cubic_Nm_per_rad3",), _at_foot(lambda m, _: -m.a**3),
                 form="cube"),
+        # a spring that hardens as none of the two alone, about the angle at which the base's spring is given
+        _effect("return_spring", at, M, ("square_Nm_per_rad2", "cubic_Nm_per_rad3"),
+                _at_foot(*(lambda m, p, power=n: -((m.a - p["rest_rad"]) ** power) for n in (2, 3))),
+                [{"rest_rad": REST_rad}], form="square and cube"),
     ]  # fmt: skip
 
 
