@@ -31,8 +31,8 @@ FEW = 0.02  # of the rows; decimation to independent rows may leave a small part
 APART = 0.25  # of the mean square: equations leave less than this share when a parameter may differ between them
 TELLS = 0.05  # of a column's length: the part that the others leave when the equation alone determines its parameter
 SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
-# Of what a named cause adds: parameters that leave less than this of it stand for it, each of which takes at least TAKES
-# of it; a parameter among them and the cause are one thing, and are judged together. Chosen by us
+# Of what a named cause adds: parameters that leave less than this of it stand for it, and each takes at least TAKES of
+# it; a parameter among them and the cause are one thing, and are judged together. Chosen by us
 STANDS_FOR, TAKES = 0.05, 0.05
 MOST = 5  # causes at once: where everything seems wrong, it is another machine, or other data
 LARGEST_SCALE = 0.5  # largest change of a sensor's scale: beyond it, the channel shows another signal or another unit

@@ -141,7 +141,7 @@ WRONG = (
 )
 
 # Beside a torque of another form over the joint's angle these two are only a part of one spring, and what sound ankles
-# have is that of the whole: they have neither prior nor limits of their own then, and plausibility.py judges both together
+# have is that of the whole: they have neither prior nor limits of their own then; plausibility.py judges both together
 WHOLE_SPRING = (STIFFNESS, TORQUE)
 
 Shape = Mapping[str, float]

@@ -29,9 +29,9 @@ STEP_S, LOG = 0.0005, 8
 def ankle_run(seed=1, hertz=1.0, seconds=4.0, joint_only=False, **fault):
     """One run by the midpoint rule, one period before it; the ankle of the body `ranger`, but for its faults.
 
-    fault: inertia, spring, friction, damping, square and hardening (of a return spring), excess (of friction at low speed), lag_s and
-    zero of the encoder at the joint; program: the law of the robot's program, which limits targets and feeds a spring
-    forward.
+    fault: inertia, spring, friction, damping, square and hardening (of a return spring), excess (of friction at low
+    speed), lag_s and zero of the encoder at the joint; program: the law of the robot's program, which limits targets
+    and feeds a spring forward.
     """
     J, k_r, a_0, k_s = fault.get("inertia", 0.0012), fault.get("spring", 0.066), 1.66, 14.0
     square, excess, lag_s = fault.get("square", 0.0), fault.get("excess", 0.0), fault.get("lag_s", 0.0)
