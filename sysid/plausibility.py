@@ -85,6 +85,7 @@ def look(
     for each in named:
         findings += _of_sensor(regression, each)
     shared = with_causes(regression, machine.parameters, named)
+    in_part = {name for each in regression.recordings for name in each.in_part} if named else set()
     for known in machine.parameters:
         if known.name not in regression.values:
             continue
@@ -93,6 +94,8 @@ def look(
         error = float(np.sqrt(max(0.0, float(regression.covariance[number, number]))))
         whole = value + shared.get(known.name, 0.0)
         together = ", together with what the named causes add" if known.name in shared else ""
+        if known.name in in_part and not together:
+            continue
         if absurd(known, value, error) and absurd(known, whole, error):
             text = f"it comes out as {whole:.4g} {known.unit}{together}, which no machine has"
             findings.append(_finding(known.name, "impossible", whole, known.unit, text))

@@ -331,6 +331,7 @@ def _recording(fit: "_Fit") -> AnkleRecording:
     )
     recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
     recording.values = dict(fit.values)
+    recording.in_part = fit.in_part()
     known = [name for name in fit.base if not (fit.dry and name == SIGN_WIDTH)]  # dry friction has no width
     recording.priors = {name: (fit.usual[name], each) for name, each in fit.spread.items() if name in known}
     if fit.of_program:
@@ -617,7 +618,7 @@ class _Fit:
                 other.acting.append(Acting(effect, shape, names))
                 acting |= dict(zip(names, coefficients, strict=True))
         other.all = [*self.base, *self.extra, *(() if fixed else acting)]
-        whole = WHOLE_SPRING if any(_by_the_foot(each.effect) for each in other.acting) else ()
+        whole = other.in_part()
         other.spread = {name: each for name, each in self.spread.items() if name not in whole}
         other.limits = self.limits | {name: (-math.inf, math.inf) for name in (*acting, *whole)}
         for values in ({**self.usual, ZERO: self._zero()}, self.values):
@@ -627,6 +628,10 @@ class _Fit:
                 other._settle()
                 return other
         return self
+
+    def in_part(self) -> tuple[str, ...]:
+        """Parameters that are a part of one spring with an effect in the simulation."""
+        return WHOLE_SPRING if any(_by_the_foot(each.effect) for each in self.acting) else ()
 
     def shown_beside(self) -> Pair:
         """What the acting effects add to the readings of the motor's and the joint's encoder: (n,) each."""

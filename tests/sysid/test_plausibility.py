@@ -285,3 +285,15 @@ def test_what_a_named_cause_adds_is_told_in_its_parameter_s_unit(drag):
 def absurd_of(machine, name, value):
     (known,) = [each for each in machine.parameters if each.name == name]
     return plausibility.absurd(known, value, 0.0)
+
+
+def test_a_parameter_that_is_a_part_beside_a_named_cause_is_not_judged_alone():
+    """As a spring's stiffness beside its square, which other columns resemble more than the stiffness's does."""
+    machine = Cart()
+    recording = machine.prepare(cart_run(1))
+    regression = Regression([dataclasses.replace(recording, left_over=True, in_part=("mass_kg",))])
+    machine.parameters = (dataclasses.replace(machine.parameters[0], value=0.1), machine.parameters[1])
+    (cause,) = [of(machine, regression, "drag", quadratic=0.1)]
+    assert not plausibility.look(machine, regression, [cause]).findings
+    (alone,) = plausibility.look(machine, regression).findings
+    assert (alone.channel, alone.kind) == ("mass_kg", "other_machine")
