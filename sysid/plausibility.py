@@ -139,11 +139,13 @@ def with_causes(regression: Regression, parameters: Sequence[Known], named: Sequ
         return {}
     places = [regression.names.index(name) for name in names]
     own = [each.name for each in parameters if each.name in regression.names]
+    of_own = [regression.names.index(each) for each in own]
+    values = np.array([regression.values[each] for each in names])
     columns, added = [], []
     for name, part in regression.parts.items():
-        rows, scale = _counting(part), regression.whitening[name].deviation
-        columns.append(part.measured[np.ix_(rows, [regression.names.index(each) for each in own])] / scale)
-        added.append(part.measured[np.ix_(rows, places)] @ [regression.values[each] for each in names] / scale)
+        measured = part.measured[_counting(part)] / regression.whitening[name].deviation
+        columns.append(measured[:, of_own])
+        added.append(measured[:, places] @ values)
     x, y = np.concatenate(columns), np.concatenate(added)
     lengths = np.linalg.norm(x, axis=0)
     whole = float(y @ y)

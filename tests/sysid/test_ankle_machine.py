@@ -153,7 +153,7 @@ def test_a_fault_of_the_ankle_is_named_alone_and_with_its_size(cause, at, fault,
 
 
 def test_a_spring_that_hardens_is_named_and_is_not_another_machine():
-    """An exponential, whose slope at the rest angle is 0.16 N m/rad, where the model's spring has 0.066 in all."""
+    """An exponential, whose slope at the rest angle is 0.17 N m/rad, where the model's spring has 0.066."""
     found = diagnose(Ankle(), [ankle_run(hardening=0.01)]).answer
     assert found["detected"] and not found["abstained"]
     first = found["causes"][0]
