@@ -31,9 +31,9 @@ FEW = 0.02  # of the rows; decimation to independent rows may leave a small part
 APART = 0.25  # of the mean square: equations leave less than this share when a parameter may differ between them
 TELLS = 0.05  # of a column's length: the part that the others leave when the equation alone determines its parameter
 SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
-# Of what a named cause adds: parameters that leave less than this of it stand for it, and each takes at least TAKES of
+# Of what a named cause adds: parameters that leave less than this of it resemble it, and each takes at least TAKES of
 # it; a parameter among them and the cause are one thing, and are judged together. Chosen by us
-STANDS_FOR, TAKES = 0.05, 0.05
+RESEMBLES, TAKES = 0.05, 0.05
 MOST = 5  # causes at once: where everything seems wrong, it is another machine, or other data
 LARGEST_SCALE = 0.5  # largest change of a sensor's scale: beyond it, the channel shows another signal or another unit
 UNIT_TOLERANCE = 0.05  # of a factor that is reported as a unit's: friction and noise move it by per cents
@@ -128,10 +128,10 @@ def look(
 
 
 def with_causes(regression: Regression, parameters: Sequence[Known], named: Sequence[Named]) -> dict[str, float]:
-    """By parameter that is one thing with a named cause: the change of it that stands for what the causes add.
+    """By parameter that is one thing with a named cause: the change of it that resembles what they add.
 
     A spring's cube has a slope where it is measured, which is a part of the whole spring's stiffness, and the linear
-    spring's value beside it is that of an angle where nothing may have been measured. The parameter that is most like
+    spring's value next to it is that of an angle where nothing may have been measured. The parameter that is most like
     the causes' columns comes first, and others follow while they take a part of the rest.
     """
     names = [each for cause in named for each in cause.coefficients]
@@ -151,7 +151,7 @@ def with_causes(regression: Regression, parameters: Sequence[Known], named: Sequ
     whole = float(y @ y)
     taken: list[int] = []
     found, left = np.zeros(0), y
-    while whole > 0.0 and float(left @ left) > STANDS_FOR * whole and len(taken) < len(own):
+    while whole > 0.0 and float(left @ left) > RESEMBLES * whole and len(taken) < len(own):
         likeness = np.abs(x.T @ left) / np.where(lengths > 0.0, lengths, np.inf)
         likeness[taken] = 0.0
         tried = [*taken, int(np.argmax(likeness))]

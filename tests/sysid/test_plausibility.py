@@ -252,7 +252,7 @@ def pushed(drag=0.0, cubic=0.0, damping=0.12):
     return changed(force_N=run["force_N"] + (damping - 0.12) * v + drag * v * np.abs(v) + cubic * v**3)
 
 
-def test_a_parameter_is_judged_together_with_the_named_cause_that_stands_for_it():
+def test_a_parameter_is_judged_together_with_the_named_cause_that_resembles_it():
     """A cube of the speed is a square less a part that goes with the speed: the damping alone comes out below zero."""
     machine, run = Cart(), pushed(cubic=0.5)
     found = diagnose(machine, [run])
@@ -272,7 +272,7 @@ def test_a_parameter_and_a_cause_that_are_impossible_together_stay_impossible():
 
 
 @pytest.mark.parametrize("drag", [0.02, 0.5, 5.0])
-def test_what_a_named_cause_adds_is_told_in_its_parameter_s_unit(drag):
+def test_what_a_named_cause_adds_is_in_its_parameter_s_unit(drag):
     """Against the straight line through d v |v| over the run's speeds, by numpy's own fit of a polynomial."""
     run = pushed(drag=drag)
     found = diagnose(Cart(), [run])
@@ -287,8 +287,8 @@ def absurd_of(machine, name, value):
     return plausibility.absurd(known, value, 0.0)
 
 
-def test_a_parameter_that_is_a_part_beside_a_named_cause_is_not_judged_alone():
-    """As a spring's stiffness beside its square, which other columns resemble more than the stiffness's does."""
+def test_a_parameter_that_is_a_part_next_to_a_named_cause_is_not_judged_alone():
+    """As a spring's stiffness next to its square, which other columns resemble more than the stiffness's does."""
     machine = Cart()
     recording = machine.prepare(cart_run(1))
     regression = Regression([dataclasses.replace(recording, left_over=True, in_part=("mass_kg",))])
