@@ -126,6 +126,8 @@ class Recording:
     floors: dict[str, float] = dataclasses.field(default_factory=dict)  # by equation: least deviation of the noise
     # parameter -> (value, standard deviation) of sound machines: equivalent to a measurement of it
     priors: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    # parameters that are only a part of what they are named for, beside an effect that acts in the simulation
+    in_part: tuple[str, ...] = ()
     lags: tuple[int, ...] = (0, 10, 30, 100)  # samples back at which the general tests use slopes
     own_noise: dict[str, float] = dataclasses.field(default_factory=dict)  # by equation that does not show it
     findings: list[Finding] = dataclasses.field(default_factory=list)  # the machine's own findings about the data

@@ -10,8 +10,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.plant import terms
+from ranger_sim.plant import body_files, terms
 from ranger_sim.plant.electrics.battery import BatteryParameters
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR, MotorParameters
 from ranger_sim.sysid.causes import CAUSES
@@ -80,6 +82,28 @@ def _dead_time(numbers: Numbers, _: Context) -> dict[str, float]:
     return {"fraction": numbers["drop_V"] / nominal_V}
 
 
+def _whole_spring(numbers: Numbers, values: Numbers) -> dict[str, float]:
+    """What square and cube about `rest_rad` add to the simulator's spring, with the change of the base's own.
+
+    It is about the angle at which all of it pulls nothing: a term has no constant torque.
+    """
+    spring = body_files.load("ranger").parameters.ankle_return_Nm_per_rad
+    more = values["return_stiffness_Nm_per_rad"] - spring
+    square, cubic = numbers["square_Nm_per_rad2"], numbers["cubic_Nm_per_rad3"]
+    pull = np.polynomial.Polynomial([-values["return_torque_Nm"], more, square, cubic])
+    roots = pull.roots()
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    if not len(real):
+        raise NoFormError("it pulls at every angle, the simulator's form of it has an angle of rest")
+    at = float(real[np.argmin(np.abs(real))])
+    return {
+        "linear_Nm_per_rad": float(pull.deriv()(at)),
+        "square_Nm_per_rad2": square + 3.0 * cubic * at,
+        "cubic_Nm_per_rad3": cubic,
+        "rest_rad": numbers["rest_rad"] + at,
+    }
+
+
 FORM_OF = {cause.identifier: cause.form for cause in CAUSES.values() if cause.form}
 # by cause; each takes coefficients and shape, and returns the form's parameters
 TO_TERM: dict[str, Made] = {
@@ -131,7 +155,9 @@ def term_of(machine: Machine, cause: str, at: str, numbers: Numbers, values: Num
     if at not in form.places:
         raise NoFormError(f"the simulator has it at {', '.join(form.places)}, and no place {at}")
     context = context_of(machine, at, values)
-    if all(name in {each.name for each in form.parameters} for name in numbers) and context.ratio == 1.0:
+    if cause == "return_spring" and "rest_rad" in numbers and "return_torque_Nm" in values:
+        made = _whole_spring(numbers, values)
+    elif all(name in {each.name for each in form.parameters} for name in numbers) and context.ratio == 1.0:
         made = dict(numbers)  # given in the form's own parameters
     elif cause in TO_TERM:
         try:

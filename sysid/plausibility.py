@@ -31,6 +31,9 @@ FEW = 0.02  # of the rows; decimation to independent rows may leave a small part
 APART = 0.25  # of the mean square: equations leave less than this share when a parameter may differ between them
 TELLS = 0.05  # of a column's length: the part that the others leave when the equation alone determines its parameter
 SLOWEST = 6.0  # a memory of 0.986 from sample to sample; instruments have up to 0.95 (3.2), a voltage 10 ms late has 12
+# Of what a named cause adds: parameters that leave less than this of it resemble it, and each takes at least TAKES of
+# it; a parameter among them and the cause are one thing, and are judged together. Chosen by us
+RESEMBLES, TAKES = 0.05, 0.05
 MOST = 5  # causes at once: where everything seems wrong, it is another machine, or other data
 LARGEST_SCALE = 0.5  # largest change of a sensor's scale: beyond it, the channel shows another signal or another unit
 UNIT_TOLERANCE = 0.05  # of a factor that is reported as a unit's: friction and noise move it by per cents
@@ -81,19 +84,25 @@ def look(
         findings.append(_finding("", "too_many", len(named), "", text))
     for each in named:
         findings += _of_sensor(regression, each)
+    shared = with_causes(regression, machine.parameters, named)
+    in_part = {name for each in regression.recordings for name in each.in_part} if named else set()
     for known in machine.parameters:
         if known.name not in regression.values:
             continue
         value = regression.values[known.name]
         number = regression.names.index(known.name)
         error = float(np.sqrt(max(0.0, float(regression.covariance[number, number]))))
-        if absurd(known, value, error):
-            text = f"it comes out as {value:.4g} {known.unit}, which no machine has"
-            findings.append(_finding(known.name, "impossible", value, known.unit, text))
-        elif known.value * value != 0.0 and error < CLEAR * abs(value):
-            factor = value / known.value
-            if not 1.0 / FACTOR <= abs(factor) <= FACTOR:
-                findings.append(_factor(known, value, factor, _of_a_simulator(regression) and not by_candidates))
+        whole = value + shared.get(known.name, 0.0)
+        together = ", together with what the named causes add" if known.name in shared else ""
+        if known.name in in_part and not together:
+            continue
+        if absurd(known, value, error) and absurd(known, whole, error):
+            text = f"it comes out as {whole:.4g} {known.unit}{together}, which no machine has"
+            findings.append(_finding(known.name, "impossible", whole, known.unit, text))
+        elif known.value * value * whole != 0.0 and error < CLEAR * min(abs(value), abs(whole)):
+            if not any(1.0 / FACTOR <= abs(each / known.value) <= FACTOR for each in (value, whole)):
+                simulated = _of_a_simulator(regression) and not by_candidates
+                findings.append(_factor(known, whole, together, simulated))
     few = {name: each.few for recording in regression.recordings for name, each in recording.equations.items()}
     for name in regression.equations:
         counted, rows = int(np.count_nonzero(regression.good[name])), len(regression.parts[name].valid)
@@ -116,6 +125,43 @@ def look(
             findings.append(_finding(name, "slow", new, "", text))
     findings += _contradictions(machine, regression if base is None else base)
     return Doubts(findings, any(each.kind in FORBID for each in findings))
+
+
+def with_causes(regression: Regression, parameters: Sequence[Known], named: Sequence[Named]) -> dict[str, float]:
+    """By parameter that is one thing with a named cause: the change of it that resembles what they add.
+
+    A spring's cube has a slope where it is measured, which is a part of the whole spring's stiffness, and the linear
+    spring's value next to it is that of an angle where nothing may have been measured. The parameter that is most like
+    the causes' columns comes first, and others follow while they take a part of the rest.
+    """
+    names = [each for cause in named for each in cause.coefficients]
+    if not all(name in regression.names for name in names) or not names:
+        return {}
+    places = [regression.names.index(name) for name in names]
+    own = [each.name for each in parameters if each.name in regression.names]
+    of_own = [regression.names.index(each) for each in own]
+    values = np.array([regression.values[each] for each in names])
+    columns, added = [], []
+    for name, part in regression.parts.items():
+        measured = part.measured[_counting(part)] / regression.whitening[name].deviation
+        columns.append(measured[:, of_own])
+        added.append(measured[:, places] @ values)
+    x, y = np.concatenate(columns), np.concatenate(added)
+    lengths = np.linalg.norm(x, axis=0)
+    whole = float(y @ y)
+    taken: list[int] = []
+    found, left = np.zeros(0), y
+    while whole > 0.0 and float(left @ left) > RESEMBLES * whole and len(taken) < len(own):
+        likeness = np.abs(x.T @ left) / np.where(lengths > 0.0, lengths, np.inf)
+        likeness[taken] = 0.0
+        tried = [*taken, int(np.argmax(likeness))]
+        scaled = x[:, tried] / np.maximum(lengths[tried], 1e-300)
+        new = np.linalg.lstsq(scaled, y, rcond=1e-9)[0]
+        rest = y - scaled @ new
+        if float(left @ left) - float(rest @ rest) < TAKES * whole:
+            break
+        taken, found, left = tried, new / lengths[tried], rest
+    return {own[number]: float(value) for number, value in zip(taken, found, strict=True)}
 
 
 def absurd(known: Known, value: float, error: float) -> bool:
@@ -269,15 +315,17 @@ def _of_sensor(regression: Regression, named: Named) -> list[Finding]:
     return []
 
 
-def _factor(known: Known, value: float, factor: float, simulated: bool) -> Finding:
-    """A parameter far from the simulation's. simulated: from equations that are linearised where a fit ended; a value
-    far from the fit's start may then be an artefact.
+def _factor(known: Known, value: float, together: str, simulated: bool) -> Finding:
+    """A parameter far from the simulation's. together: words, where the named causes are a part of the value; they are
+    then what is wrong. simulated: from equations that are linearised where a fit ended; a value far from the fit's
+    start may then be an artefact.
     """
+    factor = value / known.value
+    meant = "" if together else ": another machine, or a channel in another unit"
     text = (
-        f"it comes out as {value:.4g} {known.unit}, {factor:.3g} times the model's {known.value:.4g}: "
-        "another machine, or a channel in another unit"
+        f"it comes out as {value:.4g} {known.unit}{together}, {factor:.3g} times the model's {known.value:.4g}{meant}"
     )
-    if simulated and not any(word in known.name for word in MAY_BE_ANY):
+    if simulated and not together and not any(word in known.name for word in MAY_BE_ANY):
         return _finding(known.name, "other_machine", factor, "", text)
     return _finding(known.name, "far_off", factor, "", text)
 

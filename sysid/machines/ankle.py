@@ -140,6 +140,10 @@ WRONG = (
     (ZERO, "sensor_offset", "joint_angle_rad", "offset_rad", "sensor", "what the joint's encoder shows too much"),
 )
 
+# Beside a torque of another form over the joint's angle these two are only a part of one spring, and what sound ankles
+# have is that of the whole: they have neither prior nor limits of their own then; plausibility.py judges both together
+WHOLE_SPRING = (STIFFNESS, TORQUE)
+
 Shape = Mapping[str, float]
 
 
@@ -327,6 +331,7 @@ def _recording(fit: "_Fit") -> AnkleRecording:
     )
     recording.acting = {each.effect.key(each.shape): each.of(fit.values) for each in fit.acting}
     recording.values = dict(fit.values)
+    recording.in_part = fit.in_part()
     known = [name for name in fit.base if not (fit.dry and name == SIGN_WIDTH)]  # dry friction has no width
     recording.priors = {name: (fit.usual[name], each) for name, each in fit.spread.items() if name in known}
     if fit.of_program:
@@ -613,7 +618,9 @@ class _Fit:
                 other.acting.append(Acting(effect, shape, names))
                 acting |= dict(zip(names, coefficients, strict=True))
         other.all = [*self.base, *self.extra, *(() if fixed else acting)]
-        other.limits = self.limits | {name: (-math.inf, math.inf) for name in acting}
+        whole = other.in_part()
+        other.spread = {name: each for name, each in self.spread.items() if name not in whole}
+        other.limits = self.limits | {name: (-math.inf, math.inf) for name in (*acting, *whole)}
         for values in ({**self.usual, ZERO: self._zero()}, self.values):
             moved = other._moved(values | acting)
             if moved is not None:
@@ -621,6 +628,10 @@ class _Fit:
                 other._settle()
                 return other
         return self
+
+    def in_part(self) -> tuple[str, ...]:
+        """Parameters that are a part of one spring with an effect in the simulation."""
+        return WHOLE_SPRING if any(_by_the_foot(each.effect) for each in self.acting) else ()
 
     def shown_beside(self) -> Pair:
         """What the acting effects add to the readings of the motor's and the joint's encoder: (n,) each."""
@@ -928,6 +939,11 @@ def _wrong() -> list[Effect]:
     ]
 
 
+def _by_the_foot(effect: Effect) -> bool:
+    """True for a torque that depends on the joint's angle alone, as the return spring's does."""
+    return effect.at == "inner_ankle" and effect.cause in ("return_spring", "once_per_turn")
+
+
 def _springs() -> list[Effect]:
     M, at = "mechanical", "inner_ankle"
     return [
@@ -935,6 +951,10 @@ def _springs() -> list[Effect]:
                 form="square"),
         _effect("return_spring", at, M, ("cubic_Nm_per_rad3",), _at_foot(lambda m, _: -m.a**3),
                 form="cube"),
+        # a spring that hardens as none of the two alone, about the angle at which the base's spring is given
+        _effect("return_spring", at, M, ("square_Nm_per_rad2", "cubic_Nm_per_rad3"),
+                _at_foot(*(lambda m, p, power=n: -((m.a - p["rest_rad"]) ** power) for n in (2, 3))),
+                [{"rest_rad": REST_rad}], form="square and cube"),
     ]  # fmt: skip
 
 

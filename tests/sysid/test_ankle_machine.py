@@ -29,12 +29,18 @@ STEP_S, LOG = 0.0005, 8
 def ankle_run(seed=1, hertz=1.0, seconds=4.0, joint_only=False, **fault):
     """One run by the midpoint rule, one period before it; the ankle of the body `ranger`, but for its faults.
 
-    fault: inertia, spring, friction, damping, square (of a return spring), excess (of friction at low speed), lag_s and
-    zero of the encoder at the joint; program: the law of the robot's program, which limits targets and feeds a spring
-    forward.
+    fault: inertia, spring, friction, damping, square and hardening (of a return spring), excess (of friction at low
+    speed), lag_s and zero of the encoder at the joint; program: the law of the robot's program, which limits targets
+    and feeds a spring forward.
     """
     J, k_r, a_0, k_s = fault.get("inertia", 0.0012), fault.get("spring", 0.066), 1.66, 14.0
     square, excess, lag_s = fault.get("square", 0.0), fault.get("excess", 0.0), fault.get("lag_s", 0.0)
+    hardening = fault.get("hardening", 0.0)
+
+    def spring(a):
+        over = max(a - 0.7, 0.0) / 0.45
+        return k_r * (a - a_0) + square * a * a + hardening * (math.expm1(over) - over)
+
     w = 2.0 * math.pi * hertz
 
     def slopes(t, p, a, u):
@@ -47,10 +53,10 @@ def ankle_run(seed=1, hertz=1.0, seconds=4.0, joint_only=False, **fault):
         rubs = fault.get("friction", 0.05) + 0.1 * GK * abs(current) + excess * math.exp(-((u / 0.4) ** 2))
         cable = k_s * (p - a)
         push = GK * current - rubs * math.tanh(u / 0.05) - fault.get("damping", 0.004) * u - cable
-        return push / J_A, (cable - k_r * (a - a_0) - square * a * a) / J
+        return push / J_A, (cable - spring(a)) / J
 
     h, a, u = STEP_S, 1.05, 0.85 * w
-    v, p = u, a + (k_r * (a - a_0) + square * a * a) / k_s
+    v, p = u, a + spring(a) / k_s
     shown, rows = a, []
     for number in range(round((seconds + 1.0 / hertz) / h)):
         t = number * h - 1.0 / hertz
@@ -144,6 +150,28 @@ def test_a_fault_of_the_ankle_is_named_alone_and_with_its_size(cause, at, fault,
     assert (named["name"], named["at"]) == (cause, at)
     low, high = next(iter(named["parameters"].values()))["ci95"]
     assert size is None or low <= size <= high
+
+
+def test_a_spring_that_hardens_is_named_and_is_not_another_machine():
+    """An exponential, whose slope at the rest angle is 0.17 N m/rad, where the model's spring has 0.066."""
+    found = diagnose(Ankle(), [ankle_run(hardening=0.01)]).answer
+    assert found["detected"] and not found["abstained"]
+    first = found["causes"][0]
+    assert (first["name"], first["form"]) == ("return_spring", "square and cube")
+    assert found["evidence"]["parameters_are_physical"]
+
+
+def test_a_spring_in_the_simulation_has_its_stiffness_without_the_prior_of_a_sound_ankle():
+    """Ten times the model's slope at rest, by another cube than the base has: all of it comes back, rest included."""
+    run = ankle_run(seconds=3.0, spring=0.66, square=0.1)
+    recording = Ankle().prepare(run)
+    (spring,) = [each for each in Ankle().effects([recording]) if each.form == "square and cube"]
+    made = Ankle().again(recording, [(spring, spring.shapes[0], [0.0, 0.0])])
+    assert set(recording.priors) - set(made.priors) == {"return_stiffness_Nm_per_rad", "return_torque_Nm"}
+    # a^2 about 1.66 rad: 0.1 (a - 1.66)^2, 0.332 (a - 1.66) and 0.276 N m
+    expected = {"return_stiffness_Nm_per_rad": 0.66 + 0.332, "return_torque_Nm": -0.276}
+    assert {name: made.values[name] for name in expected} == pytest.approx(expected, rel=0.1)
+    assert made.values[f"{spring.name}: square_Nm_per_rad2"] == pytest.approx(0.1, rel=0.3)
 
 
 @pytest.mark.parametrize(

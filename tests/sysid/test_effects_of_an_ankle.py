@@ -121,6 +121,9 @@ def book(top, both, rate, logged, low):
     rows = [
         Row("return_spring", "inner_ankle", M, ("square_Nm_per_rad2",), at_foot(lambda p: [-A * A]), form="square"),
         Row("return_spring", "inner_ankle", M, ("cubic_Nm_per_rad3",), at_foot(lambda p: [-A * A * A]), form="cube"),
+        Row("return_spring", "inner_ankle", M, ("square_Nm_per_rad2", "cubic_Nm_per_rad3"),
+            at_foot(lambda p: [-np.square(A - 1.66), -((A - 1.66) * np.square(A - 1.66))]), ({"rest_rad": 1.66},),
+            form="square and cube"),
         Row("stribeck", "inner_motor", M, ("excess_Nm",),
             at_motor(lambda p: [-SLIDING * np.exp(-np.square(U / p["speed_rad_s"]))]),
             tuple({"speed_rad_s": share * top} for share in (0.04, 0.08, 0.16, 0.3, 0.5)), **positive("excess_Nm")),

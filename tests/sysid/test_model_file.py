@@ -15,6 +15,7 @@ from ranger_sim.sysid import model_file
 from ranger_sim.sysid.benches.bench_terms import BenchTerms
 from ranger_sim.sysid.benches.motor import BENCH_MOTOR, SuppliedMotor
 from ranger_sim.sysid.benches.motor_run import error, motor_run
+from ranger_sim.sysid.machines.ankle import Ankle
 from ranger_sim.sysid.machines.motor_bench import MotorBench
 from ranger_sim.sysid.model_terms import NoFormError, effects_of, term_of
 from ranger_sim.sysid.pipeline import diagnose
@@ -75,6 +76,22 @@ def test_springs_and_gaps_are_terms_under_the_forms_name():
     assert table == {"form": "spring", "at": "inner_ankle", "cubic_Nm_per_rad3": 0.03}
     table = term_of(BENCH, "cable_backlash", "inner_cable", {"half_gap_rad": 0.01, "torque_Nm": 0.03}, VALUES)
     assert table == {"form": "cable_backlash", "at": "inner_cable", "gap_rad": 0.01}
+
+
+def test_a_spring_with_square_and_cube_is_a_term_with_the_base_s_change_in_it():
+    """The torque of term and simulator's spring, against the fitted spring's, angle by angle."""
+    numbers = {"square_Nm_per_rad2": 0.75, "cubic_Nm_per_rad3": 0.31, "rest_rad": 1.66}
+    fitted = {"return_stiffness_Nm_per_rad": 0.72, "return_torque_Nm": -0.23}
+    term = term_of(Ankle(), "return_spring", "inner_ankle", numbers, fitted)
+    for angle in (0.4, 1.0, 1.66, 2.2):
+        x = angle - 1.66
+        wanted = -0.72 * x - 0.23 - 0.75 * x**2 - 0.31 * x**3
+        y = angle - term["rest_rad"]
+        pulls = term["linear_Nm_per_rad"] * y + term["square_Nm_per_rad2"] * y**2 + term["cubic_Nm_per_rad3"] * y**3
+        assert -0.066 * x - pulls == pytest.approx(wanted, abs=1e-12)
+    with pytest.raises(NoFormError, match="it pulls at every angle"):
+        numbers["cubic_Nm_per_rad3"] = 0.0
+        term_of(Ankle(), "return_spring", "inner_ankle", numbers, fitted)
 
 
 @pytest.mark.parametrize(

@@ -243,3 +243,57 @@ def test_few_rows_are_reported_below_what_the_machine_says_is_few(few, told):
     recording.equations[name] = dataclasses.replace(equation, valid=valid, few=few)
     found = plausibility.look(Cart(), Regression([dataclasses.replace(recording, whitened=False)])).findings
     assert [each.kind for each in found if each.kind == "few_rows"] == told
+
+
+def pushed(drag=0.0, cubic=0.0, damping=0.12):
+    """A cart's run whose drag goes with the cube of the speed, which the machine's square does not follow."""
+    run = cart_run(1)
+    v = run["v_m_per_s"]
+    return changed(force_N=run["force_N"] + (damping - 0.12) * v + drag * v * np.abs(v) + cubic * v**3)
+
+
+def test_a_parameter_is_judged_together_with_the_named_cause_that_resembles_it():
+    """A cube of the speed is a square less a part that goes with the speed: the damping alone comes out below zero."""
+    machine, run = Cart(), pushed(cubic=0.5)
+    found = diagnose(machine, [run])
+    (named,) = found.named
+    alone = found.extended.values["damping"]
+    assert named.effect.cause == "drag" and alone < -0.5 and absurd_of(machine, "damping", alone)
+    assert "impossible" in [each.kind for each in plausibility.look(machine, found.extended, []).findings]
+    assert not plausibility.look(machine, found.extended, found.named).forbid
+
+
+def test_a_parameter_and_a_cause_that_are_impossible_together_stay_impossible():
+    machine, run = Cart(), pushed(drag=-0.05, damping=-0.5)
+    found = diagnose(machine, [run])
+    assert [each.effect.cause for each in found.named] == ["drag"]
+    (finding,) = [each for each in found.doubts.findings if each.kind == "impossible"]
+    assert finding.channel == "damping" and "together with what the named causes add" in finding.text
+
+
+@pytest.mark.parametrize("drag", [0.02, 0.5, 5.0])
+def test_what_a_named_cause_adds_is_in_its_parameter_s_unit(drag):
+    """Against the straight line through d v |v| over the run's speeds, by numpy's own fit of a polynomial."""
+    run = pushed(drag=drag)
+    found = diagnose(Cart(), [run])
+    v = run["v_m_per_s"]
+    (line,) = np.linalg.lstsq(v[:, None], drag * v * np.abs(v), rcond=None)[0]
+    shared = plausibility.with_causes(found.extended, Cart.parameters, found.named)
+    assert shared.keys() == {"damping"} and shared["damping"] == pytest.approx(line, rel=0.1)
+
+
+def absurd_of(machine, name, value):
+    (known,) = [each for each in machine.parameters if each.name == name]
+    return plausibility.absurd(known, value, 0.0)
+
+
+def test_a_parameter_that_is_a_part_next_to_a_named_cause_is_not_judged_alone():
+    """As a spring's stiffness next to its square, which other columns resemble more than the stiffness's does."""
+    machine = Cart()
+    recording = machine.prepare(cart_run(1))
+    regression = Regression([dataclasses.replace(recording, left_over=True, in_part=("mass_kg",))])
+    machine.parameters = (dataclasses.replace(machine.parameters[0], value=0.1), machine.parameters[1])
+    (cause,) = [of(machine, regression, "drag", quadratic=0.1)]
+    assert not plausibility.look(machine, regression, [cause]).findings
+    (alone,) = plausibility.look(machine, regression).findings
+    assert (alone.channel, alone.kind) == ("mass_kg", "other_machine")
