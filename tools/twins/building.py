@@ -13,7 +13,6 @@ from ranger_sim.tools.twins.making import FAR_NAME, FLOORS_M, made
 from ranger_sim.tools.twins.walking import Task, Walked, fingerprint, values_of
 
 
-
 def built(tasks: list[Task], folder: pathlib.Path) -> TwinFile:
     """Maps, scatter and directions by all rates, from the walks in a folder."""
     walks = list(made(tasks, folder))
