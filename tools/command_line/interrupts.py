@@ -50,7 +50,7 @@ def _again(number: int) -> None:
     if hasattr(signal, "pthread_kill"):  # also ends a wait, which interrupt_main does not
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:
-        _thread.interrupt_main(number)
+        _thread.interrupt_main(signal.Signals(number))
 
 
 def end_at_once() -> None:
