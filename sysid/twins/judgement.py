@@ -19,6 +19,7 @@ EMULATIONS = 10  # of a cause at a size, at most, for one log
 FIRST, NEAR_BEST = 3, 0.5  # of the likeliest causes, and the share of the best one's gain, that are confirmed
 AMONG_TWINS = 0.3  # of the largest size of a cause's twins: between it and the largest they count themselves
 CLOSE = 0.05  # of a size: nearer to an emulated one it is not emulated again
+KNOWN, FAR_KNOWN = 4.0, 2.0  # times its error's squared length that a direction has: near 0, and by a far walk
 MOST_NOISE = 0.5  # of a direction's squared length, that its noise may have added
 AT_KNOT = 0.1  # the same where the cause was emulated for the log
 FARTHEST = 2.5  # times the largest size that was made
@@ -103,31 +104,34 @@ def _polynomial(each: Direction, sizes: Array) -> Array:
     return np.asarray(np.stack((inside, inside**2, inside**3), axis=1) * stretch[:, None])
 
 
-def _emulated(each: Direction) -> list[Knot]:
+def _walked(each: Direction) -> list[Knot]:
     """The knots in which the robot walked, by size."""
-    return sorted((knot for knot in each.knots if knot.steps), key=lambda knot: knot.size)
+    return sorted((knot for knot in (*each.far, *each.knots) if knot.steps), key=lambda knot: knot.size)
 
 
 def _shares(each: Direction, sizes: Array) -> Array:
-    """(m, k) share of each emulated knot at these sizes."""
-    knots = _emulated(each)
-    at = np.array([0.0, *(knot.size for knot in knots)])
+    """(m, k) share of each knot at these sizes. A far knot begins to count where the other twins end."""
+    knots = _walked(each)
+    own = [knot.size for knot in each.knots if knot.steps]
+    edges = [edge for edge in (each.low, each.high) if edge and not any(0.0 < size / edge <= 1.0 for size in own)]
+    bends = [edge for edge in edges if any(knot.size / edge > 1.0 for knot in each.far)]
+    at = np.array([0.0, *bends, *(knot.size for knot in knots)])
     order = np.argsort(at)
     out = np.zeros((len(sizes), len(knots)))
-    for place, knot in enumerate(knots):
-        out[:, place] = np.interp(sizes, at[order], (at == knot.size)[order].astype(float))
+    for place, knot in enumerate(knots, 1 + len(bends)):
+        out[:, place - 1 - len(bends)] = np.interp(sizes, at[order], (np.arange(len(at)) == place)[order].astype(float))
         if knot.size in (at.min(), at.max()):  # the outermost on its side
             beyond = sizes / knot.size > 1.0
-            out[beyond, place] = sizes[beyond] / knot.size
+            out[beyond, place - 1 - len(bends)] = sizes[beyond] / knot.size
     return out
 
 
 def reach_of(each: Direction) -> tuple[float, float]:
     """Sizes among which the best is sought: some times those that were made or emulated, below any at which it fell."""
     low, high = FARTHEST * each.low, FARTHEST * each.high
-    for knot in _emulated(each):
+    for knot in _walked(each):
         low, high = min(low, FURTHER * knot.size), max(high, FURTHER * knot.size)
-    for knot in each.knots:
+    for knot in (*each.far, *each.knots):
         if not knot.steps:
             low = max(low, BELOW_FALL * knot.size) if knot.size < 0.0 else low
             high = min(high, BELOW_FALL * knot.size) if knot.size > 0.0 else high
@@ -205,7 +209,7 @@ class Space:
 
     def _beyond_terms(self, each: Direction) -> Array:
         """(k, 2 p) what the terms leave of each knot."""
-        knots = _emulated(each)
+        knots = _walked(each)
         if not knots:
             return np.zeros((0, each.terms.shape[1]))
         moved = np.array([knot.moved for knot in knots])
@@ -224,7 +228,7 @@ class Space:
         """(m,) variance of a direction over that of a sound walk."""
         each = self.directions[number]
         found = np.einsum("mi,ij,mj->m", powers[:, :3], each.unsure, powers[:, :3])
-        for place, knot in enumerate(_emulated(each), 3):
+        for place, knot in enumerate(_walked(each), 3):
             share = np.minimum(powers[:, place], 1.0)
             found = (1.0 - share) * found + share * powers[:, place] ** 2 / knot.steps
         return np.asarray(self.steps * found)
@@ -270,14 +274,16 @@ class Space:
         return float(self.profile(number, BEYOND * np.linspace(least, most, 2 * GRID)).max())
 
     def is_known(self, number: int) -> bool:
-        """Whether a cause moves a walk by more than twice the error of its direction, or was emulated for the log."""
+        """Whether a cause moves a walk by more than the error of its direction at any size that was made, or was
+        emulated for the log."""
         each = self.directions[number]
-        if _emulated(each):
+        if any(knot.steps for knot in each.knots):
             return True
-        powers = self._powers(number, np.array([each.high or each.low]))
-        length = float(np.sum((powers[0] @ self.terms[number]) ** 2))
-        error = self.steps * float(powers[0, :3] @ each.unsure @ powers[0, :3]) * self.freedom
-        return length > 4.0 * error
+        far = [knot.size for knot in each.far if knot.steps]
+        powers = self._powers(number, np.array([each.high or each.low, *far]))
+        length = np.sum((powers @ self.terms[number]) ** 2, axis=1)
+        enough = np.array([KNOWN] + [FAR_KNOWN] * len(far))
+        return bool(np.any(length > enough * self.error(number, powers) * self.freedom))
 
     def fits(self) -> list[Fit]:
         """All causes, the likeliest first."""
@@ -314,6 +320,8 @@ def judge(
     if mean is None:
         return None
     weights = view.weights(floor_m)
+    whole = view
+    view = _near(view)  # limits are those of sound walks with the sizes near 0
     space = Space(view, mean, weights)
     fits, since = space.fits(), 0
     if not fits:
@@ -336,12 +344,15 @@ def judge(
     detected = fits[0].gain > gain_limit or distance > distance_limit
     habits = habits_of(space, fits, limits) if detected else ()
     own: Mapping[str, float] = {}
-    if emulate is not None and detected and not habits:
-        view, own = confirmed(view, mean, weights, floor_m, emulate)
+    if detected and not habits:
+        view = whole
+        if emulate is not None:
+            view, own = confirmed(view, mean, weights, floor_m, emulate)
         space = Space(view, mean, weights)
         fits = space.fits()
         habits = habits_of(space, fits, limits)
     detected = detected and not habits
+    fits, most = best_known_first(space, fits, gain_limit)
     best = fits[0]
     named = None
     if detected and best.gain > gain_limit and best.left < sound_distance(view):
@@ -350,7 +361,7 @@ def judge(
             there = _floor_without(floor_m, own.get(best.direction.name, 0.0))
             named = as_repeated(view, named, sum(mean.steps), repeat(named.direction, named.size, there))
     scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
-    ties = tuple(each.direction for each in fits[1:] if best.gain - each.gain < TIE * scale)
+    ties = tuple(each.direction for each in fits[1:] if most - each.gain < TIE * scale)
     return Verdict(
         detected,
         named,
@@ -367,6 +378,29 @@ def judge(
         view,
         habits,
     )
+
+
+def best_known_first(space: Space, fits: Sequence[Fit], gain_limit: float) -> tuple[list[Fit], float]:
+    """The causes in the order in which they are named, and the most that the gain of one counts.
+
+    Noise is left of a sound walk as well. What a cause gains beyond it is chance, and its direction's own noise, which
+    far sizes have much of: of the causes that leave no more than a sound walk does, the one with the best known
+    direction comes first, and they tie.
+    """
+    most = max(float(space.value @ space.value) - space.freedom, gain_limit)
+    number = {id(each): place for place, each in enumerate(space.directions)}
+
+    def error(fit: Fit) -> float:
+        place = number[id(fit.direction)]
+        return float(space.error(place, space._powers(place, np.array([fit.size])))[0])
+
+    sound = sorted((each for each in fits if each.gain >= most), key=error)
+    return [*sound, *(each for each in fits if each.gain < most)], min(most, fits[0].gain)
+
+
+def _near(view: View) -> View:
+    """Without the far twins."""
+    return dataclasses.replace(view, directions=tuple(dataclasses.replace(each, far=()) for each in view.directions))
 
 
 def habits_of(space: Space, fits: Sequence[Fit], limits: tuple[float, float]) -> tuple[Fit, ...]:

@@ -8,20 +8,21 @@ import numpy as np
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins import judgement, step_map
 from ranger_sim.sysid.twins.features import NAMES
-from ranger_sim.sysid.twins.model import RARE, Direction, Mean, View, mean_of
+from ranger_sim.sysid.twins.model import RARE, Direction, Knot, Mean, View, mean_of
 from ranger_sim.sysid.twins.step_map import FOOTHOLD, VOLTAGE, LegMap, Rest
 from ranger_sim.sysid.twins.steps import INNER, OUTER
 
 FOLDS = 4  # of sound twins, for thresholds
 SHRUNK = 0.02  # of a correlation towards none
 LEAST = 1e-4  # of a feature's size: a scatter below it is a constant's
+FEWEST_STEPS = 6  # of a walk that counts: others fell at once
 SIDES = (OUTER, INNER)
 
 
 @dataclasses.dataclass(frozen=True)
 class Twinned:
     """One twin. floor: its number; leg: (k,); found: (k, all features); key: of its cause, "" for a sound robot;
-    loose: of a body within tolerances."""
+    loose: of a body within tolerances; far: of a size far beyond those of the cause's line, square and cube."""
 
     floor: int
     leg: np.ndarray
@@ -29,6 +30,7 @@ class Twinned:
     key: str = ""
     size: float = 0.0
     loose: bool = False
+    far: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,16 +50,17 @@ def learned(twins: Sequence[Twinned], causes: Sequence[Cause], floors_m: Sequenc
     """The view by these twins."""
     sound = [each for each in twins if not each.key and not each.loose]
     legs = tuple(_map(sound, side, few) for side in SIDES)
-    rests = {id(each): step_map.rest(legs, each.leg, each.found, few) for each in twins}
+    near = [each for each in twins if not each.far]
+    rests = {id(each): step_map.rest(legs, each.leg, each.found, few) for each in near}
     view = _scattered([(each, rests[id(each)]) for each in sound], (legs[0], legs[1]), floors_m, few)
-    made = {each.key: [twin for twin in twins if twin.key == each.key] for each in causes}
+    made = {each.key: [twin for twin in near if twin.key == each.key] for each in causes}
     directions = [
         direction
         for each in causes
         if (direction := _direction(view, each, [(twin, rests[id(twin)]) for twin in made[each.key]])) is not None
     ]
     view = dataclasses.replace(view, directions=tuple(directions))
-    loose = [(each, rests[id(each)]) for each in twins if each.loose]
+    loose = [(each, rests[id(each)]) for each in near if each.loose]
     alarms = []
     for fold in range(FOLDS):
         kept = [(each, rests[id(each)]) for number, each in enumerate(sound) if number % FOLDS != fold]
@@ -68,7 +71,39 @@ def learned(twins: Sequence[Twinned], causes: Sequence[Cause], floors_m: Sequenc
         others += [(each, rests[id(each)]) for number, each in enumerate(sound) if number % FOLDS == fold]
         alarms += [_alarm(part, *pair) for pair in others]
     view = _loosened(view, loose)
-    return dataclasses.replace(view, alarms=np.array([each for each in alarms if each is not None]))
+    view = dataclasses.replace(view, alarms=np.array([each for each in alarms if each is not None]))
+    return with_far(view, causes, [each for each in twins if each.far])
+
+
+def with_far(view: View, causes: Sequence[Cause], twins: Sequence[Twinned]) -> View:
+    """The view whose directions have these twins of far sizes: what they move by and in how many steps."""
+    keys = {(each.cause, each.at, each.parameter): each.key for each in causes}
+    made: dict[str, list[Twinned]] = {}
+    for twin in twins:
+        made.setdefault(twin.key, []).append(twin)
+    return dataclasses.replace(
+        view,
+        directions=tuple(
+            dataclasses.replace(each, far=_far(view, made.get(keys[each.cause, each.at, each.parameter], [])))
+            for each in view.directions
+        ),
+    )
+
+
+def _far(view: View, twins: Sequence[Twinned]) -> tuple[Knot, ...]:
+    """A knot by size."""
+    knots = []
+    for size in sorted({each.size for each in twins}):
+        moved, steps = np.zeros(view.middle.shape[1]), 0
+        for twin in twins:
+            if twin.size != size or len(twin.leg) < FEWEST_STEPS:
+                continue
+            mean = mean_of(step_map.rest(view.legs, twin.leg, twin.found, view.few))
+            if mean is not None:
+                moved = moved + sum(mean.steps) * np.nan_to_num(mean.value - view.middle[twin.floor])
+                steps += sum(mean.steps)
+        knots.append(Knot(size, moved / max(steps, 1), steps))
+    return tuple(knots)
 
 
 def _loosened(view: View, loose: Sequence[tuple[Twinned, Rest]]) -> View:

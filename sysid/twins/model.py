@@ -22,8 +22,8 @@ SHOWN = 1.7  # times its variance on a level floor: a feature that has as much o
 
 @dataclasses.dataclass(frozen=True)
 class Knot:
-    """Walks that were emulated for one log, with a cause of one size. moved: (2 p,) from a sound walk; steps: of them,
-    0 when the robot falls at once with it."""
+    """Walks with a cause of one size. moved: (2 p,) from a sound walk; steps: of them, 0 when the robot falls at once
+    with it."""
 
     size: float
     moved: Array
@@ -35,7 +35,7 @@ class Direction:
     """How a cause moves the vector. terms: (3, 2 p) of its size, the square and the cube; unsure: (3, 3) covariance of
     these coefficients for a walk of one step; low, high: smallest and largest size that was made, which include 0;
     tolerance: deviation of the size among sound robots; knots: what was emulated for the log, by size; sound: the
-    farthest size that a sound robot reaches by itself now and then, 0 for none."""
+    farthest size that a sound robot reaches by itself now and then, 0 for none; far: twins far beyond low and high."""
 
     cause: str
     at: str
@@ -48,6 +48,7 @@ class Direction:
     unsure: Array
     knots: tuple[Knot, ...] = ()
     sound: float = 0.0
+    far: tuple[Knot, ...] = ()
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ from ranger_sim.foundation import json_text
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.plant import body_files
 from ranger_sim.sysid.dataset import Array
-from ranger_sim.sysid.twins.model import Direction, View
+from ranger_sim.sysid.twins.model import Direction, Knot, View
 from ranger_sim.sysid.twins.step_map import LegMap, outcomes
 
 FOLDER = pathlib.Path(__file__).parent / "files"
@@ -58,7 +58,11 @@ def written(file: TwinFile) -> bytes:
                 buffer = io.BytesIO()
                 np.save(buffer, np.asarray(values, dtype="<f4"), allow_pickle=False)
                 _add(archive, f"{name}/{part}.npy", buffer.getvalue())
-            texts = [{key: getattr(each, key) for key in OF_CAUSE} for each in view.directions]
+            texts = [
+                {key: getattr(each, key) for key in OF_CAUSE}
+                | {"far": [{"size": knot.size, "steps": knot.steps} for knot in each.far]}
+                for each in view.directions
+            ]
             _add(archive, f"{name}/directions.json", json.dumps({"few": view.few, "directions": texts}).encode())
     return made.getvalue()
 
@@ -75,6 +79,8 @@ def _arrays(view: View) -> dict[str, Array]:
         found |= {f"leg{number}_{part}": getattr(leg, part) for part in OF_LEG}
     found["terms"] = np.array([each.terms for each in view.directions])
     found["unsure"] = np.array([each.unsure for each in view.directions])
+    far = [knot for each in view.directions for knot in each.far]
+    found["far_moved"] = np.array([knot.moved for knot in far]).reshape(len(far), view.middle.shape[1])
     return found
 
 
@@ -98,8 +104,13 @@ def _view(archive: zipfile.ZipFile, name: str) -> View:
         return np.load(io.BytesIO(archive.read(f"{name}/{part}.npy")), allow_pickle=False).astype(np.float64)
 
     legs = [LegMap(*(array(f"leg{number}_{part}") for part in OF_LEG)) for number in range(2)]
+    moved = iter(array("far_moved"))
     directions = tuple(
-        Direction(terms=terms, unsure=unsure, **each)
+        Direction(
+            terms=terms,
+            unsure=unsure,
+            **each | {"far": tuple(Knot(knot["size"], next(moved), knot["steps"]) for knot in each["far"])},
+        )
         for each, terms, unsure in zip(texts["directions"], array("terms"), array("unsure"), strict=True)
     )
     parts = {part: array(part) for part in PARTS}

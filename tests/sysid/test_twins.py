@@ -1,6 +1,7 @@
 """The comparison of a walk with its twins: steps, features, maps, the file, and known answers of the judgement."""
 
 import dataclasses
+import pathlib
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from ranger_sim.sysid.results import TwinCause, TwinsEvidence, Value
 from ranger_sim.sysid.twins import evidence, features, judgement, learning, step_map, steps, twin_file
 from ranger_sim.sysid.twins.model import mean_of
 from ranger_sim.sysid.twins.step_map import FEW, FEW_START, Rest
-from ranger_sim.tools.twins import walking
+from ranger_sim.tools.twins import making, walking
 from ranger_sim.tools.twins.causes import TWINS
 from ranger_sim.tools.twins.emulation import REPEATS, WALKS, emulate
 
@@ -118,7 +119,8 @@ def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE):
     return leg, found
 
 
-def made_up_view():
+def made_up_view(far=()):
+    """far: twins beyond the others' sizes."""
     twins = [learning.Twinned(0, *made_up(100 + seed)) for seed in range(40)]
     twins += [learning.Twinned(0, *made_up(200 + seed), loose=True) for seed in range(10)]
     for place, size in enumerate((-0.4, -0.2, 0.2, 0.4) * 3):
@@ -128,12 +130,23 @@ def made_up_view():
         learning.Cause("one", "geometry", "feet", "foot_height_m", "", 0.0),
         learning.Cause("two", "inertia", "body", "mass_kg", "", 0.0),
     ]
-    return learning.learned(twins, causes, [0.0], few=True)
+    return learning.learned([*twins, *far], causes, [0.0], few=True)
 
 
 @pytest.fixture(scope="module")
 def view():
     return made_up_view()
+
+
+@pytest.fixture(scope="module")
+def far_view():
+    """With walks of the first cause at four times the largest size, and with one of the other that falls there."""
+    far = [
+        learning.Twinned(0, *made_up(600 + place, moved=bent(size)), key="one", size=size, far=True)
+        for place, size in enumerate((-1.6, 1.6, -1.6, 1.6))
+    ]
+    leg, found = made_up(610, other=1.6)
+    return made_up_view([*far, learning.Twinned(0, leg[:3], found[:3], key="two", size=1.6, far=True)])
 
 
 def judged(view, leg, found):
@@ -328,6 +341,64 @@ def test_a_size_far_beyond_those_of_twins_is_found_by_emulating_it(view, size):
     assert len(asked) <= judgement.EMULATIONS
 
 
+@pytest.mark.parametrize("size", [-1.9, -1.0, 1.2, 1.6])
+def test_far_twins_show_a_size_beyond_the_others_without_an_emulation(view, far_view, size):
+    leg, found = made_up(9750, moved=bent(size))
+    named = judged(far_view, leg, found).named
+    assert named.direction.cause == "geometry" and named.low <= size <= named.high
+    fit = judged(view, leg, found).fits[0]
+    assert not fit.low <= size <= fit.high
+
+
+def test_far_twins_leave_sizes_of_the_others_as_they_were(view, far_view):
+    sizes = np.array([-0.4, -0.1, 0.2, 0.4])
+    mean = mean_of(step_map.rest(view.legs, *made_up(9100, moved=0.3), few=True))
+    near, far = (judgement.Space(each, mean, np.ones(1)) for each in (view, far_view))
+    assert far.profile(0, sizes) == pytest.approx(near.profile(0, sizes), rel=1e-9)
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.05, 0.3])
+def test_far_twins_change_no_limit_and_detect_nothing_more(view, far_view, moved):
+    walk = made_up(9001, moved=moved)
+    near, far = judged(view, *walk), judged(far_view, *walk)
+    assert (far.detected, far.distance, far.limits) == (near.detected, near.distance, near.limits)
+    assert [size for _, size in far.visible] == [size for _, size in near.visible]
+
+
+def test_of_causes_that_leave_a_sound_walk_the_best_known_is_named_and_the_others_tie(view):
+    """A direction of few walks gains more, since its noise is taken off its length; what it gains beyond the noise of
+    a sound walk is chance."""
+    first = view.directions[0]
+    vague = dataclasses.replace(first, at="soles", unsure=10.0 * first.unsure)
+    verdict = judged(dataclasses.replace(view, directions=(vague, *view.directions)), *made_up(9100, moved=0.3))
+    assert verdict.named.direction.at == "feet"
+    assert [each.at for each in verdict.ties] == ["soles"]
+    gains = {fit.direction.at: fit.gain for fit in verdict.fits}
+    assert gains["soles"] > gains["feet"]
+
+
+def test_a_cause_that_leaves_more_than_a_sound_walk_has_no_tie_by_that_rule(view):
+    leg, found = made_up(9100, moved=0.3)
+    verdict = judged(view, leg, found)
+    assert verdict.named.direction.cause == "geometry" and verdict.ties == ()
+
+
+def test_a_size_with_which_a_far_twin_falls_is_not_an_answer(far_view):
+    least, most = judgement.reach_of(far_view.directions[1])
+    assert least == judgement.FARTHEST * -0.4
+    assert most == min(judgement.FARTHEST * 0.4, judgement.BELOW_FALL * 1.6)
+    fell = changed(far_view, far=(judgement.Knot(0.5, np.zeros(2 * len(FEW)), 0),)).directions[0]
+    assert judgement.reach_of(fell)[1] == judgement.BELOW_FALL * 0.5
+
+
+def test_a_cause_that_only_a_far_twin_shows_is_a_candidate(far_view):
+    """Near 0 it moves a walk less than its error; four times further it does not."""
+    weak = changed(far_view, terms=0.01 * far_view.directions[0].terms)
+    mean = mean_of(step_map.rest(far_view.legs, *made_up(9100, moved=bent(1.6)), few=True))
+    assert judgement.Space(weak, mean, np.ones(1)).is_known(0)
+    assert not judgement.Space(changed(weak, far=()), mean, np.ones(1)).is_known(0)
+
+
 def test_a_size_with_which_the_emulated_robot_falls_is_not_an_answer(view):
     verdict, asked = confirmed(view, 1.8, falls_from=1.1)
     assert max(abs(size) for _, size in asked) >= 1.1
@@ -418,7 +489,8 @@ def test_the_trimmed_mean_is_not_moved_by_a_single_step():
 # --- the file --------------------------------------------------------------------------------------------------
 
 
-def test_the_file_has_the_same_bytes_each_time_and_reads_back(view, tmp_path):
+def test_the_file_has_the_same_bytes_each_time_and_reads_back(far_view, tmp_path):
+    view = far_view
     file = twin_file.TwinFile({"few": view}, {"controller": "made-up", "parameters": {}})
     content = twin_file.written(file)
     assert content == twin_file.written(file)
@@ -427,7 +499,28 @@ def test_the_file_has_the_same_bytes_each_time_and_reads_back(view, tmp_path):
     again = twin_file.read(path)
     assert again.made_of == file.made_of and len(again.views["few"].directions) == 2
     assert again.views["few"].directions[0].terms == pytest.approx(view.directions[0].terms, rel=1e-6)
+    assert [[(knot.size, knot.steps) for knot in each.far] for each in again.views["few"].directions] == [
+        [(knot.size, knot.steps) for knot in each.far] for each in view.directions
+    ]
+    assert again.views["few"].directions[0].far[1].moved == pytest.approx(view.directions[0].far[1].moved, rel=1e-6)
     assert twin_file.written(again) == content
+
+
+def test_far_twins_have_twice_and_four_times_the_outermost_size_of_either_sign():
+    tasks = making.far_tasks("record-2011", "ranger")
+    assert len({making.path_of(pathlib.Path("here"), each) for each in tasks}) == len(tasks)
+    for twin in TWINS:
+        sizes = sorted({each.size for each in tasks if each.key == twin.key})
+        outermost = min(0.0, *twin.sizes), max(0.0, *twin.sizes)
+        assert sizes == sorted(times * size for times in (2.0, 4.0) for size in outermost if size)
+
+
+def test_a_far_size_that_no_body_has_counts_as_a_fall(tmp_path):
+    twin = next(each for each in TWINS if each.key == "coulomb_friction@outer_ankle@change_Nm")
+    tasks = [each for each in making.far_tasks("record-2011", "ranger") if each.key == twin.key and each.size < 0.0]
+    making.keep(tasks[0], tmp_path)
+    ((_, walked),) = making.made(tasks[:1], tmp_path)
+    assert walked.fell and len(walked.leg) == 0
 
 
 def test_another_file_is_refused_in_one_line(tmp_path):

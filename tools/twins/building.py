@@ -9,20 +9,15 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.twins import learning, twin_file
 from ranger_sim.sysid.twins.twin_file import FEW, FULL, LINK, TwinFile
 from ranger_sim.tools.twins.causes import TWINS
-from ranger_sim.tools.twins.making import FLOORS_M, made
+from ranger_sim.tools.twins.making import FAR_NAME, FLOORS_M, made
 from ranger_sim.tools.twins.walking import Task, Walked, fingerprint, values_of
-
-FEWEST_STEPS = 6  # of a walk that counts: others fell at once
 
 
 def built(tasks: list[Task], folder: pathlib.Path) -> TwinFile:
     """Maps, scatter and directions by all rates, from the walks in a folder."""
     walks = list(made(tasks, folder))
     first = tasks[0]
-    causes = [
-        learning.Cause(each.key, each.cause, each.at, each.parameter, each.form, each.tolerance, each.sound)
-        for each in TWINS
-    ]
+    causes = causes_of_twins()
     with threadpool_limits(1):  # threads of the linear algebra change the last digits
         views = {
             name: learning.learned(twins(walks, name), causes, FLOORS_M, few=name == FEW) for name in (FULL, LINK, FEW)
@@ -42,17 +37,25 @@ def built(tasks: list[Task], folder: pathlib.Path) -> TwinFile:
     return TwinFile(views, made_of)
 
 
+def causes_of_twins() -> list[learning.Cause]:
+    """The causes of the table of twins."""
+    return [
+        learning.Cause(each.key, each.cause, each.at, each.parameter, each.form, each.tolerance, each.sound)
+        for each in TWINS
+    ]
+
+
 def twins(walks: list[tuple[Task, Walked]], name: str) -> list[learning.Twinned]:
     """The walks that count, by the rate of a view."""
     found = []
     for task, walk in walks:
         features: Array = walk.full if name == FULL else walk.link
         count = min(len(walk.leg), len(features))
-        if count >= FEWEST_STEPS:
+        far = task.name.startswith(FAR_NAME)
+        if far or count >= learning.FEWEST_STEPS:
             floor = FLOORS_M.index(task.floor_m)
-            found.append(
-                learning.Twinned(floor, walk.leg[:count], features[:count], task.key, task.size, task.tolerances)
-            )
+            leg, rows = walk.leg[:count], features[:count]
+            found.append(learning.Twinned(floor, leg, rows, task.key, task.size, task.tolerances, far))
     return found
 
 
