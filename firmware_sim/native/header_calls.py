@@ -195,7 +195,10 @@ class Calls:
         d: cython.longlong,
         e: cython.longlong,
     ) -> cython.longlong:
-        """The result of call number `call` with its numbers; 0 for one without a result."""
+        """The result of call number `call` with its numbers; 0 for one without a result.
+
+        The function is long because every call of the header is a case of one switch.
+        """
         if call == CALL_ATTACH:
             self.attach(a)
         elif call == CALL_DETACH:

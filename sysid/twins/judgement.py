@@ -352,7 +352,7 @@ def judge(
         fits = space.fits()
         habits = habits_of(space, fits, limits)
     detected = detected and not habits
-    fits, most = best_known_first(space, fits, gain_limit)
+    fits, most = best_known_first(space, fits, gain_limit, emulate is not None)
     best = fits[0]
     named = None
     if detected and best.gain > gain_limit and best.left < sound_distance(view):
@@ -380,14 +380,19 @@ def judge(
     )
 
 
-def best_known_first(space: Space, fits: Sequence[Fit], gain_limit: float) -> tuple[list[Fit], float]:
+def best_known_first(
+    space: Space, fits: Sequence[Fit], gain_limit: float, are_confirmed: bool
+) -> tuple[list[Fit], float]:
     """The causes in the order in which they are named, and the most that the gain of one counts.
 
     Noise is left of a sound walk as well. What a cause gains beyond it is chance, and its direction's own noise, which
     far sizes have much of: of the causes that leave no more than a sound walk does, the one with the best known
-    direction comes first, and they tie.
+    direction comes first, and they tie. Where the likeliest have walked at their sizes for this log, they keep their
+    order: what one gains more than another is then no longer a matter of a bend that nobody has seen.
     """
     most = max(float(space.value @ space.value) - space.freedom, gain_limit)
+    if are_confirmed:
+        return list(fits), min(most, fits[0].gain)
     number = {id(each): place for place, each in enumerate(space.directions)}
 
     def error(fit: Fit) -> float:

@@ -121,7 +121,7 @@ def test_a_board_with_can_fd_controllers_has_no_image(tmp_path):
     manifest = "[firmware]\nname = 'small'\n[hardware]\ncan = 'fd'\n"
     folder = folder_with(tmp_path / "small", TIMER + START + SCHEDULE, manifest)
     assert lines(folder)[0].endswith(
-        "hardware.can is 'fd', and an image is for an LPC2194, whose CAN controllers are classic"
+        "hardware.can is 'fd', and an image is for an LPC2194, whose controllers are classic"
     )
     (folder / "firmware.toml").write_text(manifest.replace("'fd'", "'xl'"), encoding="utf-8")
     with pytest.raises(UserError, match="hardware.can is 'xl', allowed are classic, fd"):
