@@ -387,8 +387,8 @@ def best_known_first(
 
     Noise is left of a sound walk as well. What a cause gains beyond it is chance, and its direction's own noise, which
     far sizes have much of: of the causes that leave no more than a sound walk does, the one with the best known
-    direction comes first, and they tie. Where the likeliest have walked at their sizes for this log, they keep their
-    order: what one gains more than another is then no longer a matter of a bend that nobody has seen.
+    direction comes first, and they tie. are_confirmed: the likeliest have walked at their sizes for this log; they keep
+    their order then, because their directions are known there.
     """
     most = max(float(space.value @ space.value) - space.freedom, gain_limit)
     if are_confirmed:
