@@ -66,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
     command = argparse.ArgumentParser(
         prog=COMMAND, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    command.add_argument("room", nargs="+", choices=packages(), metavar="PACKAGE", help=", ".join(packages()))
+    command.add_argument("package", nargs="+", choices=packages(), metavar="PACKAGE", help=", ".join(packages()))
     command.add_argument(
         "--count", type=whole_number(1), default=COUNT, metavar="N", help=f"mutants of each package (default {COUNT})"
     )
@@ -135,8 +135,8 @@ def run(options: argparse.Namespace) -> int:
     options.work.mkdir(parents=True, exist_ok=True)
     copy = Copy(options.work / "copy")
     found = {}
-    for room in dict.fromkeys(options.room):
-        found[room] = of_room(options, copy, room, listed, say)
+    for package in dict.fromkeys(options.package):
+        found[package] = of_package(options, copy, package, listed, say)
     text = json.dumps({"seed": options.seed, "mutate": found}, indent=2)
     if json_file is not None:
         replace_file(json_file, (text + "\n").encode())
@@ -145,15 +145,15 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(each["survivors"] for each in found.values()) else 0
 
 
-def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Known], say: Any) -> dict:
+def of_package(options: argparse.Namespace, copy: Copy, package: str, listed: list[Known], say: Any) -> dict:
     """Figures of one package, after all its mutants of this run have a verdict."""
     equivalent = {each.key for each in listed}
-    every = all_mutants(room)
-    drawn = sample(every, room, options.count, options.seed)
+    every = all_mutants(package)
+    drawn = sample(every, package, options.count, options.seed)
     if options.at:
         drawn = [mutant for mutant in every if f"{mutant.path}:{mutant.line}" in options.at]
-    results = Results(options.work / f"verdicts-{room}.jsonl")
-    wanted = options.tests or [f"tests/{room}", *ALSO.get(room, ())]
+    results = Results(options.work / f"verdicts-{package}.jsonl")
+    wanted = options.tests or [f"tests/{package}", *ALSO.get(package, ())]
 
     def keep(mutant: Mutant, verdict: Verdict) -> None:
         results.add(verdict)
@@ -171,9 +171,9 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
         build_later = compiled and options.build and len(of_mode) < len(drawn_open)
         if not of_mode and not build_later:
             continue
-        paths = [*wanted, *WALKS.get(room, ())] if compiled and not options.tests else wanted
+        paths = [*wanted, *WALKS.get(package, ())] if compiled and not options.tests else wanted
         with copy.server(paths, compiled) as ask:
-            maps[compiled] = reach_of(copy, ask, room, paths, options.map_limit, say)
+            maps[compiled] = reach_of(copy, ask, package, paths, options.map_limit, say)
             for mutant in of_mode:
                 keep(mutant, judge(copy, ask, mutant, maps[compiled], options.limit))
     if options.build and False in maps:
@@ -181,10 +181,12 @@ def of_room(options: argparse.Namespace, copy: Copy, room: str, listed: list[Kno
         for mutant in drawn_open:
             if not copy.runs_compiled(mutant) and results.verdicts[mutant.key].outcome not in NOTICED:
                 keep(mutant, judge_built(built, mutant, maps[False], maps[True], options.build))
-    return told(room, every, drawn, results, equivalent, say)
+    return told(package, every, drawn, results, equivalent, say)
 
 
-def told(room: str, every: list[Mutant], drawn: list[Mutant], results: Results, equivalent: set[str], say: Any) -> dict:
+def told(
+    package: str, every: list[Mutant], drawn: list[Mutant], results: Results, equivalent: set[str], say: Any
+) -> dict:
     """Count the verdicts and print the survivors."""
     counts = Counter("equivalent" if each.key in equivalent else results.verdicts[each.key].outcome for each in drawn)
     judged = len(drawn) - counts["equivalent"]
@@ -200,7 +202,7 @@ def told(room: str, every: list[Mutant], drawn: list[Mutant], results: Results, 
         say(f"\n{mutant.path}:{mutant.line}: {outcome}; {mutant.function or 'module'}\n{mutant.difference(source)}")
     share = "none" if rate is None else f"{100.0 * rate:.0f} %"
     parts = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
-    say(f"\n{room}: {noticed} of {judged} noticed, {share} ({parts}; {len(every)} mutants in all)")
+    say(f"\n{package}: {noticed} of {judged} noticed, {share} ({parts}; {len(every)} mutants in all)")
     return {"mutants": len(every), "drawn": len(drawn), "rate": rate, **counts, "survivors": survivors}
 
 

@@ -43,7 +43,7 @@ class TooLong(BaseException):
 # --- functions and their code -----------------------------------------------------------------------------------
 
 
-def functions_of_rooms() -> list[FunctionType]:
+def functions_of_packages() -> list[FunctionType]:
     """Every function of the packages that exists now, decorated ones and methods as well."""
     return [
         each
@@ -82,7 +82,7 @@ def exchange(path: pathlib.Path, before: str, after: str) -> None:
         for key, old in by_name(compile(before, str(path), "exec")).items()
         if key in changed
     }
-    for each in functions_of_rooms():
+    for each in functions_of_packages():
         code = each.__code__
         old, other = new.get((code.co_qualname, code.co_firstlineno), (code, code))
         same_names = len(other.co_freevars) == len(code.co_freevars)
@@ -101,7 +101,7 @@ class Watch:
     """
 
     def __init__(self) -> None:
-        every = functions_of_rooms()
+        every = functions_of_packages()
         self.codes = {each: each.__code__ for each in every if not each.__code__.co_freevars}
         self.unwatched = {each.__code__ for each in every if each.__code__.co_freevars}
         self.stubs = {each: self._stub(each, code) for each, code in self.codes.items()}

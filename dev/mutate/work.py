@@ -84,19 +84,19 @@ def known(path: pathlib.Path = EQUIVALENT) -> list[Known]:
     return found
 
 
-def all_mutants(room: str, house: pathlib.Path = PACKAGE) -> list[Mutant]:
+def all_mutants(package: str, source: pathlib.Path = PACKAGE) -> list[Mutant]:
     """Every mutant of a package, in order of file and place."""
     found: list[Mutant] = []
-    for path in sorted((house / room).rglob("*.py")):
-        name = path.relative_to(house).as_posix()
+    for path in sorted((source / package).rglob("*.py")):
+        name = path.relative_to(source).as_posix()
         if not name.startswith(NOT_MUTATED):
             found += mutants(path.read_text(encoding="utf-8"), name)
     return found
 
 
-def sample(every: list[Mutant], room: str, count: int, seed: int) -> list[Mutant]:
+def sample(every: list[Mutant], package: str, count: int, seed: int) -> list[Mutant]:
     """The first `count` of an order fixed by seed and package: a larger count begins with the same ones."""
-    order = generator(seed, f"mutants of {room}").permutation(len(every))
+    order = generator(seed, f"mutants of {package}").permutation(len(every))
     return [every[number] for number in order[:count]]
 
 
@@ -106,38 +106,38 @@ def sample(every: list[Mutant], room: str, count: int, seed: int) -> list[Mutant
 class Copy:
     """The repository's files in another folder, where mutants live; the folder may be one that an earlier run left."""
 
-    def __init__(self, folder: pathlib.Path, house: pathlib.Path | None = CHECKOUT) -> None:
-        if house is None:
+    def __init__(self, folder: pathlib.Path, source: pathlib.Path | None = CHECKOUT) -> None:
+        if source is None:
             raise UserError("mutants need a checkout with its .git")
         self.folder = folder = folder.resolve()  # programs there have a different working folder
-        self.house = house
+        self.source = source
         listed = subprocess.run(
             ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-            cwd=house,
+            cwd=source,
             capture_output=True,
             check=False,
         )
         if listed.returncode:
-            raise UserError(f"{house}: mutants need a checkout with its .git: {listed.stderr.decode().strip()}")
+            raise UserError(f"{source}: mutants need a checkout with its .git: {listed.stderr.decode().strip()}")
         names = [
             name
             for name in listed.stdout.decode().split("\0")
-            if name and ((house / name).is_file() or (house / name).is_symlink())
+            if name and ((source / name).is_file() or (source / name).is_symlink())
         ]
         for name in names:
             there = folder / name
             there.parent.mkdir(parents=True, exist_ok=True)
             there.unlink(missing_ok=True)
-            shutil.copy2(house / name, there, follow_symlinks=False)
+            shutil.copy2(source / name, there, follow_symlinks=False)
         for path in [path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts]:
             if path.relative_to(folder).as_posix() not in set(names) and path.suffix in (".py", ".pxd", ".toml"):
                 path.unlink()  # gone since an earlier run
         for cache in [path for path in folder.rglob("__pycache__") if path.is_dir()]:
             shutil.rmtree(cache)  # an earlier run gave its files the same time stamps
         self.stamp = int((folder / "pyproject.toml").stat().st_mtime)
-        self.compiled = RUNS_COMPILED and house == CHECKOUT
+        self.compiled = RUNS_COMPILED and source == CHECKOUT
         if self.compiled and COMPILED is not None:
-            shutil.copytree(COMPILED, folder / COMPILED.relative_to(house), dirs_exist_ok=True)
+            shutil.copytree(COMPILED, folder / COMPILED.relative_to(source), dirs_exist_ok=True)
 
     def runs_compiled(self, mutant: Mutant) -> bool:
         """True when the rest of the robot may run compiled: the mutant's own file never is."""
@@ -203,13 +203,15 @@ class Copy:
 class Built(Copy):
     """A copy whose compiled modules are rebuilt with each mutant, as `make test` would run them."""
 
-    def __init__(self, folder: pathlib.Path, house: pathlib.Path | None = CHECKOUT) -> None:
-        super().__init__(folder, house)
+    def __init__(self, folder: pathlib.Path, source: pathlib.Path | None = CHECKOUT) -> None:
+        super().__init__(folder, source)
         if not self.compiled:
-            raise UserError(f"{house}: nothing is compiled there, so that no mutant can be: {RUNS_INTERPRETED_BECAUSE}")
+            raise UserError(
+                f"{source}: nothing is compiled there, so that no mutant can be: {RUNS_INTERPRETED_BECAUSE}"
+            )
         shutil.rmtree(self.folder / "build", ignore_errors=True)  # an earlier run may have left a mutant in it
-        for made in ("cython", "compiled", *(each.name for each in (self.house / "build").glob("temp.*"))):
-            shutil.copytree(self.house / "build" / made, self.folder / "build" / made)
+        for made in ("cython", "compiled", *(each.name for each in (self.source / "build").glob("temp.*"))):
+            shutil.copytree(self.source / "build" / made, self.folder / "build" / made)
 
     def put(self, path: str, text: str) -> None:
         """Set the file's text, newer than all built files."""
@@ -360,30 +362,30 @@ class TestsOf:
 
 
 def reach_of(
-    copy: Copy, ask: Asked, room: str, tests: list[str], limit_s: float, say: Callable[[str], None]
+    copy: Copy, ask: Asked, package: str, tests: list[str], limit_s: float, say: Callable[[str], None]
 ) -> TestsOf:
     """The map of a package's tests, file by file: made by running them once, kept until the package or file changes.
 
     A test that takes longer than LIMIT_TEST_S is not run again, one that fails or a file that takes longer than
     `limit_s` takes no part, and this is reported. UserError when a map cannot be made at all.
     """
-    folder = copy.folder.parent / f"reach-{room}{'-compiled' if ask.compiled else ''}"
+    folder = copy.folder.parent / f"reach-{package}{'-compiled' if ask.compiled else ''}"
     folder.mkdir(exist_ok=True)
     files = list(dict.fromkeys(file for path in tests for file in files_of_tests(copy.folder / path)))
     if not files:
-        raise UserError(f"{room}: there are no tests in {', '.join(tests)}")
+        raise UserError(f"{package}: there are no tests in {', '.join(tests)}")
     found: dict[str, Any] = {}
     for file in files:
         name = file.relative_to(copy.folder).as_posix()
         kept = folder / f"{name.replace('/', '.')}.json"
-        state = state_of(copy.folder, room, file)
+        state = state_of(copy.folder, package, file)
         if not kept.exists() or json.loads(kept.read_text(encoding="utf-8")).get("state") != state:
             partial = kept.with_suffix(".partial")
             answer = ask(map=name, to=str(partial), limit_s=limit_s, limit_test_s=LIMIT_TEST_S)
             if answer["code"] == 0:
-                say(f"{room}: {name} is mapped")
+                say(f"{package}: {name} is mapped")
             elif answer["code"] is None:
-                say(f"{room}: {name} takes no part: it takes too long")
+                say(f"{package}: {name} takes no part: it takes too long")
                 partial.write_text(json.dumps(NOTHING | {"failed": [name]}), "utf-8")
             else:
                 raise UserError(f"{name}: its map cannot be made: {answer['by']}")
@@ -393,18 +395,19 @@ def reach_of(
         found[name] = json.loads(kept.read_text(encoding="utf-8"))
     failed = [name for each in found.values() for name in each["failed"]]
     if failed:
-        say(f"{room}: {len(failed)} tests fail or skip and take no part: {', '.join(failed[:3])} ...")
+        say(f"{package}: {len(failed)} tests fail or skip and take no part: {', '.join(failed[:3])} ...")
     late = [name for each in found.values() for name in each["late"]]
     if late:
-        say(f"{room}: {len(late)} tests last longer than {LIMIT_TEST_S:g} s and are not run: {', '.join(late[:3])} ...")
+        some = ", ".join(late[:3])
+        say(f"{package}: {len(late)} tests last longer than {LIMIT_TEST_S:g} s and are not run: {some} ...")
     return TestsOf(found, importers_in(copy.folder))
 
 
 def importers_in(folder: pathlib.Path) -> dict[str, set[str]]:
     """{module: modules that import it or from it}, as paths; folder: the checkout or a copy of it."""
     importers: dict[str, set[str]] = {}
-    for room in packages():
-        for path in (folder / room).rglob("*.py"):
+    for package in packages():
+        for path in (folder / package).rglob("*.py"):
             reader = path.relative_to(folder).as_posix()
             for node in ast.walk(ast.parse(path.read_bytes())):
                 names = []
@@ -419,11 +422,11 @@ def importers_in(folder: pathlib.Path) -> dict[str, set[str]]:
     return importers
 
 
-def state_of(folder: pathlib.Path, room: str, tests: pathlib.Path) -> str:
+def state_of(folder: pathlib.Path, package: str, tests: pathlib.Path) -> str:
     """A digest of the inputs of a map: the package's sources, a file of tests and its helpers."""
     digest = hashlib.sha256()
     helpers = [path for path in tests.parent.glob("*.py") if not path.name.startswith("test_")]
-    for path in (*sorted((folder / room).rglob("*.py")), *sorted(helpers), tests):
+    for path in (*sorted((folder / package).rglob("*.py")), *sorted(helpers), tests):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

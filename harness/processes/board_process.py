@@ -2,7 +2,6 @@
 
 import os
 import sys
-import traceback
 from typing import Any
 
 from ranger_sim.can_bus.edge.peers import reasons_text
@@ -11,7 +10,7 @@ from ranger_sim.firmware_sim.native import confinement, coverage
 from ranger_sim.firmware_sim.native.sanitizers import place_of_findings
 from ranger_sim.firmware_sim.native.trial import needs_of
 from ranger_sim.foundation import wallclock
-from ranger_sim.foundation.user_error import BoardFailure
+from ranger_sim.foundation.user_error import BoardFailure, raised
 from ranger_sim.harness.firmware.fresh_board import connected, first_outputs, fresh_board, pass_on, take_edges
 from ranger_sim.harness.processes import kernel, places
 from ranger_sim.harness.processes.block import Block
@@ -129,9 +128,7 @@ def serve(
             if away := reasons_text(server.sent_away):
                 print(f"gdb for {name}: {away}", file=sys.stderr, flush=True)
     except BaseException as error:  # noqa: BLE001  (the supervisor reports any error of a board's program)
-        where = traceback.extract_tb(error.__traceback__)[-1:]
-        place_text = f" ({os.path.basename(where[0].filename)}:{where[0].lineno})" if where else ""
-        text = error.text if isinstance(error, BoardFailure) else f"{type(error).__name__}: {error}{place_text}"
+        text = error.text if isinstance(error, BoardFailure) else raised(error)
         block.leave_fault(text)
         return FAILED
     return 0

@@ -237,9 +237,9 @@ def test_that_fails_in_a_second_process():
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory):
+def source(tmp_path_factory):
     """A checkout small enough to be mutated in a test."""
-    root = tmp_path_factory.mktemp("mutate") / "house"
+    root = tmp_path_factory.mktemp("mutate") / "source"
     needed = ("ranger_sim/__init__.py", "ranger_sim/loading.py")
     for name in (*needed, "dev/__init__.py", "dev/mutate/__init__.py", "dev/mutate/serve.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -257,9 +257,9 @@ def house(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def tried(house):
+def tried(source):
     """{(function, change): verdict} of all its mutants."""
-    root = house
+    root = source
     copy = work.Copy(root.parent / "work" / "copy", root)
     results = work.Results(root.parent / "work" / "verdicts.jsonl")
     with copy.server(["tests"]) as ask:
@@ -289,10 +289,10 @@ def test_mutants_are_noticed_or_survive_in_a_copy_and_verdicts_are_kept(tried):
     assert tried["twice", "2 -> (3)"].by == "tests/test_valve.py::test_it_doubles"
 
 
-def test_a_mutant_is_noticed_as_well_by_a_second_server_that_has_a_map_already(house, tried, monkeypatch):
+def test_a_mutant_is_noticed_as_well_by_a_second_server_that_has_a_map_already(source, tried, monkeypatch):
     """It must have imported everything when the first mutant is put into a file; folders may be given from here."""
-    monkeypatch.chdir(house.parent)
-    copy = work.Copy(pathlib.Path("work/copy"), house)
+    monkeypatch.chdir(source.parent)
+    copy = work.Copy(pathlib.Path("work/copy"), source)
     (copy.folder / "seen").unlink()
     said = []
     with copy.server(["tests"]) as ask:
@@ -312,8 +312,8 @@ class Rebuilt(work.Copy):
         return "not a" not in (self.folder / "plant" / "valve.py").read_text(encoding="utf-8")
 
 
-def test_what_is_built_anew_is_noticed_by_tests_that_pass_with_the_original(house):
-    copy = Rebuilt(house.parent / "built" / "copy", house)
+def test_what_is_built_anew_is_noticed_by_tests_that_pass_with_the_original(source):
+    copy = Rebuilt(source.parent / "built" / "copy", source)
     (copy.folder / "seen").touch()  # so that the last of TESTS always fails
     names = ["it_clips", "it_doubles", "that_fails_in_a_second_process"]
     every = {f"tests/test_valve.py::test_{name}": {"seconds": 0.1, "functions": [], "starts": False} for name in names}
@@ -332,7 +332,7 @@ def test_what_is_built_anew_is_noticed_by_tests_that_pass_with_the_original(hous
 
 
 def test_packages_have_mutants_and_no_key_twice():
-    for room in ("foundation", "datatable"):
-        keys = [each.key for each in work.all_mutants(room)]
+    for package in ("foundation", "datatable"):
+        keys = [each.key for each in work.all_mutants(package)]
         assert len(keys) == len(set(keys)) > 300
         assert not any(key.startswith("datatable/generated/") for key in keys)
