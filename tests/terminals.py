@@ -92,12 +92,18 @@ class Terminal:
             assert wallclock.monotonic_s() < end, f"no {text!r} in:\n{self.shown[-2000:]}"
 
     def suspend(self) -> None:
-        """Stop its process group, as Ctrl-Z does where a shell has started it, and wait for that."""
-        os.killpg(self.process, signal.SIGSTOP)  # a group without a shell would ignore SIGTSTP
+        """Stop its process group, as Ctrl-Z does where a shell has started it, and wait for that.
+
+        Its first process stops before the others: one that is just starting a program by vfork can stop only when that
+        program has been loaded, which never happens when both are stopped at once. SIGSTOP because a group without a
+        shell would ignore SIGTSTP.
+        """
+        os.kill(self.process, signal.SIGSTOP)
         end = wallclock.monotonic_s() + PATIENCE_S
         while self.stopped is None:
             self.read(0.1)
             assert self.is_there() and wallclock.monotonic_s() < end, self.shown
+        os.killpg(self.process, signal.SIGSTOP)
 
     def resume(self) -> None:
         """Continue it, as `fg` of a shell does."""
