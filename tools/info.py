@@ -9,7 +9,6 @@ from typing import Any
 from rich.table import Table
 
 from ranger_sim import __version__, datatable, loading
-from ranger_sim.can_bus.edge import interfaces
 from ranger_sim.tools.command_line import terminal
 
 
@@ -22,6 +21,8 @@ def register(commands: Any) -> None:
 
 def facts() -> dict[str, Any]:
     """Everything that the command reports, as plain data."""
+    from ranger_sim.can_bus.edge import interfaces  # loads python-can, which its help does not need
+
     declared = set(loading.declared_modules())
     return {
         "version": __version__,

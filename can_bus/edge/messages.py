@@ -1,12 +1,10 @@
-"""Frames of the bus as messages of python-can, and back.
-
-A CAN FD frame of more than eight bytes has all bytes from the fifth on in its word `hi`.
-"""
+"""Frames of the bus as messages of python-can, and back."""
 
 import can
 
+from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.fd_frame import fd_data_length, length_code, padded
-from ranger_sim.can_bus.frame import LENGTH_CODE, data_length
+from ranger_sim.can_bus.frame import LENGTH_CODE
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError
 
@@ -84,16 +82,3 @@ def frame_of_message(message: can.Message, fd: bool = False) -> tuple[int, int, 
         return message.arbitration_id, flags | FLAG_REMOTE, 0, 0
     lo, hi = words_of_data(bytes(message.data))
     return message.arbitration_id, flags, lo, hi
-
-
-def data_of_words(flags: int, lo: int, hi: int) -> bytes:
-    """The data bytes that a frame carries, 0 ... 8; CAN FD 0 ... 64."""
-    if flags & FLAG_FD:
-        return (lo | hi << 32).to_bytes(64, "little")[: fd_data_length(flags)]
-    return (lo.to_bytes(4, "little") + hi.to_bytes(4, "little"))[: data_length(flags)]
-
-
-def words_of_data(data: bytes) -> tuple[int, int]:
-    """Up to eight data bytes as the words lo (bytes 0-3) and hi (bytes 4-7), little-endian."""
-    padded = data.ljust(8, b"\0")
-    return int.from_bytes(padded[:4], "little"), int.from_bytes(padded[4:8], "little")

@@ -6,7 +6,7 @@ C (close), t T r R (send), F (status), V v N (version, serial number), Z (stamps
 """
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.peers import FULL, Terminal
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Taps

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.messages import data_of_words, words_of_data
+from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream, listening_address
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps

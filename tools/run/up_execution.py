@@ -6,12 +6,11 @@ import argparse
 import contextlib
 import pathlib
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from ranger_sim import loading
-from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener
 from ranger_sim.datatable.addresses import XCP_MASTER_ID, XCP_SLAVE_ID
 from ranger_sim.harness.firmware.printed import Printed
 from ranger_sim.harness.processes import places
@@ -36,6 +35,9 @@ from ranger_sim.tools.run.logs import PrintedFiles, RunLogs
 from ranger_sim.tools.run.up_plan import OutsideBus, Plan
 from ranger_sim.tools.run.up_view import PLAIN_S, LiveView, PlainView, print_processes
 from ranger_sim.tools.timing import trace
+
+if TYPE_CHECKING:
+    from ranger_sim.can_bus.edge.external_bus import ExternalBus
 
 
 class Execution:
@@ -106,7 +108,10 @@ class Execution:
         plan, options = self.plan, self.options
         bit_rates = {each.name: each.bitrate for each in robot.buses}
         self.outside = [external(each, bit_rates[each.name]) for each in plan.outside]
-        self.openers = {board: opener(board, dict(keywords)) for board, keywords in plan.peers.items()}
+        if plan.peers:
+            from ranger_sim.can_bus.edge.external_bus import opener
+
+            self.openers = {board: opener(board, dict(keywords)) for board, keywords in plan.peers.items()}
         self.ends, lines = serial_options.connect(robot, options)
         self.servers, where = bus.open_servers({each.name: each for each in robot.buses}, options)
         lines += where
@@ -204,6 +209,8 @@ class Execution:
 
 def external(planned: OutsideBus, own_rate: int) -> ExternalBus:
     """The bus, not opened yet. own_rate: of the emulated bus, bit/s."""
+    from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener  # python-can: only where it is used
+
     rate = own_rate if planned.bit_rate is None else planned.bit_rate
     return ExternalBus(planned.name, rate, opener(planned.name, dict(planned.keywords)))
 

@@ -49,6 +49,11 @@ def test_the_options_of_a_diagnosis_load_no_can_library_and_no_reader_of_another
     assert loaded(["can", "asammdf", "pandas", "scipy"], "diagnose", "--help") == ""
 
 
+def test_a_bus_a_robot_without_adapters_and_the_versions_need_no_library_of_can_adapters_for_their_options():
+    for name in ("bus", "info", "up"):
+        assert loaded(["can", "asammdf", "pandas"], name, "--help") == "", name
+
+
 def test_a_campaign_of_a_users_machine_loads_nothing_of_the_robot(tmp_path):
     (tmp_path / "servo.py").write_text("def new():\n    raise ValueError\n", encoding="utf-8")
     plan = tmp_path / "plan.toml"
