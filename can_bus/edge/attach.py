@@ -37,6 +37,7 @@ class _Client(Connection):
     def __init__(self, connection: socket.socket) -> None:
         super().__init__(SocketStream(connection))
         self.outstanding = 0  # SEND records without an answer yet
+        self.is_fd = False
         self.missed = 0
         self.overflowing = False
         self.state = b""  # the latest STATE record, while it does not fit
@@ -100,8 +101,8 @@ class AttachServer(StreamServer[_Client]):
         if tap is None or taps is None:
             raise MalformedError(f"record type {kind} before HELLO")
         if kind == wire.SEND:
-            identifier, flags, lo, hi = wire.unpacked(wire.SEND_BODY, body)
-            fault = fault_of_frame(identifier, flags, lo, hi)
+            identifier, flags, lo, hi = wire.frame_of(wire.SEND_HEAD, body)
+            fault = fault_of_frame(identifier, flags, lo, hi, client.is_fd)
             if fault:
                 raise MalformedError(fault)
             if client.outstanding >= tap.depth:
@@ -150,11 +151,15 @@ class AttachServer(StreamServer[_Client]):
                 reason = f"{self.name!r} has no channel {channel!r}; it has {known}"
                 self.send_away(client, MALFORMED, self._refused(reason))
                 return
+            client.is_fd = bool(options & wire.OPTION_FD)
+            if client.is_fd and not taps.bus.is_fd:
+                self.send_away(client, MALFORMED, self._refused(f"{self.name}/{channel} is classic CAN, not CAN FD"))
+                return
             if taps.full:
                 self.send_away(client, FULL)
                 return
             client.taps = taps
-            client.tap = taps.add(f"{channel} client {self.totals['clients_seen']}")
+            client.tap = taps.add(f"{channel} client {self.totals['clients_seen']}", client.is_fd)
             self.totals["clients_seen"] += 1
             window, bitrate = client.tap.depth, taps.bus.bitrate
             if options & wire.OPTION_LISTEN:
@@ -163,6 +168,9 @@ class AttachServer(StreamServer[_Client]):
         client.answer(
             wire.record(wire.WELCOME, wire.WELCOME_BODY.pack(wire.VERSION, window, bitrate, self.epoch_ns) + names)
         )
+        if client.is_fd and client.taps is not None:
+            bus = client.taps.bus
+            client.answer(wire.record(wire.FD, wire.FD_BODY.pack(bus.data_bitrate, bus.iso)))
 
     def _report(self, client: _Client) -> None:
         """Send bus events as records. For a client that is far behind, frames are dropped and counted."""
@@ -193,7 +201,10 @@ class AttachServer(StreamServer[_Client]):
                     client.overflowing = False
                     out += wire.record(wire.OVERFLOW, wire.OVERFLOW_BODY.pack(time + epoch, client.missed))
                 self.totals["frames_out"] += 1
-                out += pack(size, wire.FRAME, time + epoch, a, b, c, d)
+                if client.is_fd:
+                    out += wire.frame_record(wire.FRAME, time + epoch, a, b, c, d)
+                else:
+                    out += pack(size, wire.FRAME, time + epoch, a, b, c, d)
             else:
                 client.outstanding -= 1
-                client.answer(pack(size, EVENT_RECORD[kind], time + epoch, a, b, c, d))
+                client.answer(wire.frame_record(EVENT_RECORD[kind], time + epoch, a, b, c, d))

@@ -48,10 +48,13 @@ class AttachedLink(Link):
         listen_only: bool = False,
         receive_own: bool = False,
         queue_limit: int = RECEIVE_QUEUE,
+        fd: bool = False,
     ) -> None:
         super().__init__(f"{name}/{channel}", receive_own, queue_limit)
-        self.socket, welcome = handshake(name, channel, wire.OPTION_LISTEN if listen_only else 0)
+        options = (wire.OPTION_LISTEN if listen_only else 0) | (wire.OPTION_FD if fd else 0)
+        self.socket, welcome = handshake(name, channel, options)
         _, self.window, self.bitrate, self.epoch_ns, self.channels, rest = welcome
+        self.data_bitrate, self.iso = 0, True  # of CAN FD: directly after the welcome
         self.state = LISTENING if listen_only else ERROR_ACTIVE
         self.incoming = rest
         self.outstanding = 0
@@ -62,6 +65,11 @@ class AttachedLink(Link):
         self.epoll: Any = None  # a `select.epoll` of `socket` and `signal`
         with self.changed:
             self._understand()  # frames may have arrived directly after the welcome
+            if fd:
+                self._wait(lambda: self.data_bitrate > 0, HANDSHAKE_S)
+        if fd and not self.data_bitrate:
+            self.close()
+            raise BusError(f"attaching to {name!r}: {self.gone or 'no bit rate of CAN FD has come'}")
 
     def send(self, identifier: int, flags: int, lo: int, hi: int, timeout: float | None) -> None:
         """Queue a frame, waiting up to `timeout` s for a place.
@@ -208,17 +216,24 @@ class AttachedLink(Link):
         """Process the received records in order."""
         frame_size, unpack = wire.FRAME_BODY.size, wire.FRAME_BODY.unpack
         for kind, body in wire.records_of(self.incoming):
-            if kind == wire.FRAME and len(body) == frame_size:
+            if kind == wire.FRAME and len(body) == frame_size:  # eight data bytes are two words as well
                 self._arrive((RECEIVED, *unpack(body)))
+            elif kind == wire.FRAME:
+                time, identifier, flags, lo, hi = wire.frame_of(wire.FRAME_HEAD, body)
+                self._arrive((RECEIVED, time, identifier, flags, lo, hi))
             elif kind in (wire.SENT, wire.DROPPED):
                 self.outstanding -= 1
-                self._arrive((SENT if kind == wire.SENT else DROPPED, *wire.unpacked(wire.FRAME_BODY, body)))
+                time, identifier, flags, lo, hi = wire.frame_of(wire.FRAME_HEAD, body)
+                self._arrive((SENT if kind == wire.SENT else DROPPED, time, identifier, flags, lo, hi))
             elif kind == wire.STATE:
                 time, state, transmit, receive = wire.unpacked(wire.STATE_BODY, body)
                 self._arrive((STATE, time, state, transmit, receive, 0))
             elif kind == wire.OVERFLOW:
                 time, self.missed_frames = wire.unpacked(wire.OVERFLOW_BODY, body)
                 self._arrive(overflow_frame(time))
+            elif kind == wire.FD:
+                self.data_bitrate, iso = wire.unpacked(wire.FD_BODY, body)
+                self.iso = bool(iso)
             elif kind == wire.REFUSED:
                 self.gone = body.decode("utf-8", "replace")
             else:

@@ -98,10 +98,10 @@ class PacedBus:
             node = self.bus.add_node(f"{self.channel} acknowledger", self.acknowledger, 1, ORDER)
             self.bus.nodes[node].listening = False
 
-    def add(self, name: str) -> Tap:
-        """Add a client, from now on."""
+    def add(self, name: str, fd: bool = True) -> Tap:
+        """Add a client, from now on; see `Taps.add`."""
         self.advance()
-        return self.taps.add(name)
+        return self.taps.add(name, fd)
 
     def now(self) -> int:
         """Virtual time that the wall clock allows, ns."""

@@ -69,9 +69,7 @@ class PrivateLink(Link):
         self.changed = threading.Condition(bus.lock)
         self.pump: threading.Thread | None = None
         with bus.lock:
-            self.tap = bus.paced.add(label)
-            if bus.paced.bus.is_fd:
-                bus.paced.bus.set_classic(self.tap.node, not fd)
+            self.tap = bus.paced.add(label, fd)
             if listen_only:
                 self.tap.listen(bus.paced.time)
             bus.links.append(self)

@@ -64,7 +64,8 @@ class RangerSimBus(can.BusABC):
 
     fd: True makes the private bus CAN FD, with data_bitrate (default 2 Mbit/s, or the nominal rate where that is
     higher), fd_non_iso as before ISO 11898-1:2015, and the sample points of timing, a can.BitTimingFd. On such a bus a
-    client without fd is a classic node, which answers FD frames with error frames. Robots and hosts are classic.
+    client without fd is a classic node, which answers FD frames with error frames. Attached, fd needs a CAN FD bus
+    there (`ranger-sim bus --data-bitrate`), and data_bitrate and fd_non_iso must be its own.
 
     Stamps of a robot are its own time since power-up, those of other buses seconds since 1970.
     """
@@ -144,7 +145,7 @@ class RangerSimBus(can.BusABC):
     ) -> AttachedLink | None:
         """A place on a running robot's bus; None when none runs and no particular one was requested."""
         try:
-            link = AttachedLink(name, channel, listen, own, limit)
+            link = AttachedLink(name, channel, listen, own, limit, self._fd)
         except FileNotFoundError:
             if not named:
                 return None
@@ -158,10 +159,13 @@ class RangerSimBus(can.BusABC):
                 return None  # a system without abstract sockets
             raise
         fault = ""
-        if self._fd:
-            fault = "is classic CAN, not CAN FD"
-        elif rate is not None and rate != link.bitrate:
+        data_rate = self._wanted_fd.get("data_bitrate", link.data_bitrate)
+        if rate is not None and rate != link.bitrate:
             fault = f"runs at {link.bitrate} bit/s, not at {rate}"
+        elif self._fd and data_rate != link.data_bitrate:
+            fault = f"runs at a data bit rate of {link.data_bitrate} bit/s, not at {data_rate}"
+        elif self._fd and self._wanted_fd["iso"] != link.iso:
+            fault = f"runs with fd_non_iso {not link.iso}"
         given = [option for option, value in self._wanted_private.items() if value is not None]
         if given:
             fault = f"is a bus of another process: {', '.join(given)} can only be set where that is started"

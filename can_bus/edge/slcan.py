@@ -2,21 +2,34 @@
 
 One line per command, ended by a carriage return; the answer ends with a carriage return too, or is a bell (refused).
 Understood: S and s (bit rate: acknowledged without effect, the bus keeps its own), O (open), L (open, listen only),
-C (close), t T r R (send), F (status), V v N (version, serial number), Z (stamps), X M m (acknowledged, no effect).
+C (close), t T r R (send), F (status), V v N (version, serial number), Z (stamps), X M m (acknowledged, no effect). On a
+CAN FD bus also d D (send CAN FD) and b B (the same with BRS), with the length code as one hexadecimal digit, and Y
+(data bit rate: acknowledged without effect), as adapters with CAN FD extend the protocol. It has no sign for ESI.
 """
 
+import dataclasses
+
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
+from ranger_sim.can_bus.edge.frame_bytes import data_of_words
 from ranger_sim.can_bus.edge.peers import FULL, Terminal
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Taps
+from ranger_sim.can_bus.fd_frame import LENGTHS
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 
 STAMP_WRAP_MS = 60_000  # LAWICEL: stamps of 16 bits run from 0 to 59999 ms
 OK, BELL = b"\r", b"\a"
 # letter: (digits of the identifier, flags)
 FRAMES = {"t": (3, 0), "T": (8, FLAG_EXTENDED), "r": (3, FLAG_REMOTE), "R": (8, FLAG_EXTENDED | FLAG_REMOTE)}
+FD_FRAMES = {
+    "d": (3, FLAG_FD),
+    "D": (8, FLAG_FD | FLAG_EXTENDED),
+    "b": (3, FLAG_FD | FLAG_BRS),
+    "B": (8, FLAG_FD | FLAG_BRS | FLAG_EXTENDED),
+}
+FD_LETTERS = {flags: letter for letter, (_, flags) in FD_FRAMES.items()}
+LONGEST_FD_LINE = 160  # an extended frame with 64 bytes has 138 characters; chosen by us
 HEXADECIMAL = frozenset("0123456789abcdefABCDEF")
 # Answer to F (LAWICEL): bit 0 receive queue full, 2 warning, 3 overrun, 5 error passive, 7 bus error
 STATUS_QUEUE_FULL, STATUS_PASSIVE, STATUS_BUS_ERROR = 1 << 0, 1 << 5, 1 << 7
@@ -32,6 +45,10 @@ class SlcanServer(StreamServer[Connection]):
         super().__init__("slcan", None, {channel: bus}, epoch_ns)
         self.channel = channel
         self.taps = self.channels[channel]
+        self.frames = FRAMES
+        if self.taps.bus.is_fd:
+            self.frames = {**FRAMES, **FD_FRAMES}
+            self.limits = dataclasses.replace(self.limits, longest=LONGEST_FD_LINE)
         terminal = Terminal()
         self.path = terminal.path
         self.program = Connection(terminal)
@@ -78,7 +95,7 @@ class SlcanServer(StreamServer[Connection]):
     def _command(self, line: str) -> None:
         """One command and its answer."""
         letter, rest = line[0], line[1:]
-        if letter in FRAMES:
+        if letter in self.frames:
             self._send(letter, rest)
         elif letter in "OL" and not rest:
             if self.program.tap is not None or self.taps.full:
@@ -119,20 +136,23 @@ class SlcanServer(StreamServer[Connection]):
         return status
 
     def _send(self, letter: str, rest: str) -> None:
-        """t, T, r or R: identifier, length, data."""
-        digits, flags = FRAMES[letter]
+        """A frame: identifier, length, data."""
+        digits, flags = self.frames[letter]
         name, length, data = rest[:digits], rest[digits : digits + 1], rest[digits + 1 :]
-        fits = len(name) == digits and all(c in HEXADECIMAL for c in rest) and length in tuple("012345678")
-        if not fits or len(data) != (0 if flags & FLAG_REMOTE else 2 * int(length)):
+        codes = "0123456789abcdef" if flags & FLAG_FD else "012345678"
+        fits = len(name) == digits and all(c in HEXADECIMAL for c in rest) and length.lower() in tuple(codes)
+        code = int(length, 16) if fits else 0
+        if not fits or len(data) != (0 if flags & FLAG_REMOTE else 2 * LENGTHS[code]):
             self._refuse()
             return
         identifier = int(name, 16)
         if identifier > (HIGHEST_EXTENDED if flags & FLAG_EXTENDED else HIGHEST_STANDARD):
             self._refuse()
             return
-        lo, hi = words_of_data(bytes.fromhex(data))
+        carried = bytes.fromhex(data)
+        lo, hi = int.from_bytes(carried[:4], "little"), int.from_bytes(carried[4:], "little")
         tap = self.program.tap
-        if tap is None or tap.offer(identifier, flags | int(length), lo, hi) != QUEUED:
+        if tap is None or tap.offer(identifier, flags | code, lo, hi) != QUEUED:
             self.totals["refused"] += 1
             self._answer(BELL)
             return
@@ -157,8 +177,13 @@ class SlcanServer(StreamServer[Connection]):
             self.overrun = True
             return
         extended, remote = flags & FLAG_EXTENDED, flags & FLAG_REMOTE
-        letter = ("R" if remote else "T") if extended else ("r" if remote else "t")
-        text = f"{letter}{identifier:0{8 if extended else 3}X}{min(flags & LENGTH_CODE, 8)}"
+        if flags & FLAG_FD:
+            letter = FD_LETTERS[flags & (FLAG_FD | FLAG_BRS | FLAG_EXTENDED)]
+            length = f"{flags & LENGTH_CODE:X}"
+        else:
+            letter = ("R" if remote else "T") if extended else ("r" if remote else "t")
+            length = f"{min(flags & LENGTH_CODE, 8)}"
+        text = f"{letter}{identifier:0{8 if extended else 3}X}{length}"
         if not remote:
             text += data_of_words(flags, lo, hi).hex().upper()
         if self.stamps:

@@ -1,8 +1,9 @@
 """Emulated buses over TCP in the raw mode of the socketcand protocol, which several CAN programs use.
 
 `< open can1 >`, `< rawmode >`, then `< send 123 2 11 22 >` in and `< frame 123 1.000000 1122 >` out. Remote frames
-have no text in that mode (they are counted as not carried). On loopback this user's programs and root's are served,
-and all users' where the system does not report owners (Windows, macOS); beyond it, where it must be allowed, all are.
+and CAN FD frames have no text in that mode (they are counted as not carried). On loopback this user's programs and
+root's are served, and all users' where the system does not report owners (Windows, macOS); beyond it, where it must be
+allowed, all are.
 """
 
 import socket
@@ -16,7 +17,7 @@ from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
 from ranger_sim.foundation import systems
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError
 
 # Clients read everything that has arrived as the answer to `rawmode`; a frame directly after it confuses them. So
@@ -171,7 +172,7 @@ class SocketcandServer(StreamServer[_Client]):
         for event in events:
             if event[0] != RECEIVED:
                 continue
-            if event[3] & FLAG_REMOTE:
+            if event[3] & (FLAG_REMOTE | FLAG_FD):
                 totals["not_carried"] += 1
                 continue
             if len(out) >= self.limits.backlog:

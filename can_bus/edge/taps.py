@@ -281,8 +281,11 @@ class Taps:
         """True while no more clients fit."""
         return len(self.taps) >= TAP_LIMIT
 
-    def add(self, name: str) -> Tap:
-        """Add a client; it is on the bus at once, or after 11 recessive bits when it takes the place of another."""
+    def add(self, name: str, fd: bool = True) -> Tap:
+        """Add a client; it is on the bus at once, or after 11 recessive bits when it takes the place of another.
+
+        On a CAN FD bus a client without `fd` is a classic node, which answers CAN FD frames with error frames.
+        """
         for tap in self.spare:
             if tap.controller.mode == RESET:
                 self.spare.remove(tap)
@@ -291,6 +294,8 @@ class Taps:
                 break
         else:
             tap = Tap(self.bus, name, self.depth)
+        if self.bus.is_fd:
+            self.bus.set_classic(tap.node, not fd)
         self.taps.append(tap)
         return tap
 

@@ -320,7 +320,7 @@ def test_frames_arrive_in_their_order_and_a_missing_stretch_is_reported_with_its
         (struct.pack("<IB", 0, 3), "the other side does not speak the attach protocol: a record of 0 bytes"),
         (
             struct.pack("<IB", 2, 5) + b"x",
-            "the other side does not speak the attach protocol: record type 5 with 1 bytes",
+            "the other side does not speak the attach protocol: a body of 1 bytes is too short for a frame",
         ),
         (struct.pack("<IB", 2, 8) + b"x", "the other side does not speak the attach protocol: a body of 1 bytes"),
         (struct.pack("<IB", 1, 66), "the other side does not speak the attach protocol: record type 66 with 0 bytes"),
@@ -781,11 +781,11 @@ def attached_bus(monkeypatch, rate=500_000, missing=False, running=(), **options
 
 def test_a_robot_is_attached_to_by_the_name_in_front_of_the_channel(monkeypatch):
     for options, what in (
-        ({"channel": "can2"}, ("ranger", "can2", False, False, 100_000)),
-        ({"channel": "r/can2"}, ("r", "can2", False, False, 100_000)),
-        ({"channel": "can2", "robot": "s", "listen_only": "1"}, ("s", "can2", True, False, 100_000)),
-        ({"channel": "r/can2", "robot": "s", "receive_own_messages": True}, ("r", "can2", False, True, 100_000)),
-        ({"channel": "can1", "rx_queue_size": "7", "bitrate": 500_000}, ("ranger", "can1", False, False, 7)),
+        ({"channel": "can2"}, ("ranger", "can2", False, False, 100_000, False)),
+        ({"channel": "r/can2"}, ("r", "can2", False, False, 100_000, False)),
+        ({"channel": "can2", "robot": "s", "listen_only": "1"}, ("s", "can2", True, False, 100_000, False)),
+        ({"channel": "r/can2", "robot": "s", "receive_own_messages": True}, ("r", "can2", False, True, 100_000, False)),
+        ({"channel": "can1", "rx_queue_size": "7", "bitrate": 500_000}, ("ranger", "can1", False, False, 7, False)),
     ):
         bus, made = attached_bus(monkeypatch, **options)
         assert made == what and bus.channel_info == f"ranger_sim {what[0]}/{what[1]}, 500000 bit/s"

@@ -12,6 +12,7 @@ from ranger_sim.can_bus.edge.paced import DEFAULT_BITRATE, PacedBus, speed_of
 from ranger_sim.can_bus.edge.peers import loopback, owners_are_known
 from ranger_sim.can_bus.edge.slcan import SlcanServer
 from ranger_sim.can_bus.edge.socketcand import SocketcandServer
+from ranger_sim.can_bus.edge.taps import Taps
 from ranger_sim.foundation import systems, wallclock
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.stop_rule import MOST_TIME_S
@@ -31,6 +32,12 @@ def register(commands: Any) -> None:
     )
     command.add_argument(
         "--bitrate", type=whole_number(1000), default=DEFAULT_BITRATE, help="bit/s of every bus (default 1000000)"
+    )
+    command.add_argument(
+        "--data-bitrate",
+        type=whole_number(1000),
+        default=0,
+        help="bit/s of the data of CAN FD (default: classic buses)",
     )
     command.add_argument("--speed", default="1", help="times real time, or max: as fast as frames are sent (default 1)")
     command.add_argument(
@@ -70,7 +77,9 @@ def open_servers(buses: dict[str, Any], options: argparse.Namespace, epoch_ns: i
         if systems.is_linux():
             servers.append(opened.enter_context(closing(AttachServer(name, buses, epoch_ns))))
             prefix = "" if name == DEFAULT_NAME else f"{name}/"
-            lines.append(f'python-can: can.Bus(interface="ranger_sim", channel="{prefix}{first}")')
+            bus = buses[first]
+            fd = ", fd=True" if (bus.bus if isinstance(bus, Taps) else bus).is_fd else ""
+            lines.append(f'python-can: can.Bus(interface="ranger_sim", channel="{prefix}{first}"{fd})')
         elif socketcand is None:
             systems.require_linux("bus: names to attach by", "abstract sockets", "give --socketcand PORT")
         for channel in options.slcan:
@@ -112,6 +121,7 @@ def run(options: argparse.Namespace) -> int:
             options.seed,
             options.bit_error_rate,
             acknowledge=options.acknowledge,
+            data_bitrate=options.data_bitrate,
         )
         for channel in options.channel
     ]
@@ -121,9 +131,13 @@ def run(options: argparse.Namespace) -> int:
         host.serve(server)
     end = wallclock.monotonic_s() + options.seconds
     pace = "as fast as frames are sent" if speed == 0.0 else f"{speed:g} x real time"
+    data = f", CAN FD at {options.data_bitrate} bit/s" if options.data_bitrate else ""
     try:
         print(
-            f"{', '.join(options.channel)}: {options.bitrate} bit/s, {pace}; Ctrl-C ends", *lines, sep="\n", flush=True
+            f"{', '.join(options.channel)}: {options.bitrate} bit/s{data}, {pace}; Ctrl-C ends",
+            *lines,
+            sep="\n",
+            flush=True,
         )
         while (left := end - wallclock.monotonic_s()) > 0.0:
             host.turn(min(left, 1.0))
