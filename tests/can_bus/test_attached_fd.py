@@ -156,7 +156,7 @@ def test_a_program_with_an_adapter_of_the_slcan_protocol_sends_and_receives_can_
 @pytest.mark.parametrize(
     "line", [b"d1239", b"d12380102", b"b123g", b"D200000000", b"d1230" + b"0" * 160, b"d8000", b"d123"]
 )
-def test_a_can_fd_line_that_is_no_frame_is_refused_with_a_bell(line):
+def test_a_malformed_can_fd_line_is_refused_with_a_bell(line):
     with hosted("can1", servers=[lambda taps: SlcanServer("can1", taps["can1"])], **RATES) as (_, host):
         with open(host.servers[1].path, "r+b", buffering=0) as terminal:
             terminal.write(b"O\r" + line + b"\r")
