@@ -54,6 +54,7 @@ from ranger_sim.can_bus.frame import (
     frame_bits,
     measure,
 )
+from ranger_sim.can_bus.frame_bytes import data_of_words
 from ranger_sim.can_bus.frame_log import SENDER_SHIFT, TIMES_BUFFER_SHIFT, FrameLog
 from ranger_sim.can_bus.load_meter import LoadMeter
 from ranger_sim.can_bus.medium_access import (
@@ -281,6 +282,10 @@ class Bus:
         controller: Node = self.nodes[node]
         controller.fdf = FDF_REFUSED if classic else FDF_KNOWN
 
+    def knows_fd(self, node) -> bool:
+        """Whether a node of this bus knows CAN FD frames."""
+        return self.nodes[node].fdf == FDF_KNOWN
+
     @property
     def operating(self) -> int:
         """Nodes that take part and acknowledge."""
@@ -306,6 +311,9 @@ class Bus:
     def note_outside(self, time, identifier, flags, lo, hi) -> None:
         """Record a frame that passed on the real bus which replaces this one."""
         self.counters.frames += 1
+        if flags & FLAG_FD:
+            self.log.add_fd(time, identifier, flags, data_of_words(flags, lo, hi), -1)
+            return
         self.log.add(time, identifier, flags, lo, hi, -1)
         if self.log.times is not None:  # its requester and the time of the request are unknown here
             bits = frame_bits(identifier, flags & RECEIVERS_SEE, lo, hi)

@@ -8,8 +8,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words
 from ranger_sim.can_bus.fd_frame import fd_data_length
+from ranger_sim.can_bus.frame_bytes import data_of_words
 from ranger_sim.foundation import systems
 from ranger_sim.foundation.events import FLAG_FD
 from ranger_sim.foundation.user_error import BusError

@@ -12,9 +12,9 @@ import pathlib
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.fd_frame import LENGTHS, LONGEST, length_code
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
+from ranger_sim.can_bus.frame_bytes import data_of_words, words_of_data
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError
 

@@ -7,7 +7,7 @@ frames get their stamps there; a board's process never sees a wall clock.
 Such a bus is asynchronous: received frames depend on the wall clock, and no run on it can be repeated. Arbitration,
 acknowledgement and the wire are those of the interface; here a controller is busy for the nominal length of its
 frame. Frames that do not fit are counted: `not_taken` (the interface's queue was full, tried again), `overflow`
-(external frames faster than the bus could carry them), `refused` (CAN FD).
+(external frames faster than the bus could carry them), `refused` (CAN FD on a classic bus, or for a classic board).
 
 The robot uses a small set of plain methods (`from_board`, `poll`), as for the other ends of wires.
 """
@@ -26,7 +26,9 @@ import can
 from can import cli as can_options
 
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
+from ranger_sim.can_bus.fd_frame import PHASE_SHIFT, phases
 from ranger_sim.can_bus.frame import INTERMISSION_BITS, LENGTH_CODE, frame_bits
+from ranger_sim.can_bus.frame_bytes import data_of_words
 from ranger_sim.foundation.descriptors import Readers
 from ranger_sim.foundation.events import (
     CAN_ABORT,
@@ -35,6 +37,7 @@ from ranger_sim.foundation.events import (
     CAN_RX,
     CAN_TX_DONE,
     FLAG_ERROR,
+    FLAG_FD,
     FLAG_SINGLE_SHOT,
     TX_ABORTED,
     TX_LOST,
@@ -151,10 +154,20 @@ def dropped_by_kernel(connection: Any) -> int:
 
 
 class Peer:
-    """One controller of a board on the interface. Fields as those of a node of an emulated bus."""
+    """One controller of a board on the interface. Fields as those of a node of an emulated bus.
+
+    is_fd: whether the board's controller knows CAN FD; other frames than that reach a classic one.
+    """
 
     def __init__(
-        self, owner: "ExternalBus", label: str, connection: Any, inbox: Any, controller: int, order: int
+        self,
+        owner: "ExternalBus",
+        label: str,
+        connection: Any,
+        inbox: Any,
+        controller: int,
+        order: int,
+        is_fd: bool = False,
     ) -> None:
         self.owner = owner
         self.label = label
@@ -162,6 +175,7 @@ class Peer:
         self.inbox = inbox
         self.controller = controller
         self.order = order
+        self.is_fd = is_fd
         self.operating = True
         self.descriptor = -1
         with suppress(NotImplementedError, OSError, ValueError):
@@ -221,14 +235,15 @@ class Peer:
             if message is None:
                 return
             try:
-                identifier, flags, lo, hi = frame_of_message(message)
+                identifier, flags, lo, hi = frame_of_message(message, self.owner.is_fd)
             except UserError:
                 self.owner.refused += 1
                 continue
             if flags & FLAG_ERROR:
                 self.owner.count_error(self)
                 continue
-            flags = flags & ~LENGTH_CODE | min(flags & LENGTH_CODE, 8)
+            if not flags & FLAG_FD:
+                flags = flags & ~LENGTH_CODE | min(flags & LENGTH_CODE, 8)
             end_ns = max(now_ns, self.read_ns + self.owner.length_ns(identifier, flags, lo, hi))
             self.owner.frames_in += self is self.owner.peers[0]
             self.owner.seen(self, min(end_ns, now_ns + AHEAD_NS), identifier, flags, lo, hi)
@@ -236,7 +251,13 @@ class Peer:
                 self.owner.overflow += 1
                 continue
             self.read_ns = end_ns
-            if self.operating:
+            if flags & FLAG_FD and not self.is_fd:
+                self.owner.refused += 1
+            elif self.operating and flags & FLAG_FD:
+                data = data_of_words(flags, lo, hi)
+                second = int.from_bytes(data[4:8], "little")
+                self.inbox.push(end_ns, self.order, CAN_RX, self.controller, identifier, flags, lo, second, 0, data)
+            elif self.operating:
                 self.inbox.push(end_ns, self.order, CAN_RX, self.controller, identifier, flags, lo, hi)
 
     def _drop(self, time: int, buffers: set[int]) -> None:
@@ -251,14 +272,17 @@ class Peer:
 class ExternalBus:
     """Bus `name` of the robot at `bit_rate` (bit/s, for the length of frames). `open_peer` gives python-can buses.
 
+    data_bit_rate: bit/s of the data of CAN FD; 0: a classic bus.
     `sinks`: functions (time_ns, identifier, flags, lo, hi) that receive every frame once, as the first peer does.
     """
 
     asynchronous = True
 
-    def __init__(self, name: str, bit_rate: int, open_peer: Callable[[], Any]) -> None:
+    def __init__(self, name: str, bit_rate: int, open_peer: Callable[[], Any], data_bit_rate: int = 0) -> None:
         self.name = name
         self.bit_rate = bit_rate
+        self.data_bit_rate = data_bit_rate
+        self.is_fd = data_bit_rate > 0
         self.open_peer = open_peer
         self.peers: list[Peer] = []
         self.poller = Readers()
@@ -277,10 +301,16 @@ class ExternalBus:
         self.window_load = 0.0
 
     def add_peer(
-        self, label: str, inbox: Any, controller: int, order: int, open_peer: Callable[[], Any] | None = None
+        self,
+        label: str,
+        inbox: Any,
+        controller: int,
+        order: int,
+        open_peer: Callable[[], Any] | None = None,
+        is_fd: bool = False,
     ) -> Peer:
-        """A controller of a board; UserError when the interface cannot be opened."""
-        peer = Peer(self, label, (open_peer or self.open_peer)(), inbox, controller, order)
+        """A controller of a board, with CAN FD or without; UserError when the interface cannot be opened."""
+        peer = Peer(self, label, (open_peer or self.open_peer)(), inbox, controller, order, is_fd)
         self.peers.append(peer)
         if peer.descriptor >= 0:
             self.poller.add(peer.descriptor)
@@ -313,6 +343,10 @@ class ExternalBus:
 
     def length_ns(self, identifier: int, flags: int, lo: int, hi: int) -> int:
         """Time for which such a frame occupies the wire, intermission included."""
+        if flags & FLAG_FD:
+            both = phases(identifier, flags & ~FLAG_SINGLE_SHOT, data_of_words(flags, lo, hi))
+            fast, slow = both >> PHASE_SHIFT, (both & (1 << PHASE_SHIFT) - 1) + INTERMISSION_BITS
+            return slow * 1_000_000_000 // self.bit_rate + fast * 1_000_000_000 // self.data_bit_rate
         bits = frame_bits(identifier, flags & ~FLAG_SINGLE_SHOT, lo, hi) + INTERMISSION_BITS
         return bits * 1_000_000_000 // self.bit_rate
 

@@ -20,9 +20,9 @@ import can
 
 from ranger_sim.can_bus.edge import log_kinds, pcap
 from ranger_sim.can_bus.edge.candump import CanFdError, fd_words, frame_of_line
-from ranger_sim.can_bus.edge.frame_bytes import words_of_data
 from ranger_sim.can_bus.edge.messages import frame_of_message
 from ranger_sim.can_bus.fd_frame import LENGTHS
+from ranger_sim.can_bus.frame_bytes import words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError, DataError, UserError
 

@@ -2,9 +2,9 @@
 
 import can
 
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.fd_frame import fd_data_length, length_code, padded
 from ranger_sim.can_bus.frame import LENGTH_CODE
+from ranger_sim.can_bus.frame_bytes import data_of_words, words_of_data
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError
 

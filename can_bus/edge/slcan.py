@@ -10,12 +10,12 @@ CAN FD bus also d D (send CAN FD) and b B (the same with BRS), with the length c
 import dataclasses
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words
 from ranger_sim.can_bus.edge.peers import FULL, Terminal
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import ERROR_PASSIVE, OFF, QUEUED, RECEIVED, Event, Taps
 from ranger_sim.can_bus.fd_frame import LENGTHS
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
+from ranger_sim.can_bus.frame_bytes import data_of_words
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 
 STAMP_WRAP_MS = 60_000  # LAWICEL: stamps of 16 bits run from 0 to 59999 ms

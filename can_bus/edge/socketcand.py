@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 from ranger_sim.can_bus.bus import Bus
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.peers import FULL, LIMITS, MALFORMED, REASONS, SocketStream, listening_address
 from ranger_sim.can_bus.edge.stream_server import Connection, StreamServer
 from ranger_sim.can_bus.edge.taps import QUEUED, RECEIVED, Event, Tap, Taps
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD
+from ranger_sim.can_bus.frame_bytes import data_of_words, words_of_data
 from ranger_sim.foundation import systems
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import BusError

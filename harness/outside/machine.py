@@ -78,8 +78,8 @@ class Pace:
         Input from outside meanwhile is read at once.
         """
         due_s = self.begun_s + (now_ns - self.begun_ns) * 1e-9 / self.speed
-        numbers = [number for end in self.machine.polled for number in end.filenos()]
         while (left := due_s - wallclock.monotonic_s()) > 0.0:
+            numbers = [number for end in self.machine.polled for number in end.filenos()]  # a poll may close some
             if descriptors.wait(numbers, [], min(left, SLICE_NS * 1e-9))[0]:
                 self.machine.poll_now()
         return now_ns + SLICE_NS
@@ -102,11 +102,15 @@ def move_outside(
     from ranger_sim.harness.processes.outside import move_bus
 
     machine.pace = Pace(machine, speed)
-    rates = {bus.name: bus.bitrate for bus in machine.buses}
+    rates = {bus.name: (bus.bitrate, bus.data_bitrate if bus.is_fd else 0) for bus in machine.buses}
     for name in machine.boards:
         if name not in here:
             leave_out(machine, name)
-    moved = [ExternalBus(name, rates[name], opener(name, dict(keywords))) for name, keywords in buses.items()]
+    moved = []
+    for name, keywords in buses.items():
+        rate, data_rate = rates[name]
+        wanted = {**keywords, "fd": True} if data_rate else dict(keywords)
+        moved.append(ExternalBus(name, rate, opener(name, wanted), data_rate))
     for each in moved:
         move_bus(machine, each, {}, tuple(here))
     return moved

@@ -75,7 +75,10 @@ class FaultyProfileError(ProfileError):
 
 @dataclasses.dataclass(frozen=True)
 class BusProfile:
-    """One bus. `interface` None: emulated inside. `bit_rate` in bit/s; `options`: further arguments of python-can."""
+    """One bus. `interface` None: emulated inside. `bit_rate` in bit/s; `options`: further arguments of python-can.
+
+    data_bit_rate: bit/s of the data of CAN FD; 0: a classic bus.
+    """
 
     name: str
     interface: str | None
@@ -84,6 +87,7 @@ class BusProfile:
     schedule_name: str
     schedule: BusSchedule
     options: Mapping[str, Any]
+    data_bit_rate: int = 0
 
     def python_can(self) -> dict[str, Any] | None:
         """Arguments of `can.Bus`, or None for an emulated bus. The bit rate is included where the interface sets it."""
@@ -92,6 +96,10 @@ class BusProfile:
         found: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
         if self.interface != "socketcan" and self.interface not in SOFTWARE_INTERFACES:
             found["bitrate"] = self.bit_rate  # a SocketCAN interface gets its rate from `ip link`
+            if self.data_bit_rate:
+                found["data_bitrate"] = self.data_bit_rate
+        if self.data_bit_rate:
+            found["fd"] = True
         return {**found, **self.options}
 
 
@@ -389,7 +397,8 @@ def _buses(
                 there = ", ".join(available_schedules(folder))
                 reader.fault(f"{place}.schedule", wanted, f"no such schedule; there are {there}")
                 schedules[wanted] = full_schedule()
-        found[name] = BusProfile(name, interface, channel, rate, wanted, schedules[wanted], options)
+        data_rate = table.data_bit_rates.get(name.upper(), 0)
+        found[name] = BusProfile(name, interface, channel, rate, wanted, schedules[wanted], options, data_rate)
     return found
 
 

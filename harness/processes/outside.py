@@ -19,6 +19,7 @@ def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
             continue
         place = list(robot.boards).index(wire.board)
         wires = loop.wires[place]
+        is_fd = bool(external.is_fd) and robot.buses[number].knows_fd(wires.nodes[wire.controller])
         wires.connect_bus(wire.controller, None, -1)
         if wire.board not in boards:
             continue
@@ -29,6 +30,7 @@ def move_bus(robot: Any, external: Any, openers: dict, boards: tuple) -> None:
             wire.controller,
             order,
             openers.get(wire.board),
+            is_fd,
         )
     external.sinks.append(robot.buses[number].note_outside)
     robot.attach(external)

@@ -296,7 +296,12 @@ class BoardWires(Outbox):
         bus = self.buses[controller]
         why = ""
         if bus is None:
-            why = "its bus is outside, where only classic frames go" if controller in self.can_lines else ""
+            line = self.can_lines.get(controller)
+            if line is not None and line.is_fd:
+                low, high = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
+                line.from_board(CAN_REQUEST, time, buffer, identifier, flags, low, high)
+            elif line is not None:
+                why = "its bus outside, or its controller, is classic CAN"
         elif not bus.is_fd:
             why = f"{bus.name} is classic CAN (a bus of the machine with two bit rates is CAN FD)"
         elif bus.nodes[self.nodes[controller]].fdf != FDF_KNOWN:

@@ -12,8 +12,8 @@ from ranger_sim.can_bus.edge import attach_records as wire
 from ranger_sim.can_bus.edge import check_bus, dbc, interfaces, linux_errors, logs
 from ranger_sim.can_bus.edge.candump import CandumpWriter, line_of_frame, read_candump
 from ranger_sim.can_bus.edge.check_bus import NotReadError, Traffic, check_link, check_traffic, parse_link, read_link
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words, words_of_data
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
+from ranger_sim.can_bus.frame_bytes import data_of_words, words_of_data
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 

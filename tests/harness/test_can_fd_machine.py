@@ -2,6 +2,7 @@
 
 import contextlib
 import sys
+import threading
 
 import can
 import pytest
@@ -12,9 +13,11 @@ from ranger_sim.firmware_sim.native.native_board import NativeBoard
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_FD
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.machine import Machine
+from ranger_sim.harness.outside.machine import offer, put_on
 from ranger_sim.harness.processes.modes import OwnProcesses
 from ranger_sim.harness.wiring.wires import CanWire, Wiring
 from ranger_sim.plant.plant import Plant
+from tests.can_bus.hosting import fresh_name
 from tests.firmware_sim.native.support import COMPILER, SCHEDULE, folder_with, library_of
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
@@ -248,3 +251,69 @@ def test_what_the_log_on_disk_keeps_of_long_frames_is_whole_however_it_is_read(p
         assert len(rows) >= 4 and len(robot.logbook.frames()["flags"]) == robot.buses[0].counters.frames
         frames = robot.wire(since_s=0.0).frames(0x123)
         assert len(frames) >= 1240 and {frame.data[4:] for frame in frames} == {bytes(range(4, 64))}
+
+
+def answers_to_every_length(bus, run):
+    """Send messages of every length to ECHO by `bus`; run() lets the machine's time pass. Each answer is compared."""
+    for length in (0, 8, 12, 64):
+        message = can.Message(
+            arbitration_id=0x140,
+            is_extended_id=False,
+            is_fd=True,
+            bitrate_switch=length != 12,
+            data=bytes(range(length)),
+        )
+        bus.send(message)
+        run()
+        answer = bus.recv(30)
+        data = bytearray(range(length))
+        if length:
+            data[-1] ^= 0xFF
+        assert (answer.arbitration_id, answer.is_fd, bytes(answer.data)) == (0x141, True, bytes(data))
+        assert answer.bitrate_switch == message.bitrate_switch
+    bus.send(can.Message(arbitration_id=0x140, is_extended_id=False, data=b"abc"))
+    run()
+    assert not bus.recv(30).is_fd
+
+
+def test_a_can_fd_bus_on_an_interface_outside_carries_frames_of_every_length(programs):
+    """The other program is on python-can's `virtual`, which has no time of its own: the machine's record has that."""
+    with machine(programs, "ECHO") as robot, can.Bus(interface="virtual", channel="fd outside", fd=True) as program:
+        put_on(robot, "can1", "virtual:fd outside", speed=100.0)
+        answers_to_every_length(program, lambda: robot.run_for(0.005))
+        sent, answered = robot.wire().frames(0x140), robot.wire().frames(0x141)
+        assert [len(frame.data) for frame in sent] == [len(frame.data) for frame in answered] == [0, 8, 12, 64, 3]
+        assert answered[3].data == bytes(range(63)) + bytes([63 ^ 0xFF])
+        # of 64 bytes: 29 nominal bits of 2 us at least and 549 data bits of 0.5 us, a quarter more with stuff bits
+        assert 329_000 < answered[3].time_ns - sent[3].time_ns < 329_000 * 1.25 + 20_000 + 2 * 125_000
+
+
+def test_a_classic_board_on_an_interface_outside_receives_no_can_fd_frame(programs):
+    with machine(programs, "CLASSIC") as robot, can.Bus(interface="virtual", channel="mixed", fd=True) as program:
+        put_on(robot, "can1", "virtual:mixed", speed=100.0)
+        program.send(can.Message(arbitration_id=0x140, is_extended_id=False, is_fd=True, data=bytes(12)))
+        program.send(can.Message(arbitration_id=0x141, is_extended_id=False, data=b"a"))
+        robot.run_for(0.025)
+        assert robot.counters()["CLASSIC"].can[0].received == 1
+        assert program.recv(30).arbitration_id == 0x10
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names to attach by need Linux")
+def test_a_program_of_another_process_attaches_to_the_can_fd_bus_of_a_machine(programs):
+    name = fresh_name()
+    with machine(programs, "ECHO") as robot:
+        offer(robot, name)
+        ending = threading.Event()
+
+        def run():
+            while not ending.is_set():
+                robot.run_for(0.001)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        try:
+            with can.Bus(interface="ranger_sim", channel=f"{name}/can1", fd=True, ignore_config=True) as bus:
+                answers_to_every_length(bus, lambda: None)
+        finally:
+            ending.set()
+            thread.join()

@@ -7,9 +7,18 @@ import can
 import cantools
 
 from ranger_sim.can_bus.edge import interfaces
+from ranger_sim.can_bus.edge.external_bus import ExternalBus, opener
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
 from ranger_sim.datatable.generate import GENERATED_FOLDER
-from ranger_sim.foundation.events import FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import (
+    CAN_REQUEST,
+    FLAG_BRS,
+    FLAG_EXTENDED,
+    FLAG_FD,
+    FLAG_REMOTE,
+    NEVER,
+    EventQueue,
+)
 from ranger_sim.ranger.robot import Ranger
 from ranger_sim.ranger.scenario import Scenario
 from ranger_sim.tools.run import walk
@@ -17,6 +26,30 @@ from ranger_sim.tools.run import walk
 
 def test_python_can_finds_the_interfaces():
     assert {"socketcan:vcan0", "socketcan:vcan3"} <= set(interfaces.available_interfaces())
+
+
+def test_a_board_with_can_fd_on_an_interface_exchanges_frames_with_cansend_and_candump(candump):
+    watcher = candump("vcan1")
+    place = {"interface": "socketcan", "channel": "vcan1", "fd": True}
+    bus = ExternalBus("can1", 500_000, opener("can1", place), 2_000_000)
+    inbox = EventQueue(64)
+    peer = bus.add_peer("can1, BOARD", inbox, 1, 0, is_fd=True)
+    subprocess.run(["cansend", "vcan1", "123##1" + bytes(range(64)).hex()], check=True)
+    while inbox.head_time == NEVER:
+        bus.poll(0)
+    inbox.take()
+    assert (inbox.b, inbox.c, inbox.ref) == (0x123, FLAG_FD | FLAG_BRS | 15, bytes(range(64)))
+    data = bytes(range(12))
+    peer.from_board(
+        CAN_REQUEST, 0, 1, 0x124, FLAG_FD | 9, int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
+    )
+    assert watcher.stop() == ""
+    lines = [line.split()[2] for line in watcher.path.read_text().splitlines()]
+    assert [line for line in lines if "##" in line] == [
+        "123##1" + bytes(range(64)).hex().upper(),
+        "124##0" + data.hex().upper(),
+    ]
+    peer.connection.shutdown()
 
 
 def test_cansend_writes_what_our_codes_read_and_candump_reads_what_they_write(candump):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.can_bus import frame
-from ranger_sim.can_bus.edge.frame_bytes import data_of_words
+from ranger_sim.can_bus.frame_bytes import data_of_words
 from ranger_sim.datatable.generated import all_variables
 from ranger_sim.datatable.packing import value_of_word
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
