@@ -2,8 +2,8 @@
 
 One line per frame: `(seconds.microseconds) interface identifier#data`; three hexadecimal digits are a
 standard identifier, eight an extended one; `#R` and a length is a remote frame. A CAN FD frame is
-`identifier##` with one digit of flags (1: BRS, 2: ESI) and up to 64 bytes. An error frame is
-written as identifier 20000080 (error flag of SocketCAN and its class "bus error") with the field of the
+`identifier##` with one digit of flags (1: BRS, 2: ESI, 4: FDF, which older kernels do not set) and up to 64 bytes. An
+error frame is written as identifier 20000080 (error flag of SocketCAN and its class "bus error") with the field of the
 error in byte 3 (linux/can/error.h: the position of the violation, the same codes as in can_bus.frame).
 Nanoseconds are cut to microseconds, the resolution of the format; the time is the receivers'.
 """
