@@ -57,6 +57,15 @@ start = ["step 1"]
 """
 
 
+def in_use() -> set[str]:
+    """Names of the shared memory that a process has mapped: of other programs of this machine, or of a run."""
+    found = set()
+    for maps in pathlib.Path("/proc").glob("[0-9]*/maps"):
+        with contextlib.suppress(OSError):  # of another user, or ended meanwhile
+            found |= {line.rpartition("/dev/shm/")[2] for line in maps.read_text().splitlines() if "/dev/shm/" in line}
+    return found
+
+
 class Finding(Exception):  # noqa: N818  (not an error of this program)
     """What a killed command lost or left."""
 
@@ -193,7 +202,7 @@ class Kills:
         """What is left of a command that has ended; empty for nothing."""
         if processes := command.processes():
             return f"processes are left: {processes}"
-        if shared := set(os.listdir("/dev/shm")) - self.shared:
+        if (shared := set(os.listdir("/dev/shm")) - self.shared) and (shared := shared - in_use()):
             return f"shared memory is left: {sorted(shared)}"
         sockets = pathlib.Path("/proc/net/unix").read_text(encoding="utf-8")
         return "a local socket is left" if f"kills-{os.getpid()}" in sockets else ""
