@@ -34,6 +34,7 @@ PLANT = "plant"
 POLL_S = 0.2  # between two polls of boards and updates of the screen
 ASK_S = 0.005  # between two polls of requests, however many there are: it limits a client that never stops
 MOST_POLL_S = 5 * POLL_S  # how much of a process's stop one poll counts: a suspended machine or terminal counts once
+EXIT_LOST = 2  # as where a file cannot be finished; 1 is a robot that fell or a board that failed, with a summary
 HANG_S = 1.0  # a board that keeps its turn this long is checked, and named well within 2 s
 RESTART_LIMIT = 5  # per board with --restart on-failure, so that a broken board does not keep us busy
 
@@ -435,7 +436,7 @@ class Supervisor:
             return
         how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
         self.view.say(f"{PLANT} (process {child.process}) {how}: the run is lost, no files are finished")
-        self.exit_code = 1
+        self.exit_code = EXIT_LOST
 
     def check(self) -> None:
         """Find processes that keep their turn, or are stopped, too long, and show the state."""

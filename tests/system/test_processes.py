@@ -189,7 +189,7 @@ def test_every_killed_process_is_named_within_two_seconds_and_nothing_is_left(up
         robot.wait_for(rf"{victim} is off its bus since ")
     os.kill(processes["plant"], signal.SIGKILL)
     robot.wait_for(r"plant \(process \d+\) was killed by signal 9: the run is lost", TWO_SECONDS)
-    assert robot.end() == 1
+    assert robot.end() == 2
 
 
 def test_without_the_supervisor_nothing_is_left(up):
@@ -237,7 +237,7 @@ def test_a_body_that_stays_stopped_ends_the_run(up):
     robot = up(speed="max")
     os.kill(robot.processes()["plant"], signal.SIGSTOP)
     robot.wait_for(r"plant \(process \d+\) is stopped and has not replied for 10 s")
-    assert robot.end() == 1
+    assert robot.end() == 2
     assert "the run is lost, no files are finished" in robot.text
 
 

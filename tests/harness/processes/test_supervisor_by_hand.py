@@ -151,7 +151,7 @@ def test_the_body_that_stays_stopped_ends_the_run_as_well(alone):
     pass_time(alone, 10.2)
     assert alone.killed == [(42, signal.SIGKILL)]
     alone.ended(alone.children[PLANT], -9)
-    assert alone.exit_code == 1
+    assert alone.exit_code == 2
 
 
 def test_a_suspended_machine_counts_as_one_second_of_a_stop(alone):
@@ -309,9 +309,9 @@ def test_a_board_that_ends_while_the_run_does_is_not_restarted(alone):
     [
         (True, 0, 0, ""),
         (True, 3, 3, ""),
-        (True, -9, 1, "was killed by signal 9"),
-        (False, 0, 1, "ended with code 0"),
-        (False, 2, 1, "ended with code 2"),
+        (True, -9, 2, "was killed by signal 9"),
+        (False, 0, 2, "ended with code 0"),
+        (False, 2, 2, "ended with code 2"),
     ],
 )
 def test_the_end_of_the_plant_is_that_of_the_run(alone, ending, code, exit_code, reported):
