@@ -277,7 +277,7 @@ def answers_to_every_length(bus, run):
 
 
 def test_a_can_fd_bus_on_an_interface_outside_carries_frames_of_every_length(programs):
-    """The other program is on python-can's `virtual`, which has no time of its own: the machine's record has that."""
+    """The other program is on python-can's `virtual`, which has no bit times: the machine's record has them."""
     with machine(programs, "ECHO") as robot, can.Bus(interface="virtual", channel="fd outside", fd=True) as program:
         put_on(robot, "can1", "virtual:fd outside", speed=100.0)
         answers_to_every_length(program, lambda: robot.run_for(0.005))
