@@ -100,10 +100,11 @@ def test_a_link_of_50_hz_is_recognised_and_strikes_come_at_most_one_sample_late(
 SLOPES = generator(1, "slopes of made-up twins").normal(size=(len(FEW_START), len(FEW)))
 EFFECT = generator(2, "effect of a made-up cause").normal(size=(2, len(FEW)))
 OTHER = generator(3, "effect of another cause").normal(size=(2, len(FEW)))
+UNKNOWN = generator(4, "effect that no cause has").normal(size=(2, len(FEW)))
 NOISE = 0.3
 
 
-def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE):
+def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE, unknown=0.0):
     """Steps whose outcomes are linear in the step before, plus noise and effects of this size from a step on."""
     draw = generator(seed, "made-up walk")
     found = np.full((count, len(features.NAMES)), np.nan)
@@ -113,7 +114,7 @@ def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE):
     for row in range(1, count):
         made = 0.15 * found[row - 1, starts] @ SLOPES + noise * draw.normal(size=len(FEW))
         if row >= since:
-            made += moved * EFFECT[leg[row]] + other * OTHER[leg[row]]
+            made += moved * EFFECT[leg[row]] + other * OTHER[leg[row]] + unknown * UNKNOWN[leg[row]]
         found[row] = draw.normal(size=found.shape[1])
         found[row, outcomes] = made
     return leg, found
@@ -403,6 +404,37 @@ def test_a_size_with_which_the_emulated_robot_falls_is_not_an_answer(view):
     verdict, asked = confirmed(view, 1.8, falls_from=1.1)
     assert max(abs(size) for _, size in asked) >= 1.1
     assert all(abs(fit.size) < 1.1 for fit in verdict.fits if fit.direction.cause == "geometry")
+
+
+def turning(size):
+    """An effect that goes on in another direction from a size of 0.8 on: the best size of a line is 0.8 from there."""
+    return {"moved": min(size, 0.8), "unknown": 1.2 * max(size - 0.8, 0.0)}
+
+
+@pytest.mark.parametrize("falls_from", [np.inf, 1.45])
+def test_a_size_that_leaves_more_than_a_sound_walk_is_sought_by_walks_next_to_it(view, falls_from):
+    asked = []
+
+    def emulate(direction, size, floor_m):
+        asked.append((direction.cause, size))
+        if direction.cause != "geometry" or size >= falls_from:
+            return None
+        walked = [step_map.rest(view.legs, *made_up(9800 + seed, **turning(size)), few=True) for seed in range(2)]
+        return judgement.Walks(mean_of(evidence.joined(walked)), 0.0)
+
+    rest = step_map.rest(view.legs, *made_up(9750, **turning(1.4)), few=True)
+    named = judgement.judge(view, rest, FEW, 0.0, emulate).named
+    assert named.direction.cause == "geometry"
+    assert named.size == pytest.approx(1.4, abs=0.1)
+    assert named.low <= 1.4 <= named.high
+    assert len(asked) <= judgement.EMULATIONS
+
+
+def test_a_size_at_which_the_robot_walked_may_be_nearer_to_a_fall(view):
+    zero = np.zeros(2 * len(FEW))
+    knots = judgement.Knot(1.0, zero, 0), judgement.Knot(0.9, zero, 40)
+    assert judgement.reach_of(changed(view, knots=knots).directions[0])[1] == 0.9
+    assert judgement.reach_of(changed(view, knots=knots[:1]).directions[0])[1] == judgement.BELOW_FALL
 
 
 def test_a_sound_walk_asks_for_no_emulation(view):
