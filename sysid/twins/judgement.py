@@ -40,8 +40,9 @@ ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, befor
 # A later begin must gain so many times what all steps do and the limit of a sound walk: chosen by us, looking at false
 # alarms on 1 mm of roughness, of which most were begins.
 ONSET_PAYS, ONSET_LIMITS = 1.25, 3.0
+STANDS_OUT = 0.67  # of a cause's gain: with less than this of every other one it may be named by walks like it
 FEWEST_REPEATS = 4  # walks with the named cause by whose sizes its interval is checked
-UNEXPLAINED = 1.3  # times the distance that few sound walks exceed: what is left under it is sound
+UNEXPLAINED = 1.3  # times the distance that few walks exceed: what is left under it is as with them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -361,11 +362,14 @@ def judge(
     fits, most = best_known_first(space, fits, gain_limit, emulate is not None)
     best = fits[0]
     named = None
-    if detected and best.gain > gain_limit and best.left < sound_distance(view):
-        named = _sized(view, mean, weights, best)
-        if repeat is not None:
+    if detected and best.gain > gain_limit:
+        is_sound, walks = best.left < sound_distance(view), list[Rest]()
+        if repeat is not None and (is_sound or _stands_out(fits)):
+            sized = _sized(view, mean, weights, best)
             there = _floor_without(view, looks_m, own.get(_key(best.direction), 0.0))
-            named = as_repeated(view, named, sum(mean.steps), repeat(named.direction, named.size, there))
+            walks = list(repeat(sized.direction, sized.size, there))
+        if is_sound or is_as_repeated(view, mean, weights, best, walks):
+            named = as_repeated(view, _sized(view, mean, weights, best), sum(mean.steps), walks)
     scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
     ties = tuple(each.direction for each in fits[1:] if most - each.gain < TIE * scale)
     return Verdict(
@@ -420,7 +424,7 @@ def habits_of(space: Space, fits: Sequence[Fit], limits: tuple[float, float]) ->
     left, taken = copy.copy(space), list[Fit]()
     while fits and _is_habit(fits[0]):
         taken.append(fits[0])
-        number = next(n for n, each in enumerate(space.directions) if each is fits[0].direction)
+        number = _number(space.directions, fits[0])
         left.value = left.value - left.moved(number, fits[0].size)
         fits = [fit for fit in left.fits() if all(fit.direction is not each.direction for each in taken)]
         gain, distance = fits[0].gain if fits else 0.0, float(left.value @ left.value) / left.freedom
@@ -506,17 +510,50 @@ def _floor_without(view: View, looks_m: float, own_m2: float) -> float:
     return min(float(np.sqrt(max(looks_m**2 - own_m2, 0.0))), float(view.floors_m[-1]))
 
 
+def is_as_repeated(view: View, mean: Mean, weights: Array, best: Fit, walks: Sequence[Rest]) -> bool:
+    """Whether what a cause leaves of a walk is not more than what it leaves of walks with it: near a fall a gait may
+    have two forms, and no walk is like the mean of others."""
+    own = _left(view, mean, weights, best)
+    left = [
+        _left(view, part, view.weights(view.roughness(rest)), best)
+        for rest in walks
+        if (part := _last_of(rest, sum(mean.steps))) is not None
+    ]
+    return len(left) >= FEWEST_REPEATS and own < UNEXPLAINED * max(left)
+
+
+def _left(view: View, mean: Mean, weights: Array, best: Fit) -> float:
+    """Distance of a walk from one with a cause of this size."""
+    space = Space(view, mean, weights, without=best.direction.name)
+    rest = space.value - space.moved(_number(view.directions, best), best.size)
+    return float(rest @ rest) / space.freedom
+
+
+def _last_of(rest: Rest, steps: int) -> Mean | None:
+    """The mean of so many steps at a walk's end."""
+    return mean_of(rest, rest.step > rest.step[-1] - steps)
+
+
+def _number(directions: Sequence[Direction], fit: Fit) -> int:
+    return next(number for number, each in enumerate(directions) if each is fit.direction)
+
+
+def _stands_out(fits: Sequence[Fit]) -> bool:
+    """Whether the likeliest cause was emulated, and explains much more than every other one."""
+    walked = any(knot.steps for knot in fits[0].direction.knots)
+    return walked and all(each.gain < STANDS_OUT * fits[0].gain for each in fits[1:])
+
+
 def as_repeated(view: View, named: Fit, steps: int, walks: Sequence[Rest]) -> Fit:
     """A cause whose interval reaches as far as the sizes that are found in walks with it: a walk with a cause may
     scatter more than a sound one, and a body's tolerances act otherwise there. steps: of the recording, as many count
     here."""
-    number = next(n for n, each in enumerate(view.directions) if each is named.direction)
     errors = []
     for rest in walks:
-        mean = mean_of(rest, rest.step > rest.step[-1] - steps)
+        mean = _last_of(rest, steps)
         if mean is not None:
             space = Space(view, mean, view.weights(view.roughness(rest)), without=named.direction.name)
-            errors.append(space.fit(number).size - named.size)
+            errors.append(space.fit(_number(view.directions, named)).size - named.size)
     if len(errors) < FEWEST_REPEATS:
         return named
     reach = float(stats.t.ppf(0.975, len(errors)) * np.sqrt(np.mean(np.square(errors))))
@@ -541,7 +578,7 @@ def _begins(view: View, found: Rest, onset: int, weights: Array, later: Fit) -> 
     if before is None:
         return False
     space = Space(view, before, weights)
-    number = next(n for n, each in enumerate(view.directions) if each is later.direction)
+    number = _number(view.directions, later)
     return bool(space.profile(number, np.array([0.5 * later.size]))[0] < 0.0)
 
 
@@ -555,14 +592,14 @@ def _sized(view: View, mean: Mean, weights: Array, best: Fit) -> Fit:
     if not best.direction.tolerance:
         return best
     space = Space(view, mean, weights, without=best.direction.name)
-    number = next(n for n, each in enumerate(view.directions) if each is best.direction)
+    number = _number(view.directions, best)
     sized = space.fit(number)
     return dataclasses.replace(best, size=sized.size, low=sized.low, high=sized.high)
 
 
 def _alike(space: Space, best: Fit) -> tuple[Direction, ...]:
     """Causes whose direction is the best one's in the present features."""
-    number = next(n for n, each in enumerate(space.directions) if each is best.direction)
+    number = _number(space.directions, best)
     own = space.moved(number, best.size)
     out = []
     for other, each in enumerate(space.directions):

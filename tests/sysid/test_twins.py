@@ -176,6 +176,13 @@ def test_a_floor_is_as_rough_as_the_scatter_of_all_features_says(on_two_floors, 
     assert view.roughness(rest) == pytest.approx(floor_m, abs=0.13e-3)
 
 
+@pytest.mark.parametrize(("noise", "looks_m"), [(2.0, 0.001), (3.0, 0.001 * (8.0 / 3.0) ** 0.5)])
+def test_steps_may_look_as_if_on_a_rougher_floor_than_was_made(on_two_floors, noise, looks_m):
+    view = on_two_floors
+    rest = step_map.rest(view.legs, *made_up(9100, count=400, noise=noise * NOISE), few=True)
+    assert view.looks(rest) == pytest.approx(looks_m, rel=0.1)  # variances go with its square
+
+
 def test_a_cause_that_moves_each_leg_another_way_is_not_a_rougher_floor(on_two_floors):
     view = on_two_floors
     sound, moved = (
@@ -411,6 +418,24 @@ def turning(size):
     return {"moved": min(size, 0.8), "unknown": 1.2 * max(size - 0.8, 0.0)}
 
 
+def test_a_cause_that_scatters_the_steps_walks_on_the_floor_that_is_left(on_two_floors):
+    """The log looks rougher than any floor that was made, and so do the first walks: the floor may be level."""
+    view, walked = on_two_floors, made_up_view()
+    view = dataclasses.replace(view, directions=walked.directions, alarms=walked.alarms)
+    rest = step_map.rest(view.legs, *made_up(9750, moved=0.9, noise=3.0 * NOISE), few=True)
+    floors_m = []
+
+    def emulate(direction, size, floor_m):
+        floors_m.append(floor_m)
+        return judgement.Walks(mean_of(rest), float(np.hypot(1.6e-3, floor_m)))
+
+    confirmed, own = judgement.confirmed(view, mean_of(rest), view.weights(0.001), 1.7e-3, emulate)
+    assert floors_m[:2] == pytest.approx([0.001, (1.7**2 - 1.6**2) ** 0.5 * 1e-3])
+    assert own["geometry at feet", "foot_height_m"] == pytest.approx(1.6e-3**2)
+    assert all(knot.steps for each in confirmed.directions for knot in each.knots)
+    assert sum(len(each.knots) for each in confirmed.directions) == len(floors_m) - len(own)  # first ones do not count
+
+
 @pytest.mark.parametrize("falls_from", [np.inf, 1.45])
 def test_a_size_that_leaves_more_than_a_sound_walk_is_sought_by_walks_next_to_it(view, falls_from):
     asked = []
@@ -428,6 +453,31 @@ def test_a_size_that_leaves_more_than_a_sound_walk_is_sought_by_walks_next_to_it
     assert named.size == pytest.approx(1.4, abs=0.1)
     assert named.low <= 1.4 <= named.high
     assert len(asked) <= judgement.EMULATIONS
+
+
+def of_two_forms(seed, size, form):
+    """A walk with the first cause near a fall: its gait has one of two forms, at random."""
+    return made_up(seed, moved=size, unknown=0.5 * form)
+
+
+@pytest.mark.parametrize(("forms", "named"), [((1, -1, -1, 1, 1, -1), True), ((0, 0, 0, 0, 0, 0), False)])
+def test_a_walk_that_differs_from_the_mean_as_walks_with_its_cause_do_has_a_name(view, forms, named):
+    """Two walks of either form have a mean that no walk is like."""
+
+    def rests(first, size, forms):
+        walks = [of_two_forms(first + number, size, form) for number, form in enumerate(forms)]
+        return [step_map.rest(view.legs, *each, few=True) for each in walks]
+
+    def emulate(direction, size, floor_m):
+        if direction.cause != "geometry":
+            return None
+        return judgement.Walks(mean_of(evidence.joined(rests(9800, size, (1, -1)))), 0.0)
+
+    rest = step_map.rest(view.legs, *of_two_forms(9750, 1.0, 1), few=True)
+    verdict = judgement.judge(view, rest, FEW, 0.0, emulate, lambda direction, size, floor_m: rests(9900, size, forms))
+    assert verdict.detected and verdict.fits[0].direction.cause == "geometry"
+    assert verdict.fits[0].left > judgement.sound_distance(verdict.view)
+    assert (verdict.named is not None) == named
 
 
 def test_a_size_at_which_the_robot_walked_may_be_nearer_to_a_fall(view):
