@@ -21,7 +21,7 @@ AMONG_TWINS = 0.3  # of the largest size of a cause's twins: between it and the 
 CLOSE = 0.05  # of a size: nearer to an emulated one it is not emulated again
 SMOOTHER_M = 0.0003  # than the floor of a cause's first walks, by what these show that it adds: they walk again there
 USUAL = 0.95  # quantile of sound walks: a cause that leaves more is not yet at its best size
-BESIDE = 1.25  # to such a size: next to it on either side the cause is emulated as well
+NEXT_TO = 1.25  # to such a size: next to it on either side the cause is emulated as well
 KNOWN, FAR_KNOWN = 4.0, 2.0  # times its error's squared length that a direction has: near 0, and by a far walk
 MOST_NOISE = 0.5  # of a direction's squared length, that its noise may have added
 AT_KNOT = 0.1  # the same where the cause was emulated for the log
@@ -459,7 +459,7 @@ def confirmed(
         by_gain = sorted((fit for _, fit in likely), key=lambda fit: -fit.gain)
         wanted = [(fit.direction, fit.size) for fit in by_gain if not _is_confirmed(fit, sound)]
         if _is_confirmed(best, sound) and float(space.value @ space.value) - best.gain > usual * space.freedom:
-            wanted = [(best.direction, size) for size in _beside(best)] + wanted
+            wanted = [(best.direction, size) for size in _next_to(best)] + wanted
         if not wanted:
             break
         direction, size = wanted[0]
@@ -487,7 +487,7 @@ def _key(each: Direction) -> tuple[str, str]:
     return each.name, each.parameter
 
 
-def _beside(best: Fit) -> list[float]:
+def _next_to(best: Fit) -> list[float]:
     """Sizes next to that of a confirmed cause at which it was not emulated: outside, then inside. Where the robot falls
     outside, half the way to it."""
     emulated = {knot.size / best.size: knot.steps for knot in best.direction.knots if knot.size * best.size > 0.0}
@@ -496,12 +496,12 @@ def _beside(best: Fit) -> list[float]:
     outside = min((ratio for ratio in emulated if ratio > 1.0 + CLOSE), default=np.inf)
     inside = max((ratio for ratio in emulated if ratio < 1.0 - CLOSE), default=0.0)
     ratios = []
-    if outside > BESIDE * (1.0 + CLOSE):
-        ratios.append(BESIDE)
+    if outside > NEXT_TO * (1.0 + CLOSE):
+        ratios.append(NEXT_TO)
     elif not emulated[outside] and outside > (1.0 + CLOSE) ** 2:
         ratios.append(float(np.sqrt(outside)))
-    if inside < (1.0 - CLOSE) / BESIDE:
-        ratios.append(1.0 / BESIDE)
+    if inside < (1.0 - CLOSE) / NEXT_TO:
+        ratios.append(1.0 / NEXT_TO)
     return [ratio * best.size for ratio in ratios]
 
 
