@@ -213,7 +213,7 @@ def _emulate(repeat: Repeated, view: View) -> judgement.Emulate:
         mean = mean_of(together) if together is not None else None
         if together is None or mean is None:
             return None
-        return judgement.Walks(mean, view.roughness(together))
+        return judgement.Walks(mean, view.looks(together))
 
     return emulate
 

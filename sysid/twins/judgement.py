@@ -3,7 +3,7 @@
 import copy
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import linalg, stats
@@ -19,6 +19,9 @@ EMULATIONS = 10  # of a cause at a size, at most, for one log
 FIRST, NEAR_BEST = 3, 0.5  # of the likeliest causes, and the share of the best one's gain, that are confirmed
 AMONG_TWINS = 0.3  # of the largest size of a cause's twins: between it and the largest they count themselves
 CLOSE = 0.05  # of a size: nearer to an emulated one it is not emulated again
+SMOOTHER_M = 0.0003  # than the floor of a cause's first walks, by what these show that it adds: they walk again there
+USUAL = 0.95  # quantile of sound walks: a cause that leaves more is not yet at its best size
+NEXT_TO = 1.25  # to such a size: next to it on either side the cause is emulated as well
 KNOWN, FAR_KNOWN = 4.0, 2.0  # times its error's squared length that a direction has: near 0, and by a far walk
 MOST_NOISE = 0.5  # of a direction's squared length, that its noise may have added
 AT_KNOT = 0.1  # the same where the cause was emulated for the log
@@ -37,13 +40,14 @@ ONSET_EVERY, ONSET_AFTER, ONSET_LEAST = 2, 10, 8  # steps: between onsets, befor
 # A later begin must gain so many times what all steps do and the limit of a sound walk: chosen by us, looking at false
 # alarms on 1 mm of roughness, of which most were begins.
 ONSET_PAYS, ONSET_LIMITS = 1.25, 3.0
+STANDS_OUT = 0.67  # of a cause's gain: with less than this of every other one it may be named by walks like it
 FEWEST_REPEATS = 4  # walks with the named cause by whose sizes its interval is checked
-UNEXPLAINED = 1.3  # times the distance that few sound walks exceed: what is left under it is sound
+UNEXPLAINED = 1.3  # times the distance that few walks exceed: what is left under it is as with them
 
 
 @dataclasses.dataclass(frozen=True)
 class Walks:
-    """Emulated walks as a vector. floor_m: as rough as their steps look."""
+    """Emulated walks as a vector. floor_m: as rough as their steps look, on a floor that was made or beyond."""
 
     mean: Mean
     floor_m: float
@@ -129,12 +133,14 @@ def _shares(each: Direction, sizes: Array) -> Array:
 def reach_of(each: Direction) -> tuple[float, float]:
     """Sizes among which the best is sought: some times those that were made or emulated, below any at which it fell."""
     low, high = FARTHEST * each.low, FARTHEST * each.high
-    for knot in _walked(each):
-        low, high = min(low, FURTHER * knot.size), max(high, FURTHER * knot.size)
+    walked = [knot.size for knot in _walked(each)]
+    for size in walked:
+        low, high = min(low, FURTHER * size), max(high, FURTHER * size)
     for knot in (*each.far, *each.knots):
         if not knot.steps:
-            low = max(low, BELOW_FALL * knot.size) if knot.size < 0.0 else low
-            high = min(high, BELOW_FALL * knot.size) if knot.size > 0.0 else high
+            inside = [size for size in walked if 0.0 < size / knot.size < 1.0]
+            last = max((BELOW_FALL * knot.size, *inside), key=abs)
+            low, high = (max(low, last), high) if knot.size < 0.0 else (low, min(high, last))
     return low, high
 
 
@@ -343,11 +349,12 @@ def judge(
     limits = gain_limit, distance_limit
     detected = fits[0].gain > gain_limit or distance > distance_limit
     habits = habits_of(space, fits, limits) if detected else ()
-    own: Mapping[str, float] = {}
+    own, looks_m = dict[tuple[str, str], float](), floor_m
     if detected and not habits:
         view = whole
         if emulate is not None:
-            view, own = confirmed(view, mean, weights, floor_m, emulate)
+            looks_m = view.looks(found)
+            view, own = confirmed(view, mean, weights, looks_m, emulate)
         space = Space(view, mean, weights)
         fits = space.fits()
         habits = habits_of(space, fits, limits)
@@ -355,11 +362,14 @@ def judge(
     fits, most = best_known_first(space, fits, gain_limit, emulate is not None)
     best = fits[0]
     named = None
-    if detected and best.gain > gain_limit and best.left < sound_distance(view):
-        named = _sized(view, mean, weights, best)
-        if repeat is not None:
-            there = _floor_without(floor_m, own.get(best.direction.name, 0.0))
-            named = as_repeated(view, named, sum(mean.steps), repeat(named.direction, named.size, there))
+    if detected and best.gain > gain_limit:
+        is_sound, walks = best.left < sound_distance(view), list[Rest]()
+        if repeat is not None and (is_sound or _stands_out(fits)):
+            sized = _sized(view, mean, weights, best)
+            there = _floor_without(view, looks_m, own.get(_key(best.direction), 0.0))
+            walks = list(repeat(sized.direction, sized.size, there))
+        if is_sound or is_as_repeated(view, mean, weights, best, walks):
+            named = as_repeated(view, _sized(view, mean, weights, best), sum(mean.steps), walks)
     scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
     ties = tuple(each.direction for each in fits[1:] if most - each.gain < TIE * scale)
     return Verdict(
@@ -414,7 +424,7 @@ def habits_of(space: Space, fits: Sequence[Fit], limits: tuple[float, float]) ->
     left, taken = copy.copy(space), list[Fit]()
     while fits and _is_habit(fits[0]):
         taken.append(fits[0])
-        number = next(n for n, each in enumerate(space.directions) if each is fits[0].direction)
+        number = _number(space.directions, fits[0])
         left.value = left.value - left.moved(number, fits[0].size)
         fits = [fit for fit in left.fits() if all(fit.direction is not each.direction for each in taken)]
         gain, distance = fits[0].gain if fits else 0.0, float(left.value @ left.value) / left.freedom
@@ -431,13 +441,14 @@ def _is_habit(fit: Fit) -> bool:
 
 def confirmed(
     view: View, mean: Mean, weights: Array, looks_m: float, emulate: Emulate
-) -> tuple[View, Mapping[str, float]]:
+) -> tuple[View, dict[tuple[str, str], float]]:
     """The view with the likeliest causes emulated at the sizes found; what an emulation shows may bring another cause
     or size to the front. It ends when the first ones have been emulated and the best explains the walk, or after too
     many. looks_m: roughness of the log's floor by its steps, to whose scatter a cause adds: its walks are on a floor of
-    what is left. Also, by name, the square of the roughness (m2) that a cause adds."""
+    what is left. Also, by name and parameter, the square of the roughness (m2) that a cause adds."""
     middle, sound = weights @ view.middle, sound_distance(view)
-    own: dict[str, float] = {}
+    usual = float(np.quantile(view.alarms[:, 1], USUAL))
+    own: dict[tuple[str, str], float] = {}
     for _ in range(EMULATIONS):
         space = Space(view, mean, weights)
         numbers = range(len(view.directions))  # what is not known from the twins becomes so by its own walks
@@ -445,39 +456,104 @@ def confirmed(
         best = max((fit for _, fit in likely), key=lambda fit: fit.gain)
         if _is_confirmed(best, sound) and best.left < sound:
             likely = [each for each in likely[:FIRST] if each[0] > NEAR_BEST * best.gain]
-        wanted = [fit for _, fit in likely if not _is_confirmed(fit, sound)]
+        by_gain = sorted((fit for _, fit in likely), key=lambda fit: -fit.gain)
+        wanted = [(fit.direction, fit.size) for fit in by_gain if not _is_confirmed(fit, sound)]
+        if _is_confirmed(best, sound) and float(space.value @ space.value) - best.gain > usual * space.freedom:
+            wanted = [(best.direction, size) for size in _next_to(best)] + wanted
         if not wanted:
             break
-        direction, size = wanted[0].direction, wanted[0].size
-        floor_m = _floor_without(looks_m, own.get(direction.name, 0.0))
+        direction, size = wanted[0]
+        floor_m = _floor_without(view, looks_m, own.get(_key(direction), 0.0))
         walked = emulate(direction, size, floor_m)
-        moved, steps = np.zeros_like(middle), 0
+        knots, is_first = direction.knots, _key(direction) not in own
         if walked is not None:
-            moved, steps = np.nan_to_num(walked.mean.value - middle), sum(walked.mean.steps)
-            own[direction.name] = max(walked.floor_m**2 - floor_m**2, 0.0)
-        renewed = dataclasses.replace(direction, knots=(*direction.knots, Knot(size, moved, steps)))
+            own[_key(direction)] = max(walked.floor_m**2 - floor_m**2, 0.0)
+            smoother_m = _floor_without(view, looks_m, own[_key(direction)])
+            if not is_first or smoother_m > floor_m - SMOOTHER_M:
+                moved = np.nan_to_num(walked.mean.value - middle)
+                knots = (*knots, Knot(size, moved, sum(walked.mean.steps)))
+        elif is_first and floor_m > SMOOTHER_M:
+            own[_key(direction)] = looks_m**2  # the scatter may be the cause's alone: it may walk on a level floor
+        else:
+            knots = (*knots, Knot(size, np.zeros_like(middle), 0))
+        renewed = dataclasses.replace(direction, knots=knots)
         view = dataclasses.replace(
             view, directions=tuple(renewed if each is direction else each for each in view.directions)
         )
     return view, own
 
 
-def _floor_without(looks_m: float, own_m2: float) -> float:
-    """Roughness of a floor by its steps, without what a cause adds to their scatter."""
-    return float(np.sqrt(max(looks_m**2 - own_m2, 0.0)))
+def _key(each: Direction) -> tuple[str, str]:
+    return each.name, each.parameter
+
+
+def _next_to(best: Fit) -> list[float]:
+    """Sizes next to that of a confirmed cause at which it was not emulated: outside, then inside. Where the robot falls
+    outside, half the way to it."""
+    emulated = {knot.size / best.size: knot.steps for knot in best.direction.knots if knot.size * best.size > 0.0}
+    if not emulated:
+        return [best.size]
+    outside = min((ratio for ratio in emulated if ratio > 1.0 + CLOSE), default=np.inf)
+    inside = max((ratio for ratio in emulated if ratio < 1.0 - CLOSE), default=0.0)
+    ratios = []
+    if outside > NEXT_TO * (1.0 + CLOSE):
+        ratios.append(NEXT_TO)
+    elif not emulated[outside] and outside > (1.0 + CLOSE) ** 2:
+        ratios.append(float(np.sqrt(outside)))
+    if inside < (1.0 - CLOSE) / NEXT_TO:
+        ratios.append(1.0 / NEXT_TO)
+    return [ratio * best.size for ratio in ratios]
+
+
+def _floor_without(view: View, looks_m: float, own_m2: float) -> float:
+    """Roughness of a floor by its steps, without what a cause adds to their scatter: of those that were made."""
+    return min(float(np.sqrt(max(looks_m**2 - own_m2, 0.0))), float(view.floors_m[-1]))
+
+
+def is_as_repeated(view: View, mean: Mean, weights: Array, best: Fit, walks: Sequence[Rest]) -> bool:
+    """Whether what a cause leaves of a walk is not more than what it leaves of walks with it: near a fall a gait may
+    have two forms, and no walk is like the mean of others."""
+    own = _left(view, mean, weights, best)
+    left = [
+        _left(view, part, view.weights(view.roughness(rest)), best)
+        for rest in walks
+        if (part := _last_of(rest, sum(mean.steps))) is not None
+    ]
+    return len(left) >= FEWEST_REPEATS and own < UNEXPLAINED * max(left)
+
+
+def _left(view: View, mean: Mean, weights: Array, best: Fit) -> float:
+    """Distance of a walk from one with a cause of this size."""
+    space = Space(view, mean, weights, without=best.direction.name)
+    rest = space.value - space.moved(_number(view.directions, best), best.size)
+    return float(rest @ rest) / space.freedom
+
+
+def _last_of(rest: Rest, steps: int) -> Mean | None:
+    """The mean of so many steps at a walk's end."""
+    return mean_of(rest, rest.step > rest.step[-1] - steps)
+
+
+def _number(directions: Sequence[Direction], fit: Fit) -> int:
+    return next(number for number, each in enumerate(directions) if each is fit.direction)
+
+
+def _stands_out(fits: Sequence[Fit]) -> bool:
+    """Whether the likeliest cause was emulated, and explains much more than every other one."""
+    walked = any(knot.steps for knot in fits[0].direction.knots)
+    return walked and all(each.gain < STANDS_OUT * fits[0].gain for each in fits[1:])
 
 
 def as_repeated(view: View, named: Fit, steps: int, walks: Sequence[Rest]) -> Fit:
     """A cause whose interval reaches as far as the sizes that are found in walks with it: a walk with a cause may
     scatter more than a sound one, and a body's tolerances act otherwise there. steps: of the recording, as many count
     here."""
-    number = next(n for n, each in enumerate(view.directions) if each is named.direction)
     errors = []
     for rest in walks:
-        mean = mean_of(rest, rest.step > rest.step[-1] - steps)
+        mean = _last_of(rest, steps)
         if mean is not None:
             space = Space(view, mean, view.weights(view.roughness(rest)), without=named.direction.name)
-            errors.append(space.fit(number).size - named.size)
+            errors.append(space.fit(_number(view.directions, named)).size - named.size)
     if len(errors) < FEWEST_REPEATS:
         return named
     reach = float(stats.t.ppf(0.975, len(errors)) * np.sqrt(np.mean(np.square(errors))))
@@ -502,7 +578,7 @@ def _begins(view: View, found: Rest, onset: int, weights: Array, later: Fit) -> 
     if before is None:
         return False
     space = Space(view, before, weights)
-    number = next(n for n, each in enumerate(view.directions) if each is later.direction)
+    number = _number(view.directions, later)
     return bool(space.profile(number, np.array([0.5 * later.size]))[0] < 0.0)
 
 
@@ -516,14 +592,14 @@ def _sized(view: View, mean: Mean, weights: Array, best: Fit) -> Fit:
     if not best.direction.tolerance:
         return best
     space = Space(view, mean, weights, without=best.direction.name)
-    number = next(n for n, each in enumerate(view.directions) if each is best.direction)
+    number = _number(view.directions, best)
     sized = space.fit(number)
     return dataclasses.replace(best, size=sized.size, low=sized.low, high=sized.high)
 
 
 def _alike(space: Space, best: Fit) -> tuple[Direction, ...]:
     """Causes whose direction is the best one's in the present features."""
-    number = next(n for n, each in enumerate(space.directions) if each is best.direction)
+    number = _number(space.directions, best)
     own = space.moved(number, best.size)
     out = []
     for other, each in enumerate(space.directions):

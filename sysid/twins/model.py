@@ -16,7 +16,8 @@ from ranger_sim.sysid.twins.steps import INNER, OUTER
 TRIM = 0.1  # of the steps at either end, which do not count
 FEWEST = 3  # steps of either leg
 RARE = 6.0  # deviations at which a sound step is cut
-TRIED = 41  # floors, from level to the roughest that was made
+TRIED = 40  # floors, above level up to the roughest that was made
+BEYOND = 3.0  # times the roughest floor that was made: as rough a floor a recording may look
 SHOWN = 1.7  # times its variance on a level floor: a feature that has as much on the roughest one shows the floor
 
 
@@ -89,26 +90,33 @@ class View:
         return weights
 
     def roughness(self, found: Rest) -> float:
-        """The roughness of the floor, in m, on which a sound robot's steps scatter as much as these.
+        """The roughness of the floor, in m, on which a sound robot's steps scatter as much as these; of floors up to
+        the roughest that was made."""
+        return min(self.looks(found), float(self.floors_m[-1]))
+
+    def looks(self, found: Rest) -> float:
+        """The same beyond the roughest floor that was made, where variances go on with the square of the roughness.
 
         A cause moves features; the floor scatters them. So each feature that shows the floor counts about its mean of
         either leg, and the median of all decides: no single one, which a slow log may sample too coarsely.
         """
-        tried = self.floors_m[-1] * np.linspace(0.0, 1.0, TRIED)
+        tried = self.floors_m[-1] * np.arange(int(TRIED * BEYOND) + 1) / TRIED
+        rougher = np.maximum((tried / max(self.floors_m[-1], 1e-9)) ** 2 - 1.0, 0.0)[:, None]
         p = self.correlation.shape[1]
-        beyond = []  # (TRIED, features): logarithms of variances, over what sound steps have on each floor
+        beyond = []  # (floors, features): logarithms of variances, over what sound steps have on each floor
         for side in (OUTER, INNER):
             left = found.left[found.inside & (found.leg == side)]
             if len(left) < FEWEST:
                 continue
             left = np.clip(left - np.median(left, 0), -RARE, RARE)
             variance = left.var(0, ddof=1)
-            sound = np.array([self.weights(each) @ self.deviation[:, side * p : (side + 1) * p] ** 2 for each in tried])
-            shown = (sound[-1] > SHOWN * sound[0]) & np.isfinite(variance) & (variance > 0.0)
+            made = self.deviation[:, side * p : (side + 1) * p] ** 2
+            sound = np.array([self.weights(each) @ made for each in tried]) + rougher * (made[-1] - made[0])
+            shown = (made[-1] > SHOWN * made[0]) & np.isfinite(variance) & (variance > 0.0)
             half = 0.5 * (len(left) - 1)
             few = float(special.digamma(half)) - np.log(half)  # what the logarithm of a variance is too small by
             beyond.append(np.log(variance[shown]) - few - np.log(sound[:, shown]))
-        together = np.hstack(beyond) if beyond else np.zeros((TRIED, 0))
+        together = np.hstack(beyond) if beyond else np.zeros((len(tried), 0))
         if not together.shape[1]:
             return 0.0
         return float(np.interp(0.0, -np.median(together, axis=1), tried))

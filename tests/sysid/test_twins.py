@@ -100,10 +100,11 @@ def test_a_link_of_50_hz_is_recognised_and_strikes_come_at_most_one_sample_late(
 SLOPES = generator(1, "slopes of made-up twins").normal(size=(len(FEW_START), len(FEW)))
 EFFECT = generator(2, "effect of a made-up cause").normal(size=(2, len(FEW)))
 OTHER = generator(3, "effect of another cause").normal(size=(2, len(FEW)))
+UNKNOWN = generator(4, "effect that no cause has").normal(size=(2, len(FEW)))
 NOISE = 0.3
 
 
-def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE):
+def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE, unknown=0.0):
     """Steps whose outcomes are linear in the step before, plus noise and effects of this size from a step on."""
     draw = generator(seed, "made-up walk")
     found = np.full((count, len(features.NAMES)), np.nan)
@@ -113,7 +114,7 @@ def made_up(seed, moved=0.0, other=0.0, count=40, since=0, noise=NOISE):
     for row in range(1, count):
         made = 0.15 * found[row - 1, starts] @ SLOPES + noise * draw.normal(size=len(FEW))
         if row >= since:
-            made += moved * EFFECT[leg[row]] + other * OTHER[leg[row]]
+            made += moved * EFFECT[leg[row]] + other * OTHER[leg[row]] + unknown * UNKNOWN[leg[row]]
         found[row] = draw.normal(size=found.shape[1])
         found[row, outcomes] = made
     return leg, found
@@ -173,6 +174,13 @@ def test_a_floor_is_as_rough_as_the_scatter_of_all_features_says(on_two_floors, 
     rest = step_map.rest(view.legs, *made_up(9100, count=400, noise=noise * NOISE), few=True)
     # the variance of 200 steps of either leg is known to a tenth, which is 0.13 mm on a level floor
     assert view.roughness(rest) == pytest.approx(floor_m, abs=0.13e-3)
+
+
+@pytest.mark.parametrize(("noise", "looks_m"), [(2.0, 0.001), (3.0, 0.001 * (8.0 / 3.0) ** 0.5)])
+def test_steps_may_look_as_if_on_a_rougher_floor_than_was_made(on_two_floors, noise, looks_m):
+    view = on_two_floors
+    rest = step_map.rest(view.legs, *made_up(9100, count=400, noise=noise * NOISE), few=True)
+    assert view.looks(rest) == pytest.approx(looks_m, rel=0.1)  # variances go with its square
 
 
 def test_a_cause_that_moves_each_leg_another_way_is_not_a_rougher_floor(on_two_floors):
@@ -403,6 +411,80 @@ def test_a_size_with_which_the_emulated_robot_falls_is_not_an_answer(view):
     verdict, asked = confirmed(view, 1.8, falls_from=1.1)
     assert max(abs(size) for _, size in asked) >= 1.1
     assert all(abs(fit.size) < 1.1 for fit in verdict.fits if fit.direction.cause == "geometry")
+
+
+def turning(size):
+    """An effect that goes on in another direction from a size of 0.8 on: the best size of a line is 0.8 from there."""
+    return {"moved": min(size, 0.8), "unknown": 1.2 * max(size - 0.8, 0.0)}
+
+
+def test_a_cause_that_scatters_the_steps_walks_on_the_floor_that_is_left(on_two_floors):
+    """The log looks rougher than any floor that was made, and so do the first walks: the floor may be level."""
+    view, walked = on_two_floors, made_up_view()
+    view = dataclasses.replace(view, directions=walked.directions, alarms=walked.alarms)
+    rest = step_map.rest(view.legs, *made_up(9750, moved=0.9, noise=3.0 * NOISE), few=True)
+    floors_m = []
+
+    def emulate(direction, size, floor_m):
+        floors_m.append(floor_m)
+        return judgement.Walks(mean_of(rest), float(np.hypot(1.6e-3, floor_m)))
+
+    confirmed, own = judgement.confirmed(view, mean_of(rest), view.weights(0.001), 1.7e-3, emulate)
+    assert floors_m[:2] == pytest.approx([0.001, (1.7**2 - 1.6**2) ** 0.5 * 1e-3])
+    assert own["geometry at feet", "foot_height_m"] == pytest.approx(1.6e-3**2)
+    assert all(knot.steps for each in confirmed.directions for knot in each.knots)
+    assert sum(len(each.knots) for each in confirmed.directions) == len(floors_m) - len(own)  # first ones do not count
+
+
+@pytest.mark.parametrize("falls_from", [np.inf, 1.45])
+def test_a_size_that_leaves_more_than_a_sound_walk_is_sought_by_walks_next_to_it(view, falls_from):
+    asked = []
+
+    def emulate(direction, size, floor_m):
+        asked.append((direction.cause, size))
+        if direction.cause != "geometry" or size >= falls_from:
+            return None
+        walked = [step_map.rest(view.legs, *made_up(9800 + seed, **turning(size)), few=True) for seed in range(2)]
+        return judgement.Walks(mean_of(evidence.joined(walked)), 0.0)
+
+    rest = step_map.rest(view.legs, *made_up(9750, **turning(1.4)), few=True)
+    named = judgement.judge(view, rest, FEW, 0.0, emulate).named
+    assert named.direction.cause == "geometry"
+    assert named.size == pytest.approx(1.4, abs=0.1)
+    assert named.low <= 1.4 <= named.high
+    assert len(asked) <= judgement.EMULATIONS
+
+
+def of_two_forms(seed, size, form):
+    """A walk with the first cause near a fall: its gait has one of two forms, at random."""
+    return made_up(seed, moved=size, unknown=0.5 * form)
+
+
+@pytest.mark.parametrize(("forms", "named"), [((1, -1, -1, 1, 1, -1), True), ((0, 0, 0, 0, 0, 0), False)])
+def test_a_walk_that_differs_from_the_mean_as_walks_with_its_cause_do_has_a_name(view, forms, named):
+    """Two walks of either form have a mean that no walk is like."""
+
+    def rests(first, size, forms):
+        walks = [of_two_forms(first + number, size, form) for number, form in enumerate(forms)]
+        return [step_map.rest(view.legs, *each, few=True) for each in walks]
+
+    def emulate(direction, size, floor_m):
+        if direction.cause != "geometry":
+            return None
+        return judgement.Walks(mean_of(evidence.joined(rests(9800, size, (1, -1)))), 0.0)
+
+    rest = step_map.rest(view.legs, *of_two_forms(9750, 1.0, 1), few=True)
+    verdict = judgement.judge(view, rest, FEW, 0.0, emulate, lambda direction, size, floor_m: rests(9900, size, forms))
+    assert verdict.detected and verdict.fits[0].direction.cause == "geometry"
+    assert verdict.fits[0].left > judgement.sound_distance(verdict.view)
+    assert (verdict.named is not None) == named
+
+
+def test_a_size_at_which_the_robot_walked_may_be_nearer_to_a_fall(view):
+    zero = np.zeros(2 * len(FEW))
+    knots = judgement.Knot(1.0, zero, 0), judgement.Knot(0.9, zero, 40)
+    assert judgement.reach_of(changed(view, knots=knots).directions[0])[1] == 0.9
+    assert judgement.reach_of(changed(view, knots=knots[:1]).directions[0])[1] == judgement.BELOW_FALL
 
 
 def test_a_sound_walk_asks_for_no_emulation(view):
