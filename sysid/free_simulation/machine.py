@@ -101,12 +101,17 @@ class SimulatedMachine(DeclaredMachine):
     def again(
         self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
     ) -> Recording:
-        """The recording fitted and linearised with these effects in the simulator; fixed: their coefficients stay."""
+        """The recording fitted and linearised with these effects in the simulator; fixed: their coefficients stay.
+
+        A fit that has settled with the same effects is the answer already: it would end at the same place again.
+        """
         acting = [
             Acting(effect.term, shape, tuple(coefficients))
             for effect, shape, coefficients in effects
             if isinstance(effect, SimulatedEffect) and effect.term is not None
         ]
+        if not fixed and _fit(recording).settled_with(acting):
+            return recording
         fit = _fit(recording).acted_on(acting, fixed)
         fit.settle(AGAIN)
         _chosen(fit)

@@ -214,9 +214,17 @@ class Simulator:
         return at
 
     def linearised(
-        self, x: Array, u: Array, p: Array, ports: Array, sizes: tuple[Array, Array, Array], by: Iterable[int]
+        self,
+        x: Array,
+        u: Array,
+        p: Array,
+        ports: Array,
+        sizes: tuple[Array, Array, Array],
+        by: Iterable[int],
+        central: bool = True,
     ) -> Jacobians:
-        """By central differences. x: (n, s), u: (n, i), p: (p,), ports: (n, q); sizes: of x, u and p.
+        """By central differences, or by simple ones at half the price. x: (n, s), u: (n, i), p: (p,), ports: (n, q);
+        sizes: of x, u and p.
 
         by: numbers of the ports that have derivatives; those of the others are 0.
         """
@@ -226,14 +234,15 @@ class Simulator:
         def derivative(which: int, size: float, number: int) -> tuple[Array, Array]:
             """By x, p, u or a port."""
             ends = []
-            for nudge in (NUDGE * size, -NUDGE * size):
+            for nudge in (NUDGE * size, -NUDGE * size)[: 1 + central]:
                 given = [x, p, u, ports]
                 given[which] = given[which].copy()
                 given[which][..., number] += nudge
                 there = driven if which < 2 else self.driven(given[2], given[3])
                 ends.append(self.at(given[0], given[1], there))
-            (f_up, h_up), (f_down, h_down) = ends
-            return (f_up - f_down) / (2.0 * NUDGE * size), (h_up - h_down) / (2.0 * NUDGE * size)
+            (f_up, h_up), (f_down, h_down) = ends if central else (*ends, (f, h))
+            width = (1 + central) * NUDGE * size
+            return (f_up - f_down) / width, (h_up - h_down) / width
 
         def stacked(which: int, sizes: Array) -> tuple[Array, Array]:
             f_by, h_by = np.zeros((*f.shape, len(sizes))), np.zeros((*h.shape, len(sizes)))
