@@ -76,7 +76,7 @@ class TrajectoryFit:
         noisy = self.simulator.noisy
         self.noise_u = np.array(
             [
-                signals.roughness(table, given[name]) if known is None else known
+                self._shown_by(given[name], name) if known is None else known
                 for name, known in machine.noisy_inputs.items()
             ]
         )
@@ -108,6 +108,11 @@ class TrajectoryFit:
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
         self.last_step = np.inf  # largest one of a parameter in the last round, in its standard errors
         self.settled = False  # nothing moved any more where the last rounds ended
+
+    def _shown_by(self, column: Array, name: str) -> float:
+        """Noise of an input as its channel shows it."""
+        rough = signals.roughness(self.table, column)
+        return max(rough, signals.rounding(self.table, column)) if name in self.simulator.staying else rough
 
     @property
     def count(self) -> int:

@@ -109,8 +109,10 @@ class Predictor:
         self.unit = np.median(np.abs(self.spread[:, np.arange(o), np.arange(o)]), axis=0)
 
     def reached(self, samples: np.ndarray) -> Array:
-        """(m, s, s) covariances before these samples, by what comes before them; at a stretch's start that of the end of
-        the one before, which knows more than the stretch began with."""
+        """(m, s, s) covariances before these samples, by what comes before them.
+
+        At a stretch's start it is that of the end of the one before, which knows more than the stretch began with.
+        """
         found: Array = self.covariance[samples]
         begin = (samples > 0) & (samples % self.length == 0)
         found[begin] = self.ends[samples[begin] // self.length - 1]

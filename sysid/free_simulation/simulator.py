@@ -135,11 +135,17 @@ class Simulator:
 
         at_once: inputs that jump and that an output shows in the same row; their clock may be another one.
 
-        Known are inputs that the machine holds, those that stay at a value and jump, and smooth ones. Of the others the
-        row may be a point of straight lines, held until the next row, or the mean of the step that ends there; where
-        they jump, the place of the jump inside a step may be open.
+        Known are inputs that the machine holds, and smooth ones. One that stays at a value and jumps is held, or jumps
+        between the rows: a step of a slow log is somewhere before the row that first shows it, half a row on average.
+        Of the others the row may be a point of straight lines, held until the next row, or the mean of the step that
+        ends there; where they jump, the place of the jump inside a step may be open.
         """
         now, made = self.numerics, [self.numerics]
+        for name in sorted(self.staying):
+            alone = frozenset({name})
+            held = dataclasses.replace(now, held=now.held | alone, unsure=now.unsure - alone)
+            between = dataclasses.replace(now, held=now.held - alone, unsure=now.unsure | alone)
+            made += [each for each in (held, between) if each != now]
         for name in self.open_ways:
             alone = frozenset({name})
             lines = dataclasses.replace(now, held=now.held - alone, means=now.means - alone, unsure=now.unsure - alone)

@@ -182,7 +182,7 @@ def test_samples_of_a_run_are_averaged_and_what_is_left_over_goes():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_stretches_that_begin_where_another_predictor_was_are_as_good_as_one(seed):
-    """One stretch of all samples is exact; short ones begin with its covariances, and their own ends go on from there."""
+    """One stretch of all samples is exact; short ones begin with its covariances, and others with theirs."""
     system = System(seed)
     one = system.predictor(stretch=N)
     short = system.predictor(stretch=3, before=one)
