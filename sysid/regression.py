@@ -133,8 +133,9 @@ def autoregression_above(
     before, under a Gaussian of `width` samples and with one in `every` kept. Its memory is the upper limit of a
     one-sided interval of 95 %, by Whittle's likelihood above `share`: what is seen there of a memory of 0.9 may as well
     be one of 0.8, which has a quarter of the power at low frequencies, and slow noise would be an effect. But noise has
-    no more power below `share` than the residual, and at least that of the likeliest memory. The spectrum gives the autocorrelations, these give the coefficients (Yule and Walker), and the Bayesian
-    information criterion chooses their number. good: rows that count; each unbroken stretch has its own periodogram.
+    no more power below `share` than the residual, and at least that of the likeliest memory. The spectrum gives the
+    autocorrelations, these give the coefficients (Yule and Walker), and the Bayesian information criterion chooses
+    their number. good: rows that count; each unbroken stretch has its own periodogram.
     """
     stretches = [_periodogram(residual[rows]) for rows in _stretches(good)]
     frequencies, powers = (np.concatenate([each[part] for each in stretches] or [np.zeros(0)]) for part in (0, 1))

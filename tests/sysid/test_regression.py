@@ -51,7 +51,7 @@ def test_noise_found_above_a_frequency_is_hardly_another_with_a_slow_effect_belo
     # Known answer: innovations have the deviation sqrt(1 - memory^2), which 20,000 samples tell to 0.5 %
     true_deviation = np.sqrt(1.0 - memory**2)
     assert deviation == pytest.approx(true_deviation, rel=0.02)
-    # With more power below, memories up to the end of their one-sided interval are noise: two steps of 0.02 at most here
+    # With more power below, memories up to the end of their one-sided interval are noise: two steps of 0.02 here
     assert 0.98 < deviation_beside / true_deviation < 1.04
     # the slow part counts as under the noise's true spectrum, or less by the interval's end: 0.84 for a memory of 0.8
     white = innovations(beside, slow) / deviation_beside
