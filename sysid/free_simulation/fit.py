@@ -209,7 +209,7 @@ class TrajectoryFit:
 
     def linearise(self, final: bool = True) -> Jacobians:
         """About the present trajectory, with the effects that act; final: by all ports, not only by those in which one
-        acts, and by central differences."""
+        acts, and by central differences (so is all without effects)."""
         simulator, states = self.simulator, self.machine.states
         values = dict(zip(simulator.names, self.p, strict=False))
         seen = self._closed(values) if self.acting else None
@@ -218,7 +218,13 @@ class TrajectoryFit:
         )
         sizes = self.size_x, self.size_u, self.size_p[: self.count]
         lin = simulator.linearised(
-            self.x, self.u, self.p, self.entering(), sizes, range(len(simulator.ports)) if final else there, final
+            self.x,
+            self.u,
+            self.p,
+            self.entering(),
+            sizes,
+            range(len(simulator.ports)) if final else there,
+            final or not self.acting,
         )
         back = np.zeros((len(self.x), len(simulator.ports), len(states)))
         for each, enter, own in zip(self.acting, self.enter, self._coefficients(), strict=True):
@@ -317,12 +323,17 @@ class TrajectoryFit:
     def round(self, final: bool = False) -> float:
         """One round; returns the largest step of a parameter in its standard errors.
 
-        final: the answer comes from it; the others only lead there, by simple differences. Theirs are short stretches
-        where a stretch need not learn much: near the end, where the covariances that it begins with hardly change any
-        more, and where the law is open.
+        final: the answer comes from it; where effects act the others only lead there, by simple differences, and by
+        short stretches where a stretch need not learn much: near the end, where the covariances that it begins with
+        hardly change any more, and where the law is open. A fit without effects may end far off, where every detail
+        decides where: its rounds are careful.
         """
         self.lin = lin = self.linearise(final)
-        short = not final and (self.predictor is not None and self.last_step < NEAR or bool(np.any(self.slack)))
+        short = (
+            not final
+            and bool(self.acting)
+            and (self.predictor is not None and self.last_step < NEAR or bool(np.any(self.slack)))
+        )
         self.predictor = Predictor(lin, self.noise_u, self.open_outputs(), self.open_steps(), self.starts,
                                    AWAY * self.size_x, self.predictor, SHORT_STRETCH if short else STRETCH)  # fmt: skip
         wide = self.predictor
@@ -449,7 +460,8 @@ class TrajectoryFit:
                 continue
             if self.cost > RISES * before:
                 share *= SHORT
-            led = np.any(self.slack) and (step < ON_THE_WAY or abs(self.cost - before) < HARDLY * self.cost)
+            hardly = step < ON_THE_WAY or abs(self.cost - before) < HARDLY * self.cost
+            led = np.any(self.slack) and (hardly if self.acting else step <= STEADY)
             before = self.cost
             if share < 1.0:
                 self.x, self.u, self.p = (
