@@ -102,8 +102,11 @@ def diagnose(
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
         previous = found
         effects = _finer(effects, found, skews)
+        linearised = [*recordings, *held]
         recordings = simulations.again(recordings, found.named, found.with_named)
         held = simulations.again(held, found.named, found.with_named)
+        if all(new is old for new, old in zip([*recordings, *held], linearised, strict=True)):
+            break
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
         if [each.effect.name for each in found.named] == [each.effect.name for each in previous.named]:
             if all(_unmoved(found, previous, name) for each in found.named for name in each.coefficients):

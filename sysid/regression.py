@@ -21,7 +21,8 @@ NOTHING = 1e-9  # of a column's square after the base is projected out: rounding
 REACH = 4.0  # widths of the Gaussian
 HALF = 0.5  # of its weight: a kept row with less of it on rows that count does not count itself
 ORDER = 8  # largest order of the autoregression
-MEMORIES = tuple(0.05 * n for n in range(19))  # memories of noise from sample to sample that the fit tries
+MEMORIES = tuple(0.02 * n for n in range(48))  # memories of noise from sample to sample that the fit tries
+ONE_SIDED = 2.71  # of -2 log likelihood: 95 % on one side
 FEWEST_SHARED = 40  # common rows of two equations for their correlation, which is then known to 0.16
 UPPER = 0.95  # noise from repeats is the upper limit of this one-sided interval: few repeats, less trust
 FEWEST_REPEATS = 20  # degrees of freedom of pure error; below it the whole residual gives the noise
@@ -129,9 +130,12 @@ def autoregression_above(
     """(coefficients, deviation of the innovations) of noise, estimated above `share` of the rows' frequency only.
 
     Slower parts may belong to an effect. Below `share` the noise gets the spectrum of samples that remember the one
-    before, under a Gaussian of `width` samples and with one in `every` kept; Whittle's estimate above `share` gives the
-    memory. The spectrum gives the autocorrelations, these give the coefficients (Yule and Walker), and the Bayesian
-    information criterion chooses their number. good: rows that count; each unbroken stretch has its own periodogram.
+    before, under a Gaussian of `width` samples and with one in `every` kept. Its memory is the upper limit of a
+    one-sided interval of 95 %, by Whittle's likelihood above `share`: what is seen there of a memory of 0.9 may as well
+    be one of 0.8, which has a quarter of the power at low frequencies, and slow noise would be an effect. But noise has
+    no more power below `share` than the residual, and at least that of the likeliest memory. The spectrum gives the
+    autocorrelations, these give the coefficients (Yule and Walker), and the Bayesian information criterion chooses
+    their number. good: rows that count; each unbroken stretch has its own periodogram.
     """
     stretches = [_periodogram(residual[rows]) for rows in _stretches(good)]
     frequencies, powers = (np.concatenate([each[part] for each in stretches] or [np.zeros(0)]) for part in (0, 1))
@@ -142,8 +146,17 @@ def autoregression_above(
     for memory in MEMORIES:
         shape = _spectrum(frequencies[alone], memory, width, every)
         level = float(np.mean(powers[alone] / shape))
-        tried.append((float(np.mean(np.log(level * shape))), memory, level))
-    _, memory, level = min(tried)
+        tried.append((2.0 * float(np.sum(np.log(level * shape))), memory, level))
+    best_one = min(tried)
+    below, seen = frequencies[~alone], float(np.sum(powers[~alone]))
+    _, memory, level = next(
+        each
+        for each in reversed(tried)
+        if each is best_one
+        or each[0] - best_one[0] <= ONE_SIDED
+        and each[1] > best_one[1]
+        and each[2] * float(np.sum(_spectrum(below, each[1], width, every))) <= seen
+    )
     rows = sum(2 * len(f) for f, _ in stretches)
     correlations = np.zeros(ORDER + 1)
     for f, p in stretches:

@@ -24,8 +24,10 @@ JUMP, JUMPS_BY = 0.1, 8.0  # of the range, and times the median change: larger i
 # Of a channel that is cut off: samples of one number in a stretch, stretches, part of the usual slope at which it
 # arrives there, and different numbers of a channel that has only states
 FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
+PASSED = 5.0  # counts, by the usual slope, over which the slope is taken at which it arrives. Chosen by us
 ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
 HELD_JUMPS = 0.2  # of the samples at most: a channel that changes at no more of them is held in between
+FEWEST_RETURNS = 5  # of rows that go to the next count and back, in a channel of counts. Chosen by us
 SMOOTHER = 0.25  # of the straight lines' square that a cubic leaves: there it is the better way between samples
 
 
@@ -142,11 +144,15 @@ def clipped(table: Table, column: Array) -> np.ndarray:
     """True where a measured column is cut off at its largest or its smallest value.
 
     It then arrives there at its usual slope and stays for three samples or more at one number; a machine that rests at
-    the end of its way slows down before. All False for less than two such stretches, and for few different numbers.
+    the end of its way slows down before. In counts it arrives there by a whole count however slow it is, so that it
+    must have passed more of them. All False for less than two such stretches, and for few different numbers.
     """
     out = np.zeros(len(column), dtype=bool)
     if len(np.unique(column)) <= FEW_NUMBERS:
         return out
+    usual = float(np.sqrt(np.mean(np.diff(column) ** 2)))
+    count = lattice_step(column)
+    back = max(FLAT, math.ceil(PASSED * count / usual))
     for extreme in (np.max(column), np.min(column)):
         arrivals, found = [], []
         for run in table.runs:
@@ -154,11 +160,12 @@ def clipped(table: Table, column: Array) -> np.ndarray:
             slope = np.abs(np.diff(part))
             edges = np.flatnonzero(np.diff(np.concatenate(([0], (part == extreme).astype(int), [0]))))
             for first, last in edges.reshape(-1, 2).tolist():
-                if last - first >= FLAT and first >= FLAT and last < len(part):
-                    arrivals.append(float(np.mean(slope[first - FLAT : first])))
+                if last - first >= FLAT and first >= back and last < len(part):
+                    way = (
+                        abs(part[first] - part[first - back]) - count if count else np.sum(slope[first - back : first])
+                    )
+                    arrivals.append(float(way) / back)
                     found.append(slice(run.start + first, run.start + last))
-        moving = np.abs(np.diff(column))
-        usual = float(np.sqrt(np.mean(moving**2)))
         if len(found) >= FEWEST_FLATS and float(np.median(arrivals)) > STEEP * usual:
             for each in found:
                 out[each] = True
@@ -216,6 +223,24 @@ def stays(table: Table, column: Array) -> bool:
         for run in table.runs
         if run.stop - run.start > 1
     )
+
+
+def rounding(table: Table, column: Array) -> float:
+    """Deviation that white noise would have whose slow part is that of the rounding of a channel that stays at levels.
+
+    A level is rounded once, and the error lasts as long as the level does: 1 / sqrt(12) of a count, times the root of
+    the level's rows. `roughness` sees none of it. 0 where the values are not counts of a measurement, which shows by
+    some that go to the next count and back: a command on round values has none of these.
+    """
+    steps = np.concatenate([np.diff(column[run]) for run in table.runs])
+    sizes = np.abs(steps)
+    count = lattice_step(column)
+    of_one = sizes < 1.5 * count
+    there_and_back = of_one[1:] & of_one[:-1] & (steps[1:] * steps[:-1] < -0.25 * count**2)
+    if np.count_nonzero(there_and_back) < FEWEST_RETURNS:
+        return 0.0
+    levels = 1 + np.count_nonzero(~of_one)
+    return count / math.sqrt(12.0) * math.sqrt(len(column) / levels)
 
 
 def is_smooth(table: Table, column: Array) -> bool:

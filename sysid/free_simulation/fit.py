@@ -13,12 +13,14 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation import acting as effects
 from ranger_sim.sysid.free_simulation.contract import check_columns, check_methods
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
-from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor
+from ranger_sim.sysid.free_simulation.predictor import STRETCH, Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.simulator import Simulator
 from ranger_sim.sysid.free_simulation.terms import Acting, into, sensed
 from ranger_sim.sysid.machine import Values
 
+SHORT_STRETCH = 100  # samples, in rounds that only lead to the answer: covariances of four times as many side by side
+NEAR = 100.0  # standard errors: a round after a smaller step is near the end. Chosen by us
 ROUNDS = 30  # of Gauss and Newton, at most
 RENEWED = 2  # times that the sensors' noise is estimated again, each time when the rounds have converged
 WORSE = 4.0  # times the least sum of squares: a round that ended there went too far
@@ -34,6 +36,8 @@ LOUDER = 2.0  # times the channel's own noise estimate (`signals.roughness`), wh
 PATIENCE, FALLS, WANDERING = 5, 0.9, 10.0
 FAR_OFF = 100.0  # mean square of the errors, in their noise: from here on the fit follows the measurement
 FOLLOWED = (0.3, 0.1, 0.03, 0.01)  # of a state's usual step, by which it may leave the law
+# Such a fit only leads to the next one: it ends with a smaller step in standard errors, or relative change of its cost
+ON_THE_WAY, HARDLY = 1.0, 0.02
 FOLLOWING, MISSED = 6, 3.0  # rounds with each of them; mean square of the errors that a share no longer explains
 CARRIED = 2  # rounds in which covariances go from one stretch to the next
 OTHER_CLOCK = 0.5  # of a jump: deviation of a row that shows it or not, alike likely
@@ -72,7 +76,7 @@ class TrajectoryFit:
         noisy = self.simulator.noisy
         self.noise_u = np.array(
             [
-                signals.roughness(table, given[name]) if known is None else known
+                self._shown_by(given[name], name) if known is None else known
                 for name, known in machine.noisy_inputs.items()
             ]
         )
@@ -102,6 +106,13 @@ class TrajectoryFit:
         self.slack: Array = np.zeros(len(machine.states))  # deviation of each state's step from the law
         self.moves = np.ones(len(self.p))  # 0 for a parameter that stays
         self.damped = np.zeros(len(self.p))  # of a column's length: pull of a parameter towards 0
+        self.last_step = np.inf  # largest one of a parameter in the last round, in its standard errors
+        self.settled = False  # nothing moved any more where the last rounds ended
+
+    def _shown_by(self, column: Array, name: str) -> float:
+        """Noise of an input as its channel shows it."""
+        rough = signals.roughness(self.table, column)
+        return max(rough, signals.rounding(self.table, column)) if name in self.simulator.staying else rough
 
     @property
     def count(self) -> int:
@@ -130,8 +141,16 @@ class TrajectoryFit:
         new.moves = np.concatenate((np.ones(count), np.full(len(added), 0.0 if fixed else 1.0)))
         new.damped = np.zeros(len(new.p))
         new.came_from = (new.x, new.u, new.p)
-        new.enter = []  # until the first round
+        new.enter, new.last_step = [], np.inf  # until the first round
         return new
+
+    def settled_with(self, acting: Sequence[Acting]) -> bool:
+        """True where nothing moves any more with just these effects, whatever their coefficients started from."""
+        same = len(self.acting) == len(acting) and all(
+            here.term is other.term and here.shape == other.shape
+            for here, other in zip(self.acting, acting, strict=True)
+        )
+        return same and self.settled and not np.any(self.damped) and bool(np.all(self.moves))
 
     def with_all(self, acting: Sequence[Acting]) -> "TrajectoryFit":
         """A fit from the start, with candidates in the simulator that are pulled towards 0; their coefficients are 0.
@@ -188,8 +207,9 @@ class TrajectoryFit:
                 break
         return seen
 
-    def linearise(self, every_port: bool = True) -> Jacobians:
-        """About the present trajectory, with the effects that act; by all ports, or only by those in which one acts."""
+    def linearise(self, final: bool = True) -> Jacobians:
+        """About the present trajectory, with the effects that act; final: by all ports, not only by those in which one
+        acts, and by central differences (so is all without effects)."""
         simulator, states = self.simulator, self.machine.states
         values = dict(zip(simulator.names, self.p, strict=False))
         seen = self._closed(values) if self.acting else None
@@ -198,7 +218,13 @@ class TrajectoryFit:
         )
         sizes = self.size_x, self.size_u, self.size_p[: self.count]
         lin = simulator.linearised(
-            self.x, self.u, self.p, self.entering(), sizes, range(len(simulator.ports)) if every_port else there
+            self.x,
+            self.u,
+            self.p,
+            self.entering(),
+            sizes,
+            range(len(simulator.ports)) if final else there,
+            final or not self.acting,
         )
         back = np.zeros((len(self.x), len(simulator.ports), len(states)))
         for each, enter, own in zip(self.acting, self.enter, self._coefficients(), strict=True):
@@ -265,7 +291,7 @@ class TrajectoryFit:
         if len(ways) == 1:
             return False
         here = self._end()
-        self.round(every_port=True)
+        self.round(final=True)
         assert self.predictor is not None
         first, now = self.predictor, self.simulator
         self.x, self.u, self.p, self.noise_y, self.predictor = here
@@ -294,12 +320,22 @@ class TrajectoryFit:
         self.simulator = now.stepping(ways[best])
         return best > 0
 
-    def round(self, every_port: bool = False) -> float:
-        """One round; returns the largest step of a parameter in its standard errors."""
-        self.lin = lin = self.linearise(every_port)
-        self.predictor = Predictor(
-            lin, self.noise_u, self.open_outputs(), self.open_steps(), self.starts, AWAY * self.size_x, self.predictor
+    def round(self, final: bool = False) -> float:
+        """One round; returns the largest step of a parameter in its standard errors.
+
+        final: the answer comes from it; where effects act the others only lead there, by simple differences, and by
+        short stretches where a stretch need not learn much: near the end, where the covariances that it begins with
+        hardly change any more, and where the law is open. A fit without effects may end far off, where every detail
+        decides where: its rounds are careful.
+        """
+        self.lin = lin = self.linearise(final)
+        short = (
+            not final
+            and bool(self.acting)
+            and (self.predictor is not None and self.last_step < NEAR or bool(np.any(self.slack)))
         )
+        self.predictor = Predictor(lin, self.noise_u, self.open_outputs(), self.open_steps(), self.starts,
+                                   AWAY * self.size_x, self.predictor, SHORT_STRETCH if short else STRETCH)  # fmt: skip
         wide = self.predictor
         assert wide is not None
         offset = self.measured_u - self.u  # the part that the inputs' noise has to explain already
@@ -327,7 +363,8 @@ class TrajectoryFit:
         self.rest = errors @ step
         dx, du = wide.smoothed(x @ step, self.rest, lin.f_u, lin.h_u, self.noise_u)
         self.x, self.u, self.p = self.x + dx, self.u + offset + du, self.p + change
-        return float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
+        self.last_step = float(np.max(np.abs(change) / np.maximum(error, 1e-30)))
+        return self.last_step
 
     def _step(self, a: Array, b: Array) -> tuple[Array, Array]:
         """(change of the parameters, their standard errors) by least squares within the limits.
@@ -372,10 +409,10 @@ class TrajectoryFit:
         if follow and self.far_off:
             self._follow()
             return
-        settled = self._settled(rounds)
-        if not follow or self.cost < MISSED or settled and self.cost <= FAR_OFF:
+        self.settled = self._settled(rounds)
+        if not follow or self.cost < MISSED or self.settled and self.cost <= FAR_OFF:
             return
-        self.far_off = True
+        self.far_off, self.settled = True, False
         ended, reached = self._end(), self._surprise_here()
         self._follow()
         if not self._surprise_here() <= reached:
@@ -383,7 +420,7 @@ class TrajectoryFit:
 
     def settle_anew(self, rounds: int) -> None:
         """Rounds with another way of the inputs: a fit that was far off by its way between samples alone is not."""
-        self._settled(rounds)
+        self.settled = self._settled(rounds)
         self.far_off = self.far_off and not self.cost < MISSED
 
     def _end(self) -> tuple[Array, Array, Array, Array, Predictor | None]:
@@ -423,6 +460,8 @@ class TrajectoryFit:
                 continue
             if self.cost > RISES * before:
                 share *= SHORT
+            hardly = step < ON_THE_WAY or abs(self.cost - before) < HARDLY * self.cost
+            led = np.any(self.slack) and (hardly if self.acting else step <= STEADY)
             before = self.cost
             if share < 1.0:
                 self.x, self.u, self.p = (
@@ -435,9 +474,11 @@ class TrajectoryFit:
                 fell, low = number, best
             elif number - fell >= PATIENCE:
                 return False
+            if led:
+                return True
             if step > STEADY:
                 continue
-            if renewed == RENEWED or np.any(self.slack):
+            if renewed == RENEWED:
                 return True
             self._renew_noise()
             renewed, best, before = renewed + 1, np.inf, np.inf
@@ -473,7 +514,7 @@ class TrajectoryFit:
         """Linearise where the last round ended, without moving."""
         self.p_at = self.p.copy()
         x, u = self.x, self.u
-        self.round(every_port=True)
+        self.round(final=True)
         self.x, self.u = x, u
 
 

@@ -101,12 +101,17 @@ class SimulatedMachine(DeclaredMachine):
     def again(
         self, recording: Recording, effects: Sequence[tuple[Effect, Shape, Sequence[float]]], fixed: bool = False
     ) -> Recording:
-        """The recording fitted and linearised with these effects in the simulator; fixed: their coefficients stay."""
+        """The recording fitted and linearised with these effects in the simulator; fixed: their coefficients stay.
+
+        A fit that has settled with the same effects is the answer already: it would end at the same place again.
+        """
         acting = [
             Acting(effect.term, shape, tuple(coefficients))
             for effect, shape, coefficients in effects
             if isinstance(effect, SimulatedEffect) and effect.term is not None
         ]
+        if not fixed and _fit(recording).settled_with(acting):
+            return recording
         fit = _fit(recording).acted_on(acting, fixed)
         fit.settle(AGAIN)
         _chosen(fit)
@@ -152,7 +157,7 @@ def _chosen(fit: TrajectoryFit) -> None:
     Where rows next to a jump weigh less, another way may be the likelier one again.
     """
     at_once = fit.simulator.shown_at_once(fit.u, fit.p)
-    for _ in range(len(fit.simulator.open_ways) + 2 * len(at_once)):
+    for _ in range(len(fit.simulator.open_ways) + len(fit.simulator.staying) + 2 * len(at_once)):
         if not fit.choose_way():
             break
         fit.settle_anew(AGAIN)

@@ -58,7 +58,8 @@ class Predictor:
         length = min(n, stretch)
         P: Array = np.tile(free, (-(-n // length), 1, 1))
         if before is not None:
-            P[1:] = before.ends[:-1]
+            P[1:] = before.reached(np.arange(length, n, length))
+        self.length = length
 
         def side_by_side(rows: Array) -> Array:
             """(length, stretches, ...) of (n, ...); what the last stretch lacks is its last row again."""
@@ -88,7 +89,7 @@ class Predictor:
             less = S @ K_turned
             P = inner @ P @ inner.swapaxes(1, 2) + K @ R_all[k] @ K_turned + Q_all[k] - less - less.swapaxes(1, 2)
             P = 0.5 * (P + P.swapaxes(1, 2))
-        self.ends: Array = P  # (stretches, s, s) covariances at the end of each stretch but the last
+        self.ends: Array = P  # (stretches, s, s) covariances at the end of each stretch
         self.covariance, self.gain = in_turn(covariance), in_turn(gain)
         self.spread = in_turn(spread)  # Cholesky factor of the prediction error's covariance
         self.spread = np.asarray(np.linalg.cholesky(self.spread), dtype=float)
@@ -106,6 +107,16 @@ class Predictor:
                 self.band[s + row - column, place] = -self.inner[:-1, row, column]
         # in units of the channels: the errors are white, and as large as the middle one
         self.unit = np.median(np.abs(self.spread[:, np.arange(o), np.arange(o)]), axis=0)
+
+    def reached(self, samples: np.ndarray) -> Array:
+        """(m, s, s) covariances before these samples, by what comes before them.
+
+        At a stretch's start it is that of the end of the one before, which knows more than the stretch began with.
+        """
+        found: Array = self.covariance[samples]
+        begin = (samples > 0) & (samples % self.length == 0)
+        found[begin] = self.ends[samples[begin] // self.length - 1]
+        return found
 
     def _march(self, forcing: Array, backward: bool = False) -> Array:
         """x (n, s, k) with x[0] = forcing[0] and x[k] = inner[k-1] x[k-1] + forcing[k]; or its transpose."""

@@ -135,11 +135,17 @@ class Simulator:
 
         at_once: inputs that jump and that an output shows in the same row; their clock may be another one.
 
-        Known are inputs that the machine holds, those that stay at a value and jump, and smooth ones. Of the others the
-        row may be a point of straight lines, held until the next row, or the mean of the step that ends there; where
-        they jump, the place of the jump inside a step may be open.
+        Known are inputs that the machine holds, and smooth ones. One that stays at a value and jumps is held, or jumps
+        between the rows: a step of a slow log is somewhere before the row that first shows it, half a row on average.
+        Of the others the row may be a point of straight lines, held until the next row, or the mean of the step that
+        ends there; where they jump, the place of the jump inside a step may be open.
         """
         now, made = self.numerics, [self.numerics]
+        for name in sorted(self.staying):
+            alone = frozenset({name})
+            held = dataclasses.replace(now, held=now.held | alone, unsure=now.unsure - alone)
+            between = dataclasses.replace(now, held=now.held - alone, unsure=now.unsure | alone)
+            made += [each for each in (held, between) if each != now]
         for name in self.open_ways:
             alone = frozenset({name})
             lines = dataclasses.replace(now, held=now.held - alone, means=now.means - alone, unsure=now.unsure - alone)
@@ -214,9 +220,17 @@ class Simulator:
         return at
 
     def linearised(
-        self, x: Array, u: Array, p: Array, ports: Array, sizes: tuple[Array, Array, Array], by: Iterable[int]
+        self,
+        x: Array,
+        u: Array,
+        p: Array,
+        ports: Array,
+        sizes: tuple[Array, Array, Array],
+        by: Iterable[int],
+        central: bool = True,
     ) -> Jacobians:
-        """By central differences. x: (n, s), u: (n, i), p: (p,), ports: (n, q); sizes: of x, u and p.
+        """By central differences, or by simple ones at half the price. x: (n, s), u: (n, i), p: (p,), ports: (n, q);
+        sizes: of x, u and p.
 
         by: numbers of the ports that have derivatives; those of the others are 0.
         """
@@ -226,14 +240,15 @@ class Simulator:
         def derivative(which: int, size: float, number: int) -> tuple[Array, Array]:
             """By x, p, u or a port."""
             ends = []
-            for nudge in (NUDGE * size, -NUDGE * size):
+            for nudge in (NUDGE * size, -NUDGE * size)[: 1 + central]:
                 given = [x, p, u, ports]
                 given[which] = given[which].copy()
                 given[which][..., number] += nudge
                 there = driven if which < 2 else self.driven(given[2], given[3])
                 ends.append(self.at(given[0], given[1], there))
-            (f_up, h_up), (f_down, h_down) = ends
-            return (f_up - f_down) / (2.0 * NUDGE * size), (h_up - h_down) / (2.0 * NUDGE * size)
+            (f_up, h_up), (f_down, h_down) = ends if central else (*ends, (f, h))
+            width = (1 + central) * NUDGE * size
+            return (f_up - f_down) / width, (h_up - h_down) / width
 
         def stacked(which: int, sizes: Array) -> tuple[Array, Array]:
             f_by, h_by = np.zeros((*f.shape, len(sizes))), np.zeros((*h.shape, len(sizes)))

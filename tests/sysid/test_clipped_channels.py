@@ -7,6 +7,7 @@ import pytest
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
+from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.robot_joint import Joint
 from tests.sysid.test_scores_grow import run
@@ -48,3 +49,25 @@ def test_a_recording_that_is_cut_off_for_half_of_its_rows_is_refused():
     table = cut(run(5, 0.0, "drag", 0.0), 0.25)
     with pytest.raises(UserError, match=r"joint 5: current_A: \d+\.\d% of its values are cut off"):
         diagnose(Joint(), [table])
+
+
+def swinging(limit_rad, count_rad=1e-3, rate_hz=1000.0):
+    """An angle in counts that creeps to the end of each of six swings and rests there, cut off at a limit."""
+    time_s = np.arange(6 * 1000) / rate_hz
+    side = np.where(np.floor(time_s) % 2 == 0, 1.0, -1.0)
+    angle = 0.4 * side * (1.0 - 2.0 * np.exp(-(time_s % 1.0) / 0.12))
+    shown = count_rad * np.round(np.clip(angle, -limit_rad, limit_rad) / count_rad)
+    return Table(time_s, {"angle_rad": shown}, (slice(0, len(time_s)),), "swings", {})
+
+
+def test_a_joint_that_creeps_to_its_last_count_and_rests_there_is_not_cut_off():
+    """It arrives there by a whole count from one row to the next, as fast as it usually moves."""
+    table = swinging(1.0)
+    assert np.count_nonzero(table["angle_rad"] == np.max(table["angle_rad"])) > 300
+    assert not np.any(signals.clipped(table, table["angle_rad"]))
+
+
+def test_counts_that_are_cut_off_in_mid_swing_are_found():
+    table = swinging(0.25)
+    found = signals.clipped(table, table["angle_rad"])
+    assert np.count_nonzero(found) > 0.8 * np.count_nonzero(np.abs(table["angle_rad"]) == 0.25)

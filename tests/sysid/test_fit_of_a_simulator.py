@@ -222,6 +222,18 @@ def test_rounds_end_at_the_toy_s_own_numbers():
     assert steps[0] > 1.0 > 0.01 > steps[-1]
 
 
+def test_simple_differences_are_the_central_ones_to_a_ten_thousandth_of_the_largest():
+    """The toy is linear but for a product of a state and an input, whose error is the nudge of 1e-6."""
+    fit = TrajectoryFit(Toy(), table())
+    sizes = fit.size_x, fit.size_u, fit.size_p
+    central, simple = (
+        fit.simulator.linearised(fit.x, fit.u, fit.p, fit.entering(), sizes, (), each) for each in (True, False)
+    )
+    for name in ("f_x", "f_u", "f_p", "h_x", "h_u", "h_p"):
+        wanted = getattr(central, name)
+        assert getattr(simple, name) == pytest.approx(wanted, abs=1e-4 * float(np.max(np.abs(wanted), initial=1e-9)))
+
+
 @pytest.mark.parametrize(("true", "limit"), [(8.0, 2.05), (0.9, 1.9)])
 def test_limits_hold_in_every_round(true, limit):
     class Narrow(Still):

@@ -138,6 +138,20 @@ def test_an_effect_that_is_taken_back_leaves_the_simulator_as_it_was():
     assert response == pytest.approx(wanted, abs=1e-3 * float(np.ptp(wanted)))
 
 
+def test_a_fit_that_has_settled_with_the_same_effects_is_the_answer_already():
+    """Whatever their coefficients would have started from; not with others, nor where coefficients stay."""
+    arm = Exact()
+    without = arm.prepare(log(1).part(slice(0, 1000)))
+    (drag,) = (each for each in arm.effects([without]) if each.cause == "drag")
+    acting = arm.again(without, [(drag, {}, [0.001])])
+    assert acting.fit.settled
+    assert arm.again(acting, [(drag, {}, [0.002])]) is acting
+    assert arm.again(acting, []) is not acting
+    stays = arm.again(acting, [(drag, {}, [0.002])], fixed=True)
+    assert stays is not acting and stays.fit.p[-1] == 0.002
+    assert arm.again(stays, [(drag, {}, [0.002])]).fit.p[-1] == pytest.approx(acting.fit.p[-1], abs=1e-4)
+
+
 def test_a_recording_that_says_nothing_is_reported_in_a_sentence():
     run = log(1)
     still = Table(run.time_s, {"voltage_V": run["voltage_V"], "angle_rad": np.zeros(COUNT)}, run.runs, "still")

@@ -178,3 +178,17 @@ def test_samples_of_a_run_are_averaged_and_what_is_left_over_goes():
     assert list(found["a"]) == pytest.approx([(0 + 1 + 4) / 3, (9 + 16 + 25) / 3, (81 + 100 + 121) / 3])
     assert found.runs == (slice(0, 2), slice(2, 3)) and (found.name, found.resolution) == ("log", {"a": 0.5})
     assert averaged(table, 1) is table
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_stretches_that_begin_where_another_predictor_was_are_as_good_as_one(seed):
+    """One stretch of all samples is exact; short ones begin with its covariances, and others with theirs."""
+    system = System(seed)
+    one = system.predictor(stretch=N)
+    short = system.predictor(stretch=3, before=one)
+    again = system.predictor(stretch=4, before=short)
+    for found in (short, again):
+        assert found.covariance == pytest.approx(one.covariance, rel=1e-9, abs=1e-12)
+        assert found.spread == pytest.approx(one.spread, rel=1e-9, abs=1e-12)
+    alone = system.predictor(stretch=3)
+    assert np.max(np.abs(alone.covariance - one.covariance)) > 0.01 * np.max(np.abs(one.covariance))

@@ -99,3 +99,57 @@ def test_a_lag_of_the_drive_is_named_where_the_sensor_is_known_to_have_none():
     assert [each.name for each in found.causes] == ["actuator_lag"]
     low, high = found.causes[0].parameters["lag_s"].ci95
     assert low < 0.05 < high < 1.02 * low
+
+
+def stepped(seed, at_rows, count_V=0.0):
+    """A disc on voltages that stay for 0.2 to 0.6 s, w' = 5 V - w, exactly solved; steps at rows or anywhere between.
+
+    count_V: of the voltage's measurement, whose own noise is a fifth of a count.
+    """
+    random = generator(seed, "steps between rows")
+    ends_s = np.cumsum(random.uniform(0.2, 0.6, 200))
+    ends_s = STEP_s * np.round(ends_s / STEP_s) if at_rows else ends_s
+    levels = random.uniform(-6.0, 6.0, len(ends_s))
+    time_s = STEP_s * np.arange(ROWS)
+    speed, voltage, now, since, level = np.zeros(ROWS), np.zeros(ROWS), 0.0, 0.0, 0
+    for k, until in enumerate(time_s):
+        while ends_s[level] <= until + 1e-9:  # a row at a step shows the new level
+            now = 5.0 * levels[level] + (now - 5.0 * levels[level]) * np.exp(-(ends_s[level] - since))
+            since, level = ends_s[level], level + 1
+        now = 5.0 * levels[level] + (now - 5.0 * levels[level]) * np.exp(-(until - since))
+        since, speed[k], voltage[k] = until, now, levels[level]
+    if count_V:
+        voltage = count_V * np.round(voltage / count_V + 0.2 * random.normal(size=ROWS))
+    columns = {"voltage_V": voltage, "speed_rad_per_s": speed + NOISE * random.normal(size=ROWS)}
+    return Table(time_s, columns, (slice(0, ROWS),), f"steps {seed}", {})
+
+
+@pytest.mark.parametrize(("at_rows", "way"), [(True, "held"), (False, "straight line, jumps anywhere inside a step")])
+def test_a_step_is_where_the_data_show_it_and_nothing_is_named(at_rows, way):
+    """Held until the row that first shows it, a step that was between the rows is half a row late."""
+    result = diagnose(Disc(), [stepped(5, at_rows)], [stepped(6, at_rows)]).result
+    assert result.evidence.between_rows == {"steps 5": {"voltage": way}}
+    assert not result.detected
+    for name, true in (("gain", 5.0), ("damping", 1.0)):
+        low, high = result.evidence.parameters[name].ci95
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        assert abs(middle - true) < 2.0 * half, name  # 3.9 standard errors
+
+
+def test_the_rounding_of_a_level_lasts_as_long_as_the_level():
+    """1 / sqrt(12) of a count, by the root of a level's rows; a command on whole values is not rounded."""
+    table = stepped(5, False, count_V=0.1)
+    level_rows = ROWS / (1 + np.count_nonzero(np.abs(np.diff(table["voltage_V"])) > 0.15))
+    wanted = 0.1 / np.sqrt(12.0) * np.sqrt(level_rows)
+    assert signals.rounding(table, table["voltage_V"]) == pytest.approx(wanted, rel=0.02)
+    assert signals.rounding(table, np.round(stepped(5, False)["voltage_V"])) == 0.0
+    assert signals.rounding(table, stepped(5, False)["voltage_V"]) == 0.0
+    assert signals.rounding(table, np.zeros(ROWS)) == 0.0
+
+
+def test_a_voltage_that_is_measured_in_coarse_counts_is_no_cause():
+    """A level's rounding moves the speed at rest by up to 0.25 rad/s, twelve times the speed's noise."""
+    result = diagnose(Disc(), [stepped(5, False, 0.1)], [stepped(6, False, 0.1)]).result
+    assert not result.detected
+    low, high = result.evidence.parameters["gain"].ci95
+    assert low < 5.0 < high
