@@ -147,7 +147,7 @@ def test_the_rounding_of_a_level_lasts_as_long_as_the_level():
     assert signals.rounding(table, np.zeros(ROWS)) == 0.0
 
 
-def test_a_voltage_that_is_measured_in_coarse_counts_is_no_cause():
+def test_a_voltage_in_coarse_counts_shows_nothing_that_is_not_there():
     """A level's rounding moves the speed at rest by up to 0.25 rad/s, twelve times the speed's noise."""
     result = diagnose(Disc(), [stepped(5, False, 0.1)], [stepped(6, False, 0.1)]).result
     assert not result.detected

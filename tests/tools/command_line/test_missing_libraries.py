@@ -29,7 +29,7 @@ CAMPAIGN = '[vary]\nseed = [1]\nfault = ["UI.imu:gyro_bias@4s"]\n'
 # every library of pyproject.toml, by a command that needs it
 NEEDED = {
     "asammdf": ["diagnose run.mf4 --experiment motor-bench"],
-    "can": ["bus", "check-bus hil-1mbit", "up --bus can1=virtual:x --steps 1"],
+    "can": ["check-bus hil-1mbit", "up --bus can1=virtual:x --steps 1"],
     "cantools": ["can-bounds --dbc x.dbc"],
     "cffi": [f"walk --time 50ms --firmware MCH={ROOT / 'examples' / 'hip_in_c'}"],
     "cryptography": ["campaign few.toml --out c --pool dask"],
