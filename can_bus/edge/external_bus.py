@@ -156,7 +156,7 @@ def dropped_by_kernel(connection: Any) -> int:
 class Peer:
     """One controller of a board on the interface. Fields as those of a node of an emulated bus.
 
-    is_fd: whether the board's controller knows CAN FD; other frames than that reach a classic one.
+    is_fd: whether the board's controller knows CAN FD; a classic one gets no CAN FD frame.
     """
 
     def __init__(
@@ -178,6 +178,7 @@ class Peer:
         self.is_fd = is_fd
         self.operating = True
         self.descriptor = -1
+        # an interface without a descriptor to wait on is polled
         with suppress(NotImplementedError, OSError, ValueError):
             self.descriptor = connection.fileno()
         self.waiting: collections.deque[tuple[int, int, int, int, int]] = collections.deque()
@@ -254,8 +255,7 @@ class Peer:
             if flags & FLAG_FD and not self.is_fd:
                 self.owner.refused += 1
             elif self.operating and flags & FLAG_FD:
-                data = data_of_words(flags, lo, hi)
-                second = int.from_bytes(data[4:8], "little")
+                data, second = data_of_words(flags, lo, hi), hi & 0xFFFFFFFF  # as a bus of the machine gives them
                 self.inbox.push(end_ns, self.order, CAN_RX, self.controller, identifier, flags, lo, second, 0, data)
             elif self.operating:
                 self.inbox.push(end_ns, self.order, CAN_RX, self.controller, identifier, flags, lo, hi)

@@ -107,6 +107,19 @@ def test_a_classic_client_answers_can_fd_frames_with_error_frames(attach):
         assert classic.protocol == can.CanProtocol.CAN_20
 
 
+def test_a_classic_client_that_only_listens_disturbs_no_can_fd_frame_and_receives_none(attach):
+    with hosted("can1", **RATES) as (name, _):
+        a, b = attach(f"{name}/can1", fd=True), attach(f"{name}/can1", fd=True)
+        classic = attach(f"{name}/can1", listen_only=True)
+        for number in range(20):
+            a.send(message(number, bytes(64), bitrate_switch=True))
+        assert [b.recv(PATIENCE_S).arbitration_id for _ in range(20)] == list(range(20))
+        a.send(can.Message(arbitration_id=0x100, is_extended_id=False))
+        while (received := classic.recv(PATIENCE_S)).is_error_frame:  # in its view alone: b has none
+            pass
+        assert (received.arbitration_id, received.is_fd) == (0x100, False)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

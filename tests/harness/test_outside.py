@@ -1,6 +1,7 @@
 """A machine of which a board is outside: the servo's control board is this test, on an interface of python-can."""
 
 import contextlib
+import os
 import pathlib
 import struct
 
@@ -10,7 +11,7 @@ import pytest
 from ranger_sim.datatable.loader import load_table
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.outside import profile
-from ranger_sim.harness.outside.machine import put_outside
+from ranger_sim.harness.outside.machine import Pace, put_outside
 from tests.firmware_sim.native.support import COMPILER
 
 SERVO = pathlib.Path(__file__).resolve().parents[2] / "examples" / "servo"
@@ -72,3 +73,41 @@ def test_the_drive_obeys_a_control_board_that_is_outside(servo, tmp_path):
 def test_a_profile_is_held_against_the_machines_own_table(tmp_path, replaced, line):
     with pytest.raises(UserError, match=line):
         profile.load(written(tmp_path, **replaced), table=TABLE)
+
+
+def test_a_client_that_leaves_while_the_machine_waits_for_the_clock_does_not_end_it():
+    """What a poll closes is not waited on any more."""
+
+    class Client:
+        def __init__(self):
+            self.read, self.write = os.pipe()
+            os.close(self.write)  # so that it is readable: its program has gone
+
+        def filenos(self):
+            return [] if self.read < 0 else [self.read]
+
+    class Waiting:
+        polled = (Client(),)
+        polls = 0
+
+        def poll_now(self):
+            os.close(self.polled[0].read)
+            self.polled[0].read = -1
+            self.polls += 1
+
+    machine = Waiting()
+    pace = Pace(machine, 1.0)
+    pace.begin(0)
+    assert pace.release(2_000_000) > 2_000_000 and machine.polls == 1
+
+
+def test_a_can_fd_bus_of_a_table_is_opened_with_its_data_bit_rate():
+    """SocketCAN gets its rates from `ip link`, other interfaces from python-can; each is opened with CAN FD."""
+    schedule = profile.full_schedule()
+    made = [
+        profile.BusProfile("can1", interface, "x", 500_000, "full", schedule, {}, data_bit_rate=2_000_000).python_can()
+        for interface in ("socketcan", "pcan", "virtual")
+    ]
+    assert made[0] == {"interface": "socketcan", "channel": "x", "fd": True}
+    assert made[1] == {"interface": "pcan", "channel": "x", "bitrate": 500_000, "data_bitrate": 2_000_000, "fd": True}
+    assert made[2] == {"interface": "virtual", "channel": "x", "fd": True}

@@ -62,6 +62,8 @@ def test_it_ends_by_itself_when_asked_to(capsys):
     [
         (["--speed", "warp"], "speed 'warp' is neither a number in 0.001 ... 1000 nor 'max'"),
         (["--bitrate", "200000000"], "200000000 bit/s is outside 1000"),
+        (["--bitrate", "500000", "--data-bitrate", "250000"], "250000"),
+        (["--data-bitrate", "999"], "--data-bitrate"),
         (["--bit-error-rate", "2"], "bit error rate 2.0 is outside"),
         (["--slcan", "can9"], "--slcan can9: no such bus; there are can1"),
         (["--socketcand", "here"], "--socketcand here: PORT or HOST:PORT"),

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -102,6 +103,11 @@ def test_a_missing_library_is_named_in_one_line_with_what_installs_it(library, c
         f"ranger-sim: {name} needs the library {package}, which is not installed; this installs it: "
     )
     assert before == []
+
+
+def test_a_bus_is_hosted_without_python_can(folder):
+    done = without("can", ["bus", "--name", f"without-{os.getpid()}", "--seconds", "0.01", "--slcan", "can1"], folder)
+    assert (done.returncode, done.stderr) == (0, "") and "can1: 0 frames, 0 error frames" in done.stdout
 
 
 def test_a_walk_without_the_library_of_its_report_keeps_everything_else_and_says_what_installs_it(folder):
