@@ -71,30 +71,30 @@ def once(hash_seed: int, tests: list[str]) -> dict:
     with tempfile.TemporaryDirectory() as folder, busy_processes(BUSY):
         report = pathlib.Path(folder) / "report.xml"
         call = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
-        told = subprocess.run(
+        done = subprocess.run(
             [sys.executable, "-m", "tests.system.digest_of", case],
             cwd=ROOT, env=environment, capture_output=True, text=True, check=True,
         )  # fmt: skip
         if tests:
             subprocess.run(call, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, check=False)
         found = outcomes(report.read_text(encoding="utf-8")) if tests else {}
-    return {"hash_seed": hash_seed, "digest": told.stdout.strip(), "outcomes": found}
+    return {"hash_seed": hash_seed, "digest": done.stdout.strip(), "outcomes": found}
 
 
 def differences(rows: list[dict]) -> list[str]:
     """A line for everything that was not the same every time, or not as it should be."""
-    told = []
+    lines = []
     digests = sorted({row["digest"] for row in rows})
     if len(digests) > 1:
-        told.append(f"{len(digests)} digests: {'; '.join(digests)}")
+        lines.append(f"{len(digests)} digests: {'; '.join(digests)}")
     for name in sorted({name for row in rows for name in row["outcomes"]}):
         counts: dict[str, int] = {}
         for row in rows:
             outcome = row["outcomes"].get(name, "missing")
             counts[outcome] = counts.get(outcome, 0) + 1
         if len(counts) > 1 or not counts.keys() <= {"passed", "skipped"}:
-            told.append(f"{name}: " + ", ".join(f"{outcome} {count} times" for outcome, count in counts.items()))
-    return told
+            lines.append(f"{name}: " + ", ".join(f"{outcome} {count} times" for outcome, count in counts.items()))
+    return lines
 
 
 def main(arguments: list[str] | None = None) -> int:

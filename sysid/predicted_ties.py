@@ -86,7 +86,7 @@ def key_of(cause: str, at: str) -> str:
         return f"{cause}@{at}"
 
 
-def told(predicted: Mapping[str, Any] | None) -> list[str]:
+def described(predicted: Mapping[str, Any] | None) -> list[str]:
     """The same in sentences."""
     lines = []
     for each in (predicted or {}).get("ties", ()):

@@ -113,8 +113,8 @@ class SocketcandServer(StreamServer[_Client]):
             client.taps = self.channels.get(words[1])
             if client.taps is None:
                 self.totals["refused"] += 1
-                words_told = f"< error could not open bus (available: {' '.join(self.channels)}) >"
-                self.send_away(client, MALFORMED, words_told.encode())
+                refusal = f"< error could not open bus (available: {' '.join(self.channels)}) >"
+                self.send_away(client, MALFORMED, refusal.encode())
                 return
             client.answer(b"< ok >")
         elif order == "rawmode" and len(words) == 1 and client.taps is not None and client.tap is None:

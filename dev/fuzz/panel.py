@@ -237,7 +237,7 @@ class Fuzz:
         self.stream: Any = RandomStream(seed, "panel fuzz")
         self.source = source
         self.cases = self.answered = self.visits = self.messages = self.sent_away = 0
-        self.told: list[str] = []
+        self.reported: list[str] = []
         self.faults = Faults()
         self.now_s = 0.0
 
@@ -245,7 +245,7 @@ class Fuzz:
         """The server, on a clock of ours."""
         loop = asyncio.get_running_loop()
         loop.time = lambda: self.now_s  # type: ignore[method-assign]
-        self.panel = PanelServer(self.source, TOKEN, ("127.0.0.1",), self.told.append)
+        self.panel = PanelServer(self.source, TOKEN, ("127.0.0.1",), self.reported.append)
         config: uvicorn.Config = http_server(self.panel).config
         config.load()
         log = logging.getLogger("uvicorn.error")

@@ -112,12 +112,12 @@ class Fuzz:
         link, uart, decoder = self.board.computer, self.board.computer_uart, self.session.decoder
         held = uart.filled + link.waiting()
         seen = 8 * link.packets + link.bad_packets + link.ring_full + uart.lost
-        told = decoder.segments * SEGMENT_BYTES + decoder.skipped_bytes + len(decoder.buffer)
+        counted = decoder.segments * SEGMENT_BYTES + decoder.skipped_bytes + len(decoder.buffer)
         for what, is_so in (
             ("a slot of the main brain is missing", self.board.scheduler.slot_count == slots + SLOTS_PER_PASS),
             ("a slot took too long", self.board.scheduler.overruns == 0),
             ("bytes to the robot are not accounted for", seen + held == self.bytes_to_robot),
-            ("bytes from the robot are not accounted for", told == self.bytes_to_session),
+            ("bytes from the robot are not accounted for", counted == self.bytes_to_session),
         ):
             if not is_so:
                 raise Finding(f"{what} (case {self.cases})")

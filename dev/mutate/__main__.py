@@ -181,10 +181,10 @@ def of_package(options: argparse.Namespace, copy: Copy, package: str, listed: li
         for mutant in drawn_open:
             if not copy.runs_compiled(mutant) and results.verdicts[mutant.key].outcome not in NOTICED:
                 keep(mutant, judge_built(built, mutant, maps[False], maps[True], options.build))
-    return told(package, every, drawn, results, equivalent, say)
+    return summarised(package, every, drawn, results, equivalent, say)
 
 
-def told(
+def summarised(
     package: str, every: list[Mutant], drawn: list[Mutant], results: Results, equivalent: set[str], say: Any
 ) -> dict:
     """Count the verdicts and print the survivors."""

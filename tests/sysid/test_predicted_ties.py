@@ -48,7 +48,7 @@ def test_a_predicted_tie_is_confirmed_or_broken_by_the_data(bench, tied, rivals,
     (tie,) = found["ties"]
     assert (tie["with"], tie["reason"], tie["data"]) == ("dead_time", "structure", data)
     assert tie["cosine"] == pytest.approx(1.0, abs=1e-3)
-    (line,) = predicted_ties.told(found)
+    (line,) = predicted_ties.described(found)
     assert line.startswith("predicted tie with dead_time (cosine 1.00 on the reference motion): ") and text in line
 
 
@@ -60,7 +60,7 @@ def test_the_nearest_form_of_the_other_cause_counts(bench):
 def test_a_tie_that_was_not_predicted_is_reported(bench):
     found = predicted_ties.of(*bench, named("stribeck", "hip_motor", [("presliding", "hip_motor")]))
     assert [(each["with"], each["data"]) for each in found["ties"]] == [("presliding", predicted_ties.NOT_PREDICTED)]
-    assert predicted_ties.told(found) == [
+    assert predicted_ties.described(found) == [
         "a tie with presliding was not predicted, these data cannot decide: another motion may"
     ]
 
@@ -83,7 +83,7 @@ def test_a_cause_that_these_channels_were_not_predicted_to_show_is_reported(benc
     columns = {name: each for name, each in table.columns.items() if name != "motor_angle_rad"}
     without = machine.prepare(Table(table.time_s, columns, table.runs))
     found = predicted_ties.of(machine, [without], named("cable_backlash", "transmission"))
-    assert found["status"] == "not shown" and "predicted not to show" in predicted_ties.told(found)[-1]
+    assert found["status"] == "not shown" and "predicted not to show" in predicted_ties.described(found)[-1]
     assert predicted_ties.of(machine, [recording], named("cable_backlash", "transmission"))["status"] == "shown"
 
 
@@ -103,4 +103,4 @@ def test_a_cause_is_called_as_the_catalogue_calls_it(cause, at, key):
 
 def test_a_machine_of_ones_own_has_no_prediction():
     (cause,) = diagnose(Cart(), [cart_run(1, drag=0.02)]).answer["causes"]
-    assert cause["evidence"]["predicted"] is None and predicted_ties.told(None) == []
+    assert cause["evidence"]["predicted"] is None and predicted_ties.described(None) == []

@@ -46,7 +46,7 @@ def render(found: Diagnosis, command: str = "", files: dict[str, str] | None = N
         samples=sum(len(recording.table) for recording in found.recordings),
         kind=kind,
         headline=headline,
-        told=words.told(found),
+        told=words.in_sentences(found),
         errors=evidence.get("held_out_errors") or {},
         twins=twin_words.lines(answer),
         unusual=twin_figure.unusual(evidence.get("twins")),
@@ -93,7 +93,9 @@ def cause_of(found: Diagnosis, each: Named, cause: dict[str, Any], sides: dict[s
         "chi2": cause["evidence"]["chi2"],
         "p": cause["evidence"]["p"],
         "bic": cause["evidence"]["bic"],
-        "predicted": [f"{line[0].upper()}{line[1:]}" for line in predicted_ties.told(cause["evidence"]["predicted"])],
+        "predicted": [
+            f"{line[0].upper()}{line[1:]}" for line in predicted_ties.described(cause["evidence"]["predicted"])
+        ],
         "rivals": [
             {"name": name, "behind": behind, "standing": "a tie" if name in tied else words.standing(behind)}
             for name, behind in rivals

@@ -166,7 +166,7 @@ def verdict(answer: dict[str, Any]) -> tuple[str, str]:
     return "found", "One cause found" if count == 1 else f"{count} causes found"
 
 
-def told(found: Diagnosis) -> str:
+def in_sentences(found: Diagnosis) -> str:
     """The fault in one sentence of plain words, for the top of the page."""
     answer = found.answer
     if doubts(answer):

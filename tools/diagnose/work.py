@@ -204,7 +204,7 @@ def _show(found: Diagnosis, console: Console) -> None:
         tied = f"; ties with {', '.join(cause['evidence']['ties'])}" if cause["evidence"]["ties"] else ""
         form = f" ({cause['form']})" if cause.get("form") else ""
         console.print(f"{cause['name']} at {cause['at']}{form}: {values}{tied}", highlight=False, soft_wrap=True)
-        for line in predicted_ties.told(cause["evidence"]["predicted"]):
+        for line in predicted_ties.described(cause["evidence"]["predicted"]):
             console.print(f"  {line}", highlight=False, soft_wrap=True)
     if told["gain"] is not None:
         gain = told["gain"]
