@@ -27,7 +27,8 @@ from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.datatable.generated import routes
 from ranger_sim.firmware_sim.board import EVERY_KIND
 from ranger_sim.firmware_sim.peripherals.adc_internal import AdcInternal
-from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, MOD_RESET, RFS_EIGHT_BYTES, CanController
+from ranger_sim.firmware_sim.peripherals.can_controller import EIGHT_BYTES, RFS_EIGHT_BYTES, CanController
+from ranger_sim.firmware_sim.peripherals.can_controller_base import MOD_RESET
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.peripherals.ssp import SspPort, SspSegment
 from ranger_sim.firmware_sim.peripherals.timer_capture import IR_MR0, TimerCapture

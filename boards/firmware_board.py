@@ -16,12 +16,11 @@ from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
 from ranger_sim.firmware_sim.peripherals.can_controller import (
     ICR_BUS_ERROR,
-    ICR_DOI,
     ICR_ERROR_PASSIVE,
     ICR_ERROR_WARNING,
-    ICR_RI,
     CanController,
 )
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_DOI, ICR_RI
 from ranger_sim.firmware_sim.peripherals.gpio import Gpio
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.firmware_sim.vic import IRQ_LATENCY

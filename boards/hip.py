@@ -14,7 +14,8 @@ from ranger_sim.boards.modules.joint_safety import HipSafety
 from ranger_sim.boards.modules.publishing import Send, laid_out
 from ranger_sim.boards.motor_board import MotorBoard
 from ranger_sim.datatable.generated import mch as table
-from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BUS_ERROR, ICR_ERROR_WARNING, ICR_RI, ICR_TI1
+from ranger_sim.firmware_sim.peripherals.can_controller import ICR_BUS_ERROR, ICR_ERROR_WARNING
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_RI, ICR_TI1
 from ranger_sim.firmware_sim.scheduler import Schedule, Task, Wait
 
 if TYPE_CHECKING:

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from ranger_sim.datatable.generated import errors as codes
 from ranger_sim.firmware_sim.peripherals.can_controller import (
     ICR_BUS_ERROR,
-    ICR_DOI,
     ICR_ERROR_PASSIVE,
     ICR_ERROR_WARNING,
     ICR_RECEIVING,
     CanController,
 )
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_DOI
 
 OPERATING = 0  # CxMOD: not in reset
 

@@ -13,13 +13,8 @@ from ranger_sim.can_bus.acceptance import packed
 from ranger_sim.can_bus.node import WARNING_LIMIT
 from ranger_sim.firmware_sim.lpc2194.block import Block
 from ranger_sim.firmware_sim.lpc2194.vic import CAN1_RX_INPUT, CAN1_TX_INPUT, CAN_INPUT
-from ranger_sim.firmware_sim.peripherals.can_controller import (
-    CMR_SRR,
-    ICR_RI,
-    MOD_RESET,
-    TABLE_BYTES,
-    CanController,
-)
+from ranger_sim.firmware_sim.peripherals.can_controller import CMR_SRR, TABLE_BYTES, CanController
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_RI, MOD_RESET
 from ranger_sim.foundation.events import NEVER
 from ranger_sim.foundation.user_error import BusError
 

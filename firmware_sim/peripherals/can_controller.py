@@ -13,38 +13,45 @@ Interrupts: (CAN_RX, n) while a frame waits, (CAN_TX_DONE, n), and (CAN_STATUS, 
 Bus-off puts the controller into reset mode; writing MOD = 0 begins the recovery.
 """
 
-from typing import Annotated, Final
+from typing import Final
 
 import cython
 
-from ranger_sim.can_bus.acceptance import Acceptance, Ranges, packed
+from ranger_sim.can_bus.acceptance import Ranges, packed
 
 # handed on to the boards, which see the controller and not the bus
 from ranger_sim.can_bus.node import ICR_BUS_ERROR as ICR_BUS_ERROR  # noqa: PLC0414
 from ranger_sim.can_bus.node import ICR_ERROR_PASSIVE as ICR_ERROR_PASSIVE  # noqa: PLC0414
 from ranger_sim.can_bus.node import ICR_ERROR_WARNING as ICR_ERROR_WARNING  # noqa: PLC0414
 from ranger_sim.can_bus.node import ICR_RECEIVING as ICR_RECEIVING  # noqa: PLC0414
-from ranger_sim.can_bus.node import WARNING_LIMIT
 from ranger_sim.can_bus.transmit_ends import TransmitEnds
-from ranger_sim.firmware_sim.peripheral import Peripheral
+from ranger_sim.firmware_sim.peripherals.can_controller_base import (
+    ENDED_1,
+    ENDED_2_3,
+    ICR_RI,
+    MOD_RESET,
+    SR_BS,
+    SR_DOS,
+    SR_ES,
+    SR_RBS,
+    SR_TBS,
+    SR_TCS,
+    TI2_SHIFT,
+    CanControllerBase,
+    buffers_of,
+)
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.events import (
     CAN_ABORT,
-    CAN_FILTER,
     CAN_MODE,
     CAN_RX,
-    CAN_STATUS,
     CAN_TX_DONE,
     FLAG_EXTENDED,
     FLAG_REMOTE,
     FLAG_SINGLE_SHOT,
     NEVER,
-    TX_ABORTED,
-    TX_SENT,
 )
 from ranger_sim.foundation.user_error import FirmwareError
-
-MOD_RESET: Final = 0x1  # CxMOD: reset mode
 
 TABLE_BYTES: Final = 2048  # of the acceptance filter's lookup table
 
@@ -58,31 +65,7 @@ CMR_STB1: Final = 0x20  # select transmit buffer
 CMR_STB2: Final = 0x40
 CMR_STB3: Final = 0x80
 
-# CxICR and CxIER: the bits of the controller itself; those from the bus, ICR_*, are in can_bus/node.py.
-ICR_RI: Final = 0x1  # a frame waits
-ICR_TI1: Final = 0x2  # transmit buffer 1 has ended
-ICR_DOI: Final = 0x8  # data overrun
-ICR_ALI: Final = 0x40  # arbitration lost
-ICR_TI2: Final = 0x200
-ICR_TI3: Final = 0x400
-# ends of transmissions as bits 1 ... 3; those of buffers 2 and 3 are higher up in CxICR
-ENDED_1: Final = 0x2
-ENDED_2_3: Final = 0xC
-TI2_SHIFT: Final = 7
-
-# CxSR, once per transmit buffer
-SR_RBS: Final = 0x1  # a frame waits
-SR_DOS: Final = 0x2  # data overrun
-SR_TBS: Final = 0x4  # the transmit buffer is free
-SR_TCS: Final = 0x8  # its last transmission was completed
-SR_ES: Final = 0x40  # an error counter is at the warning limit
-SR_BS: Final = 0x80  # bus-off
-SR_BUFFER_BITS: Final = 8
-
-# CxGSR: as CxSR below, TBS and TCS of all three buffers together, and the error counters
-GSR_RX_ERRORS_SHIFT: Final = 16
-GSR_TX_ERRORS_SHIFT: Final = 24
-ERROR_COUNTER_MASK: Final = 0xFF
+SR_BUFFER_BITS: Final = 8  # of a transmit buffer in CxSR
 
 # CxRFS and CxTFI: DLC in bits 16-19, RTR bit 30, FF (extended identifier) bit 31; from a message's flags by shifts
 DLC_MASK: Final = 0xF
@@ -134,34 +117,19 @@ def table_bytes(standard: Ranges, extended: Ranges) -> int:
     return 4 * words + sum(8 if isinstance(each, tuple) else 4 for each in extended)
 
 
-@cython.cfunc
-@cython.exceptval(check=False)
-def buffers_of(word: cython.longlong) -> cython.longlong:
-    """TI1 ... TI3 of a CxICR or CxIER value, as bits 1 ... 3."""
-    return word & ENDED_1 | word >> TI2_SHIFT & ENDED_2_3
-
-
 @cython.final
 @cython.cclass
-class CanController(Peripheral):
-    """Controller `number` (1 ... 4), field a of all its messages. Counters are ground truth for tests.
+class CanController(CanControllerBase):
+    """Controller `number` (1 ... 4) of the LPC2194; what it has in common with other kinds is in the base class.
 
     `sent`, `aborted` and `lost` count the ends that have been taken in.
     """
 
     # what a frame touches; registers of the chip have 32 bits
-    rx_source: InterruptSource
-    tx_source: InterruptSource
-    MOD: cython.longlong
     ends: TransmitEnds
-    IER: Annotated[cython.longlong, "readonly"]
-    acceptance: Acceptance
     end_interrupts: cython.longlong
     ended: cython.longlong
-    noted: cython.longlong
-    number: cython.longlong
     rx_count: cython.longlong
-    tx_status: cython.longlong[4]
     RFS: cython.longlong
     RID: cython.longlong
     RDA: cython.longlong
@@ -170,39 +138,19 @@ class CanController(Peripheral):
     second_RID: cython.longlong
     second_RDA: cython.longlong
     second_RDB: cython.longlong
-    received: cython.longlong
-    sent: cython.longlong
-    requests: cython.longlong
     TFI: cython.longlong[4]
     TID: cython.longlong[4]
     TDA: cython.longlong[4]
     TDB: cython.longlong[4]
     # the rest
-    data_overruns: cython.longlong
-    lost: cython.longlong
-    aborted: cython.longlong
-    refused: cython.longlong
-    overrun: cython.bint
-    bus_off: cython.bint
-    error_warning: cython.bint
-    tx_errors: cython.longlong
-    rx_errors: cython.longlong
     BTR: cython.longlong
-    error_source: InterruptSource
 
     def __init__(self, chip, number=1, btr=0x00254001, IER=ICR_RI) -> None:
         # 0x00254001: BRP 1, SJW 1, TSEG1 5, TSEG2 2: 3 Mbit/s at 60 MHz, sampled at 70 %
-        Peripheral.__init__(self, chip)
-        if not 1 <= number <= 4:
-            raise FirmwareError(f"{chip.name}: CAN controller {number} is not 1 ... 4")
-        self.number = number
+        CanControllerBase.__init__(self, chip, number, IER, "CAN controller")
         self.ends = TransmitEnds()
-        self.acceptance = None
-        self.MOD = 0
-        self.IER = IER
         self.end_interrupts = buffers_of(IER)  # by buffer, bits 1 ... 3
         self.ended = 0  # the same way: ends that CxICR shows until it is read
-        self.noted = 0  # the other bits that it shows until it is read
         self.BTR = btr
         self.RFS = 0
         self.RID = 0
@@ -217,25 +165,6 @@ class CanController(Peripheral):
         self.TID = [0] * 4
         self.TDA = [0] * 4
         self.TDB = [0] * 4
-        self.tx_status = [SR_TBS | SR_TCS] * 4  # of a buffer; 0 while it transmits
-        self.overrun = False
-        self.bus_off = False
-        self.error_warning = False
-        self.tx_errors = 0
-        self.rx_errors = 0
-        self.received = 0
-        self.data_overruns = 0
-        self.requests = 0
-        self.sent = 0
-        self.lost = 0
-        self.aborted = 0
-        self.refused = 0
-        self.rx_source = chip.vic.source(CAN_RX, number)
-        self.tx_source = chip.vic.source(CAN_TX_DONE, number)
-        self.error_source = chip.vic.source(CAN_STATUS, number)
-        chip.claim(CAN_RX, number, self)
-        chip.claim(CAN_TX_DONE, number, self)
-        chip.claim(CAN_STATUS, number, self)
 
     def transmit_ends(self) -> object:
         """Where a bus writes the ends of its transmissions."""
@@ -249,28 +178,14 @@ class CanController(Peripheral):
         The others cost the board nothing, and no simulation either. The lookup table is that of the chip, shared by its
         controllers: FirmwareError where one of them alone takes more than its 2 KB.
         """
-        where = f"{self.chip.name}: CAN controller {self.number}"
         standard, extended = tuple(standard), tuple(extended)
         used = table_bytes(standard, extended)
-        data = packed(where, standard, extended)
+        data = packed(self.where(), standard, extended)
         if used > TABLE_BYTES:
             raise FirmwareError(
-                f"{where}: its acceptance filter takes {used} bytes of the table, which has {TABLE_BYTES}"
+                f"{self.where()}: its acceptance filter takes {used} bytes of the table, which has {TABLE_BYTES}"
             )
         self.set_filter(data)
-
-    def accept_all(self) -> None:
-        """Let every frame pass: the filter is in bypass."""
-        self.set_filter(None)
-
-    def set_filter(self, data: bytes | None) -> None:
-        """Set the filter by the bytes of `can_bus.acceptance`; None: bypass."""
-        self.acceptance = None if data is None else Acceptance(data)
-        self.chip.outbox.push(self.chip.now, 0, CAN_FILTER, self.number, int(data is not None), 0, 0, 0, 0, data)
-
-    def filter_bytes(self) -> bytes | None:
-        """What `set_filter` was called with last."""
-        return None if self.acceptance is None else self.acceptance.data
 
     @cython.ccall
     def bit_rate(self) -> cython.double:
@@ -339,15 +254,7 @@ class CanController(Peripheral):
         """The transmission from a buffer has ended."""
         self.ends.times[buffer] = NEVER
         self.ended |= 1 << buffer
-        if status == TX_SENT:
-            self.sent += 1
-            self.tx_status[buffer] = SR_TBS | SR_TCS
-            return
-        self.tx_status[buffer] |= SR_TBS
-        if status == TX_ABORTED:
-            self.aborted += 1
-        else:
-            self.lost += 1
+        self.count_end(buffer, status)
 
     @cython.ccall
     def transmit(
@@ -378,7 +285,7 @@ class CanController(Peripheral):
     ) -> cython.bint:
         """`transmit` by a program that reads the buffer's status first: False when it is not free, or in reset."""
         if not 1 <= buffer <= 3:
-            raise IndexError(f"{self.chip.name}: CAN controller {self.number}: transmit buffer {buffer} is not 1 ... 3")
+            raise IndexError(f"{self.where()}: transmit buffer {buffer} is not 1 ... 3")
         if self.ends.times[buffer] <= self.chip.now:
             self._end(buffer, self.ends.statuses[buffer])
         if self.tx_status[buffer] == 0 or self.MOD & MOD_RESET:
@@ -446,14 +353,7 @@ class CanController(Peripheral):
                 self.second_RDA = queue.d
                 self.second_RDB = queue.e
             else:
-                self.data_overruns += 1
-                if self.overrun:  # DOI comes when the status bit rises, and CDO was not commanded since
-                    return None
-                self.overrun = True
-                self.noted |= ICR_DOI
-                if self.IER & ICR_DOI:
-                    return self.error_source
-                return None
+                return self.take_overrun()
             self.received += 1
             if self.IER & ICR_RI:
                 return self.rx_source
@@ -463,26 +363,8 @@ class CanController(Peripheral):
             if self.end_interrupts >> buffer & 1:
                 return self.tx_source
         else:  # CAN_STATUS
-            self.tx_errors = queue.c
-            self.rx_errors = queue.d
-            self.error_warning = queue.c >= WARNING_LIMIT or queue.d >= WARNING_LIMIT
-            self.noted |= queue.b
-            if queue.e and not self.bus_off:
-                self._bus_off()
-            elif not queue.e:
-                self.bus_off = False
-            if self.IER & queue.b:
-                return self.error_source
+            return self.take_status(queue)
         return None
-
-    @cython.cfunc
-    def _bus_off(self) -> cython.void:
-        """Enter reset mode after too many transmit errors: nothing is sent or received until software restarts it."""
-        buffer: cython.longlong
-        self.bus_off = True
-        self.MOD |= MOD_RESET
-        for buffer in range(1, 4):
-            self.tx_status[buffer] |= SR_TBS
 
     @cython.ccall
     def release(self) -> cython.void:
@@ -503,12 +385,10 @@ class CanController(Peripheral):
     @cython.ccall
     def write_MOD(self, mode: cython.longlong) -> cython.void:
         """Bit 0: 1 reset mode, 0 operating (after bus-off: begin the recovery)."""
-        buffer: cython.longlong
         self.MOD = mode
         if mode & MOD_RESET:
             self.rx_count = 0
-            for buffer in range(1, 4):
-                self.tx_status[buffer] |= SR_TBS
+            self.free_buffers()
         self.chip.outbox.push(self.chip.now, 0, CAN_MODE, self.number, mode & MOD_RESET)
 
     @cython.ccall
@@ -533,16 +413,9 @@ class CanController(Peripheral):
         """Status of the three buffers, 8 bits each."""
         buffer: cython.longlong
         word: cython.longlong = 0
-        common: cython.longlong = 0
+        common: cython.longlong
         self._take_ends()
-        if self.rx_count > 0:
-            common |= SR_RBS
-        if self.overrun:
-            common |= SR_DOS
-        if self.error_warning:
-            common |= SR_ES
-        if self.bus_off:
-            common |= SR_BS
+        common = self.common_status(self.rx_count > 0)
         for buffer in range(1, 4):
             word |= (common | self.tx_status[buffer]) << SR_BUFFER_BITS * (buffer - 1)
         return word
@@ -555,5 +428,4 @@ class CanController(Peripheral):
         status: cython.longlong = self.SR()
         all_three: cython.longlong = status & status >> SR_BUFFER_BITS & status >> 2 * SR_BUFFER_BITS
         word: cython.longlong = status & (SR_RBS | SR_DOS | SR_ES | SR_BS) | all_three & (SR_TBS | SR_TCS)
-        word |= (self.rx_errors & ERROR_COUNTER_MASK) << GSR_RX_ERRORS_SHIFT
-        return word | (self.tx_errors & ERROR_COUNTER_MASK) << GSR_TX_ERRORS_SHIFT
+        return word | self.error_counts()

@@ -1,7 +1,7 @@
 """A CAN FD controller, of no particular chip: three transmit buffers, a receive queue, an acceptance filter.
 
 Bits of its interrupts (IER, ICR), its status (GSR) and its mode (MOD) are those of the LPC2194's classic controllers
-(can_controller.py), so that a program needs one set of names. The rest is generic:
+(can_controller_base.py), so that a program needs one set of names. The rest is generic:
 
 Transmit: a buffer holds up to 64 bytes and goes out as CAN_REQUEST with these bytes; its end comes as CAN_TX_DONE.
 Receive: a queue of RECEIVE_FRAMES frames; a frame that finds it full is a data overrun and lost.
@@ -15,43 +15,30 @@ from typing import Annotated, Final
 
 import cython
 
-from ranger_sim.can_bus.acceptance import Acceptance, Ranges, packed
+from ranger_sim.can_bus.acceptance import Ranges, packed
 from ranger_sim.can_bus.fd_frame import LENGTHS, fd_data_length
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, data_length
-from ranger_sim.can_bus.node import WARNING_LIMIT
-from ranger_sim.firmware_sim.peripheral import Peripheral
-from ranger_sim.firmware_sim.peripherals.can_controller import (
-    ERROR_COUNTER_MASK,
-    GSR_RX_ERRORS_SHIFT,
-    GSR_TX_ERRORS_SHIFT,
-    ICR_DOI,
+from ranger_sim.firmware_sim.peripherals.can_controller_base import (
     ICR_RI,
     MOD_RESET,
-    SR_BS,
-    SR_DOS,
-    SR_ES,
-    SR_RBS,
     SR_TBS,
     SR_TCS,
     TI2_SHIFT,
+    CanControllerBase,
     buffers_of,
 )
 from ranger_sim.firmware_sim.vic import InterruptSource
 from ranger_sim.foundation.events import (
     CAN_ABORT,
-    CAN_FILTER,
     CAN_MODE,
     CAN_REQUEST,
     CAN_RX,
-    CAN_STATUS,
     CAN_TX_DONE,
     FLAG_BRS,
     FLAG_ESI,
     FLAG_EXTENDED,
     FLAG_FD,
     FLAG_REMOTE,
-    TX_ABORTED,
-    TX_SENT,
 )
 from ranger_sim.foundation.user_error import FirmwareError
 
@@ -59,79 +46,28 @@ RECEIVE_FRAMES: Final = 32  # chosen by us: controllers have from three to 64 pl
 KNOWN_FLAGS: Final = 0x750  # of a request: CAN FD, BRS, ESI, extended, remote
 
 
-def _frame_text(number: int, identifier: int) -> str:
-    return f"CAN FD controller {number}: identifier {identifier:#x}"
-
-
 @cython.final
 @cython.cclass
-class CanFdController(Peripheral):
-    """Controller `number` (1 ... 4), field a of all its messages. Counters are ground truth for tests.
+class CanFdController(CanControllerBase):
+    """Controller `number` (1 ... 4); what it has in common with other kinds is in the base class.
 
     bit_rate, data_bit_rate: bit/s of the two phases; the bus must have the same (`harness.machine.Machine`).
     """
 
-    number: cython.longlong
-    rx_source: InterruptSource
-    tx_source: InterruptSource
-    error_source: InterruptSource
-    MOD: cython.longlong
-    IER: Annotated[cython.longlong, "readonly"]
-    noted: cython.longlong
-    acceptance: Acceptance
     waiting: list
-    tx_status: cython.longlong[4]
     bit_rate: Annotated[cython.longlong, "readonly"]
     data_bit_rate: Annotated[cython.longlong, "readonly"]
-    received: cython.longlong
-    sent: cython.longlong
-    requests: cython.longlong
-    data_overruns: cython.longlong
-    lost: cython.longlong
-    aborted: cython.longlong
-    refused: cython.longlong
-    overrun: cython.bint
-    bus_off: cython.bint
-    error_warning: cython.bint
-    tx_errors: cython.longlong
-    rx_errors: cython.longlong
 
     def __init__(self, chip, number=1, bit_rate=500_000, data_bit_rate=2_000_000, IER=ICR_RI) -> None:
-        Peripheral.__init__(self, chip)
-        if not 1 <= number <= 4:
-            raise FirmwareError(f"{chip.name}: CAN FD controller {number} is not 1 ... 4")
+        CanControllerBase.__init__(self, chip, number, IER, "CAN FD controller")
         if bit_rate < 1 or (data_bit_rate and data_bit_rate < bit_rate):
             raise FirmwareError(
-                f"{chip.name}: CAN FD controller {number}: {bit_rate} and {data_bit_rate} bit/s: the first is at least "
+                f"{self.where()}: {bit_rate} and {data_bit_rate} bit/s: the first is at least "
                 "1, the second, of the data, not lower, or 0 for classic CAN"
             )
-        self.number = number
         self.bit_rate = bit_rate
         self.data_bit_rate = data_bit_rate
-        self.acceptance = None
-        self.MOD = 0
-        self.IER = IER
-        self.noted = 0  # bits that ICR shows until it is read
         self.waiting = []  # (identifier, flags, data) received, the oldest first
-        self.tx_status = [SR_TBS | SR_TCS] * 4  # of a buffer; 0 while it transmits
-        self.overrun = False
-        self.bus_off = False
-        self.error_warning = False
-        self.tx_errors = 0
-        self.rx_errors = 0
-        self.received = 0
-        self.sent = 0
-        self.requests = 0
-        self.data_overruns = 0
-        self.lost = 0
-        self.aborted = 0
-        self.refused = 0
-        self.rx_source = chip.vic.source(CAN_RX, number)
-        self.tx_source = chip.vic.source(CAN_TX_DONE, number)
-        self.error_source = chip.vic.source(CAN_STATUS, number)
-        chip.claim(CAN_RX, number, self)
-        chip.claim(CAN_TX_DONE, number, self)
-        chip.claim(CAN_STATUS, number, self)
 
     def can_rates(self) -> tuple[int, int] | None:
         """Its bit rates, bit/s, of the two phases; None without a data bit rate, as of a classic controller."""
@@ -144,20 +80,7 @@ class CanFdController(Peripheral):
 
         FirmwareError for an identifier that does not exist, and for more than 223 ranges of 29 bits.
         """
-        self.set_filter(packed(f"{self.chip.name}: CAN FD controller {self.number}", standard, extended))
-
-    def accept_all(self) -> None:
-        """Let every frame pass."""
-        self.set_filter(None)
-
-    def set_filter(self, data: bytes | None) -> None:
-        """Set the filter by the bytes of `can_bus.acceptance`; None: every frame passes."""
-        self.acceptance = None if data is None else Acceptance(data)
-        self.chip.outbox.push(self.chip.now, 0, CAN_FILTER, self.number, int(data is not None), 0, 0, 0, 0, data)
-
-    def filter_bytes(self) -> bytes | None:
-        """What `set_filter` was called with last."""
-        return None if self.acceptance is None else self.acceptance.data
+        self.set_filter(packed(self.where(), standard, extended))
 
     # --- transmit -----------------------------------------------------------------------------------------
 
@@ -188,13 +111,11 @@ class CanFdController(Peripheral):
         frame. FirmwareError for a frame that does not exist.
         """
         if not 1 <= buffer <= 3:
-            raise IndexError(
-                f"{self.chip.name}: CAN FD controller {self.number}: transmit buffer {buffer} is not 1 ... 3"
-            )
+            raise IndexError(f"{self.where()}: transmit buffer {buffer} is not 1 ... 3")
         data = bytes(data)
         fault = self.fault_of(identifier, flags, data)
         if fault:
-            raise FirmwareError(f"{self.chip.name}: {_frame_text(self.number, identifier)}: {fault}")
+            raise FirmwareError(f"{self.where()}: identifier {identifier:#x}: {fault}")
         if self.tx_status[buffer] == 0 or self.MOD & MOD_RESET:
             self.refused += 1
             return False
@@ -245,12 +166,7 @@ class CanFdController(Peripheral):
             if self.acceptance is not None and not self.acceptance.accepts(queue.b, queue.c):
                 return None
             if len(self.waiting) >= RECEIVE_FRAMES:
-                self.data_overruns += 1
-                if self.overrun:
-                    return None
-                self.overrun = True
-                self.noted |= ICR_DOI
-                return self.error_source if self.IER & ICR_DOI else None
+                return self.take_overrun()
             data = queue.ref
             if data is None:
                 words = (queue.d & 0xFFFFFFFF).to_bytes(4, "little") + (queue.e & 0xFFFFFFFF).to_bytes(4, "little")
@@ -262,38 +178,13 @@ class CanFdController(Peripheral):
             buffer = queue.b & 3
             self._end(buffer, queue.c)
             return self.tx_source if buffers_of(self.IER) >> buffer & 1 else None
-        self.tx_errors = queue.c
-        self.rx_errors = queue.d
-        self.error_warning = queue.c >= WARNING_LIMIT or queue.d >= WARNING_LIMIT
-        self.noted |= queue.b
-        if queue.e and not self.bus_off:
-            self.bus_off = True
-            self._reset()
-        elif not queue.e:
-            self.bus_off = False
-        return self.error_source if self.IER & queue.b else None
+        return self.take_status(queue)
 
     @cython.cfunc
     def _end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
         """The transmission from a buffer has ended."""
         self.noted |= 1 << buffer if buffer == 1 else 1 << (buffer + TI2_SHIFT)
-        if status == TX_SENT:
-            self.sent += 1
-            self.tx_status[buffer] = SR_TBS | SR_TCS
-            return
-        self.tx_status[buffer] |= SR_TBS
-        if status == TX_ABORTED:
-            self.aborted += 1
-        else:
-            self.lost += 1
-
-    @cython.cfunc
-    def _reset(self) -> cython.void:
-        """Enter reset mode: nothing is sent or received, and no buffer is occupied."""
-        buffer: cython.longlong
-        self.MOD |= MOD_RESET
-        for buffer in range(1, 4):
-            self.tx_status[buffer] |= SR_TBS
+        self.count_end(buffer, status)
 
     # --- status -------------------------------------------------------------------------------------------
 
@@ -301,7 +192,7 @@ class CanFdController(Peripheral):
         """Bit 0: 1 reset mode, 0 operating (after bus-off: begin the recovery)."""
         if mode & MOD_RESET:
             self.waiting.clear()
-            self._reset()
+            self.free_buffers()
         self.MOD = mode
         self.chip.outbox.push(self.chip.now, 0, CAN_MODE, self.number, mode & MOD_RESET)
 
@@ -322,14 +213,5 @@ class CanFdController(Peripheral):
     def GSR(self) -> int:
         """The status, as CxGSR."""
         buffers: cython.longlong = self.tx_status[1] & self.tx_status[2] & self.tx_status[3]
-        word: cython.longlong = buffers & (SR_TBS | SR_TCS)
-        if self.waiting:
-            word |= SR_RBS
-        if self.overrun:
-            word |= SR_DOS
-        if self.error_warning:
-            word |= SR_ES
-        if self.bus_off:
-            word |= SR_BS
-        word |= (self.rx_errors & ERROR_COUNTER_MASK) << GSR_RX_ERRORS_SHIFT
-        return word | (self.tx_errors & ERROR_COUNTER_MASK) << GSR_TX_ERRORS_SHIFT
+        word: cython.longlong = buffers & (SR_TBS | SR_TCS) | self.common_status(len(self.waiting) > 0)
+        return word | self.error_counts()

@@ -9,18 +9,14 @@ from ranger_sim.firmware_sim.peripherals.can_controller import (
     CMR_STB2,
     CMR_STB3,
     CMR_TR,
-    ICR_ALI,
     ICR_BUS_ERROR,
-    ICR_DOI,
     ICR_ERROR_WARNING,
-    ICR_RI,
-    ICR_TI1,
-    ICR_TI2,
     CanController,
     bit_rate_of,
     btr_value,
     sample_point_of,
 )
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_ALI, ICR_DOI, ICR_RI, ICR_TI1, ICR_TI2
 from ranger_sim.firmware_sim.vic import FIQ
 from ranger_sim.foundation.events import (
     CAN_ABORT,

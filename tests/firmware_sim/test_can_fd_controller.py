@@ -3,7 +3,8 @@
 import pytest
 
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.peripherals.can_controller import ICR_DOI, ICR_ERROR_WARNING, ICR_RI, ICR_TI1, ICR_TI3
+from ranger_sim.firmware_sim.peripherals.can_controller import ICR_ERROR_WARNING
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_DOI, ICR_RI, ICR_TI1, ICR_TI3
 from ranger_sim.firmware_sim.peripherals.can_fd_controller import RECEIVE_FRAMES, CanFdController
 from ranger_sim.foundation.events import (
     CAN_ABORT,

@@ -5,16 +5,8 @@ import pytest
 from ranger_sim.can_bus.bus import Bus
 from ranger_sim.firmware_sim.clock import Crystal
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.peripherals.can_controller import (
-    CMR_AT,
-    CMR_STB1,
-    CMR_TR,
-    ICR_RI,
-    ICR_TI1,
-    ICR_TI2,
-    ICR_TI3,
-    CanController,
-)
+from ranger_sim.firmware_sim.peripherals.can_controller import CMR_AT, CMR_STB1, CMR_TR, CanController
+from ranger_sim.firmware_sim.peripherals.can_controller_base import ICR_RI, ICR_TI1, ICR_TI2, ICR_TI3
 from ranger_sim.firmware_sim.scheduler import Schedule, Task
 from ranger_sim.foundation.events import CAN_ABORT, CAN_REQUEST, CAN_TX_DONE, STAGE_BUS, EventQueue
 from ranger_sim.foundation.random_stream import RandomStream
