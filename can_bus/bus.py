@@ -312,7 +312,13 @@ class Bus:
         """Record a frame that passed on the real bus which replaces this one."""
         self.counters.frames += 1
         if flags & FLAG_FD:
-            self.log.add_fd(time, identifier, flags, data_of_words(flags, lo, hi), -1)
+            data = data_of_words(flags, lo, hi)
+            self.log.add_fd(time, identifier, flags, data, -1)
+            if self.log.times is not None and self.timing.is_fd:  # else the data bit rate is unknown
+                packed = phases(identifier, flags, data, self.iso)
+                ticks = (packed & PHASE_MASK) * self.bit_ticks + (packed >> PHASE_SHIFT) * self.timing.data
+                begun, hi = time - ticks * SECOND_NS // self.tick_rate, hi & 0xFFFFFFFF
+                self.log.times.add(begun, begun, time, identifier, flags & RECEIVERS_SEE, lo, hi)
             return
         self.log.add(time, identifier, flags, lo, hi, -1)
         if self.log.times is not None:  # its requester and the time of the request are unknown here

@@ -362,8 +362,10 @@ class Machine:
         return wire_of(self, bus, since_s)
 
     def timeline(self, last_s: float | None = None) -> Any:
-        """A timeline that keeps the last `last_s` seconds of virtual time, or everything; None: it has none."""
-        return None
+        """A `MachineTimeline` that keeps the last `last_s` seconds of virtual time, or everything (None)."""
+        from ranger_sim.harness.timeline.machine_timeline import MachineTimeline
+
+        return MachineTimeline(self, last_s)
 
     def inject(
         self,

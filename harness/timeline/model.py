@@ -77,13 +77,14 @@ class Instants:
 
 @dataclasses.dataclass
 class Events:
-    """A whole timeline. Tracks are in the order in which a reader wants to see them."""
+    """A whole timeline. Tracks are in the order in which a reader wants to see them; `name` is the root of them all."""
 
     begin_ns: int
     end_ns: int
     slices: list[Slices] = dataclasses.field(default_factory=list)
     counters: list[Counter] = dataclasses.field(default_factory=list)
     instants: list[Instants] = dataclasses.field(default_factory=list)
+    name: str = "Ranger"
     # {board: {pin: (time_ns, level)}} of the pins that boards drove
     pins: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = dataclasses.field(default_factory=dict)
 

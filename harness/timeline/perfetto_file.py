@@ -18,7 +18,6 @@ from ranger_sim.harness.timeline.packing import INNER_BEGINS, INNER_ENDS, OUTER_
 
 SCHEMA = "perfetto.protos.perfetto.trace.perfetto_trace_pb2"
 SEQUENCE = 1  # all packets are of one sequence, so all use one table of names
-ROOT_NAME = "Ranger"
 CHUNK_ROWS = 200_000  # slices that are laid out at once: some 50 MB of arrays
 LEVEL = 1  # of zlib: a sixth of the size; the next levels cost two times as much processor for 3 % less
 
@@ -50,7 +49,7 @@ class Writer:
         """Write descriptors and names first, then slices, counters and instants."""
         self._number_names(events)
         self._write_names()
-        self.groups[()] = self._describe((ROOT_NAME,), 0, description=title)
+        self.groups[()] = self._describe((events.name,), 0, description=title)
         for instants in events.instants:
             self._write_instants(instants)
         for slices in events.slices:

@@ -1,4 +1,4 @@
-"""Signals with a value at every time: variables of the data table, quantities of the body, states of the machines."""
+"""Signals with a value at every time: variables of the data table, duties of bridges, states of the machines."""
 
 from typing import Any
 
@@ -6,12 +6,10 @@ import numpy as np
 
 from ranger_sim.boards.modules.motor_output import PERIOD_COUNTS
 from ranger_sim.datatable.generated import all_variables
-from ranger_sim.foundation.events import PIN_OUTPUT, PWM_UPDATE
+from ranger_sim.foundation.events import PWM_UPDATE
+from ranger_sim.harness.timeline.frames import NUMPY_TYPES
 from ranger_sim.harness.timeline.model import Counter, Slices, changes, runs
-from ranger_sim.plant.ranger import SAMPLES
-from ranger_sim.ranger import wiring
 from ranger_sim.ranger.conditions import STATE_VARIABLES, state_names
-from ranger_sim.ranger.timeline.frames import NUMPY_TYPES
 
 
 def variables(rows: np.ndarray, zero_ns: int) -> list[Counter]:
@@ -25,16 +23,6 @@ def variables(rows: np.ndarray, zero_ns: int) -> list[Counter]:
             group = name.partition("_")[0]
             found.append(Counter(("Variables", group, name), all_variables.UNITS[number], at, values))
     return sorted(found, key=lambda counter: counter.path)
-
-
-def body(rows: np.ndarray, zero_ns: int) -> list[Counter]:
-    """The plant's samples; `rows`: of the samples' stream (time in s first)."""
-    time = np.round(rows[:, 0] * 1e9).astype(np.int64) - zero_ns
-    found = []
-    for column, (name, unit) in enumerate(SAMPLES.items(), start=1):
-        at, values = changes(time, rows[:, column])
-        found.append(Counter(("Body", name), unit, at, values))
-    return found
 
 
 def machine_states(robot: Any, rows: np.ndarray, zero_ns: int, end_ns: int) -> list[Slices]:
@@ -62,14 +50,3 @@ def duties(board: str, rows: np.ndarray, zero_ns: int) -> list[Counter]:
     writes = rows[rows[:, 1] == PWM_UPDATE]
     time, duty = changes(writes[:, 0] - zero_ns, (writes[:, 2] - writes[:, 3]) / PERIOD_COUNTS)
     return [Counter(("Boards", board, "duty"), "", time, duty)] if len(time) else []
-
-
-def pin_levels(board: str, rows: np.ndarray, zero_ns: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """{pin's name: (time_ns, level)} of the pins that a board drove."""
-    writes = rows[rows[:, 1] == PIN_OUTPUT]
-    found = {}
-    for name, pin in wiring.PINS.get(board, {}).items():
-        of_pin = writes[writes[:, 2] == pin]
-        if len(of_pin):
-            found[name] = changes(of_pin[:, 0] - zero_ns, of_pin[:, 3])
-    return found

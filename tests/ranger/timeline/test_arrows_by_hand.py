@@ -11,11 +11,12 @@ from ranger_sim.datatable.generated import all_variables
 from ranger_sim.firmware_sim import activity
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
 from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
-from ranger_sim.harness.timeline import perfetto_file, perfetto_reader
+from ranger_sim.harness.timeline import arrows, perfetto_file, perfetto_reader
+from ranger_sim.harness.timeline.frames import BusFrames, frame_name
 from ranger_sim.harness.timeline.model import Counter, Events, Instant, Instants, Slices, changes, runs
 from ranger_sim.harness.timeline.processors import Processor
+from ranger_sim.ranger.names import RANGER
 from ranger_sim.ranger.timeline import flows
-from ranger_sim.ranger.timeline.frames import BusFrames, frame_name
 
 
 def numbers(*values):
@@ -53,7 +54,7 @@ def test_tracks_are_found_by_their_path_and_slices_by_their_name():
 
 
 def test_arrows_are_numbered_on_and_a_pair_without_an_end_has_none():
-    book = flows.FlowBook()
+    book = arrows.FlowBook()
     one, other = slices((0, 1), (2, 3)), slices((5, 6), (7, 8))
     book.connect(one, numbers(0, -1, 1), other, numbers(1, 1, -1))
     book.connect(one, numbers(1, 0), other, numbers(0, 0))
@@ -63,16 +64,16 @@ def test_arrows_are_numbered_on_and_a_pair_without_an_end_has_none():
 
 
 def test_the_slice_that_goes_on_at_a_time_has_both_its_ends():
-    found = flows.containing(slices((10, 20), (30, 40)), numbers(9, 10, 20, 21, 29, 30, 40, 41))
+    found = arrows.containing(slices((10, 20), (30, 40)), numbers(9, 10, 20, 21, 29, 30, 40, 41))
     assert found.tolist() == [-1, 0, 0, -1, -1, 1, 1, -1]
-    assert flows.containing(slices(), numbers(1, 2)).tolist() == [-1, -1]
+    assert arrows.containing(slices(), numbers(1, 2)).tolist() == [-1, -1]
 
 
 def test_a_request_is_a_tasks_at_its_start_else_the_interrupts_or_the_turns_then():
     processor = Made(
         tasks=slices((10, 20), (30, 40)), fast=slices((12, 14)), services=slices((11, 18)), turns=slices((0, 99))
     )
-    found = flows.asking(processor, numbers(10, 12, 16, 30, 31, 100))
+    found = arrows.asking(processor, numbers(10, 12, 16, 30, 31, 100))
     assert [rows.tolist() for _, rows in found] == [
         [0, -1, -1, 1, -1, -1],
         [-1, 0, -1, -1, -1, -1],
@@ -177,8 +178,8 @@ def frames(*rows, bitrate=3_000_000):
         (a, b, c, i, (node + 1) << SENDER_SHIFT | buffer << TIMES_BUFFER_SHIFT | flags, lo, hi)
         for a, b, c, i, node, buffer, flags, lo, hi in rows
     ]
-    bus = Made(name="can1", bitrate=bitrate, nodes=[Made(name="A"), Made(name="B")])
-    return BusFrames(bus, np.array(packed, dtype=np.int64), 1000)
+    bus = Made(name="can1", bitrate=bitrate, is_fd=False, nodes=[Made(name="A"), Made(name="B")])
+    return BusFrames(bus, RANGER, np.array(packed, dtype=np.int64), 1000)
 
 
 ANGLE = next(number for number, kind in all_variables.TYPES.items() if kind == "f32")
@@ -207,8 +208,8 @@ def test_frames_are_in_order_with_their_senders_and_contents():
 
 
 def test_a_frame_without_a_name_has_its_identifier():
-    assert frame_name(0x7FF, 0) == "7FF" and frame_name(ANGLE, FLAG_EXTENDED) == f"{ANGLE:X}"
-    assert frame_name(0x7FF, FLAG_ERROR) == "error frame: 7FF"
+    assert frame_name(RANGER, 0x7FF, 0) == "7FF" and frame_name(RANGER, ANGLE, FLAG_EXTENDED) == f"{ANGLE:X}"
+    assert frame_name(RANGER, 0x7FF, FLAG_ERROR) == "error frame: 7FF"
 
 
 def test_the_frames_waiting_in_each_transmit_buffer_are_a_separate_track():
@@ -346,7 +347,7 @@ def test_a_small_timeline_is_read_back_with_all_that_it_has(tmp_path):
     )  # fmt: skip
     outer.inside = inside
     other = slices((50, 60), (60, 61), (70, 90), path=("H", "K", "late"))
-    book = flows.FlowBook()
+    book = arrows.FlowBook()
     book.connect(outer, numbers(0, 0, 1), other, numbers(2, 1, 1))
     book.connect(inside, numbers(2), outer, numbers(1))
     events = Events(

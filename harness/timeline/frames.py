@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from ranger_sim.can_bus.fd_frame import LENGTHS, PHASE_MASK, phases
+from ranger_sim.can_bus.frame import LENGTH_CODE, TAIL_BITS
 from ranger_sim.can_bus.frame_log import (
     SENDER_SHIFT,
     TIMES_ASKED,
@@ -15,8 +17,8 @@ from ranger_sim.can_bus.frame_log import (
     TIMES_SENDER,
     TIMES_START,
 )
-from ranger_sim.datatable.generated import all_variables
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_ESI, FLAG_EXTENDED, FLAG_FD
+from ranger_sim.harness.names import Names
 from ranger_sim.harness.timeline.model import Slices
 
 FLAGS_MASK = (1 << TIMES_BUFFER_SHIFT) - 1
@@ -27,10 +29,13 @@ NUMPY_TYPES = {"f32": np.float32, "i32": np.int32, "u32": np.uint32}
 class BusFrames:
     """The frames of one bus, in the order of their starts: `slices`, and columns for finding flows.
 
-    `sender`: the node's number, -1 for none. `heard_ns`: when receivers had it, a bit before its end.
+    names: of its identifiers. `sender`: the node's number, -1 for none. `heard_ns`: when receivers had it, a bit before
+    its end. On a CAN FD bus each frame has its bytes, FDF, BRS and ESI as notes, and inside one with BRS the part at
+    the data bit rate is a slice.
     """
 
-    def __init__(self, bus: Any, rows: np.ndarray, zero_ns: int) -> None:
+    def __init__(self, bus: Any, names: Names, rows: np.ndarray, zero_ns: int) -> None:
+        self.names = names
         rows = rows[np.argsort(rows[:, TIMES_START], kind="stable")]
         self.name = bus.name
         self.nodes = [node.name for node in bus.nodes]
@@ -45,13 +50,15 @@ class BusFrames:
         self.low, self.high = rows[:, TIMES_LOW], rows[:, TIMES_HIGH]
         self.is_error = self.flags & FLAG_ERROR != 0
         self.slices = self._slices()
+        if bus.is_fd:
+            self._add_fd(bus)
 
     def _slices(self) -> Slices:
         key = self.identifier << 20 | (self.sender + 1) << 8 | self.flags & (FLAG_ERROR | FLAG_EXTENDED)
         kinds, first, name = np.unique(key, return_index=True, return_inverse=True)
         names, senders = [], []
         for row in first.tolist():
-            names.append(frame_name(int(self.identifier[row]), int(self.flags[row])))
+            names.append(frame_name(self.names, int(self.identifier[row]), int(self.flags[row])))
             senders.append(self.node_name(int(self.sender[row])))
         return Slices(
             path=("Buses", self.name, "frames"),
@@ -72,10 +79,42 @@ class BusFrames:
         word = (self.low & 0xFFFFFFFF).astype(np.uint32)
         values = word.astype(np.float64)
         for kind, numpy_type in NUMPY_TYPES.items():
-            numbers = np.array([number for number, each in all_variables.TYPES.items() if each == kind])
+            numbers = np.array([number for number, each in self.names.types.items() if each == kind])
             chosen = np.isin(self.identifier, numbers) & ~self.is_error
             values[chosen] = word[chosen].view(numpy_type)
         return values
+
+    def _add_fd(self, bus: Any) -> None:
+        """The notes of CAN FD, and the data phases inside the frames."""
+        is_fd = (self.flags & FLAG_FD != 0) & ~self.is_error
+        code = self.flags & LENGTH_CODE
+        length = np.where(is_fd, np.array(LENGTHS)[code], np.minimum(code, 8))
+        self.slices.notes["bytes"] = np.where(self.is_error, 0, length)
+        for name, flag in (("FDF", FLAG_FD), ("BRS", FLAG_BRS), ("ESI", FLAG_ESI)):
+            self.slices.notes[name] = np.where(is_fd & (self.flags & flag != 0), 1, 0)
+        rows = np.flatnonzero(is_fd & (self.flags & FLAG_BRS != 0))
+        if not len(rows):
+            return
+        timing = bus.timing
+        tick_ns = 1e9 / timing.rate
+        headers, header = np.unique(np.stack([self.identifier[rows], self.flags[rows]], 1), axis=0, return_inverse=True)
+        # nominal bits up to BRS, which depend on nothing behind it; from its sample point on: the data phase
+        before = np.array(
+            [
+                (phases(int(number), int(flags), b"", bool(bus.iso)) & PHASE_MASK) - (TAIL_BITS - 1)
+                for number, flags in headers
+            ]
+        )[header.reshape(-1)]
+        first_ns = ((before - 1) * timing.nominal + timing.sample) * tick_ns
+        # the end: the sample point of the CRC delimiter, the first bit of the tail
+        last_ns = (TAIL_BITS * timing.nominal - timing.sample) * tick_ns
+        self.slices.inside = Slices(
+            path=self.slices.path,
+            names=[f"data phase, {bus.data_bitrate / 1e6:g} Mbit/s"],
+            start_ns=self.start_ns[rows] + np.round(first_ns).astype(np.int64),
+            end_ns=self.end_ns[rows] - round(last_ns),
+            name=np.zeros(len(rows), dtype=np.int64),
+        )
 
     def waits(self) -> list[Slices]:
         """For each transmit buffer: from the request of a frame to its start. Below a bit's time is not a wait."""
@@ -97,8 +136,8 @@ class BusFrames:
         return found
 
 
-def frame_name(identifier: int, flags: int) -> str:
+def frame_name(names: Names, identifier: int, flags: int) -> str:
     """The label of a frame: the variable's name, or the identifier of a frame that is not a variable."""
-    name = all_variables.NAMES.get(identifier) if not flags & FLAG_EXTENDED else None
+    name = names.variables.get(identifier) if not flags & FLAG_EXTENDED else None
     text = name if name is not None else f"{identifier:X}"
     return f"error frame: {text}" if flags & FLAG_ERROR else text

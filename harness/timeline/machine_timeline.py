@@ -1,0 +1,221 @@
+"""`MachineTimeline`: records kept during a run of any machine, and the events made from them on request."""
+
+import itertools
+import pathlib
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ranger_sim.can_bus.frame_log import FrameTimes
+from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_END
+from ranger_sim.foundation.events import PIN_OUTPUT
+from ranger_sim.foundation.row_stream import RowStream
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.harness.records.activity import activity_of
+from ranger_sim.harness.step_watch import StepWatch
+from ranger_sim.harness.timeline import arrows, files, happenings
+from ranger_sim.harness.timeline.frames import BusFrames
+from ranger_sim.harness.timeline.model import Counter, Events, Instants, changes
+from ranger_sim.harness.timeline.processors import Processor
+from ranger_sim.harness.timeline.row_store import RowStore
+
+OUTPUT_COLUMNS = 5  # a row of BoardWires: ns, kind, three numbers
+GATHER_NS = 50_000_000  # of seven boards each every 0.35 s: some 2 MB of a motor board (chosen by us)
+
+
+class MachineTimeline:
+    """Attached to a machine before it runs: keeps the last `last_s` seconds of virtual time, or everything (None).
+
+    It changes nothing: the trace digest stays the same. Boards may run in separate processes; one that is outside
+    shows nothing of what its processor does. Memory is flat with `last_s`; without, everything is in unnamed temporary
+    files. Use `write` (format by the file's suffix), or `events` to inspect it in a test.
+    """
+
+    name = "machine"  # the root of its tracks
+
+    def __init__(self, machine: Any, last_s: float | None = None) -> None:
+        if last_s is not None and not last_s > 0.0:
+            raise UserError(f"timeline: last_s is {last_s!r}, it must be above 0 s")
+        self.robot = machine
+        self.last_ns = None if last_s is None else round(last_s * 1e9)
+        self.begin_ns = machine.loop.time - machine.start_ns
+        self.stores: list[RowStore] = []
+        self.streams: list[Any] = []
+        self._attach()
+
+    def _store(self, stream: Any) -> RowStore:
+        store = RowStore(stream.columns, self.last_ns, stream.sink)
+        stream.sink = store.take
+        self.stores.append(store)
+        self.streams.append(stream)
+        return store
+
+    def _attach(self) -> None:
+        """Begin to keep records; subclasses add theirs."""
+        robot = self.robot
+        self.frames: list[RowStore] = []
+        for bus in robot.buses:
+            bus.log.times = FrameTimes()
+            self.frames.append(self._store(bus.log.times))
+        self.samples = self._store(robot.recorder.samples)
+        self.outputs: dict[str, RowStore] = {}
+        for wires in robot.loop.wires:
+            wires.watch = RowStream("q", OUTPUT_COLUMNS, False)
+            self.outputs[wires.board.name] = self._store(wires.watch)
+        self.activity: dict[str, RowStore] = {}
+        for name in robot.boards:
+            log = activity_of(robot, name)
+            if log is not None:
+                self.activity[name] = RowStore(ACTIVITY_COLUMNS, self.last_ns)
+                log.add_sink(self.activity[name].take)
+                log.keep_ns = self.last_ns or 0
+        self.gathering = Gathering(self)
+        if self.last_ns is None:
+            robot.loop.watchers.append(self.gathering)
+
+    # --- what was kept --------------------------------------------------------------------------------------
+
+    def events(self) -> Events:
+        """The events of the time that was kept."""
+        robot = self.robot
+        for stream in self.streams:
+            stream.flush()
+        for name in self.activity:
+            self.gather(name)
+        zero = robot.start_ns
+        end = robot.loop.time - zero
+        begin = self.begin_ns if self.last_ns is None else max(self.begin_ns, end - self.last_ns)
+        samples = self.samples.rows(np.float64)
+        samples = samples[samples[:, 0] * 1e9 - zero >= begin]
+        found = Events(begin, end, name=self.name)
+        found.instants = self._happenings()
+        for instants in found.instants:
+            instants.events = [event for event in instants.events if begin <= event.time_ns <= end]
+        self._add_states(found)
+        processors = {
+            name: Processor(robot.boards[name].legend(), self.since(store.rows(), begin, COLUMN_END), zero)
+            for name, store in self.activity.items()
+        }
+        for processor in processors.values():
+            found.slices += processor.tracks()
+            if processor.overruns.events:
+                found.instants.append(processor.overruns)
+        buses = [
+            BusFrames(bus, robot.names, self.since(store.rows(), begin), zero)
+            for bus, store in zip(robot.buses, self.frames, strict=True)
+        ]
+        for bus in buses:
+            found.slices += [bus.slices, *bus.waits()]
+        self._connect(found, processors, buses)
+        for board, store in self.outputs.items():
+            outputs = self.since(store.rows(), begin)
+            found.counters += self._counters_of(board, outputs)
+            pins = pin_levels(self._pins(board), outputs, zero)
+            if pins:
+                found.pins[board] = pins
+        self._add_variables(found)
+        found.counters += body(robot.plant.sample_names, samples, zero)
+        return found
+
+    def _happenings(self) -> list[Instants]:
+        return [Instants(("Faults",), happenings.faults(self.robot))] if self.robot.faults else []
+
+    def _add_states(self, found: Events) -> None:
+        """Slices of the machine's states, in front of the boards'."""
+
+    def _connect(self, found: Events, processors: dict[str, Processor], buses: list[BusFrames]) -> None:
+        """Write the arrows into the slices, from the function that sends a frame to the frame."""
+        book = arrows.FlowBook()
+        for bus in buses:
+            arrows.publish(book, bus, processors)
+
+    def _pins(self, board: str) -> dict[str, int]:
+        """Names and numbers of a board's pins: those of its wiring, without analog inputs and registers."""
+        wiring = self.robot.wiring
+        others = {each.input for each in wiring.analog if each.board == board}
+        others |= {each.register for each in wiring.words if each.board == board}
+        return {name: pin for name, pin in wiring.names.get(board, {}).items() if name not in others}
+
+    def _counters_of(self, board: str, outputs: np.ndarray) -> Iterable[Counter]:
+        """Counters made from the outputs of a board."""
+        return ()
+
+    def _add_variables(self, found: Events) -> None:
+        """Counters of variables, in front of the body's."""
+
+    def gather(self, name: str) -> None:
+        """Fetch what board `name` has written by now, from another process where it runs there."""
+        activity_of(self.robot, name).flush()
+
+    def since(self, rows: np.ndarray, begin_ns: int, time_column: int = 0) -> np.ndarray:
+        """The rows whose time, mostly the first number, is in the time to be shown."""
+        return rows[rows[:, time_column] - self.robot.start_ns >= begin_ns]
+
+    def title(self) -> str:
+        """The run in one line."""
+        return f"ranger-sim: boards {', '.join(self.robot.boards)}, seed {self.robot.seed}"
+
+    def write(self, path: str | pathlib.Path) -> None:
+        """Write the timeline into a file; the suffix gives the format (`files.FORMATS`)."""
+        files.write(self.events(), pathlib.Path(path), self.title())
+
+    def close(self) -> None:
+        """Discard all records and stop recording."""
+        for stream, store in zip(self.streams, self.stores, strict=True):
+            stream.sink = store.before
+            store.close()
+        for name, store in self.activity.items():
+            log, board = self.robot.loop.board(name).activity(), self.robot.boards[name]
+            log.sinks.remove(store.take)
+            if not log.sinks and board.scheduler.log is log:
+                board.keep_activity(None)
+            store.close()
+            log.keep_ns = 0
+        self.activity = {}
+        if self.gathering in self.robot.loop.watchers:
+            self.robot.loop.watchers.remove(self.gathering)
+        for bus in self.robot.buses:
+            bus.log.times = None
+        for wires in self.robot.loop.wires:
+            wires.watch = None
+        self.streams, self.stores = [], []
+
+
+class Gathering(StepWatch):
+    """Fetches the records of boards in other processes, one after another, before they keep too much.
+
+    Only for a timeline that keeps everything: each board keeps the last seconds itself until the end.
+    """
+
+    def __init__(self, timeline: MachineTimeline) -> None:
+        StepWatch.__init__(self)
+        self.timeline = timeline
+        self.names = itertools.cycle(tuple(timeline.activity))
+        self.next_ns = 0
+
+    def before_step(self, now_ns: int) -> None:
+        if now_ns >= self.next_ns and self.timeline.robot.loop.side_by_side:
+            self.next_ns = now_ns + GATHER_NS
+            self.timeline.gather(next(self.names))
+
+
+def body(names: dict[str, str], rows: np.ndarray, zero_ns: int) -> list[Counter]:
+    """The plant's samples by name and unit; `rows`: of the samples' stream (time in s first)."""
+    time = np.round(rows[:, 0] * 1e9).astype(np.int64) - zero_ns
+    found = []
+    for column, (name, unit) in enumerate(names.items(), start=1):
+        at, values = changes(time, rows[:, column])
+        found.append(Counter(("Body", name), unit, at, values))
+    return found
+
+
+def pin_levels(names: dict[str, int], rows: np.ndarray, zero_ns: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """{pin's name: (time_ns, level)} of the pins that a board drove."""
+    writes = rows[rows[:, 1] == PIN_OUTPUT]
+    found = {}
+    for name, pin in names.items():
+        of_pin = writes[writes[:, 2] == pin]
+        if len(of_pin):
+            found[name] = changes(of_pin[:, 0] - zero_ns, of_pin[:, 3])
+    return found
