@@ -198,3 +198,18 @@ def test_the_tables_of_the_marathon_are_those_of_the_walk_that_is_kept():
     walk = json.loads(program["KEPT"].read_text(encoding="utf-8"))["walk"]
     assert not walk["fell"] and not walk["battery"]["empty"] and walk["distance_m"] >= 65_243.0
     assert walk["electronics_off"] == ["left-outer-ankle"]
+
+
+def test_the_figure_of_the_actuators_lag_is_drawn_from_the_answers_that_are_kept():
+    program = runpy.run_path(str(ROOT / "studies" / "pictures" / "mujoco_lag.py"))
+    assert program["FIGURE"].read_text(encoding="utf-8") == program["drawn"]()
+    rows = json.loads(program["KEPT"].read_text(encoding="utf-8"))["rows"]
+    page = program["PAGE"].read_text(encoding="utf-8")
+    for row in rows:
+        if "found_ms" in row:
+            low, high = row["ci95_ms"]
+            assert row["named"] == "actuator_lag at shoulder"
+            assert (
+                f"| {row['hidden_ms']} ms | actuator_lag | {row['found_ms']:.2f} ms ({low:.2f} to {high:.2f}) |" in page
+            )
+    assert [row["hidden_ms"] for row in rows if not row["named"]] == [0]
