@@ -38,7 +38,7 @@ def decode(
     """
     dataset = Dataset(name, {})
     mapping = dict(mapping or {})
-    messages = messages_of(databases)
+    messages = messages_of(loaded(databases))
     samples: dict[Key, tuple[list[int], list[float], str]] = {}
     unknown: dict[int, int] = {}
     broken: dict[tuple[str, str], int] = {}
@@ -113,19 +113,26 @@ def decode(
     return dataset
 
 
-def messages_of(databases: Iterable[str | pathlib.Path]) -> dict:
-    """Messages by identifier, of all files together."""
+def loaded(databases: Iterable[str | pathlib.Path]) -> list[tuple[str | pathlib.Path, Any]]:
+    """(path, cantools database) of each DBC file. UserError for one that cannot be read."""
     import cantools  # only here: half a second
 
-    found: dict = {}
+    found = []
     for path in databases:
         try:
-            database: Any = cantools.database.load_file(str(path), database_format="dbc", strict=False)
+            found.append((path, cantools.database.load_file(str(path), database_format="dbc", strict=False)))
         except OSError as error:
             raise DataError(f"{path}: cannot be read ({error.strerror or error})") from None
         except Exception as error:  # a broken file raises many kinds of exceptions in cantools
-            said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            raise DataError(f"{path}: not a DBC file that cantools can read ({said})") from None
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            raise DataError(f"{path}: not a DBC file that cantools can read ({reason})") from None
+    return found
+
+
+def messages_of(databases: Iterable[tuple[str | pathlib.Path, Any]]) -> dict:
+    """Messages by identifier, of all files together (`loaded`)."""
+    found: dict = {}
+    for path, database in databases:
         for message in database.messages:
             key = message.frame_id | (EXTENDED_BIT if message.is_extended_frame else 0)
             if key in found and found[key].name != message.name:

@@ -6,7 +6,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ranger_sim.harness.records import logbook
 from ranger_sim.tools.panel.channels import Channel, Memory, Times, Values
 from ranger_sim.tools.panel.inside.frames import ERROR, Reading, listed
 from ranger_sim.tools.panel.inside.load import WINDOW_NS, Load
@@ -33,19 +32,28 @@ class Frames(Protocol):
 
 
 class Bus:
-    """One bus. start_ns: the stamp of its frames at the source's time 0; bit_per_s: None if unknown.
+    """One bus. start_ns: the stamp of its frames at the source's time 0; bit_per_s: None if unknown. data_bit_per_s:
+    of the data phase of CAN FD frames; 0 on a classic bus.
 
     more_errors: number of error frames known from elsewhere, beyond those in the rows; None if unknown.
     """
 
     def __init__(
-        self, name: str, start_ns: int, bit_per_s: int | None, frames: Frames, read: Reading, kept_s: float = KEPT_S
+        self,
+        name: str,
+        start_ns: int,
+        bit_per_s: int | None,
+        frames: Frames,
+        read: Reading,
+        kept_s: float = KEPT_S,
+        data_bit_per_s: int = 0,
     ) -> None:
         self.name = name
         self.start_ns = start_ns
         self.frames = frames
         self.read = read
-        self.load = None if bit_per_s is None else Load(bit_per_s, start_ns)
+        self.load = None if bit_per_s is None else Load(bit_per_s, start_ns, data_bit_per_s)
+        self.rates = [each for each in (bit_per_s, data_bit_per_s) if each]
         self.memory = Memory(1, WINDOW_S, kept_s)
         self.more_errors: int | None = 0
 
@@ -58,7 +66,7 @@ class Bus:
     def take(self, rows: Any) -> None:
         """Add frames that have passed."""
         if self.load is not None:
-            self._note(*self.load.take(logbook.decoded(rows)))
+            self._note(*self.load.take(rows))
 
     def passed(self, until_ns: int) -> None:
         """No other frame has passed before this time."""
@@ -79,7 +87,7 @@ class Bus:
         return None if row is None or (at is not None and at - row[0] > 2 * WINDOW_S) else float(row[1][0])
 
     def content(self, at: float | None, now_s: float) -> dict[str, Any]:
-        """The 10 ms and the second before a time (None: now): load in %, frames, and error frames up to it.
+        """Bit rates; the 10 ms and the second before a time (None: now): load in %, frames, and error frames up to it.
 
         "load" and "of_second" are None if unknown.
         """
@@ -89,6 +97,7 @@ class Bus:
         first, last = np.searchsorted(times, (end_s - STATISTICS_S, end_s), side="right")
         errors = self.frames.counts(None if at is None else end_ns, [ERROR])[0]
         return {
+            "rates": self.rates,
             "load": self.value(at),
             "of_second": statistics(values[first:last, 0]) if self.value(at) is not None else None,
             "frames_per_s": self.frames.within(end_ns - SECOND_NS, end_ns),

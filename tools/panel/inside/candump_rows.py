@@ -9,6 +9,7 @@ import numpy as np
 
 from ranger_sim.can_bus.edge.candump import frame_of_line
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.panel.inside.frames import ROW_WORDS, rows_of_frame
 
 # A usual line, `(0000000012.345678) can1 0A1#0011223344556677`: positions of its digits, counted from the first letter;
 # positions after the interface are counted from the last.
@@ -38,7 +39,7 @@ def rows_of(text: bytes) -> Any:
         ends = np.append(ends, len(text))
     starts = np.concatenate(([0], ends[:-1] + 1)).astype(np.int64)
     lengths = ends - starts
-    rows = np.zeros((len(starts), 3), np.int64)
+    rows = np.zeros((len(starts), ROW_WORDS), np.int64)
     usual = int(np.bincount(lengths).argmax()) if len(lengths) else 0
     other = np.ones(len(starts), bool)
     if usual >= SHORTEST:
@@ -48,16 +49,23 @@ def rows_of(text: bytes) -> Any:
         rows[chosen[good]] = found[good]
         other[chosen[good]] = False
     empty = []
+    further: list[tuple[int, list[tuple[int, int, int]]]] = []  # of CAN FD frames: place of the line, rows
     for place in np.flatnonzero(other).tolist():
         line = text[starts[place] : ends[place]].decode("ascii", "replace")
         if not line.strip():
             empty.append(place)
             continue
         try:
-            _, time_ns, identifier, flags, low, high = frame_of_line(line)
+            _, *frame = frame_of_line(line, fd=True)
         except ValueError as error:
             raise UserError(str(error)) from None
-        rows[place] = (time_ns, low << 12 | flags << 4, high << 29 | identifier)
+        rows[place], *more = rows_of_frame(*frame)
+        if more:
+            further.append((place, more))
+    if further:
+        after = [place + 1 for place, more in further for _ in more]
+        rows = np.insert(rows, after, [row for _, more in further for row in more], axis=0)
+        empty = [int(place + np.searchsorted(after, place, "right")) for place in empty]
     return np.delete(rows, empty, axis=0) if empty else rows
 
 

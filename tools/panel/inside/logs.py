@@ -12,7 +12,7 @@ import numpy as np
 from ranger_sim.foundation import systems
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel.inside.candump_rows import rows_of
-from ranger_sim.tools.panel.inside.frames import counted, nothing
+from ranger_sim.tools.panel.inside.frames import MOST_ROWS, counted, first_rows, last_frames, nothing
 
 PIECE_BYTES = 1 << 20  # chosen by us: some seconds of a bus, read in some ten milliseconds
 PIECES_KEPT = 2
@@ -38,7 +38,7 @@ class LogFrames:
         self.total: dict[int, int] = {}
         self.starts: list[tuple[int, int]] = []  # of each piece: bytes
         self.first_ns: list[int] = []
-        self.before: list[int] = []  # frames before each piece
+        self.before: list[int] = []  # frames, not rows, before each piece
         self.before_by_key: list[dict[int, int]] = []
         self.frames = 0
         self.cached: dict[int, Any] = {}
@@ -71,7 +71,7 @@ class LogFrames:
         self.newest_ns = int(rows[-1, 0])
         self.before.append(self.frames)
         self.before_by_key.append(dict(self.total))
-        self.frames += len(rows)
+        self.frames += int(np.count_nonzero(first_rows(rows)))
         for key, count in counted(rows):
             self.total[key] = self.total.get(key, 0) + count
         self._keep(len(self.starts) - 1, rows)
@@ -103,14 +103,14 @@ class LogFrames:
         return self.offset < self.size and not is_over
 
     def until(self, until_ns: int | None, most: int) -> Any:
-        """The last frames not later than `until_ns` (None: of all), up to `most` rows."""
+        """The rows of the last frames not later than `until_ns` (None: of all), up to `most` frames."""
         number, end = self._place(until_ns)
         if number < 0:
             return nothing()
-        found = [self._piece(number)[max(0, end - most) : end]]
-        while sum(map(len, found)) < most and number > 0:
+        found = [last_frames(self._piece(number)[max(0, end - (most + 1) * MOST_ROWS) : end], most)]
+        while (left := most - sum(int(np.count_nonzero(first_rows(each))) for each in found)) > 0 and number > 0:
             number -= 1
-            found.append(self._piece(number)[-(most - sum(map(len, found))) :])
+            found.append(last_frames(self._piece(number), left))
         return np.concatenate(found[::-1])
 
     def within(self, first_ns: int, until_ns: int) -> int | None:
@@ -118,7 +118,11 @@ class LogFrames:
         if not self.starts or first_ns < self.first_ns[0] or self._is_open(until_ns):
             return None
         (early, early_rows), (late, late_rows) = self._place(first_ns), self._place(until_ns)
-        return self.before[late] + late_rows - self.before[early] - early_rows
+        return self._frames_up_to(late, late_rows) - self._frames_up_to(early, early_rows)
+
+    def _frames_up_to(self, number: int, rows: int) -> int:
+        """The number of frames before these rows of a piece have ended."""
+        return self.before[number] + int(np.count_nonzero(first_rows(self._piece(number)[:rows])))
 
     def counts(self, until_ns: int | None, keys: list[int]) -> list[int | None]:
         """The count of each kind up to `until_ns`, since the log's beginning; None if not read that far."""

@@ -6,11 +6,12 @@ import array
 import asyncio
 import pathlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ranger_sim.foundation import json_text
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.ranger.assembly import BUS_BIT_RATE
 from ranger_sim.sysid.dataset import Dataset
@@ -18,7 +19,7 @@ from ranger_sim.sysid.readers import columns, frames
 from ranger_sim.sysid.readers.run_folder import SUMMARY
 from ranger_sim.tools.panel.inside.buses import Bus
 from ranger_sim.tools.panel.inside.errors import ERRORS, ON_NO_BUS, ErrorList, changes
-from ranger_sim.tools.panel.inside.frames import ROW_WORDS, RecentFrames, of_the_robot
+from ranger_sim.tools.panel.inside.frames import ROW_WORDS, RecentFrames, of_the_robot, rows_of_frame
 from ranger_sim.tools.panel.inside.logs import LogFrames
 from ranger_sim.tools.run.folder import BUS_LOGS
 
@@ -31,6 +32,7 @@ NO_FRAMES = (
     "This recording keeps no frames; a walk's folder does (ranger-sim walk --log full --out), or frames with --dbc."
 )
 NO_RATE = "Frames alone do not show the bit rate, so the load is not known; error frames are left out."
+RATE_OF_FILE = "The loads are by the bit rates of the DBC file (Baudrate, BaudrateCANFD); error frames are left out."
 NO_RATE_OF_PROFILE = "The walk had a profile, whose bit rates its log does not have: loads are not known."
 
 
@@ -94,32 +96,30 @@ class RunLogs:
 
 
 class Decoded:
-    """The frames of a recording that is read with DBC files, in memory with 24 bytes each.
+    """The frames of a recording that is read with DBC files, in memory with 24 bytes each (CAN FD: up to 192).
 
-    Pass each frame to `take`; call `done` after the last one.
+    Pass each frame to `take`; call `done` after the last one. Loads are known where the DBC files have one bit rate.
     """
-
-    missing = NO_RATE
 
     def __init__(self, path: pathlib.Path, databases: Sequence[str]) -> None:
         self.path = path
-        self.messages = frames.messages_of(databases)
+        loaded = frames.loaded(databases)
+        self.messages = frames.messages_of(loaded)
+        self.bit_per_s, self.data_bit_per_s = rates_of([database for _, database in loaded])
+        self.missing = NO_RATE if self.bit_per_s is None else RATE_OF_FILE
         self.words: dict[str, array.array[int]] = {}
         self.first_ns: int | None = None  # of the frames that may be messages
         self.buses: list[Bus] = []
         self.errors = ErrorList()
-        self.fd_frames = 0
 
     def take(self, frame: frames.Frame) -> None:
         """Keep the next frame of the recording."""
         bus, time_ns, identifier, flags, low, high = frame
-        if flags & FLAG_FD:
-            self.fd_frames += 1
-            return
         if self.first_ns is None and not flags & (FLAG_ERROR | FLAG_REMOTE):
             self.first_ns = time_ns
         words = self.words.setdefault(bus or self.path.stem, array.array("q"))
-        words.extend((time_ns, low << 12 | flags << 4, high << 29 | identifier))
+        for row in rows_of_frame(time_ns, identifier, flags, low, high):
+            words.extend(row)
 
     def done(self, group: str, shift_s: float) -> None:
         """All frames have been taken. Their time 0 is that of the channels."""
@@ -130,8 +130,11 @@ class Decoded:
             rows = rows[np.argsort(rows[:, 0], kind="stable")]
             kept = RecentFrames(len(rows))
             kept.append(rows)
-            self.buses.append(Bus(name + group, start_ns, None, kept, self.read))
-            self.buses[-1].more_errors = None
+            span_s = (int(rows[-1, 0]) - start_ns) * 1e-9 + 1.0
+            found = Bus(name + group, start_ns, self.bit_per_s, kept, self.read, span_s, self.data_bit_per_s)
+            found.more_errors = None
+            found.take(rows)
+            self.buses.append(found)
         self.words.clear()
 
     def read(self, number: int, flags: int, data: bytes) -> tuple[str, float | str | None]:
@@ -155,9 +158,16 @@ class Decoded:
 
     def note(self) -> str:
         """What is missing, as text."""
-        return self.missing + (
-            f" CAN FD frames ({self.fd_frames}) are shown as channels only." if self.fd_frames else ""
-        )
+        return self.missing
+
+
+def rates_of(databases: Sequence[Any]) -> tuple[int | None, int]:
+    """Bit rate and data bit rate (0: none) of DBC files, bit/s; None and 0 where they have none, or several."""
+    from ranger_sim.can_bus.edge.dbc import bit_rate_of
+
+    found = {(bit_rate_of(database), bit_rate_of(database, "BaudrateCANFD") or 0) for database in databases}
+    (nominal, data), *more = found
+    return (None, 0) if more or not nominal or (data and data < nominal) else (nominal, data)
 
 
 def profile_of(folder: pathlib.Path) -> str | None:

@@ -123,17 +123,29 @@ export function buses(found) {
     const bus = found[name], worst = bus.of_second?.worst ?? bus.load;
     const bar = bus.load === null ? "not known"
       : marked(meter(bus.load / 100, `${name}: ${percent(bus.load)} of it taken, at most ${percent(worst)} in the second before`), worst / 100);
-    return [name, bar, percent(bus.load), percent(bus.of_second?.worst), whole(bus.frames_per_s), whole(bus.errors)];
+    return [rated(name, bus.rates ?? []), bar, percent(bus.load), percent(bus.of_second?.worst), whole(bus.frames_per_s), whole(bus.errors)];
   }));
 }
 
+const mega = (rate) => rate >= 1e6 ? `${rate / 1e6} Mbit/s` : `${rate / 1e3} kbit/s`;
+const rated = (name, rates) => rates.length > 1 ? `${name} (${rates.map(mega).join(", data ")})` : name;
+
+// A bus with CAN FD frames has two more columns.
 export function frames(rows, filter) {
   const wanted = filter.trim().toUpperCase();
   const shown = rows.filter((row) => !wanted || row.name.toUpperCase().includes(wanted) || String(row.id) === wanted);
   if (!shown.length) return note("no frames");
-  return table("newest frames", ["#time", "#id", "name", "#value", "data", "#total"], shown.map((row) =>
-    [seconds(row.time_s), row.id, row.name, typeof row.value === "string" ? row.value : figure(row.value), Object.assign(document.createElement("code"), { textContent: row.data }), whole(row.count)]));
+  const fd = rows.some((row) => row.fd);
+  const found = table("newest frames", ["#time", "#id", ...(fd ? ["format", "#bytes"] : []), "name", "#value", "data", "#total"], shown.map((row) =>
+    [seconds(row.time_s), row.id, ...(fd ? [row.fd ?? "", row.bytes ?? bytesOf(row.data)] : []), row.name, typeof row.value === "string" ? several(row.value) : figure(row.value),
+      Object.assign(document.createElement("code"), { textContent: row.data }), whole(row.count)]));
+  found.querySelector("table").classList.toggle("fd", fd);
+  return found;
 }
+
+// Several signals of a frame: four lines of them, all when pointed at.
+const several = (text) => Object.assign(document.createElement("div"), { className: "several", textContent: text, title: text });
+const bytesOf = (data) => data && data !== "remote" ? data.split(" ").length : 0;
 
 // ---- the data link
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from ranger_sim.can_bus.edge.candump import line_of_frame, read_candump
-from ranger_sim.foundation.events import FLAG_ERROR, FLAG_EXTENDED, FLAG_REMOTE
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_ERROR, FLAG_ESI, FLAG_EXTENDED, FLAG_FD, FLAG_REMOTE
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.tools.panel.inside.candump_rows import rows_of
+from ranger_sim.tools.panel.inside.frames import first_rows, rows_of_frame
 
 
 def test_a_line_is_the_row_that_the_robots_record_has():
@@ -49,3 +50,19 @@ def test_no_letter_of_a_line_is_taken_for_another(place):
     else:
         with pytest.raises(UserError):
             rows_of(wrong)
+
+
+def test_lines_of_can_fd_are_as_many_rows_as_their_data_take():
+    long = int.from_bytes(bytes(range(4, 64)), "little")
+    frames = [
+        (1_000, 0x10, 8, 1, 2),
+        (2_000, 0x123, FLAG_FD | FLAG_BRS | 15, 0x03020100, long),
+        (3_000, 0x10, 8, 3, 4),
+        (4_000, 0x18FF00AA, FLAG_FD | FLAG_EXTENDED | FLAG_ESI | 9, 0x03020100, 0x0B0A090807060504),
+        (5_000, 0x124, FLAG_FD | 3, 0x020100, 0),
+    ]
+    first, *others = (line_of_frame("can1", *frame) for frame in frames)
+    rows = rows_of(("\n" + first + "\n\n" + "".join(others) + "\n").encode())
+    expected = [row for frame in frames for row in rows_of_frame(*frame)]
+    np.testing.assert_array_equal(rows, np.array(expected, np.int64))
+    assert np.count_nonzero(first_rows(rows)) == 5 and len(rows) == 1 + 8 + 1 + 2 + 1
