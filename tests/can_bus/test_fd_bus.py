@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from ranger_sim.can_bus.bit_timing import BitTiming
 from ranger_sim.can_bus.bus import Bus
+from ranger_sim.can_bus.frame_log import FrameTimes
 from ranger_sim.can_bus.node import BUS_OFF, OPERATING, PASSIVE_LIMIT, RESET
 from ranger_sim.foundation.events import (
     CAN_RX,
@@ -24,6 +25,7 @@ from ranger_sim.foundation.user_error import BusError
 from tests.examples import examples
 
 from . import fd_comparison as comparison
+from . import fd_oracle
 
 BIT_NS = 2000  # 500 kbit/s
 DATA_BIT_NS = 500  # 2 Mbit/s
@@ -322,3 +324,21 @@ def test_a_bus_does_not_depend_on_how_time_is_cut(kind, seed, steps):
 def test_a_request_within_a_bit_that_an_edge_begins_anew_takes_part_in_the_frame_of_that_edge(seed):
     """Found among 10,000 scenarios: the last bit of intermission, of a node that was out of step."""
     assert comparison.differences(comparison.scenario_of("noise", seed)) == []
+
+
+@pytest.mark.parametrize(("rates", "rows"), [({"data_bitrate": 2_000_000}, 1), ({}, 0)])
+def test_a_frame_on_a_real_bus_in_its_place_has_the_length_of_both_its_phases(rates, rows):
+    bus = Bus("can1", 500_000, **rates)
+    bus.log.times = FrameTimes()
+    kept = []
+    bus.log.times.sink = lambda _time, block: kept.append(list(memoryview(block).cast("B").cast("q")))
+    data = bytes(range(64))
+    low, high = int.from_bytes(data[:4], "little"), int.from_bytes(data[4:], "little")
+    bus.note_outside(1_000_000, 0x123, FAST | 15, low, high)
+    bus.log.times.flush()
+    assert len(kept) == rows  # a classic bus does not know the other bit rate
+    if rows:
+        text, brs, delimiter = fd_oracle.transmitted(fd_oracle.FdFrame(0x123, data, brs=True))
+        fast = delimiter - brs  # one bit for the two parts of BRS and of the CRC delimiter
+        begun = 1_000_000 - fast * DATA_BIT_NS - (len(text) - fast) * BIT_NS
+        assert kept == [[begun, begun, 1_000_000, 0x123, FAST | 15, low, 0x07060504]]
