@@ -163,7 +163,7 @@ def read(path):
     return path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("option", [["--from", "net.dbc"], ["--plant", "mujoco", "robot.xml"], ["--drive", "odrive"]])
+@pytest.mark.parametrize("option", [["--from", "net.dbc"], ["--plant", "fmu", "unit.fmu"], ["--drive", "odrive"]])
 def test_can_fd_is_refused_with_what_makes_classic_boards(tmp_path, capsys, option):
     assert cli.main(["new", str(tmp_path / "wheel"), "--fd", *option]) == 2
-    assert "--fd excludes --from, --plant and --drive" in capsys.readouterr().err and everything(tmp_path) == []
+    assert "--fd excludes --from, --drive and --plant fmu" in capsys.readouterr().err and everything(tmp_path) == []

@@ -28,8 +28,8 @@ URDF = """<robot name="swing"><link name="base"/>
 <joint name="swing" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint></robot>"""
 
 
-def written(folder, model):
-    assert cli.main(["new", str(folder), "--plant", "mujoco", str(model)]) == 0
+def written(folder, model, *options):
+    assert cli.main(["new", str(folder), "--plant", "mujoco", str(model), *options]) == 0
     return folder
 
 
@@ -47,6 +47,31 @@ def test_its_tests_pass_at_once(tmp_path, robot, passed):
     assert generate.stale(load_table(project / "table"), project / "table" / "generated") == []
     done = run_tests_of(project)
     assert done.returncode == 0 and f"{passed} passed" in done.stdout, done.stdout
+
+
+@pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
+def test_its_boards_exchange_can_fd_frames_where_that_is_wanted(tmp_path):
+    project = written(tmp_path / "arm", ROBOTS / "arm.xml", "--fd")
+    assert not [path for path in project.rglob("*") if path.is_file() and "[%" in path.read_text()]
+    assert "data_bit_rate = 5_000_000" in (project / "table" / "boards.toml").read_text()
+    (project / "test_fd.py").write_text(
+        "def test_every_frame_is_of_can_fd_at_both_rates(machine):\n"
+        "    wire = machine.wire()\n"
+        "    machine.run_for(0.1)\n"
+        "    assert {frame.flags for frame in wire.frames()} == {256 | 512 | 8}\n"  # FD, BRS, eight bytes
+        "    assert machine.buses[0].load.data_share() > 0.3\n"
+    )
+    done = run_tests_of(project)
+    assert done.returncode == 0 and "8 passed" in done.stdout, done.stdout
+
+
+def test_a_can_fd_bus_carries_more_joints_at_the_shortest_period():
+    def joints(fd):
+        return max(count for count in range(1, 30) if from_mujoco.schedule(count, fd)[0] == 4)
+
+    assert joints(False) == 4 and joints(True) >= 7
+    period_ms, _, load = from_mujoco.schedule(4, True)
+    assert period_ms == 4 and load < from_mujoco.schedule(4)[2] / 2
 
 
 @pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")

@@ -9,6 +9,7 @@ import tempfile
 from typing import Any
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.new.words import variant
 
 HERE = pathlib.Path(__file__).resolve().parent
 # file of the project: (template next to this module, its word for "board")
@@ -89,15 +90,16 @@ def run(options: argparse.Namespace) -> int:
         raise UserError("new: --plant and --from exclude each other")
     if options.drive is not None and options.dbc is not None:
         raise UserError("new: --drive and --from exclude each other")
-    if options.fd and (options.dbc, options.plant, options.drive) != (None, None, None):
-        raise UserError("new: --fd excludes --from, --plant and --drive, whose boards are classic")
+    is_fmu = options.plant is not None and options.plant[0] == "fmu"
+    if options.fd and (options.dbc is not None or options.drive is not None or is_fmu):
+        raise UserError("new: --fd excludes --from, --drive and --plant fmu, whose boards are classic")
     files = {}
     if options.dbc is not None:
         files = files_of_dbc(options.dbc, options.bit_rate, name)
     elif options.drive is not None:
         files = files_of_drives(options.drive, options.plant, name)
     elif options.plant is not None:
-        files = files_of_model(options.plant[0], options.plant[1], name)
+        files = files_of_model(options.plant[0], options.plant[1], name, options.fd)
     try:
         folder.resolve().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".ranger-sim-new-", dir=folder.resolve().parent) as making:
@@ -121,13 +123,6 @@ def check(folder: pathlib.Path) -> None:
         raise UserError(f"new {folder}: the folder is not empty; give one that is not there yet")
 
 
-def variant(text: str, fd: bool) -> str:
-    """The lines of a template for this kind of bus: some begin with the one that they are for."""
-    left_out, marked = ("[% classic %]", "[% fd %]") if fd else ("[% fd %]", "[% classic %]")
-    lines = [line.removeprefix(marked) for line in text.splitlines(keepends=True) if not line.startswith(left_out)]
-    return "".join(lines)
-
-
 def own_files(name: str, fd: bool = False) -> dict[str, bytes]:
     """The files of the project with a wheel; `fd`: on a CAN FD bus."""
     return {
@@ -147,8 +142,8 @@ def generate_table(project: pathlib.Path) -> None:
     generate.write(load_table(project / "table"), project / "table" / "generated")
 
 
-def files_of_model(kind: str, model: str, name: str) -> dict[str, bytes]:
-    """The files of a project for the actuators of a robot's model."""
+def files_of_model(kind: str, model: str, name: str, fd: bool = False) -> dict[str, bytes]:
+    """The files of a project for the actuators of a robot's model; fd: its boards on a CAN FD bus."""
     if kind == "fmu":
         return files_of_unit(model, name)
     if kind != "mujoco":
@@ -156,7 +151,7 @@ def files_of_model(kind: str, model: str, name: str) -> dict[str, bytes]:
     from ranger_sim.tools.new import from_mujoco
 
     robot = from_mujoco.read(pathlib.Path(model))
-    made = from_mujoco.files(robot, name)
+    made = from_mujoco.files(robot, name, fd)
     print(f"{model}: {len(robot.joints)} actuators, {len(robot.others)} other joints")
     for line in robot.left_out:
         print(f"{model}: left out: {line}")

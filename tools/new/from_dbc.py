@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from ranger_sim.foundation.user_error import UserError
+from ranger_sim.tools.new.words import variant
 
 if TYPE_CHECKING:
     from cantools.database.can import Database
@@ -250,9 +251,9 @@ def _tested(network: Network) -> list[DbcMessage]:
     return [each for each in network.messages if 0 < each.period_ms <= LONGEST_TESTED_MS]
 
 
-def filled(path: pathlib.Path, words: dict[str, str]) -> str:
-    """A template with its words in their places."""
-    text = path.read_text(encoding="utf-8")
+def filled(path: pathlib.Path, words: dict[str, str], fd: bool = False) -> str:
+    """A template with its words in their places; fd: for boards on a CAN FD bus."""
+    text = variant(path.read_text(encoding="utf-8"), fd)
     for key, value in words.items():
         text = text.replace(f"[% {key} %]", value)
     return text

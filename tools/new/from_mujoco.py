@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from ranger_sim.can_bus import bounds
+from ranger_sim.foundation.events import FLAG_BRS, FLAG_FD
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.bodies import mujoco_body
 from ranger_sim.harness.bodies.mapping import Drive, Encoder, Mapping
@@ -27,6 +28,8 @@ from ranger_sim.tools.new.words import board_name, quoted, single
 
 HERE = pathlib.Path(__file__).resolve().parent / "mujoco"
 BIT_RATE = 1_000_000
+DATA_BIT_RATE = 5_000_000  # with --fd; chosen by us: what drives of robots with CAN FD mostly have
+FD_FLAGS = FLAG_FD | FLAG_BRS | 8  # of every frame there: the same eight bytes
 SLOT_US = 500
 PERIODS_MS = (4, 5, 10, 20, 40, 80)
 MOST_LOAD = 0.5  # of the bus by cyclic messages; the rest is for errors, and for what a user adds
@@ -218,17 +221,19 @@ def axes(robot: Robot) -> list[drives.Axis]:
 # --- the project's files --------------------------------------------------------------------------------------------
 
 
-def files(robot: Robot, name: str) -> dict[str, bytes]:
-    """The project's files, {path: content}; `table/generated` is generated from them."""
+def files(robot: Robot, name: str, fd: bool = False) -> dict[str, bytes]:
+    """The project's files, {path: content}; `table/generated` is generated from them. fd: with a CAN FD bus."""
     model, made = model_files(robot.file)
     count = len(robot.joints)
-    period_ms, responses_us, load = schedule(count)
+    period_ms, responses_us, load = schedule(count, fd)
     words = {
         "name": name,
         "model": model,
         "last_error": "JOINT_SILENT",
         "load": f"{100 * load:.0f}",
         "load_limit": f"{load + 0.05:.2f}",
+        "bit_rate": str(BIT_RATE),
+        "data_bit_rate": str(DATA_BIT_RATE),
         "btr": f"0x{timing_register(BIT_RATE):08X}u",
         "period_ms": str(period_ms),
         "age_s": f"{period_ms * 1e-3:g}",
@@ -253,9 +258,9 @@ def files(robot: Robot, name: str) -> dict[str, bytes]:
             for each in robot.joints
         ).rstrip("\n"),
     }
-    texts = {path: filled(HERE / f"{pathlib.Path(path).name}.j2", words) for path in PLAIN}
-    texts["main/main.c"] = filled(HERE / "main.c.j2", words | main_words(robot, period_ms))
-    texts["table/boards.toml"] = boards_table(robot, name, period_ms)
+    texts = {path: filled(HERE / f"{pathlib.Path(path).name}.j2", words, fd) for path in PLAIN}
+    texts["main/main.c"] = filled(HERE / "main.c.j2", words | main_words(robot, period_ms), fd)
+    texts["table/boards.toml"] = boards_table(robot, name, period_ms, fd)
     texts["table/variables.csv"] = variables_table(robot, period_ms)
     texts["table/errors.csv"] = errors_table(robot)
     for folder in ("main", *(each.folder for each in robot.joints)):
@@ -270,7 +275,7 @@ def files(robot: Robot, name: str) -> dict[str, bytes]:
             "unit_per_edge": single(math.pi / LINES / GEAR[each.unit]), "stiffness": single(each.stiffness),
             "damping": single(each.damping), "integral": single(each.integral),
         }  # fmt: skip
-        texts[f"{each.folder}/{each.folder}.c"] = filled(HERE / "board.c.j2", words | own)
+        texts[f"{each.folder}/{each.folder}.c"] = filled(HERE / "board.c.j2", words | own, fd)
     return made | {path: text.encode("utf-8") for path, text in texts.items()}
 
 
@@ -301,13 +306,14 @@ def model_files(file: pathlib.Path) -> tuple[str, dict[str, bytes]]:
     return f"{file.stem}.xml", made | {f"{file.stem}.xml": spec.to_xml().encode("utf-8")}
 
 
-def schedule(count: int) -> tuple[int, list[int], float]:
+def schedule(count: int, fd: bool = False) -> tuple[int, list[int], float]:
     """(period in ms, worst response of each frame in us by order of identifiers, load) for this many joints."""
+    flags, data_bit_rate = (FD_FLAGS, DATA_BIT_RATE) if fd else (8, 0)
     for period_ms in PERIODS_MS:
-        streams = [bounds.message(str(n), n, period_ms * 1_000_000, 8) for n in range(1, 3 * count + 1)]
-        load = float(bounds.utilisation(streams, BIT_RATE))
+        streams = [bounds.message(str(n), n, period_ms * 1_000_000, flags) for n in range(1, 3 * count + 1)]
+        load = float(bounds.utilisation(streams, BIT_RATE, data_bit_rate))
         if load <= MOST_LOAD and count < period_ms * 1000 // SLOT_US:
-            found = bounds.response_times(streams, BIT_RATE)
+            found = bounds.response_times(streams, BIT_RATE, data_bit_rate=data_bit_rate)
             return period_ms, [(each.response_ns or 0) // 1000 for each in found], load
     raise UserError(f"{count} joints: their frames do not fit on a bus of {BIT_RATE} bit/s")
 
@@ -358,14 +364,14 @@ def main_words(robot: Robot, period_ms: int) -> dict[str, str]:
     }
 
 
-def boards_table(robot: Robot, name: str, period_ms: int) -> str:
+def boards_table(robot: Robot, name: str, period_ms: int, fd: bool = False) -> str:
     """boards.toml."""
     count = period_ms * 1000 // SLOT_US
     lines = [
         f"# The boards of {name}, their bus, and what each board's schedule sends. All names are of variables.csv.",
         "",
         "[buses]",
-        f"CAN1 = {{ channel = 1, bit_rate = {BIT_RATE:_} }}",
+        f"CAN1 = {{ channel = 1, bit_rate = {BIT_RATE:_}{f', data_bit_rate = {DATA_BIT_RATE:_}' if fd else ''} }}",
     ]
     main: list[list[str]] = [[] for _ in range(count)]
     for k, each in enumerate(robot.joints):
@@ -381,7 +387,7 @@ def boards_table(robot: Robot, name: str, period_ms: int) -> str:
             f"[boards.{board}]",
             f"number = {number}",
             f"description = {quoted(description)}",
-            'processor = "LPC2194"',
+            'can = "fd"' if fd else 'processor = "LPC2194"',
             "clock_hz = 60_000_000",
             "controller = 1",
             'buses = ["CAN1"]',

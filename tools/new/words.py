@@ -34,3 +34,10 @@ def single(value: float) -> str:
     """A number as a float of C, without its suffix."""
     text = f"{value:.8g}"
     return text if "." in text or "e" in text else f"{text}.0"
+
+
+def variant(text: str, fd: bool) -> str:
+    """The lines of a template for this kind of bus: some begin with the one that they are for."""
+    left_out, marked = ("[% classic %]", "[% fd %]") if fd else ("[% fd %]", "[% classic %]")
+    lines = [line.removeprefix(marked) for line in text.splitlines(keepends=True) if not line.startswith(left_out)]
+    return "".join(lines)

@@ -33,6 +33,8 @@ NO_FRAMES = (
 )
 NO_RATE = "Frames alone do not show the bit rate, so the load is not known; error frames are left out."
 RATE_OF_FILE = "The loads are by the bit rates of the DBC file (Baudrate, BaudrateCANFD); error frames are left out."
+TOO_LONG = "The recording is longer than a day, so the load is not shown; error frames are left out."
+LONGEST_S = 86_400.0  # of a load in windows of 10 ms: 140 MB, chosen by us
 NO_RATE_OF_PROFILE = "The walk had a profile, whose bit rates its log does not have: loads are not known."
 
 
@@ -130,8 +132,11 @@ class Decoded:
             rows = rows[np.argsort(rows[:, 0], kind="stable")]
             kept = RecentFrames(len(rows))
             kept.append(rows)
-            span_s = (int(rows[-1, 0]) - start_ns) * 1e-9 + 1.0
-            found = Bus(name + group, start_ns, self.bit_per_s, kept, self.read, span_s, self.data_bit_per_s)
+            span_s = (int(rows[-1, 0]) - min(int(rows[0, 0]), start_ns)) * 1e-9 + 1.0
+            rates = (self.bit_per_s, self.data_bit_per_s)
+            if span_s > LONGEST_S:
+                rates, span_s, self.missing = (None, 0), 1.0, TOO_LONG if self.bit_per_s else self.missing
+            found = Bus(name + group, start_ns, rates[0], kept, self.read, span_s, rates[1])
             found.more_errors = None
             found.take(rows)
             self.buses.append(found)

@@ -3,7 +3,7 @@
 import pytest
 
 from ranger_sim.foundation.events import FLAG_BRS, FLAG_FD
-from ranger_sim.tools.panel.inside.recorded import NO_RATE, RATE_OF_FILE, Decoded
+from ranger_sim.tools.panel.inside.recorded import NO_RATE, RATE_OF_FILE, TOO_LONG, Decoded
 
 DBC = """VERSION ""
 NS_ :
@@ -63,3 +63,12 @@ def test_a_recording_of_classic_frames_has_the_usual_note(tmp_path):
     found.take(("can0", 1_000_000, 256, 1, 7, 0))
     found.done("", 0.0)
     assert found.note() == NO_RATE and "fd" not in found.buses[0].listed(None)[0]
+
+
+def test_frames_years_apart_have_no_load_and_take_no_memory_for_it(tmp_path):
+    found = decoded(tmp_path, DBC + RATES)
+    for time_ns in (1_000_000, 2_459_565_876_000_000_000):
+        found.take(("can0", time_ns, 256, 1, 7, 0))
+    found.done("", 0.0)
+    [bus] = found.buses
+    assert found.note() == TOO_LONG and bus.load is None and len(bus.listed(None)) == 2
