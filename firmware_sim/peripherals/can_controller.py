@@ -50,6 +50,7 @@ from ranger_sim.foundation.events import (
     FLAG_REMOTE,
     FLAG_SINGLE_SHOT,
     NEVER,
+    TX_SENT,
 )
 from ranger_sim.foundation.user_error import FirmwareError
 
@@ -254,7 +255,11 @@ class CanController(CanControllerBase):
         """The transmission from a buffer has ended."""
         self.ends.times[buffer] = NEVER
         self.ended |= 1 << buffer
-        self.count_end(buffer, status)
+        if status == TX_SENT:
+            self.sent += 1
+            self.tx_status[buffer] = SR_TBS | SR_TCS
+        else:
+            self.count_unsent(buffer, status)
 
     @cython.ccall
     def transmit(

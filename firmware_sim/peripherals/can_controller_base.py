@@ -18,7 +18,6 @@ from ranger_sim.foundation.events import (
     CAN_STATUS,
     CAN_TX_DONE,
     TX_ABORTED,
-    TX_SENT,
     EventQueue,
 )
 from ranger_sim.foundation.user_error import FirmwareError
@@ -144,12 +143,8 @@ class CanControllerBase(Peripheral):
 
     @cython.cfunc
     @cython.exceptval(check=False)
-    def count_end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
-        """The transmission from a buffer has ended with `status` (TX_*)."""
-        if status == TX_SENT:
-            self.sent += 1
-            self.tx_status[buffer] = SR_TBS | SR_TCS
-            return
+    def count_unsent(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
+        """The transmission from a buffer has ended without success: TX_ABORTED or TX_LOST."""
         self.tx_status[buffer] |= SR_TBS
         if status == TX_ABORTED:
             self.aborted += 1

@@ -39,6 +39,7 @@ from ranger_sim.foundation.events import (
     FLAG_EXTENDED,
     FLAG_FD,
     FLAG_REMOTE,
+    TX_SENT,
 )
 from ranger_sim.foundation.user_error import FirmwareError
 
@@ -184,7 +185,11 @@ class CanFdController(CanControllerBase):
     def _end(self, buffer: cython.longlong, status: cython.longlong) -> cython.void:
         """The transmission from a buffer has ended."""
         self.noted |= 1 << buffer if buffer == 1 else 1 << (buffer + TI2_SHIFT)
-        self.count_end(buffer, status)
+        if status == TX_SENT:
+            self.sent += 1
+            self.tx_status[buffer] = SR_TBS | SR_TCS
+        else:
+            self.count_unsent(buffer, status)
 
     # --- status -------------------------------------------------------------------------------------------
 
