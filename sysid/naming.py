@@ -69,7 +69,7 @@ def trials(
             columns = [effect.columns(recording, shape, regression.values) for recording in regression.recordings]
             if not any(columns):
                 continue
-            white = regression.whitened(columns)
+            white = regression.whitened_once((id(effect), tuple(shape.values())), columns)
             if not white:
                 continue
             shadow = regression.shadow(white)
@@ -189,4 +189,7 @@ def refit(
                 for equation in recording.equations
             }
         )
-    return Regression(regression.recordings, extra, names, noise=None if fresh else regression)
+    out = Regression(regression.recordings, extra, names, noise=None if fresh else regression)
+    if not fresh:
+        out.kept = regression.kept  # whitened by the same noise
+    return out

@@ -275,6 +275,7 @@ class Regression:
         if noise is None:
             self._find_whitening()
         self._whiten()
+        self.kept: dict[tuple[int, tuple[float, ...]], tuple[list[Columns], dict[str, Array]]] = {}
 
     def _part(self, equation: str, extra: Sequence[Columns], extra_names: list[str]) -> Part:
         """One equation over all recordings, unwhitened."""
@@ -515,6 +516,13 @@ class Regression:
                     parts.append(np.zeros((len(_rows(recording)), width)))
             out[name] = self._scaled(name, np.vstack(parts))[self.good[name]]
         return out
+
+    def whitened_once(self, key: tuple[int, tuple[float, ...]], made: list[Columns]) -> dict[str, Array]:
+        """As `whitened`, of an effect at a shape; with the very same columns as before the answer is the same one."""
+        before = self.kept.get(key)
+        if before is None or any(old is not new for old, new in zip(before[0], made, strict=True)):
+            before = self.kept[key] = made, self.whitened(made)
+        return before[1]
 
     def full(self, white: Mapping[str, Array]) -> Array:
         """(N, k) from whitened columns by equation."""

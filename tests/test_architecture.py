@@ -2,6 +2,7 @@
 
 import ast
 import contextlib
+import functools
 import json
 import os
 import pathlib
@@ -68,18 +69,19 @@ def imported_packages(path):
         yield (rest.partition(".")[0] or package) if package == "ranger_sim" else package, line
 
 
+@functools.cache
 def imported_modules(path):
-    """(dotted name, line) of what a file imports."""
+    """(dotted name, line) of what a file imports; a file is read once, though many tests ask."""
+    found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield alias.name, node.lineno
+            found += [(alias.name, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             if node.module == "ranger_sim":
-                for alias in node.names:
-                    yield f"ranger_sim.{alias.name}", node.lineno
+                found += [(f"ranger_sim.{alias.name}", node.lineno) for alias in node.names]
             else:
-                yield node.module, node.lineno
+                found.append((node.module, node.lineno))
+    return tuple(found)
 
 
 @pytest.mark.parametrize("package", MAY_IMPORT)

@@ -163,20 +163,38 @@ def test_the_shipped_robot_walks_from_another_folder_both_ways(shipped, tmp_path
 # --- the build itself, on one package ---------------------------------------------------------------------
 
 
-@pytest.fixture
-def checkout(tmp_path):
+def checkout_in(folder):
     """What a checkout has, with the package `foundation` alone, not built."""
     for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, tmp_path)
-    (tmp_path / "dev").mkdir()
+        shutil.copy(ROOT / name, folder)
+    (folder / "dev").mkdir()
     for name in ("__init__.py", "declarations.py", "publication.py", "stubs.py"):
-        shutil.copy(ROOT / "dev" / name, tmp_path / "dev")
-    (tmp_path / "ranger_sim").mkdir()
+        shutil.copy(ROOT / "dev" / name, folder / "dev")
+    (folder / "ranger_sim").mkdir()
     for name in ("__init__.py", "__main__.py", "loading.py", "py.typed"):
-        shutil.copy(ROOT / "ranger_sim" / name, tmp_path / "ranger_sim")
-    shutil.copytree(ROOT / "foundation", tmp_path / "foundation", ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "ranger_sim" / "foundation").symlink_to("../foundation")
-    return tmp_path
+        shutil.copy(ROOT / "ranger_sim" / name, folder / "ranger_sim")
+    shutil.copytree(ROOT / "foundation", folder / "foundation", ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "ranger_sim" / "foundation").symlink_to("../foundation")
+    return folder
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    return checkout_in(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def built_once(tmp_path_factory):
+    """A checkout after its build, which takes 10 s."""
+    folder = checkout_in(tmp_path_factory.mktemp("built"))
+    build_in(folder)
+    return folder
+
+
+@pytest.fixture
+def built(built_once, tmp_path):
+    """A copy of it, with the times of its files."""
+    return pathlib.Path(shutil.copytree(built_once, tmp_path / "checkout", symlinks=True))
 
 
 def build_in(folder, **environment):
@@ -194,26 +212,25 @@ def how_it_runs(folder):
 
 
 @needs_compiler
-def test_sources_that_changed_since_the_build_run_and_are_named_until_they_are_as_before(checkout):
-    build_in(checkout)
-    numbers, events = (checkout / "foundation" / name for name in ("numbers.py", "events.py"))
+def test_sources_that_changed_since_the_build_run_and_are_named_until_they_are_as_before(built):
+    numbers, events = (built / "foundation" / name for name in ("numbers.py", "events.py"))
     before = numbers.read_text(encoding="utf-8"), events.read_text(encoding="utf-8")
     numbers.write_text(before[0] + "\nADDED = 1\n", encoding="utf-8")
-    files, reason = how_it_runs(checkout)
+    files, reason = how_it_runs(built)
     assert all(file.endswith(".py") for file in files)
     assert reason == "foundation/numbers.py changed since the build: `make setup` builds again"
     events.write_text(before[1] + "\n", encoding="utf-8")
-    _, reason = how_it_runs(checkout)
+    _, reason = how_it_runs(built)
     assert reason.startswith("foundation/events.py and 1 more changed since the build")
     numbers.write_text(before[0], encoding="utf-8")
     events.write_text(before[1], encoding="utf-8")
-    files, reason = how_it_runs(checkout)
+    files, reason = how_it_runs(built)
     assert reason == "" and all(file.endswith(BUILT) for file in files)
-    (checkout / "foundation" / "later.py").write_text("import cython\n", encoding="utf-8")
-    _, reason = how_it_runs(checkout)
+    (built / "foundation" / "later.py").write_text("import cython\n", encoding="utf-8")
+    _, reason = how_it_runs(built)
     assert reason.startswith("foundation/later.py changed since the build")
-    (checkout / "foundation" / "later.py").write_text("PLAIN = 1\n", encoding="utf-8")
-    assert how_it_runs(checkout)[1] == ""
+    (built / "foundation" / "later.py").write_text("PLAIN = 1\n", encoding="utf-8")
+    assert how_it_runs(built)[1] == ""
 
 
 def times_of_libraries(folder):
@@ -226,36 +243,34 @@ def times_of_libraries(folder):
 
 
 @needs_compiler
-def test_a_build_compiles_and_rebuilds_a_changed_module_and_those_whose_view_of_it_changed(checkout):
-    build_in(checkout)
-    files, reason = how_it_runs(checkout)
+def test_a_build_compiles_and_rebuilds_a_changed_module_and_those_whose_view_of_it_changed(built):
+    files, reason = how_it_runs(built)
     assert all(file.endswith(BUILT) and "/build/compiled/" in file for file in files) and reason == ""
-    assert not list((checkout / "foundation").glob("*.c")) and not list((checkout / "foundation").glob("*.so"))
+    assert not list((built / "foundation").glob("*.c")) and not list((built / "foundation").glob("*.so"))
 
-    built = times_of_libraries(checkout)
-    events = checkout / "foundation" / "events.py"
+    first = times_of_libraries(built)
+    events = built / "foundation" / "events.py"
     text = events.read_text(encoding="utf-8")
     events.write_text(text + "\n# a remark\n", encoding="utf-8")
-    build_in(checkout)
-    now = times_of_libraries(checkout)
-    assert {name for name in now if now[name] != built[name]} == {"events"}
+    build_in(built)
+    now = times_of_libraries(built)
+    assert {name for name in now if now[name] != first[name]} == {"events"}
 
     # numbers cimports nothing of events, row_stream cimports its constants
     events.write_text(text.replace("TX_LOST: Final = 2", "TX_LOST: Final = 3"), encoding="utf-8")
-    build_in(checkout)
-    later = times_of_libraries(checkout)
+    build_in(built)
+    later = times_of_libraries(built)
     changed = {name for name in later if later[name] != now[name]}
     assert "events" in changed and "numbers" not in changed
-    assert how_it_runs(checkout)[1] == ""
+    assert how_it_runs(built)[1] == ""
 
 
 @needs_compiler
 @pytest.mark.skipif(os.name != "posix", reason="the linker of this test is a shell script")
-def test_a_library_that_was_half_written_when_the_build_was_killed_is_made_by_the_next_build(checkout):
-    build_in(checkout)
-    numbers = checkout / "foundation" / "numbers.py"
+def test_a_library_that_was_half_written_when_the_build_was_killed_is_made_by_the_next_build(built):
+    numbers = built / "foundation" / "numbers.py"
     numbers.write_text(numbers.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
-    linker = checkout / "cc"
+    linker = built / "cc"
     linker.write_text(
         "#!/bin/sh\n"
         'for each in "$@"; do\n'
@@ -268,23 +283,22 @@ def test_a_library_that_was_half_written_when_the_build_was_killed_is_made_by_th
         encoding="ascii",
     )
     linker.chmod(0o755)
-    killed = run(["setup.py", "-q", "build_ext", "--inplace"], checkout, CC=str(linker))
+    killed = run(["setup.py", "-q", "build_ext", "--inplace"], built, CC=str(linker))
     assert killed.returncode == -signal.SIGKILL
-    build_in(checkout)
-    files, reason = how_it_runs(checkout)
+    build_in(built)
+    files, reason = how_it_runs(built)
     assert all(file.endswith(BUILT) for file in files) and reason == ""
 
 
 @needs_compiler
-def test_a_declaration_that_is_not_understood_is_reported_and_nothing_compiled_runs(checkout):
-    build_in(checkout)
-    numbers = checkout / "foundation" / "numbers.py"
+def test_a_declaration_that_is_not_understood_is_reported_and_nothing_compiled_runs(built):
+    numbers = built / "foundation" / "numbers.py"
     more = '\nfrom typing import Final\n\nWIDE: Final = "x"\n'
     numbers.write_text(numbers.read_text(encoding="utf-8") + more, encoding="utf-8")
     line = len(numbers.read_text(encoding="utf-8").splitlines())
-    report = build_in(checkout).stderr
+    report = build_in(built).stderr
     assert "NOT COMPILED" in report and f"numbers.py:{line}: WIDE: a C constant is a whole number, not 'x'" in report
-    files, reason = how_it_runs(checkout)
+    files, reason = how_it_runs(built)
     assert all(file.endswith(".py") for file in files) and "a C constant is a whole number" in reason
 
 

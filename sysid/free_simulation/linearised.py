@@ -11,7 +11,7 @@ from ranger_sim.sysid.free_simulation.fit import AWAY, TrajectoryFit
 from ranger_sim.sysid.free_simulation.predictor import Jacobians, Predictor
 from ranger_sim.sysid.free_simulation.recording import SimulatedRecording
 from ranger_sim.sysid.free_simulation.terms import Port, Ports, Shape, Term
-from ranger_sim.sysid.machine import Columns, Entry, Equation
+from ranger_sim.sysid.machine import Columns, Entry, Equation, Values
 
 LAGS_S = (0.0, 0.01, 0.03, 0.1)  # lags at which the general tests use slopes
 SHORTEST_WINDOW = 50  # samples of a free simulation, of which the free initial state takes some
@@ -19,6 +19,7 @@ DRAWS = 8  # of noise, from which its part in free simulation is known to a tent
 TOGETHER = 24  # responses that are computed side by side
 SILENT = 1e-6  # share of an effect's length below which an equation does not have it
 ROUNDED = 1e-10  # of the square of what an effect adds to the outputs: less is rounding, 6e-14 for such an offset
+MOST_KEPT = 4_000_000  # rows of responses of a machine's own terms: some 100 MB
 SHARE_OPEN = 0.01  # of the largest deviation of the open law: there it is open
 
 
@@ -33,6 +34,7 @@ class LinearisedRecording(SimulatedRecording):
     outputs: tuple[str, ...]
     fit: TrajectoryFit
     free: dict[tuple[int, int], Columns] = dataclasses.field(default_factory=dict)  # by term and number of its shape
+    own: dict[tuple[int, tuple[float, ...]], tuple[Term, Ports, Columns]] = dataclasses.field(default_factory=dict)
 
     def respond(self, entries: Ports) -> Columns:
         """First-order response of the equations to an input at the ports: (n, k) each."""
@@ -54,6 +56,19 @@ class LinearisedRecording(SimulatedRecording):
         return {
             name: white[:, number] for number, name in enumerate(self.outputs) if power[number] > SILENT * power.sum()
         }
+
+    def of_own(self, term: Term, shape: Shape, values: Values) -> Columns:
+        """The response to a term of the machine's own; naming asks for it again and again with the same input."""
+        key = (id(term), tuple(shape.values()))
+        entries = term.make(self, shape, values)
+        if kept := self.own.get(key):
+            _, before, found = kept
+            if before.keys() == entries.keys() and all(np.array_equal(before[name], entries[name]) for name in entries):
+                return found
+        found = self.respond(entries)
+        if len(self.own) * len(self.table) < MOST_KEPT:
+            self.own[key] = term, entries, found
+        return found
 
     def of_free(self, terms: Sequence[Term], term: Term, shape: Shape) -> Columns:
         """The response to a free term at a shape; on its grid, that of all free `terms` is computed together."""

@@ -53,7 +53,7 @@ class SimulatedMachine(DeclaredMachine):
             here = cast(LinearisedRecording, recording)
             if term.independent and any(term is each for each in free):
                 return here.of_free(free, term, shape)
-            return here.respond(term.make(here, shape, values))
+            return here.of_own(term, shape, values)
 
         return [
             SimulatedEffect(

@@ -129,7 +129,7 @@ def three_channels(hidden_walk):
 
 
 def test_twins_alone_judge_a_walk_that_gives_no_equation():
-    found = diagnosis(three_channels(hidden("hip spring", -1.8)), "walk", emulator=emulate)
+    found = diagnosis(three_channels(hidden("hip spring", -1.8)), "walk")
     (cause,) = found.result.causes
     assert (cause.name, cause.at) == ("spring_value", "hip_spring") and found.result.misfit == ()
     low, high = cause.parameters["stiffness_Nm_per_rad"].ci95

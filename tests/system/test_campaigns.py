@@ -52,6 +52,15 @@ def results_in(folder):
     return {line["key"]: {name: value for name, value in line.items() if name != "spent"} for line in lines}
 
 
+@pytest.fixture(scope="module")
+def whole_results(tmp_path_factory):
+    """The results of the campaign in one go, without Dask."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "few.toml").write_text(PLAN)
+    run(folder / "few.toml", folder / "out", "--jobs", "2")
+    return results_in(folder / "out")
+
+
 def campaign_command(path, folder, *more):
     return [sys.executable, "-m", "ranger_sim", "campaign", str(path), "--out", str(folder), *more]
 
@@ -106,9 +115,8 @@ def test_a_run_branched_off_the_golden_run_is_the_run_from_power_up(few, tmp_pat
 
 
 @pytest.mark.parametrize("pool", ["local", pytest.param("dask", marks=needs_dask)])
-def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path, pool):
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
-    run(few, whole, "--jobs", "2")
+def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, whole_results, tmp_path, pool):
+    killed = tmp_path / "killed"
     process = subprocess.Popen(
         campaign_command(few, killed, "--jobs", "1", "--pool", pool), cwd=ROOT, stderr=subprocess.DEVNULL
     )
@@ -127,7 +135,7 @@ def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(few, tmp_path, 
     reported = run(few, killed, "--jobs", "2").stderr
     assert f"{len(before) - HEALTHY} of them have results already" in reported
     after = results_in(killed)
-    assert len(after) == HEALTHY + RUNS and after == results_in(whole)
+    assert len(after) == HEALTHY + RUNS and after == whole_results
     assert {key: after[key] for key in before} == before
 
 
@@ -253,7 +261,7 @@ print("refused")
 
 
 @needs_dask
-def test_its_own_dask_cluster_is_on_the_loopback_address_and_refuses_clients_without_its_certificate(few, tmp_path):
+def test_its_own_dask_cluster_is_on_the_loopback_address_and_refuses_clients_without_its_certificate(few, whole_results, tmp_path):
     out = tmp_path / "out"
     with campaign_at_work(few, out, "--pool", "dask", "--jobs", "2") as process:
         found = listening(process.pid)
@@ -274,8 +282,7 @@ def test_its_own_dask_cluster_is_on_the_loopback_address_and_refuses_clients_wit
             timeout=PATIENCE_S,
         )
         assert stranger.stdout == "refused\n", stranger.stderr
-    run(few, tmp_path / "local")
-    assert results_in(out) == results_in(tmp_path / "local")
+    assert results_in(out) == whole_results
 
 
 @pytest.fixture
@@ -308,11 +315,10 @@ def outside_cluster(tmp_path):
 
 @needs_dask
 @pytest.mark.parametrize("killed", ["worker", "scheduler"])
-def test_a_dask_cluster_that_loses_a_part_gives_the_same_results(few, tmp_path, outside_cluster, killed):
+def test_a_dask_cluster_that_loses_a_part_gives_the_same_results(few, whole_results, tmp_path, outside_cluster, killed):
     """A worker's work is done by another; without a scheduler the campaign ends in a line, and goes on without Dask."""
     address, options, scheduler, workers = outside_cluster
-    local, cluster = tmp_path / "local", tmp_path / "cluster"
-    run(few, local)
+    cluster = tmp_path / "cluster"
     process = subprocess.Popen(
         campaign_command(few, cluster, "--scheduler", address, *options), cwd=ROOT, stderr=subprocess.PIPE, text=True
     )
@@ -330,7 +336,7 @@ def test_a_dask_cluster_that_loses_a_part_gives_the_same_results(few, tmp_path, 
     else:
         assert process.returncode == 0, reported
         assert "warning" not in reported
-    assert results_in(cluster) == results_in(local)
+    assert results_in(cluster) == whole_results
 
 
 def address_in(where, worker, security):
