@@ -12,6 +12,7 @@ A driven actuator becomes a motor in the model, whatever law it had: the law is 
 
 import math
 import pathlib
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -195,9 +196,11 @@ def read(file: str | pathlib.Path) -> Any:
 
 
 def compiled(spec: Any, file: str) -> Any:
-    """The model, ready to simulate."""
+    """The model, ready to simulate. What MuJoCo would have written otherwise in it is no concern of who runs it."""
     try:
-        return spec.compile()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            return spec.compile()
     except ValueError as error:
         raise ModelError(f"{file}: MuJoCo cannot compile it: {one_line(error)}") from None
 

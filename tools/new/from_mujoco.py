@@ -39,9 +39,14 @@ LINES = 1000
 GEAR = {"rad": 16.0, "m": 160.0}  # of the encoder: an edge is 0.2 mrad, or 0.02 mm
 REACH = {"rad": 0.2, "m": 0.05}  # of the trajectory, and at most a third of the joint's range
 LOOP_RAD_PER_S, LOOP_DAMPING = 20.0, 0.8  # of a joint without a law in the model, chosen by us
+LAG_RAD_PER_S = 40.0  # stiffness over viscous friction, at least: the trajectory's 1.6 rad/s then lags by a twentieth
+SAG = {"rad": 0.02, "m": 0.005}  # of a joint under its weight before the integral part holds it, at most
 SPRING_SHARE = 5.0  # in addition, in stiffnesses of the spring that the model has at the joint
 NO_LIMIT_SHARE = 1.0  # a position actuator without a limit gets the force of this error, rad or m
 FREQUENCIES_HZ = (0.5, 3.1)
+SHARES = (0.35, 0.15)  # of the reach, by frequency
+MOST_OF_FORCE = 0.7  # that the trajectory may need
+LEAST_REACH = 0.02  # of REACH, where the force hardly holds the joint
 WORDS = {"MAIN", "ERROR", "RANGER", "CAN1"}  # taken by the project itself
 FOLDERS = {"main", "table", "build", "runs", "machine", "common", "joint", "record", "experiment", "conftest"}
 
@@ -167,11 +172,21 @@ def joint_of(body: MujocoBody, number: int, board: str, actuator: str, name: str
     start = body.shown[number][0]
     low, high = (float(each) for each in joint.range) if first(joint.limited) else (-math.inf, math.inf)
     up, down = high - start, start - low
-    reach = min(REACH[unit], max(up, down) / 3.0) * (1.0 if up >= down else -1.0)
+    weight, viscous, spring = abs(float(data.qfrc_bias[dof])), first(model.dof_damping[dof]), first(joint.stiffness)
+    rate, change = (sum(share * (2.0 * math.pi * hz) ** power for share, hz in zip(SHARES, FREQUENCIES_HZ, strict=True))
+                    for power in (1, 2))  # fmt: skip
+    possible = (MOST_OF_FORCE * most * abs(gear) - weight) / (change * inertia + rate * viscous + spring)
+    reach = min(REACH[unit], max(up, down) / 3.0, max(possible, LEAST_REACH * REACH[unit]))
+    reach *= 1.0 if up >= down else -1.0
     stiffness, damping, source = law.stiffness * gear**2, law.damping * gear**2, "the model's own law"
     if stiffness <= 0.0:
-        stiffness = inertia * LOOP_RAD_PER_S**2 + SPRING_SHARE * first(joint.stiffness)
-        damping, source = 0.0, f"{LOOP_RAD_PER_S:g} rad/s with the model's inertia"
+        needs = {
+            f"{LOOP_RAD_PER_S:g} rad/s with the model's inertia": inertia * LOOP_RAD_PER_S**2,
+            "the model's viscous friction": LAG_RAD_PER_S * viscous,
+            "the joint's weight": weight / SAG[unit],
+        }
+        source = max(needs, key=lambda each: needs[each])
+        stiffness, damping = needs[source] + SPRING_SHARE * spring, 0.0
     if damping <= 0.0:
         damping = 2.0 * LOOP_DAMPING * math.sqrt(stiffness * inertia)
     per_A = most * gear / MOST_A
@@ -186,7 +201,7 @@ def joint_of(body: MujocoBody, number: int, board: str, actuator: str, name: str
         most=most,
         gear=gear,
         inertia=inertia,
-        viscous=first(model.dof_damping[dof]),
+        viscous=viscous,
         dry=first(model.dof_frictionloss[dof]),
         stiffness=stiffness / per_A,
         damping=damping / per_A,
@@ -355,6 +370,8 @@ def main_words(robot: Robot, period_ms: int) -> dict[str, str]:
         "rows": "".join(f"    [{k}] = FW_TASKS(row{k}),\n" for k in range(len(joints))),
         "watch_cost": str(100 + 40 * len(joints)),
         "watch_limit": str(150 + 60 * len(joints)),
+        "slow_share": single(SHARES[0]),
+        "fast_share": single(SHARES[1]),
         "slow_hz": f"{FREQUENCIES_HZ[0]:g}",
         "fast_hz": f"{FREQUENCIES_HZ[1]:g}",
         "slow_cosine": single(math.cos(phases[0])),
