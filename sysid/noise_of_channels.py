@@ -115,7 +115,7 @@ class OfChannels:
     residual: Array
 
     def likely(self, shocks: Array, counted: np.ndarray) -> bool:
-        """True where this noise suits about as well as an autoregression. shocks: (n,) its innovations; counted: rows."""
+        """True where this noise suits about as well as an autoregression with these innovations (n,) in `counted`."""
         here = counted[self.rows]
         if not np.any(here):
             return True
