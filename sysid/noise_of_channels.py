@@ -44,7 +44,7 @@ def autocovariances(sources: Sequence[Array], memory: float, width: float, every
     return np.array([np.pad(each, (0, longest - len(each))) for each in found])
 
 
-def factor(covariance: Array, rows: Array, run: Array) -> Array:
+def factor(covariance: Array, rows: np.ndarray, run: np.ndarray) -> Array:
     """Lower Cholesky factor (bands, n) of rows with these numbers (n,), alike in a run, apart in different ones."""
     bands = min(len(covariance), len(rows))
     banded = np.zeros((bands, len(rows)))
@@ -61,7 +61,7 @@ def whitened(lower: Array, columns: Array) -> Array:
 
 
 def fitted(
-    residual: Array, rows: Array, run: Array, sources: Sequence[Array], width: float, every: int
+    residual: Array, rows: np.ndarray, run: np.ndarray, sources: Sequence[Array], width: float, every: int
 ) -> tuple[Array, Array, Array]:
     """(covariance by lag, its factor, whitened residual), the likeliest.
 
@@ -79,7 +79,7 @@ def fitted(
         def unlikely(odds: float, mixed=mixed) -> float:  # type: ignore[no-untyped-def]
             lower = factor(mixed(odds), rows, run)
             white = whitened(lower, residual)
-            return float(len(rows) * np.log(max(np.mean(white**2), 1e-300)) + 2.0 * np.sum(np.log(lower[0])))
+            return float(len(rows) * np.log(max(float(np.mean(white**2)), 1e-300)) + 2.0 * np.sum(np.log(lower[0])))
 
         found = optimize.minimize_scalar(unlikely, bounds=(LEAST, MOST), method="bounded", options={"xatol": CLOSE})
         if best is None or found.fun < best[0] - PAYS:
@@ -109,7 +109,7 @@ class OfChannels:
     its diagonal 0; white: (m,) the residual by it; residual: (n,) of the fit in this noise."""
 
     covariance: Array
-    rows: Array
+    rows: np.ndarray
     factor: Array
     white: Array
     residual: Array
@@ -119,8 +119,10 @@ class OfChannels:
         here = counted[self.rows]
         if not np.any(here):
             return True
-        own = float(np.log(max(np.mean(self.white[here] ** 2), 1e-300)) + 2.0 * np.mean(np.log(self.factor[0, here])))
-        return own <= float(np.log(max(np.mean(shocks[counted] ** 2), 1e-300))) + WORSE
+        own = float(
+            np.log(max(float(np.mean(self.white[here] ** 2)), 1e-300)) + 2.0 * np.mean(np.log(self.factor[0, here]))
+        )
+        return own <= float(np.log(max(float(np.mean(shocks[counted] ** 2)), 1e-300))) + WORSE
 
 
 def settled(part: Rows, columns: Array, stand_ins: Array, residual: Array) -> OfChannels:

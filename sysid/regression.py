@@ -209,6 +209,7 @@ class Part:
     starts: np.ndarray
     repeats: np.ndarray
     run: np.ndarray  # number of the stretch without a gap
+    _: dataclasses.KW_ONLY
     sources: tuple[Array, ...] = ()  # of the equation, where all recordings have the same
     width: float = 0.0  # of the recordings' Gaussian
     every: int = 1
@@ -237,7 +238,7 @@ class Whitening:
     coefficients: Array
     deviation: float
     covariance: Array | None = None  # by lag, of noise of channels (`noise_of_channels.py`), instead of coefficients
-    last: tuple[Array, Array, Array] | None = dataclasses.field(default=None, repr=False, compare=False)
+    last: tuple[np.ndarray, np.ndarray, Array] | None = dataclasses.field(default=None, repr=False, compare=False)
 
     @property
     def correlation_time(self) -> float:
@@ -261,7 +262,7 @@ class Whitening:
         out[rows] = noise_of_channels.whitened(self._factor(rows, part.run[rows]), column[rows]) / self.deviation
         return out
 
-    def _factor(self, rows: Array, run: Array) -> Array:
+    def _factor(self, rows: np.ndarray, run: np.ndarray) -> Array:
         """The covariance's factor for these rows; the last one is kept, for all candidates have the same rows."""
         if not (self.last and np.array_equal(self.last[0], rows) and np.array_equal(self.last[1], run)):
             assert self.covariance is not None
@@ -346,9 +347,11 @@ class Regression:
             response, valid = reduced(recording, made.response, equation), _counts(recording, made)
             parts.append((response, measured, stand_in, valid, _starts(recording), repeats, run))
         made_here = [each.equations[equation].sources for each in self.recordings if equation in each.equations]
-        first, alike = self.recordings[0], all(_same(each, made_here[0]) for each in made_here)
-        columns = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return Part(*columns, made_here[0] if alike else (), first.width, first.every)
+        out = Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        if all(_same(each, made_here[0]) for each in made_here):
+            out.sources = made_here[0]
+        out.width, out.every = self.recordings[0].width, self.recordings[0].every
+        return out
 
     def _find_whitening(self) -> None:
         """Estimate the noise from the residual of a first fit, then solve again with that noise."""
