@@ -261,7 +261,9 @@ print("refused")
 
 
 @needs_dask
-def test_its_own_dask_cluster_is_on_the_loopback_address_and_refuses_clients_without_its_certificate(few, whole_results, tmp_path):
+def test_its_own_dask_cluster_is_on_the_loopback_address_and_refuses_clients_without_its_certificate(
+    few, whole_results, tmp_path
+):
     out = tmp_path / "out"
     with campaign_at_work(few, out, "--pool", "dask", "--jobs", "2") as process:
         found = listening(process.pid)

@@ -135,7 +135,7 @@ def own_robot(report: Any) -> Iterator[Any]:
             preexec_fn=lambda: kernel.die_with_parent(parent),
         )
         try:
-            importlib.import_module("ranger_sim.tools.panel.server")  # while the robot starts, and before this gives way
+            importlib.import_module("ranger_sim.tools.panel.server")  # before the robot takes the processors
             end_s = wallclock.monotonic_s() + START_S
             while True:
                 try:
