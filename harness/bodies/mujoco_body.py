@@ -196,7 +196,7 @@ def read(file: str | pathlib.Path) -> Any:
 
 
 def compiled(spec: Any, file: str) -> Any:
-    """The model, ready to simulate. What MuJoCo would have written otherwise in it is no concern of who runs it."""
+    """The model, ready to simulate, without the warnings with which MuJoCo advises its author."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
