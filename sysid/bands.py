@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ranger_sim.sysid import noise, noise_of_channels
+from ranger_sim.sysid import noise
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.regression import Noise, Part, Regression, Whitening, innovations
@@ -60,8 +60,6 @@ def choose(recordings: Sequence[Recording]) -> list[Band]:
     fitting = [each for each in tried if rows * _kept(each, rate_hz) <= MOST_ROWS] or tried[-1:]
     for band in fitting:
         regression = plain([band.of(recording) for recording in recordings])
-        if all(_of_channels(part) for part in regression.parts.values()):
-            return [band]
         if all(_ratio(part) <= WORSE and _agrees(part) for part in regression.parts.values()):
             first = fitting.index(band)
             return fitting[first : first + OCTAVES]
@@ -81,22 +79,6 @@ def plain(recordings: Sequence[Recording]) -> Regression:
         size = float(np.std(values)) if len(values) else 0.0
         sizes[name] = Whitening(np.zeros(0), size or 1.0)
     return Regression(recordings, noise=Noise(sizes))
-
-
-def _of_channels(part: Part) -> bool:
-    """True where what a plain fit leaves is the noise of the equation's channels; then the widest band shows most."""
-    if not part.sources:
-        return False
-    good = part.counted
-    x, y = part.measured, part.response
-    residual = y - x @ fitted(part.stand_in[good], x[good], y[good])
-    memory = noise.autoregression(residual, good & _same_run(part))
-    counted = good.copy()
-    for lag in range(1, 1 + len(memory)):
-        counted[:lag] = False
-        counted[lag:] &= part.valid[:-lag] & (part.run[lag:] == part.run[:-lag])
-    found = noise_of_channels.settled(part, x, part.stand_in, residual)
-    return found.likely(innovations(memory, residual), counted)
 
 
 def _ratio(part: Part) -> float:

@@ -13,12 +13,11 @@ from typing import Protocol
 
 import numpy as np
 
-from ranger_sim.sysid import causes, naming, noise, noise_of_channels
+from ranger_sim.sysid import causes, naming, noise
 from ranger_sim.sysid.bands import fitted, least_squares, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Effect, Recording
 from ranger_sim.sysid.naming import Named, Trial
-from ranger_sim.sysid.noise_of_channels import OfChannels
 from ranger_sim.sysid.regression import Noise, Part, Regression, Whitening, explained, innovations, reduced
 
 SURROGATES = 199
@@ -27,7 +26,6 @@ MOST = 5  # causes
 LEAST = 6.0  # score that a cause must have whatever the surrogates say: that of a tie
 BLOCKS = 8  # of the cross-validation within the training data
 SURE = 2.33  # standard errors over the blocks by which a further effect must exceed a simpler one: 1 % on one side
-DEVIATIONS = 2  # of the noise of an equation's channels
 PASSES = 3  # over the causes, each held against all others
 WORSE = 1.05  # times the held-out square: an exchange may not make it worse
 ALIKE, MOST_ALIKE = (
@@ -98,19 +96,8 @@ def noise_of(recordings: Sequence[Recording], effects: Sequence[Effect], fixed: 
         least = 1e-9 * float(np.max(np.abs(y), initial=0.0)) or 1.0
         deviation = max(math.sqrt(float(np.sum(shocks[counted] ** 2)) / free), least)
         found[name] = Whitening(memory, deviation)
-        if part.sources:
-            of_part = noise_of_channels.settled(part, wide, np.hstack([z, *kept]), residual)
-            if of_part.likely(shocks, counted):
-                found[name] = _of_channels(of_part, wide.shape[1], least)
-                counted, shocks = part.counted, found[name].scaled(part, of_part.residual) * deviation
         white[name] = np.where(counted, shocks / deviation, np.nan)
     return Noise(found, _correlations(white))
-
-
-def _of_channels(one: OfChannels, columns: int, least: float) -> Whitening:
-    """The noise of an equation's channels, after a fit of so many columns. least: deviation."""
-    free = max(1, len(one.white) - columns - DEVIATIONS)
-    return Whitening(np.zeros(0), max(math.sqrt(float(np.sum(one.white**2)) / free), least), one.covariance)
 
 
 def _correlations(white: dict[str, Array]) -> dict[tuple[str, str], float]:
@@ -177,11 +164,6 @@ def own_noise(regression: Regression) -> Noise:
     values = np.array([regression.values[each] for each in regression.names])
     for name, part in regression.parts.items():
         residual = part.response - part.measured @ values
-        if regression.whitening[name].covariance is not None:
-            least = 1e-9 * float(np.max(np.abs(part.response), initial=0.0)) or 1.0
-            nothing = np.zeros((len(residual), 0))
-            found[name] = _of_channels(noise_of_channels.settled(part, nothing, nothing, residual), 0, least)
-            continue
         memory = noise.autoregression(residual, part.valid & ~part.starts & _unbroken(part))
         counted = regression._good(name, memory)
         shocks = innovations(memory, residual)[counted]
@@ -198,7 +180,9 @@ def surrogates(regression: Regression, seed: int, count: int = SURROGATES) -> Ar
     """
     out = np.zeros((regression.size, count))
     for name, own in own_noise(regression).whitening.items():
-        raw = own.surrogates(len(regression.parts[name].response), count, seed, f"noise of {name}")
+        raw = noise.surrogates(
+            own.coefficients, own.deviation, len(regression.parts[name].response), count, seed, f"noise of {name}"
+        )
         out[regression.rows[name]] = regression._scaled(name, raw)[regression.good[name]]
     left = out - regression.phi @ (regression.inverse @ (regression.z.T @ out))
     out *= np.sqrt(regression.chi2 / np.maximum(np.einsum("nm,nm->m", left, left), 1e-300))
@@ -489,10 +473,6 @@ def _unwhitened(regression: Regression) -> tuple[Array, Array, Array]:
     out: list[tuple[Array, Array, Array]] = []
     for name, part in regression.parts.items():
         good = regression.good[name]
-        if regression.whitening[name].covariance is not None:  # nearly all of its power is where no cause is
-            rows = regression.rows[name]
-            out.append((regression.stand_in[rows], regression.measured[rows], regression.response[rows]))
-            continue
         size = regression.whitening[name].deviation
         out.append((part.stand_in[good] / size, part.measured[good] / size, part.response[good] / size))
     return tuple(np.concatenate(each) for each in zip(*out, strict=True))  # type: ignore[return-value]

@@ -77,8 +77,7 @@ class Equation:
     own does and shares no noise with any measurement of this equation; fits and tests go against these (instrumental
     variables), because a noisy column would bias the residual. lines: whether a line in the residual's spectrum means
     anything; a counter's steps beat with the samples. few: with fewer rows, which are also a small part of the
-    recording, the report says that the equation says next to nothing. sources: of two channels, the weights of their
-    rows in one row of the response or of a column, (k,), where their noise is this equation's (`noise_of_channels.py`).
+    recording, the report says that the equation says next to nothing.
     """
 
     name: str
@@ -91,7 +90,6 @@ class Equation:
     stand_ins: dict[str, Array] = dataclasses.field(default_factory=dict)
     lines: bool = True
     few: int = 50
-    sources: tuple[Array, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True)

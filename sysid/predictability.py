@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from ranger_sim.foundation.random_arrays import generator
-from ranger_sim.sysid import likelihood
+from ranger_sim.sysid import likelihood, noise
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.regression import Regression, Whitening, reduced
@@ -144,14 +144,14 @@ def test(regression: Regression, features: Mapping[str, Array], seed: int, worth
                 more = _drawn(own, len(good), count - FIRST, seed, f"further chance of {name}")[rows]
                 chance = np.concatenate((chance, ridge.shares(more)))
             p = (1.0 + float(np.count_nonzero(chance >= share))) / (1.0 + len(chance))
-        memory = own.correlation_time
+        memory = noise.correlation_time(own.coefficients)
         found.append(Predicted(name, max(0.0, share), p, np.count_nonzero(good) / memory))
     return found
 
 
 def _drawn(own: Whitening, rows: int, count: int, seed: int, name: str) -> Array:
     """(rows, count) samples of a noise."""
-    return own.surrogates(rows, count, seed, name)
+    return noise.surrogates(own.coefficients, own.deviation, rows, count, seed, name)
 
 
 def _predicted(

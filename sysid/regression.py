@@ -12,8 +12,6 @@ import numpy as np
 from scipy import linalg, sparse, stats
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid import noise as noise_with_memory
-from ranger_sim.sysid import noise_of_channels
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Columns, Equation, Recording
 
@@ -209,15 +207,6 @@ class Part:
     starts: np.ndarray
     repeats: np.ndarray
     run: np.ndarray  # number of the stretch without a gap
-    _: dataclasses.KW_ONLY
-    sources: tuple[Array, ...] = ()  # of the equation, where all recordings have the same
-    width: float = 0.0  # of the recordings' Gaussian
-    every: int = 1
-
-    @property
-    def counted(self) -> np.ndarray:
-        """(n,) rows that count where the noise does not look back."""
-        return np.asarray(self.valid & ~self.starts)
 
     def pure_error(self, residual: Array) -> tuple[Array, int]:
         """(residual less the mean of its repeats (n,), degrees of freedom); 0 degrees where repeats are too few."""
@@ -237,37 +226,6 @@ class Whitening:
 
     coefficients: Array
     deviation: float
-    covariance: Array | None = None  # by lag, of noise of channels (`noise_of_channels.py`), instead of coefficients
-    last: tuple[np.ndarray, np.ndarray, Array] | None = dataclasses.field(default=None, repr=False, compare=False)
-
-    @property
-    def correlation_time(self) -> float:
-        """Samples over which the noise is correlated."""
-        if self.covariance is not None:
-            return noise_of_channels.correlation_time(self.covariance)
-        return noise_with_memory.correlation_time(self.coefficients)
-
-    def surrogates(self, rows: int, count: int, seed: int, name: str) -> Array:
-        """(rows, count) samples of the noise; name: of the stream of random numbers."""
-        if self.covariance is not None:
-            return noise_of_channels.surrogates(self.covariance, self.deviation, rows, count, seed, name)
-        return noise_with_memory.surrogates(self.coefficients, self.deviation, rows, count, seed, name)
-
-    def scaled(self, part: Part, column: Array) -> Array:
-        """A column (n,) or (n, k) of an equation in rows of white noise of deviation 1, where they count."""
-        if self.covariance is None:
-            return np.asarray(innovations(self.coefficients, column) / self.deviation)
-        rows = np.flatnonzero(part.counted)
-        out = np.zeros_like(column)
-        out[rows] = noise_of_channels.whitened(self._factor(rows, part.run[rows]), column[rows]) / self.deviation
-        return out
-
-    def _factor(self, rows: np.ndarray, run: np.ndarray) -> Array:
-        """The covariance's factor for these rows; the last one is kept, for all candidates have the same rows."""
-        if not (self.last and np.array_equal(self.last[0], rows) and np.array_equal(self.last[1], run)):
-            assert self.covariance is not None
-            self.last = (rows, run, noise_of_channels.factor(self.covariance, rows, run))
-        return self.last[2]
 
 
 @dataclasses.dataclass
@@ -347,12 +305,7 @@ class Regression:
                 measured[:, first:] = stand_in[:, first:] = reduced(recording, extra[number][equation], equation)
             response, valid = reduced(recording, made.response, equation), _counts(recording, made)
             parts.append((response, measured, stand_in, valid, _starts(recording), repeats, run))
-        made_here = [each.equations[equation].sources for each in self.recordings if equation in each.equations]
-        out = Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-        if all(_same(each, made_here[0]) for each in made_here):
-            out.sources = made_here[0]
-        out.width, out.every = self.recordings[0].width, self.recordings[0].every
-        return out
+        return Part(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def _find_whitening(self) -> None:
         """Estimate the noise from the residual of a first fit, then solve again with that noise."""
@@ -409,7 +362,8 @@ class Regression:
         return good
 
     def _scaled(self, equation: str, column: Array) -> Array:
-        return self.whitening[equation].scaled(self.parts[equation], column)
+        whitening = self.whitening[equation]
+        return innovations(whitening.coefficients, column) / whitening.deviation
 
     def _quick(self) -> Array:
         """Parameters with the whitening known so far."""
@@ -601,10 +555,6 @@ class Regression:
     def rows_of(self, equation: str) -> slice:
         """Slice of an equation in the stacked rows."""
         return self.rows[equation]
-
-
-def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
-    return len(one) == len(other) and all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
 def innovations(coefficients: Array, column: Array) -> Array:

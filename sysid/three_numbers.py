@@ -18,7 +18,7 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.naming import Named
 from ranger_sim.sysid.predictability import Predictor, learned
-from ranger_sim.sysid.regression import Regression, Whitening, reduced
+from ranger_sim.sysid.regression import Regression, reduced
 from ranger_sim.sysid.results import HeldOutError
 
 DRAWS = 400
@@ -43,21 +43,12 @@ class Held:
         self.left = dict.fromkeys(self.sizes, 1.0)
         self.left = {name: _rms(each) or 1.0 for name, each in self.residual([], {}).items()}
 
-    def residual(
-        self,
-        named: Sequence[Named],
-        values: Mapping[str, float],
-        extra: Mapping[str, Array] | None = None,
-        noise: Mapping[str, Whitening] | None = None,
-    ) -> dict[str, Array]:
-        """By equation (rows that count,), in units of what the base left. extra: more to take off, by equation.
-
-        noise: of the training data, by equation: rows of one whose noise is that of its channels are white, for in
-        others next to nothing but the noise counts.
-        """
-        y, x, z, ends = self._stacked(extra, noise)
+    def residual(self, named: Sequence[Named], values: Mapping[str, float], extra: Mapping[str, Array] | None = None
+                 ) -> dict[str, Array]:  # fmt: skip
+        """By equation (rows that count,), in units of what the base left. extra: more to take off, by equation."""
+        y, x, z, ends = self._stacked(extra)
         for each in named:
-            columns = self._columns(each, noise)
+            columns = self._columns(each)
             if not np.any(columns):
                 continue
             sizes = np.array([values[name] for name in each.coefficients])
@@ -65,46 +56,32 @@ class Held:
         left = y - x @ fitted(z, x, y)
         return {name: left[ends[number] : ends[number + 1]] for number, name in enumerate(self.base.equations)}
 
-    def shows(
-        self,
-        each: Named,
-        values: Mapping[str, float],
-        left: Mapping[str, Array],
-        noise: Mapping[str, Whitening] | None = None,
-    ) -> bool:
+    def shows(self, each: Named, values: Mapping[str, float], left: Mapping[str, Array]) -> bool:
         """True when the effect, as large as in training, moves the held-out rows enough to be judged by them.
 
         left: errors there, of the causes before it.
         """
-        _, _, z, _ = self._stacked(None, noise)
-        columns = self._columns(each, noise)
+        _, _, z, _ = self._stacked(None)
+        columns = self._columns(each)
         moved = columns @ np.array([values[name] for name in each.coefficients])
         moved = moved - z @ fitted(z, z, moved)
         return float(moved @ moved) > SHOWS * sum(float(one @ one) for one in left.values())
 
-    def _white(self, name: str, column: Array, noise: Mapping[str, Whitening] | None) -> Array:
-        """A column of an equation, white where its noise is that of its channels."""
-        if noise is None or name not in noise or noise[name].covariance is None:
-            return column
-        return noise[name].scaled(self.base.parts[name], column) * noise[name].deviation
-
-    def _stacked(
-        self, extra: Mapping[str, Array] | None, noise: Mapping[str, Whitening] | None = None
-    ) -> tuple[Array, Array, Array, list[int]]:
+    def _stacked(self, extra: Mapping[str, Array] | None) -> tuple[Array, Array, Array, list[int]]:
         """(response, columns, their stand-ins, first row of each equation and the end), rows that count, by size."""
         ys, xs, zs = [], [], []
         for name, part in self.base.parts.items():
             good, size = self.rows[name], self.sizes[name] * self.left[name]
             response = part.response - (extra[name] if extra and name in extra else 0.0)
-            ys.append(self._white(name, response, noise)[good] / size)
-            xs.append(self._white(name, part.measured, noise)[good] / size)
-            zs.append(self._white(name, part.stand_in, noise)[good] / size)
+            ys.append(response[good] / size)
+            xs.append(part.measured[good] / size)
+            zs.append(part.stand_in[good] / size)
         ends = np.cumsum([0, *map(len, ys)]).tolist()
         x, z = np.vstack(xs), np.vstack(zs)
         used = np.any(x != 0.0, axis=0)
         return np.concatenate(ys), x[:, used], z[:, used], ends
 
-    def _columns(self, each: Named, noise: Mapping[str, Whitening] | None = None) -> Array:
+    def _columns(self, each: Named) -> Array:
         made = [each.effect.columns(recording, each.shape, self.values) for recording in self.recordings]
         wide = len(each.effect.coefficients)
         out = []
@@ -113,17 +90,15 @@ class Held:
                 reduced(recording, columns.get(name, np.zeros((len(recording.table), wide))), name)
                 for recording, columns in zip(self.recordings, made, strict=True)
             ]
-            white = self._white(name, np.vstack(parts), noise)
-            out.append(white[self.rows[name]] / (self.sizes[name] * self.left[name]))
+            out.append(np.vstack(parts)[self.rows[name]] / (self.sizes[name] * self.left[name]))
         return np.vstack(out)
 
     def accepts(self, named: Sequence[Named], candidate: Named, without: Regression, extended: Regression) -> bool:
         """False when the data, which excite the candidate, do not surely show it, or show less than half of it."""
-        before = self.residual(named, without.values, noise=without.whitening)
-        # where they do not excite it, it must show much better in the training data
-        if not self.shows(candidate, extended.values, before, without.whitening):
+        before = self.residual(named, without.values)
+        if not self.shows(candidate, extended.values, before):  # then it must show much better in the training data
             return candidate.chi2 > BETTER_SHOWN * SHOWS * extended.size
-        after = self.residual([*named, candidate], extended.values, noise=without.whitening)
+        after = self.residual([*named, candidate], extended.values)
         moved = {name: before[name] - after[name] for name in before}
         whole = sum(float(each @ each) for each in moved.values())
         share = sum(float(each @ before[name]) for name, each in moved.items()) / max(whole, 1e-300)
@@ -136,10 +111,7 @@ class Held:
 
     def square(self, named: Sequence[Named], extended: Regression) -> float:
         """Square of the errors with these causes, each equation in units of what the base left."""
-        return sum(float(each @ each) for each in self._judged(named, extended).values())
-
-    def _judged(self, named: Sequence[Named], extended: Regression) -> dict[str, Array]:
-        return self.residual(named, extended.values, noise=extended.whitening)
+        return sum(float(each @ each) for each in self.residual(named, extended.values).values())
 
     def errors(
         self,

@@ -61,15 +61,6 @@ class WeakForm:
             self.fine_rates.append((run, spline(self._fine(count), 1)))
             self.fine_places.append(spline(self._fine(count)))
 
-    def sources(self) -> tuple[Array, Array]:
-        """Weights of the rows in one mean: of a channel on straight lines, and of the acceleration up to a factor."""
-        fine = np.arange(-self.rows * PARTS, self.rows * PARTS + 1) / PARTS
-        rows = np.arange(-self.rows, self.rows + 1)
-        lines = np.maximum(0.0, 1.0 - np.abs(fine[:, None] - rows)).T @ self.weights
-        second = np.zeros(len(rows))
-        second[[0, self.rows, -1]] = 1.0, -2.0, 1.0
-        return lines, second
-
     def of_rate(self, made: Callable[[Array], Array] = lambda rate: rate) -> Array:
         """Mean of the rate, or of what is made of it."""
         out = np.zeros(len(self.table))

@@ -26,9 +26,6 @@ FORCE_N_PER_V = 35.15065188  # the drive's gain, published with the data
 FINE_S = 0.0015  # Gaussian of the speed that finds the fastest one: -3 dB at 88 Hz, far above the controller's motion
 HALF_S = 0.0037  # of the triangle: as wide as that Gaussian
 NEAR_STANDSTILL = 0.01  # of the fastest speed: about it the sign of a smooth friction turns
-# Rows in half a triangle from which on the noise is that of position and voltage: with one row, 100 and 250 Hz, what
-# the spline misses between rows is no longer small beside it, and was a friction on sound recordings
-FEWEST_ROWS = 2
 SLOWEST = 0.025  # of the fastest speed: below it friction may be anything up to its limit, and rows do not count
 DELAYS_S = (0.0, -0.1, -0.06, -0.04, -0.03, -0.02, -0.01, 0.01, 0.02, 0.03, 0.04, 0.06, 0.1)  # 0: small ones
 PITCHES_M = tuple(round(0.0005 * n, 4) for n in range(2, 61))
@@ -92,8 +89,7 @@ class Positioning:
         way = way_between_rows(weak, force, np.column_stack(others), valid)
         s["F"] = way.mean
         s["dF"] = signals.per_run(table, lambda part: np.gradient(part, table.step_s), s["F"])
-        sources = weak.sources() if weak.rows >= FEWEST_ROWS else ()
-        equation = Equation("force", "M", "mechanical", "N", s["F"], columns, valid & way.sure, sources=sources)
+        equation = Equation("force", "M", "mechanical", "N", s["F"], columns, valid & way.sure)
         fast = np.abs(v) > 0.2 * top
         regimes = {"forward": v > 0.0, "backward": v < 0.0, "low speed": ~fast, "fast": fast}
         return GuideRecording(table, s, {"force": equation}, regimes, between_rows={"voltage_V": way.name}, weak=weak)

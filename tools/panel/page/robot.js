@@ -13,7 +13,8 @@ export function makeRobot({ state, subscribe }) {
 
   subscribe(["hello"], ({ hello }) => {
     stage.know(hello);
-    by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; inner legs hollow, contact forces thin" : hello.pose.length ? "as it estimates itself; inner legs hollow, the lower foot stands" : "no leg angles in this source";
+    by("robot").hidden = !hello.pose.length;   // another machine's recording
+    by("pose-note").textContent = hello.pose.includes("hip_y_m") ? "as its body is; inner legs hollow, contact forces thin" : "as it estimates itself; inner legs hollow, the lower foot stands";
     by("bars").replaceChildren(...CURRENTS.map(([name, , swatch]) => {
       const row = document.createElement("div");
       row.innerHTML = '<span></span><div class="bar"><i></i></div><span></span>';
