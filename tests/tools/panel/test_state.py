@@ -158,3 +158,9 @@ def test_an_update_that_a_view_makes_waits_until_every_view_has_drawn_the_one_be
 def test_a_subscription_to_an_unknown_field_is_refused(page):
     script = 'try { subscribe(["marks"], () => {}); } catch (error) { return error.message; } return "";'
     assert result(page, script) == "the state has no field marks"
+
+
+def test_a_recording_without_the_robots_angles_has_no_picture_of_the_robot(page):
+    assert page.value("document.getElementById('robot').hidden")
+    columns = "getComputedStyle(document.querySelector('main')).gridTemplateColumns"
+    assert len(page.value(columns).split()) == 1
