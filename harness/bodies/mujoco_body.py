@@ -10,10 +10,11 @@
 A driven actuator becomes a motor in the model, whatever law it had: the law is the firmware's.
 """
 
+import contextlib
 import math
 import pathlib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import mujoco
@@ -195,11 +196,18 @@ def read(file: str | pathlib.Path) -> Any:
     return spec
 
 
+@contextlib.contextmanager
+def without_advice() -> Iterator[None]:
+    """Without the warnings with which MuJoCo advises a model's author."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
+
+
 def compiled(spec: Any, file: str) -> Any:
-    """The model, ready to simulate, without the warnings with which MuJoCo advises its author."""
+    """The model, ready to simulate."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
+        with without_advice():
             return spec.compile()
     except ValueError as error:
         raise ModelError(f"{file}: MuJoCo cannot compile it: {one_line(error)}") from None

@@ -318,7 +318,9 @@ def model_files(file: pathlib.Path) -> tuple[str, dict[str, bytes]]:
     assets = {path.removeprefix("assets/"): content for path, content in made.items()}
     spec.assets = assets
     mujoco_body.compiled(spec, str(file))
-    return f"{file.stem}.xml", made | {f"{file.stem}.xml": spec.to_xml().encode("utf-8")}
+    with mujoco_body.without_advice():
+        text = spec.to_xml()
+    return f"{file.stem}.xml", made | {f"{file.stem}.xml": text.encode("utf-8")}
 
 
 def schedule(count: int, fd: bool = False) -> tuple[int, list[int], float]:
