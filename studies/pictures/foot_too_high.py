@@ -10,30 +10,17 @@ import json
 import pathlib
 import sys
 
+from studies.pictures.svg import BLUE, RED, figure, line, place, text
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 KEPT = ROOT / "docs" / "foot_too_high.json"
 FIGURE = ROOT / "docs" / "foot-too-high.svg"
-GREY, RED, BLUE, INK = "#b8bec8", "#c8452f", "#2460a7", "#24292f"
 # candidate: title, ends of the axis, ticks, as printed, as found by hand (robot.md P1.13, P6)
 PLOTS = {
     "ankle_offset_m": ("d, ankle to the arc's centre, m", (0.08, 0.16), (0.08, 0.10, 0.12, 0.14, 0.16), 0.11, 0.146),
     "mass_offset_kg_m": ("w m, centre of mass ahead, kg m", (-0.06, 0.06), (-0.06, -0.03, 0.0, 0.03, 0.06), 0.0, 0.04),
 }
 WIDTH, LEFT, GAP, TOP, ROW = 860, 235, 45, 62, 44
-
-
-def text(x: float, y: float, words: str, anchor: str = "start", size: int = 13, colour: str = INK) -> str:
-    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}" fill="{colour}">{words}</text>'
-
-
-def line(x1: float, y1: float, x2: float, y2: float, colour: str = GREY, width: float = 1.0, more: str = "") -> str:
-    return f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="{colour}" stroke-width="{width:g}"{more}/>'
-
-
-def place(value: float, limits: tuple, ends: tuple) -> float:
-    """Where a value lies between two ends, in pixels; values beyond are drawn at the end."""
-    share = (min(max(value, limits[0]), limits[1]) - limits[0]) / (limits[1] - limits[0])
-    return round(ends[0] + share * (ends[1] - ends[0]), 1)
 
 
 def plot(name: str, rows: list[dict], ends: tuple[float, float], bottom: float) -> list[str]:
@@ -51,7 +38,7 @@ def plot(name: str, rows: list[dict], ends: tuple[float, float], bottom: float) 
         tied = row["hypotheses"]
         told = next((each["values"][name] for each in tied if name in each["wrong"]), None)
         told = told or row["estimates"][name]
-        low, high = (place(end, limits, ends) for end in told["ci95"])
+        low, high = (place(min(max(end, limits[0]), limits[1]), limits, ends) for end in told["ci95"])
         parts.append(line(low, y, high, y, BLUE, 4.0 if row["named"].count(name) else 2.0))
         parts.append(f'<circle cx="{place(told["value"], limits, ends):g}" cy="{y:g}" r="5" fill="{BLUE}"/>')
     return parts
@@ -70,9 +57,7 @@ def drawn() -> str:
         parts.append(text(LEFT - 14, TOP + (number + 0.5) * ROW + 4, row["figures"], "end"))
     told = "95 % intervals, each if it is this number that is wrong; thick where the figures name it"
     parts.append(text(LEFT, bottom + 42, told, size=12))
-    font = 'font-family="Helvetica, Arial, sans-serif"'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {bottom + 56:g}" {font}>'
-    return "\n".join([head, f'<rect width="{WIDTH}" height="{bottom + 56:g}" fill="white"/>', *parts, "</svg>", ""])
+    return figure(WIDTH, bottom + 56, parts)
 
 
 if __name__ == "__main__":

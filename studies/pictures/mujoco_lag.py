@@ -14,11 +14,13 @@ import subprocess
 import sys
 import tempfile
 
+from studies.pictures.svg import BLUE, GREY, RED, figure, line, place, text
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "how-to" / "mujoco.md"
 KEPT = ROOT / "docs" / "mujoco_lag.json"
 FIGURE = ROOT / "docs" / "mujoco-lag.svg"
-GREY, RED, BLUE, INK, PALE = "#b8bec8", "#c8452f", "#2460a7", "#24292f", "#7a8494"
+PALE = "#7a8494"
 LAGS_MS = (0, 2, 5, 10, 20)  # hidden
 SHOWN_MS = {0: PALE, 10: BLUE, 20: RED}  # whose first moments are drawn, and in which colour
 FIRST_S = 0.4
@@ -78,19 +80,6 @@ def beginning(recording: pathlib.Path) -> dict:
 # ---- the figure
 
 
-def text(x: float, y: float, words: str, anchor: str = "start", size: int = 13, colour: str = INK) -> str:
-    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}" fill="{colour}">{words}</text>'
-
-
-def line(x1: float, y1: float, x2: float, y2: float, colour: str = GREY, width: float = 1.0, more: str = "") -> str:
-    return f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="{colour}" stroke-width="{width:g}"{more}/>'
-
-
-def place(value: float, limits: tuple[float, float], ends: tuple[float, float]) -> float:
-    """Where a value lies between two ends, in pixels."""
-    return round(ends[0] + (value - limits[0]) / (limits[1] - limits[0]) * (ends[1] - ends[0]), 1)
-
-
 def movement(rows: list[dict]) -> list[str]:
     """The joint's angle after the beginning, for some lags."""
     shown = [row for row in rows if row["hidden_ms"] in SHOWN_MS]
@@ -139,10 +128,7 @@ def answers(rows: list[dict]) -> list[str]:
 def drawn() -> str:
     """The figure as SVG."""
     rows = json.loads(KEPT.read_text(encoding="utf-8"))["rows"]
-    font = 'font-family="Helvetica, Arial, sans-serif"'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" {font}>'
-    ground = f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>'
-    return "\n".join([head, ground, *movement(rows), *answers(rows), "</svg>", ""])
+    return figure(WIDTH, HEIGHT, [*movement(rows), *answers(rows)])
 
 
 def main() -> int:

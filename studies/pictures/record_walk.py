@@ -10,6 +10,8 @@ import json
 import pathlib
 import sys
 
+from studies.pictures.svg import BLUE, RED, figure, line, place, text
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BEFORE = ROOT / "benchmarks" / "2026-11-22-walks.json"
 NOW = ROOT / "benchmarks" / "2026-11-27-walks-on-ranger.json"
@@ -21,7 +23,6 @@ LENGTHS = (0.33, 0.39)
 TOP, BOTTOM = 54, 330
 LEFT_PLOT = (70, 420)
 RIGHT_PLOT = (520, 830)
-GREY, RED, BLUE, INK = "#b8bec8", "#c8452f", "#2460a7", "#24292f"
 
 
 def walks(path: pathlib.Path, roughness_m: float = 0.0) -> list[dict]:
@@ -29,19 +30,6 @@ def walks(path: pathlib.Path, roughness_m: float = 0.0) -> list[dict]:
     rows = json.loads(path.read_text(encoding="utf-8"))["walks"]
     chosen = [row for row in rows if row["controller"] == "record-2011" and row["floor_roughness_m"] == roughness_m]
     return sorted(chosen, key=lambda row: row["seed"])
-
-
-def text(x: float, y: float, words: str, anchor: str = "start", size: int = 13, colour: str = INK) -> str:
-    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}" fill="{colour}">{words}</text>'
-
-
-def line(x1: float, y1: float, x2: float, y2: float, colour: str = GREY, width: float = 1.0) -> str:
-    return f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="{colour}" stroke-width="{width:g}"/>'
-
-
-def place(value: float, limits: tuple, ends: tuple) -> float:
-    """Where a value lies between two ends, in pixels."""
-    return round(ends[0] + (value - limits[0]) / (limits[1] - limits[0]) * (ends[1] - ends[0]), 1)
 
 
 def distances(before: list[dict], now: list[dict]) -> list[str]:
@@ -104,15 +92,7 @@ def drawn() -> str:
     """The figure as SVG."""
     level = walks(NOW)
     parts = [*distances(walks(BEFORE), level), *gait(level, walks(NOW, 0.001)), *legend()]
-    return "\n".join(
-        [
-            '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 860 400" font-family="Helvetica, Arial, sans-serif">',
-            '<rect width="860" height="400" fill="white"/>',
-            *parts,
-            "</svg>",
-            "",
-        ]
-    )
+    return figure(860, 400, parts)
 
 
 if __name__ == "__main__":

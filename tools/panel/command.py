@@ -79,8 +79,8 @@ def run(options: argparse.Namespace) -> int:
         raise UserError(f"panel: {len(options.recordings)} recordings; one, or two over each other, are possible")
     if options.align and len(options.recordings) != 2:
         raise UserError("panel: --align lays two recordings over each other")
-    for library in ("uvicorn", "starlette", "h11", "websockets"):
-        importlib.import_module(library)  # before any process starts
+    for library in ("uvicorn", "h11", "websockets", "ranger_sim.tools.panel.server"):
+        importlib.import_module(library)  # before any process starts, and before a robot takes the processors
     address = listening_address(options.host, f"panel on {options.host}", options.allow_network)
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(listening(address, options.http_port))
@@ -135,7 +135,6 @@ def own_robot(report: Any) -> Iterator[Any]:
             preexec_fn=lambda: kernel.die_with_parent(parent),
         )
         try:
-            importlib.import_module("ranger_sim.tools.panel.server")  # before the robot takes the processors
             end_s = wallclock.monotonic_s() + START_S
             while True:
                 try:
