@@ -361,11 +361,14 @@ class Machine:
 
         return wire_of(self, bus, since_s)
 
-    def timeline(self, last_s: float | None = None) -> Any:
-        """A `MachineTimeline` that keeps the last `last_s` seconds of virtual time, or everything (None)."""
+    def timeline(self, last_s: float | None = None, detail_s: float | None = None) -> Any:
+        """A `MachineTimeline` that keeps the last `last_s` seconds of virtual time, or everything (None).
+
+        detail_s: what processors, buses and links do is kept for so long before the end, and around the first faults.
+        """
         from ranger_sim.harness.timeline.machine_timeline import MachineTimeline
 
-        return MachineTimeline(self, last_s)
+        return MachineTimeline(self, last_s, detail_s)
 
     def inject(
         self,

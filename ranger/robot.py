@@ -241,11 +241,14 @@ class Ranger(Machine):
         view: MachineSlots = Machine.slots(self, board)
         return view
 
-    def timeline(self, last_s: float | None = None) -> Any:
-        """A `ranger.timeline.Timeline` that keeps the last `last_s` seconds of virtual time, or everything."""
+    def timeline(self, last_s: float | None = None, detail_s: float | None = None) -> Any:
+        """A `ranger.timeline.Timeline` that keeps the last `last_s` seconds of virtual time, or everything.
+
+        detail_s: as of `harness.timeline.machine_timeline.MachineTimeline`.
+        """
         from ranger_sim.ranger.timeline import Timeline
 
-        return Timeline(self, last_s)
+        return Timeline(self, last_s, detail_s)
 
     def recorded(self) -> Any:
         """What the log kept, as arrays: a `ranger.records.recorded.Recorded`."""

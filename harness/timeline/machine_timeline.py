@@ -16,40 +16,52 @@ from ranger_sim.harness.records.activity import activity_of
 from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timeline import arrows, files, happenings
 from ranger_sim.harness.timeline.frames import BusFrames
-from ranger_sim.harness.timeline.model import Counter, Events, Instants, changes
+from ranger_sim.harness.timeline.model import Counter, Events, Instants, Slices, changes
 from ranger_sim.harness.timeline.processors import Processor
 from ranger_sim.harness.timeline.row_store import RowStore
 
 OUTPUT_COLUMNS = 5  # a row of BoardWires: ns, kind, three numbers
+AROUND_NS = 1_000_000_000  # in detail, before and after a fault begins to act; chosen by us
+MOST_FAULTS = 8  # that are shown so: each takes 50 MB of memory, 100 when it acts long after it was activated
+NEAR_NS = 200_000_000  # between two times in detail: the time between is shown as well, so that no arrow crosses a gap
 GATHER_NS = 50_000_000  # of seven boards each every 0.35 s: some 2 MB of a motor board (chosen by us)
 
 
 class MachineTimeline:
     """Attached to a machine before it runs: keeps the last `last_s` seconds of virtual time, or everything (None).
 
-    It changes nothing: the trace digest stays the same. Boards may run in separate processes; one that is outside
+    detail_s: what processors, buses and links do is kept for so many seconds before the end, and for a second before
+    and after each of the first faults begins to act; None: as long as the rest. It changes nothing: the trace digest stays the same. Boards may run in separate processes; one that is outside
     shows nothing of what its processor does. Memory is flat with `last_s`; without, everything is in unnamed temporary
     files. Use `write` (format by the file's suffix), or `events` to inspect it in a test.
     """
 
     name = "machine"  # the root of its tracks
 
-    def __init__(self, machine: Any, last_s: float | None = None) -> None:
-        if last_s is not None and not last_s > 0.0:
-            raise UserError(f"timeline: last_s is {last_s!r}, it must be above 0 s")
+    def __init__(self, machine: Any, last_s: float | None = None, detail_s: float | None = None) -> None:
+        for name, length_s in (("last_s", last_s), ("detail_s", detail_s)):
+            if length_s is not None and not length_s > 0.0:
+                raise UserError(f"timeline: {name} is {length_s!r}, it must be above 0 s")
         self.robot = machine
         self.last_ns = None if last_s is None else round(last_s * 1e9)
+        self.detail_ns = None if detail_s is None else round(detail_s * 1e9)
         self.begin_ns = machine.loop.time - machine.start_ns
         self.stores: list[RowStore] = []
         self.streams: list[Any] = []
         self._attach()
 
-    def _store(self, stream: Any) -> RowStore:
-        store = RowStore(stream.columns, self.last_ns, stream.sink)
+    def _store(self, stream: Any, in_detail: bool = False) -> RowStore:
+        store = self._made(stream.columns, in_detail, stream.sink)
         stream.sink = store.take
         self.stores.append(store)
         self.streams.append(stream)
         return store
+
+    def _made(self, columns: int, in_detail: bool, before: Any = None) -> RowStore:
+        if not in_detail or self.detail_ns is None:
+            return RowStore(columns, self.last_ns, before)
+        kept_ns = max(self.detail_ns, AROUND_NS)  # a block is dropped when it is known whether a fault acted near it
+        return RowStore(columns, min(kept_ns, self.last_ns or kept_ns), before, self._near_a_fault)
 
     def _attach(self) -> None:
         """Begin to keep records; subclasses add theirs."""
@@ -57,7 +69,7 @@ class MachineTimeline:
         self.frames: list[RowStore] = []
         for bus in robot.buses:
             bus.log.times = FrameTimes()
-            self.frames.append(self._store(bus.log.times))
+            self.frames.append(self._store(bus.log.times, in_detail=True))
         self.samples = self._store(robot.recorder.samples)
         self.outputs: dict[str, RowStore] = {}
         for wires in robot.loop.wires:
@@ -67,7 +79,7 @@ class MachineTimeline:
         for name in robot.boards:
             log = activity_of(robot, name)
             if log is not None:
-                self.activity[name] = RowStore(ACTIVITY_COLUMNS, self.last_ns)
+                self.activity[name] = self._made(ACTIVITY_COLUMNS, in_detail=True)
                 log.add_sink(self.activity[name].take)
                 log.keep_ns = self.last_ns or 0
         self.gathering = Gathering(self)
@@ -75,6 +87,30 @@ class MachineTimeline:
             robot.loop.watchers.append(self.gathering)
 
     # --- what was kept --------------------------------------------------------------------------------------
+
+    def _near_a_fault(self, begin_ns: int, end_ns: int) -> bool:
+        return any(begin_ns <= end and begin <= end_ns for begin, end in self._of_faults())
+
+    def _of_faults(self) -> list[tuple[int, int]]:
+        """Times (ns, as the machine counts them) around the beginnings of the faults that began first."""
+        stamps = {time for fault in self.robot.faults for time in (fault.activated_ns, fault.acted_ns) if time >= 0}
+        return [(time - AROUND_NS, time + AROUND_NS) for time in sorted(stamps)[: 2 * MOST_FAULTS]]
+
+    def windows(self) -> list[tuple[int, int]]:
+        """[(begin, end)] of the times that are kept in detail, ns since the run began, in order."""
+        zero, end = self.robot.start_ns, self.robot.loop.time - self.robot.start_ns
+        begin = self.begin_ns if self.last_ns is None else max(self.begin_ns, end - self.last_ns)
+        if self.detail_ns is None or end - self.detail_ns <= begin:
+            return [(begin, end)]
+        around = [(at - zero, until - zero) for at, until in self._of_faults()]
+        found: list[tuple[int, int]] = []
+        for at, until in sorted([*around, (end - self.detail_ns, end)]):
+            at, until = max(at, begin), min(until, end)
+            if found and at - found[-1][1] < NEAR_NS:
+                found[-1] = (found[-1][0], max(found[-1][1], until))
+            elif at < until:
+                found.append((at, until))
+        return found
 
     def events(self) -> Events:
         """The events of the time that was kept."""
@@ -92,9 +128,11 @@ class MachineTimeline:
         found.instants = self._happenings()
         for instants in found.instants:
             instants.events = [event for event in instants.events if begin <= event.time_ns <= end]
+        found.slices += self._parts(found)
         self._add_states(found)
+        gaps = [until + zero for _, until in self.windows()[:-1]]
         processors = {
-            name: Processor(robot.boards[name].legend(), self.since(store.rows(), begin, COLUMN_END), zero)
+            name: Processor(robot.boards[name].legend(), self.detail(store.rows(), COLUMN_END), zero, gaps)
             for name, store in self.activity.items()
         }
         for processor in processors.values():
@@ -102,7 +140,7 @@ class MachineTimeline:
             if processor.overruns.events:
                 found.instants.append(processor.overruns)
         buses = [
-            BusFrames(bus, robot.names, self.since(store.rows(), begin), zero)
+            BusFrames(bus, robot.names, self.detail(store.rows()), zero)
             for bus, store in zip(robot.buses, self.frames, strict=True)
         ]
         for bus in buses:
@@ -151,6 +189,26 @@ class MachineTimeline:
     def since(self, rows: np.ndarray, begin_ns: int, time_column: int = 0) -> np.ndarray:
         """The rows whose time, mostly the first number, is in the time to be shown."""
         return rows[rows[:, time_column] - self.robot.start_ns >= begin_ns]
+
+    def detail(self, rows: np.ndarray, time_column: int = 0) -> np.ndarray:
+        """The rows whose time is in the times in detail."""
+        time = rows[:, time_column] - self.robot.start_ns
+        windows = self.windows()
+        if len(windows) == 1 and windows[0][0] <= self.begin_ns:
+            return rows
+        chosen = np.zeros(len(rows), dtype=bool)
+        for begin, end in windows:
+            chosen |= (time >= begin) & (time <= end)
+        return rows[chosen]
+
+    def _parts(self, found: Events) -> list[Slices]:
+        """A track that shows which times are in detail, where some are not."""
+        windows = self.windows()
+        if windows[0][0] <= found.begin_ns:
+            return []
+        start, end = (np.array(each, dtype=np.int64) for each in zip(*windows, strict=True))
+        names = ["boards, buses and links in detail"]
+        return [Slices(("Detail",), names, start, end, np.zeros(len(start), dtype=np.int64))]
 
     def title(self) -> str:
         """The run in one line."""

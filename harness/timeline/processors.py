@@ -1,5 +1,6 @@
 """A processor's activity, as slices: slots with their tasks, interrupts, turns of the main loop."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,14 +28,16 @@ from ranger_sim.harness.timeline.model import Instant, Instants, Slices
 
 
 class Processor:
-    """One board's activity. `rows`: of its ActivityLog; `legend`: the meaning of their numbers.
+    """One board's activity. `rows`: of its ActivityLog; `legend`: the meaning of their numbers; `gaps_ns`: the ends of
+    the times that the rows are of, where more than one.
 
     `slots`, with the tasks inside. `services`: the interrupts, the fast ones inside those that they interrupted.
     `turns` of the main loop. `services_asked_ns`, `fast_asked_ns`: when each of them was requested.
     """
 
-    def __init__(self, legend: Any, rows: np.ndarray, zero_ns: int) -> None:
+    def __init__(self, legend: Any, rows: np.ndarray, zero_ns: int, gaps_ns: Sequence[int] = ()) -> None:
         self.name = legend.board
+        self.gaps = np.array([*gaps_ns, NEVER], dtype=np.int64) + 1
         self.legend = legend
         self.zero_ns = zero_ns
         kind = rows[:, COLUMN_KIND]
@@ -84,6 +87,7 @@ class Processor:
         dropped[places[known]] = overrun[known, COLUMN_ITEMS] == begun[places[known], COLUMN_ITEMS]
         open_ = begun[~dropped & ~np.isin(began, rows[:, COLUMN_START])].copy()
         next_ns = np.append(began, NEVER)[np.searchsorted(began, open_[:, COLUMN_START]) + 1]
+        next_ns = np.minimum(next_ns, self.gaps[np.searchsorted(self.gaps, open_[:, COLUMN_START])])
         ends = np.append(0, self.tasks.end_ns + self.zero_ns)  # of the latest task before that, be it an earlier slot's
         latest = ends[np.searchsorted(self.tasks.start_ns + self.zero_ns, next_ns)]
         open_[:, COLUMN_END] = np.maximum(open_[:, COLUMN_START], latest)

@@ -14,13 +14,23 @@ class RowStore:
     """The sink of one `RowStream`. `columns` of a row; `last_ns`: how much of the past is kept, None: all of it.
 
     With `last_ns` None the rows are in a temporary file, so that nothing is left behind however the process ends.
-    `before`: the previous sink of the blocks, which continues to receive them.
+    `before`: the previous sink of the blocks, which continues to receive them. `wanted(begin_ns, end_ns)`: whether a
+    block of this time is kept although it is older.
     """
 
-    def __init__(self, columns: int, last_ns: int | None, before: Callable[[int, bytes], None] | None = None) -> None:
+    def __init__(
+        self,
+        columns: int,
+        last_ns: int | None,
+        before: Callable[[int, bytes], None] | None = None,
+        wanted: Callable[[int, int], bool] | None = None,
+    ) -> None:
         self.columns = columns
         self.last_ns = last_ns
         self.before = before
+        self.wanted = wanted
+        self.begin_ns = 0  # of the oldest block that is not dropped for its age yet
+        self.held: list[bytes] = []
         self.blocks: collections.deque[tuple[int, bytes]] = collections.deque()
         self.spool: Any = None
         self.failure: OSError | None = None  # of the spool: the disk is full
@@ -38,7 +48,10 @@ class RowStore:
         assert self.last_ns is not None
         self.blocks.append((last_time_ns, block))
         while self.blocks[0][0] < last_time_ns - self.last_ns:
-            self.blocks.popleft()
+            end_ns, old = self.blocks.popleft()
+            if self.wanted is not None and self.wanted(self.begin_ns, end_ns):
+                self.held.append(old)
+            self.begin_ns = end_ns
 
     def _spool(self, block: bytes) -> None:
         """Write a block; the run goes on without a timeline where the disk is full, and `rows` reports it."""
@@ -58,7 +71,7 @@ class RowStore:
             data = self.spool.read()
             self.spool.seek(0, 2)
         else:
-            data = b"".join(block for _, block in self.blocks)
+            data = b"".join((*self.held, *(block for _, block in self.blocks)))
         return np.frombuffer(data, dtype=kind).reshape(-1, self.columns)
 
     @property
@@ -66,7 +79,7 @@ class RowStore:
         """Bytes kept."""
         if self.spool is not None:
             return int(self.spool.tell())
-        return sum(len(block) for _, block in self.blocks)
+        return sum(map(len, self.held)) + sum(len(block) for _, block in self.blocks)
 
     def close(self) -> None:
         """Close the file."""
@@ -74,3 +87,4 @@ class RowStore:
             with contextlib.suppress(OSError):  # a full disk, which `rows` reports
                 self.spool.close()
         self.blocks.clear()
+        self.held.clear()

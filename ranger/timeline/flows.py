@@ -33,6 +33,7 @@ IDENTIFIER_MASK = 0x7FF  # of a half-word's header on the link
 # Longest way through the router: two full transmit rings at 36 us a frame take less (chosen by us).
 LONGEST_WAY_NS = 20_000_000
 LONGEST_SERVICE_NS = 1_000_000  # from a frame to its interrupt (chosen by us: the firmware's are below 100 us)
+LONGEST_WAIT_NS = 100_000_000  # for a slot or an exchange (chosen by us: they come every 14 ms at most)
 ROUNDING_NS = 2  # both times are rounded to whole ns, one of them twice
 
 
@@ -104,10 +105,11 @@ def paired(came_ns: np.ndarray, asked_ns: np.ndarray, longest_ns: int) -> np.nda
 
 
 def next_start(at: np.ndarray, starts_ns: np.ndarray, after_ns: np.ndarray) -> np.ndarray:
-    """The first slice of `at` that begins after each time; -1 for none."""
+    """The first slice of `at` that begins after each time, within LONGEST_WAIT_NS; -1 for none."""
     place = np.searchsorted(starts_ns, after_ns, side="right")
     found = np.full(len(after_ns), -1, dtype=np.int64)
     there = place < len(at)
+    there[there] = starts_ns[place[there]] - after_ns[there] <= LONGEST_WAIT_NS
     found[there] = at[place[there]]
     return found
 
@@ -206,7 +208,8 @@ class Exchanges:
         if len(at) == 0 or len(put_up) == 0:
             return
         place = np.searchsorted(starts, put_up[before], side="left") - 1
-        task = np.where((before >= 0) & (place >= 0), at[place], -1)
+        soon = direction.slices.start_ns - starts[place] <= LONGEST_WAIT_NS
+        task = np.where((before >= 0) & (place >= 0) & soon, at[place], -1)
         book.connect(processor.tasks, task, direction.slices, np.arange(len(direction.slices)))
 
 

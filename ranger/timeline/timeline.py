@@ -30,7 +30,7 @@ class Timeline(MachineTimeline):
         robot.loop.sampler.words = robot.recorder.words
         self.main_brain = robot.loop.wires[robot.loop.place("MB")]
         self.main_brain.link.watch = RowStream("q", LINK_COLUMNS, False)
-        self.link = self._store(self.main_brain.link.watch)
+        self.link = self._store(self.main_brain.link.watch, in_detail=True)
 
     def _words(self, begin_ns: int) -> np.ndarray:
         return self.since(self.words.rows(), begin_ns)
@@ -43,7 +43,7 @@ class Timeline(MachineTimeline):
         found.slices += signals.machine_states(self.robot, words, self.robot.start_ns, found.end_ns)
 
     def _connect(self, found: Events, processors: dict[str, Processor], buses: list[BusFrames]) -> None:
-        link = flows.Exchanges(self.since(self.link.rows(), found.begin_ns), self.robot.start_ns)
+        link = flows.Exchanges(self.detail(self.link.rows()), self.robot.start_ns)
         found.slices += [link.to_main_brain.slices, link.to_router.slices]
         flows.connect_all(self.robot, processors, buses, link)
 

@@ -24,7 +24,19 @@ from ranger_sim.foundation.quantities import (
     in_base_units,
 )
 
-__all__ = ["ANGLES", "ENERGIES_WH", "LENGTHS", "SHARES", "SLOPES", "TIMES", "Quantity", "Value", "WholeNumber", "Word"]
+__all__ = [
+    "ANGLES",
+    "ENERGIES_WH",
+    "LENGTHS",
+    "SHARES",
+    "SLOPES",
+    "TIMES",
+    "OrAll",
+    "Quantity",
+    "Value",
+    "WholeNumber",
+    "Word",
+]
 __all__ += ["RATES_HZ", "Unit", "duration_text", "figure", "length_text", "number", "quantity", "whole_number", "word"]
 
 # Text of this form is a value, not an option: so `--time -1s` reaches its check (`-1` alone would by default).
@@ -83,6 +95,20 @@ class Quantity:
     def text(self, value: float) -> str:
         """Digits that are read back as the very same number; with the unit if 1 of it is 1 in SI."""
         return f"{value!r}{next((unit for unit, size in self.units.items() if size == 1.0), '')}"
+
+
+@dataclass(frozen=True)
+class OrAll:
+    """A quantity, or the word `all`, which is infinity."""
+
+    quantity: Quantity
+
+    def __call__(self, text: str) -> float:
+        return math.inf if text.strip() == "all" else self.quantity(text)
+
+    def text(self, value: float) -> str:
+        """Its digits, or `all`."""
+        return "all" if math.isinf(value) else self.quantity.text(value)
 
 
 @dataclass(frozen=True)

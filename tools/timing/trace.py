@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import pathlib
 import shlex
 import urllib.parse
@@ -14,7 +15,7 @@ from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.stop_rule import MOST_TIME_S
 from ranger_sim.tools.command_line.files import replace_file
 from ranger_sim.tools.command_line.options import Option, add_all
-from ranger_sim.tools.command_line.units import TIMES, quantity, word
+from ranger_sim.tools.command_line.units import TIMES, OrAll, quantity, word
 from ranger_sim.tools.timing.trace_server import PORT, VIEWER, TraceServer
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 LONGEST_NAP_S = 1.0  # so that Ctrl-C acts soon; chosen by us
 SHOWN_S = 0.02  # around the time: ten slots of the main brain, chosen by us
+DETAIL_S = 10.0  # a viewer in a browser opens 100 MB in seconds; chosen by us
 KEPT_S = 1.0  # the part of a long trace in a page for offline use: some 10 MB
 
 
@@ -40,9 +42,18 @@ OPTIONS = (
     ),
     Option(
         "--trace-last",
-        "keep only this many last seconds of virtual time; without it everything, 25 MB of disk a second",
+        "keep only this many last seconds of virtual time",
         quantity(TIMES, "s", above=0.0, most=MOST_TIME_S),
         "10s",
+        of_run=False,
+    ),
+    Option(
+        "--trace-detail",
+        "what boards, buses and links do: for this long before the end, and around the first faults; all: as long as "
+        "the rest, 25 MB of disk a second (default 10s)",
+        OrAll(quantity(TIMES, "s", above=0.0, most=MOST_TIME_S)),
+        "10s",
+        default=DETAIL_S,
         of_run=False,
     ),
 )
@@ -63,6 +74,8 @@ def check(given: argparse.Namespace) -> None:
     """UserError, before anything runs, for an impossible file."""
     if given.trace_last and not given.trace:
         raise UserError("--trace-last needs --trace FILE")
+    if given.trace_detail != DETAIL_S and not given.trace:
+        raise UserError("--trace-detail needs --trace FILE")
     for path in paths_of(given):
         from ranger_sim.harness.timeline import files
 
@@ -76,7 +89,7 @@ def attach(robot: Ranger, given: argparse.Namespace) -> Timeline | None:
         return None
     from ranger_sim.ranger.timeline import Timeline
 
-    return Timeline(robot, given.trace_last)
+    return Timeline(robot, given.trace_last, None if math.isinf(given.trace_detail) else given.trace_detail)
 
 
 def write(timeline: Timeline | None, given: argparse.Namespace, console: Console) -> None:

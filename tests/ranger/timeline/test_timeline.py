@@ -378,3 +378,73 @@ def test_a_disk_that_fills_up_while_the_file_is_written_is_reported_in_one_line_
     with pytest.raises(UserError, match=r"run\.pftrace: cannot be written: No space left on device"):
         files.write(run.events, tmp_path / "run.pftrace", "")
     assert list(tmp_path.iterdir()) == []
+
+
+# --- only a part in detail --------------------------------------------------------------------------------
+
+
+def walked(detail_s):
+    """Events of 5.5 s with a fault at 2 s, with what boards do in detail for so long."""
+    robot = Ranger(Scenario())
+    try:
+        timeline = Timeline(robot, detail_s=detail_s)
+        robot.inject("MCH.joint_encoder", "stuck", at="2 s", until="2.1 s")
+        robot.run_for(5.5)
+        return timeline.events(), timeline.windows()
+    finally:
+        robot.close()
+
+
+def tracks(events):
+    """{(path, level): slices} of a timeline."""
+    found = {(each.path, 0): each for each in events.slices}
+    return found | {(each.path, 1): each.inside for each in events.slices if each.inside is not None}
+
+
+def arrows_of(events):
+    """The pairs of slices that an arrow joins, by track and start."""
+    ends = collections.defaultdict(list)
+    for path, slices in tracks(events).items():
+        for at, number, is_end in zip(slices.flow_at, slices.flow_id, slices.flow_ends, strict=True):
+            ends[number].append((bool(is_end), path, int(slices.start_ns[at])))
+    return {tuple(sorted(pair)) for pair in ends.values()}
+
+
+def test_a_part_in_detail_is_what_the_whole_has_there_and_all_else_is_there_as_a_whole():
+    whole, _ = walked(None)
+    part, windows = walked(0.7)
+    assert [name for (path, _), each in tracks(part).items() if path == ("Detail",) for name in each.names]
+    [fault] = [each for each in part.instants if each.path == ("Faults",)]
+    begins = [event.time_ns for event in fault.events if event.name.startswith(("activated", "acted"))]
+    assert windows == [(begins[0] - 10**9, begins[-1] + 10**9), (part.end_ns - 700_000_000, part.end_ns)]
+    assert 1.9e9 < begins[0] <= begins[-1] < 2.2e9 and 5.4e9 < part.end_ns < 5.6e9
+    # states, variables and the body over the whole time
+    assert [each.path for each in part.counters] == [each.path for each in whole.counters]
+    for one, other in zip(part.counters, whole.counters, strict=True):
+        assert np.array_equal(one.time_ns, other.time_ns) and np.array_equal(one.values, other.values), one.path
+    assert [len(each.events) for each in part.instants] == [len(each.events) for each in whole.instants]
+    # slices: those of the windows, where both have begin and end in them
+    shown = tracks(part)
+    for path, slices in tracks(whole).items():
+        mine = shown[path]
+        if path[0][0] not in ("Boards", "Buses", "Link"):
+            assert np.array_equal(slices.start_ns, mine.start_ns), path
+            continue
+        for begin, end in windows:
+            expected, found = (
+                each.start_ns[(each.start_ns >= begin) & (each.end_ns <= end - 3_000_000)] for each in (slices, mine)
+            )
+            assert np.array_equal(expected, found), path
+        outside = np.ones(len(mine), dtype=bool)
+        for begin, end in windows:
+            outside &= (mine.end_ns < begin) | (mine.start_ns > end)
+        assert not outside.any(), path
+    # arrows: no other ones than the whole has, and all but those that cross an edge
+    arrows, all_arrows = arrows_of(part), arrows_of(whole)
+    assert arrows <= all_arrows
+    inside = {
+        pair
+        for pair in all_arrows
+        if any(all(begin + 10**8 <= time <= end - 10**8 for *_, time in pair) for begin, end in windows)
+    }
+    assert len(inside) > 50_000 and inside <= arrows

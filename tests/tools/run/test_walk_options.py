@@ -89,6 +89,8 @@ def test_options_that_only_choose_what_is_kept_are_not_of_the_run():
         "c.vcd",
         "--trace-last",
         "1s",
+        "--trace-detail",
+        "all",
         "--imu-offer",
         "pty",
     ]

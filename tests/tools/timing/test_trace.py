@@ -58,6 +58,19 @@ def test_only_the_last_part_is_written_where_that_is_asked_for(tmp_path, capsys)
     assert 37_000_000 < read.begin_ns and 49_900_000 < read.end_ns < 50_200_000
 
 
+def test_boards_are_in_detail_for_ten_seconds_unless_it_is_asked_otherwise(tmp_path, capsys):
+    sizes = {}
+    for length, more in {"default": (), "all": ("--trace-detail", "all"), "5 ms": ("--trace-detail", "5ms")}.items():
+        path = tmp_path / "run.pftrace"
+        assert cli.main([*RUN, "--trace", str(path), *more]) == 0
+        sizes[length] = path.read_bytes(), len(perfetto_reader.read(path).find("Boards", "MCH", "slots").slices)
+    assert sizes["default"] == sizes["all"]  # 50 ms
+    assert 0 < sizes["5 ms"][1] < sizes["all"][1] / 5
+    with pytest.raises(SystemExit):
+        cli.main(["walk", "--trace", "a.pftrace", "--trace-detail", "most"])
+    assert "'most' is not a number" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
@@ -65,6 +78,7 @@ def test_only_the_last_part_is_written_where_that_is_asked_for(tmp_path, capsys)
         (["--trace", "nowhere/run.pftrace"], "cannot be written"),
         (["--trace", "."], "is not a format"),
         (["--trace-last", "10s"], "--trace-last needs --trace"),
+        (["--trace-detail", "all"], "--trace-detail needs --trace"),
     ],
 )
 def test_a_file_that_cannot_be_written_is_reported_in_one_line_before_anything_runs(
