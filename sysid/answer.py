@@ -8,6 +8,8 @@ import numpy as np
 
 from ranger_sim.sysid import by_candidates, model_file, noise_floor, predicted_ties, repairs
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
+from ranger_sim.sysid.free_simulation import entrance
+from ranger_sim.sysid.free_simulation.linearised import LinearisedRecording
 from ranger_sim.sysid.held_out import Held
 from ranger_sim.sysid.machine import Recording
 from ranger_sim.sysid.machines import ROBOT
@@ -232,6 +234,9 @@ def _channels(found: Diagnosis) -> list[ChannelMisfit]:
 def _subsystem(found: Diagnosis) -> str | None:
     if found.named and not found.doubtful:
         return found.named[0].effect.subsystem
+    simulated = [each for each in found.plain.recordings if isinstance(each, LinearisedRecording)]
+    if simulated:
+        return entrance.subsystem(simulated)
     telling = found.before.telling.equation
     parts: dict[str, str] = {}
     for recording in found.plain.recordings:

@@ -9,6 +9,7 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.free_simulation import entrance
 from ranger_sim.sysid.machines import leg_swing
 from ranger_sim.sysid.machines.leg_swing import LegSwing
 from ranger_sim.sysid.pipeline import diagnose
@@ -28,8 +29,12 @@ TRUE = {
 }
 
 
-def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, with_voltage=True):
-    """A leg under a voltage of some sines: V = R I + V_c sgn I + K w, Coulomb's friction with true standstill."""
+def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, worn=0.0, wound=0.0, with_voltage=True):
+    """A leg under a voltage of some sines: V = R I + V_c sgn I + K w, Coulomb's friction with true standstill.
+
+    About an angle of 0.1: unknown, a torque; tight, a friction; worn, a resistance of the brushes; wound, a scale of the
+    sensor of the current.
+    """
     rng = generator(seed, "swing")
     parts = [(rng.uniform(0.9, 2.0), rng.uniform(0.4, 7.0), rng.uniform(0.0, 6.0)) for _ in range(5)]
     K, J, k, ahead, C0, C1, mu, R, drop = TRUE.values()
@@ -40,7 +45,9 @@ def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, wit
         t = n * dt
         V = sum(size * math.sin(rate * t + phase) for size, rate, phase in parts)
         driving = V - K * w
-        current = math.copysign(max(abs(driving) - drop, 0.0), driving) / (R * (1.0 + heating * heat))
+        current = math.copysign(max(abs(driving) - drop, 0.0), driving) / (
+            R * (1.0 + heating * heat + worn * math.exp(-(((q - 0.1) / 0.05) ** 2)))
+        )
         heat += dt / 10.0 * (current * current - heat)
         if n % FINE == 0:
             out[n // FINE] = V, current, q
@@ -54,7 +61,7 @@ def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, wit
         w = w_new
     V, current, q = out.T
     V = V + 0.01 * rng.normal(size=SIZE)
-    current = current + offset_A + 0.02 * rng.normal(size=SIZE)
+    current = current * (1.0 + wound * np.exp(-(((q - 0.1) / 0.05) ** 2))) + offset_A + 0.02 * rng.normal(size=SIZE)
     q = np.round((q + 3e-4 * rng.normal(size=SIZE)) / COUNT_RAD) * COUNT_RAD
     columns = {"hip_angle_rad": q, "current_A": current} | ({"voltage_V": V} if with_voltage else {})
     return Table(np.arange(SIZE) * STEP_S, columns, (slice(0, SIZE),), f"swing {seed}")
@@ -90,11 +97,29 @@ def test_what_is_wrong_is_named_with_its_size(fault, cause, coefficient):
     assert first["value"] == pytest.approx(coefficient, rel=0.2)
 
 
-@pytest.mark.parametrize("fault", [{"unknown": 0.1}, {"unknown": 0.2}, {"tight": 0.3}])
-def test_a_torque_or_a_friction_of_no_known_kind_is_detected_and_given_no_name(fault):
+@pytest.mark.parametrize(
+    ("fault", "part"),
+    [
+        ({"unknown": 0.1}, "mechanical"),
+        ({"unknown": 0.2}, "mechanical"),
+        ({"tight": 0.3}, "mechanical"),
+        ({"worn": 0.3}, "electrical"),
+    ],
+)
+def test_what_is_of_no_known_kind_is_detected_and_given_a_part_and_no_name(fault, part):
     found = diagnosed(3, **fault)
     assert found["detected"] and found["abstained"] and found["causes"] == []
-    assert found["subsystem"] == "mechanical"
+    assert found["subsystem"] == part
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+@pytest.mark.parametrize(
+    ("fault", "part"),
+    [({"unknown": 0.1}, "mechanical"), ({"tight": 0.2}, "mechanical"), ({"worn": 0.3}, "electrical"),
+     ({"wound": 0.2}, "sensor")],
+)  # fmt: skip
+def test_the_part_is_that_where_it_enters_whichever_channel_shows_it(seed, fault, part):
+    assert entrance.subsystem([LegSwing().prepare(swing(seed, **fault))]) == part
 
 
 def test_without_the_voltage_the_current_drives_and_a_sound_leg_raises_no_alarm():
