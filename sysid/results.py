@@ -274,10 +274,11 @@ class DiagnosisEvidence:
 class DiagnosisResult:
     """The errors of a simulation by measured data.
 
-    detected: something is wrong; abstained: and no cause is named; subsystem: the part where it shows; causes: the
-    likeliest first; gain: None without held-out data or a cause; next_experiment: what separates tied causes;
-    model_file: where the command wrote the extended model; data_ledger: by recording and channel, what became of every
-    sample; extended_model: the model with its named causes as text of a TOML file, "" where there is none.
+    detected: something is wrong; abstained: and no cause is named; subsystem: the part where it enters, of equations
+    without a simulator that where it shows; causes: the likeliest first; gain: None without held-out data or a cause;
+    next_experiment: what separates tied causes; model_file: where the command wrote the extended model; data_ledger:
+    by recording and channel, what became of every sample; extended_model: the model with its named causes as text of a
+    TOML file, "" where there is none.
     """
 
     detected: bool

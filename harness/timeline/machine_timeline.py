@@ -31,9 +31,10 @@ class MachineTimeline:
     """Attached to a machine before it runs: keeps the last `last_s` seconds of virtual time, or everything (None).
 
     detail_s: what processors, buses and links do is kept for so many seconds before the end, and for a second before
-    and after each of the first faults begins to act; None: as long as the rest. It changes nothing: the trace digest stays the same. Boards may run in separate processes; one that is outside
-    shows nothing of what its processor does. Memory is flat with `last_s`; without, everything is in unnamed temporary
-    files. Use `write` (format by the file's suffix), or `events` to inspect it in a test.
+    and after each of the first faults is activated and first acts; None: as long as the rest. It changes nothing: the
+    trace digest stays the same. Boards may run in separate processes; one that is outside shows nothing of what its
+    processor does. Memory is flat with `last_s`; without, everything is in unnamed temporary files. Use `write`
+    (format by the file's suffix), or `events` to inspect it in a test.
     """
 
     name = "machine"  # the root of its tracks

@@ -32,8 +32,8 @@ TRUE = {
 def swing(seed, bend=0.0, heating=0.0, offset_A=0.0, unknown=0.0, tight=0.0, worn=0.0, wound=0.0, with_voltage=True):
     """A leg under a voltage of some sines: V = R I + V_c sgn I + K w, Coulomb's friction with true standstill.
 
-    About an angle of 0.1: unknown, a torque; tight, a friction; worn, a resistance of the brushes; wound, a scale of the
-    sensor of the current.
+    About an angle of 0.1: unknown, a torque; tight, a friction; worn, a resistance of the brushes; wound, a scale of
+    the current's sensor.
     """
     rng = generator(seed, "swing")
     parts = [(rng.uniform(0.9, 2.0), rng.uniform(0.4, 7.0), rng.uniform(0.0, 6.0)) for _ in range(5)]
