@@ -105,6 +105,43 @@ def test_every_actuator_has_a_board_and_gains_by_the_models_own_law_or_the_inert
     assert elbow.damping * elbow.per_A == pytest.approx(4.0)
 
 
+def one_joint(folder, mass, joint="", motor=100.0):
+    """A point mass at the end of a level rod of half a metre, with a motor of so many N m; its only joint."""
+    file = folder / "rod.xml"
+    file.write_text(
+        f"""<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0" {joint}/>
+        <inertial mass="{mass}" pos="0.5 0 0" diaginertia="1e-9 1e-9 1e-9"/></body></worldbody>
+        <actuator><motor name="motor" joint="hinge" ctrlrange="-{motor} {motor}"/></actuator></mujoco>"""
+    )
+    [found] = from_mujoco.read(file).joints
+    return found
+
+
+@pytest.mark.parametrize(
+    ("mass", "joint", "stiffness", "source"),
+    [
+        # m g r = 4.905 N m may bend it by 0.02 rad; its inertia of 0.25 kg m2 at 20 rad/s needs 100 N m/rad
+        (1.0, "", 245.25, "weight"),
+        (0.1, 'damping="3"', 120.0, "viscous"),  # 40 rad/s; the weight needs 24.5, the inertia 10
+        (0.1, 'stiffness="7"', 24.525 + 35.0, "weight"),  # five springs of its own in addition
+    ],
+)
+def test_a_joint_without_a_law_is_as_stiff_as_what_it_carries_needs(tmp_path, mass, joint, stiffness, source):
+    found = one_joint(tmp_path, mass, joint)
+    assert found.stiffness * found.per_A == pytest.approx(stiffness, rel=1e-6) and source in found.source
+    critical = 2.0 * (stiffness * 0.25 * mass) ** 0.5
+    assert found.damping * found.per_A == pytest.approx(0.8 * critical, rel=1e-6)
+    assert found.integral * found.per_A == pytest.approx(4.0 * stiffness, rel=1e-6)
+    assert found.reach == pytest.approx(0.2)  # 100 N m are plenty
+
+
+@pytest.mark.parametrize(("motor", "reach"), [(12.0, 0.2), (9.0, 0.092440), (7.2, 0.0089458), (7.0, 0.004)])
+def test_a_joint_moves_as_far_as_its_force_allows(tmp_path, motor, reach):
+    """Two sines, 0.35 of the reach at 0.5 Hz and 0.15 at 3.1 Hz: at most 60.363 / s^2 of the reach, so 15.091 N m for
+    1 rad; 0.7 of the motor's torque is for that, less the weight's 4.905 N m, but 0.004 rad it always moves."""
+    assert one_joint(tmp_path, 1.0, motor=motor).reach == pytest.approx(reach, rel=1e-3)
+
+
 def test_an_included_file_and_an_asset_come_along(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "tetra.obj").write_text(
