@@ -8,6 +8,7 @@ import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid.dataset import Array, Finding
+from ranger_sim.sysid.free_simulation import numerical_floor
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 from ranger_sim.sysid.machine import Machine, Recording
 from ranger_sim.sysid.regression import Regression
@@ -15,7 +16,6 @@ from ranger_sim.sysid.regression import Regression
 RANK = 1e-5  # of the largest singular value: derivatives by differences are right to a part in a million
 IN_IT = 0.1  # of the direction that nothing determines: a smaller part is not of it
 ALIKE = 0.95  # correlation of two estimates above which only a combination of them is known
-FINER = 16  # steps of the check, for each of the simulator's
 COARSE = 0.15  # of an output's noise: 2 % of its square, which an alarm needs
 TOO_COARSE = 1.0  # the same, from which on no cause is named
 
@@ -66,25 +66,12 @@ def limits(machine: Machine, fit: TrajectoryFit) -> list[Finding]:
 
 def steps(fit: TrajectoryFit) -> list[Finding]:
     """Outputs whose prediction the simulator's own steps move by a part of their noise; steps of a sixteenth."""
-    assert fit.predictor is not None
-    now, predictor = fit.simulator, fit.predictor
-    finer = now.stepping(dataclasses.replace(now.numerics, parts=FINER * now.numerics.parts))
-    entering = fit.entering()
-    f, g = (each.at(fit.x, fit.p_at, each.driven(fit.u, entering))[0] for each in (now, finer))
-    moved: Array = g - f
-    moved[fit.ends] = 0.0
-    forced = np.concatenate((moved[:, :, None], fit.lin.f_p), axis=2)
-    shown = np.concatenate((np.zeros((*fit.y.shape, 1)), fit.lin.h_p), axis=2)
-    white = predictor.white(predictor.errors(forced, shown)) / predictor.unit[None, :, None]
-    stacked = white.reshape(-1, white.shape[2])
-    a, b = stacked[:, 1:], stacked[:, 0]
-    left = (b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]).reshape(fit.y.shape)
     found = []
-    for each, size in zip(fit.machine.outputs, np.sqrt(np.mean(left**2, axis=0)).tolist(), strict=True):
+    for each, size in zip(fit.machine.outputs, numerical_floor.by_finer_steps(fit).tolist(), strict=True):
         if size > COARSE:
             text = (
                 f"steps of a sixteenth move the simulated {each.channel} by {size:.2g} of its noise from row to row: "
-                f"a finding may be the simulator's own; take more than {now.numerics.parts} `parts`"
+                f"a finding may be the simulator's own; take more than {fit.simulator.numerics.parts} `parts`"
             )
             kind = "too_coarse" if size > TOO_COARSE else "coarse"
             found.append(Finding(each.channel, kind, 0.0, 0.0, size, "", text))

@@ -41,6 +41,8 @@ class SimulatedMachine(DeclaredMachine):
         fit = TrajectoryFit(self, table, -(-len(table) // MOST_ROWS))
         fit.settle(follow=True)
         _chosen(fit)
+        if numerical_floor.take_finer_steps(fit, AGAIN):
+            _chosen(fit)
         return linearised.one_step_ahead(fit)
 
     def effects(self, recordings: Sequence[Recording]) -> list[Effect]:

@@ -9,7 +9,10 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 
 ROUNDS = 4  # with other numerics, from the fit without them
+FINE_ENOUGH = 0.05  # of an output's noise: a quarter of a percent of its square. Chosen by us
+MORE, MOST_PARTS = 4, 32  # times as many steps; the most from sample to sample
 NARROW = 0.25  # of what is open at standstill
+FINER = 16  # steps of a check, for each of the simulator's
 OPEN = 1e-6  # of a state's size: a law that leaves less open is not open
 
 
@@ -21,6 +24,45 @@ def moved(fit: TrajectoryFit) -> Array:
         other.settle(ROUNDS)
         out.append(other.p[count:] - fit.p_at[count:])
     return np.array(out)
+
+
+def by_finer_steps(fit: TrajectoryFit) -> Array:
+    """(outputs,) rms by which steps of a sixteenth move each output from row to row, in its noise.
+
+    After the parameters have taken what they can; where the last round was.
+    """
+    now, predictor = fit.simulator, fit.predictor
+    assert predictor is not None
+    finer = now.stepping(dataclasses.replace(now.numerics, parts=FINER * now.numerics.parts))
+    entering = fit.entering()
+    f, g = (each.at(fit.x, fit.p, each.driven(fit.u, entering))[0] for each in (now, finer))
+    moved: Array = g - f
+    moved[fit.ends] = 0.0
+    forced = np.concatenate((moved[:, :, None], fit.lin.f_p), axis=2)
+    shown = np.concatenate((np.zeros((*fit.y.shape, 1)), fit.lin.h_p), axis=2)
+    white = predictor.white(predictor.errors(forced, shown)) / predictor.unit[None, :, None]
+    stacked = white.reshape(-1, white.shape[2])
+    a, b = stacked[:, 1:], stacked[:, 0]
+    left = (b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]).reshape(fit.y.shape)
+    return np.asarray(np.sqrt(np.mean(left**2, axis=0)))
+
+
+def take_finer_steps(fit: TrajectoryFit, rounds: int) -> bool:
+    """Settle the fit with more steps from sample to sample, until they move no output by much of its noise.
+
+    True where steps were added, up to MOST_PARTS.
+    """
+    before = fit.simulator.numerics.parts
+    while MORE * fit.simulator.numerics.parts <= MOST_PARTS:
+        p = fit.p
+        fit.round_again()
+        fit.p = p
+        if not np.any(by_finer_steps(fit) > FINE_ENOUGH):
+            break
+        now = fit.simulator.numerics
+        fit.simulator = fit.simulator.stepping(dataclasses.replace(now, parts=MORE * now.parts))
+        fit.settle_anew(rounds)
+    return fit.simulator.numerics.parts > before
 
 
 def _otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:

@@ -108,6 +108,14 @@ def test_a_larger_effect_with_a_worse_answer_is_found():
     assert list(tables.worse([*rising, record(8.0, right=False, tied=True)])) == []
 
 
+def test_a_sound_recording_above_its_noise_floor_is_an_alarm():
+    sound = {"hidden": "", "detected": False, "causes": [], "right": False}
+    quiet, loud = record(0.0, **sound), record(0.0, unexplained=True, **sound)
+    [row] = tables.alarms_by_cell([quiet, loud, quiet]).values()
+    assert row == [1, 3, {"above its noise floor": 1}]
+    assert {each[2:] for each in tables.by_level([quiet, loud])} == {(1, 2)}
+
+
 def test_limits_of_rates_are_those_of_the_binomial_law():
     assert tables.at_most(0, 200) == pytest.approx(1.0 - 0.025 ** (1.0 / 200))
     assert tables.at_most(3, 3) == 1.0
@@ -126,7 +134,7 @@ def test_a_run_goes_on_where_it_was_stopped_and_prints_its_seed(tmp_path, capsys
     path.write_text(json.dumps(kept))
     command.main(chosen)
     shown = capsys.readouterr().out
-    assert "seed 3" in shown and f"| {cell.name} | {int(first['detected'])} of 1 |" in shown
+    assert "seed 3" in shown and f"| {cell.name} | {int(tables.alarm(first))} of 1 |" in shown
     with pytest.raises(SystemExit):
         command.main(["--out", str(path), "--cells", "no such cell"])
     assert "no cell has these words" in capsys.readouterr().err
@@ -136,4 +144,4 @@ def test_a_sample_of_sound_recordings_raises_no_alarm():
     """Of three, with alarms in 2 % of them, more than one comes in one of 800. The documentation has the cells in which
     there are more."""
     chosen = [each for each in CELLS if each.machine == "axis" and each.rate_hz <= 250][:3]
-    assert sum(answer(dataclasses.astuple(each), 11)["detected"] for each in chosen) <= 1
+    assert sum(tables.alarm(answer(dataclasses.astuple(each), 11)) for each in chosen) <= 1

@@ -40,6 +40,8 @@ def answer(levels, seed, name="", strength=0.0):
         record |= {"refused": str(error), "right": False, "tied": False}
         return record | {"detected": True, "causes": [], "bic": 0.0, "cpu_s": process_cpu_s() - generated}
     record |= {"detected": result.detected, "causes": [f"{each.name} at {each.at}" for each in result.causes]}
+    seen = result.evidence
+    record |= {"unexplained": bool(seen.above_noise_floor or seen.learnable or seen.impossible)}  # exit code 3
     record |= {"bic": result.causes[0].evidence.bic if result.causes else 0.0}
     errors = result.evidence.held_out_errors or {}
     record |= {"errors": {each: [value.before, value.after, value.black_box] for each, value in errors.items()}}

@@ -15,7 +15,13 @@ def short(record):
     """One answer in a few words."""
     if record["refused"]:
         return f"refused: {record['refused']}"
-    return " + ".join(record["causes"]) or ("abstains" if record["detected"] else "nothing")
+    nothing = "above its noise floor" if record.get("unexplained") else "nothing"
+    return " + ".join(record["causes"]) or ("abstains" if record["detected"] else nothing)
+
+
+def alarm(record):
+    """Whether a record says that something is wrong: exit code 1 or 3."""
+    return record["detected"] or record.get("unexplained", False)
 
 
 def at_most(count, of):
@@ -29,9 +35,9 @@ def alarms_by_cell(answers):
     for each in answers:
         if not each["hidden"]:
             row = found[each["cell"]]
-            row[0] += each["detected"]
+            row[0] += alarm(each)
             row[1] += 1
-            row[2].update([short(each)] if each["detected"] else [])
+            row[2].update([short(each)] if alarm(each) else [])
     return {name: row for name, row in found.items() if row[1]}
 
 
@@ -42,7 +48,7 @@ def by_level(answers):
         for level in FACTORS[factor]:
             met = [each for each in answers if not each["hidden"] and each["cell"].split()[place] == str(level)]
             if met:
-                yield factor, level, sum(each["detected"] for each in met), len(met)
+                yield factor, level, sum(alarm(each) for each in met), len(met)
 
 
 def by_strength(answers):
