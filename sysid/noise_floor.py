@@ -20,6 +20,7 @@ from ranger_sim.sysid.results import NoiseFloor
 FAR = 4.0  # times the noise of the channel itself: a residual above it is not at the noise floor
 # Of what was measured: a smaller error in free simulation or on held-out data may be the integrator's. Chosen by us
 LARGE = 0.05
+FAST = 0.25  # of the rows' frequency: machines move below that. Chosen by us
 SETTLE = 2000  # samples, longer than the memory of any noise here
 
 
@@ -33,9 +34,11 @@ def by_channels(
 ) -> dict[str, NoiseFloor]:
     """By equation, in its band. sizes: of what was measured; an error below a part of it is at the floor."""
     found = {}
-    for name, (left, _) in _left(regression).items():
+    for name, (left, residual) in _left(regression).items():
         own = [_own(each, name) for each in regression.recordings if name in each.equations]
         noise = float(np.sqrt(np.mean(np.square(own))))
+        if any(name not in each.own_noise for each in regression.recordings):
+            noise = max(noise, _of_fast_part(regression, name, residual))
         if sizes is not None and left < LARGE * sizes[name]:
             noise = max(noise, left)
         found[name] = NoiseFloor(left, noise, _unit(regression, name), held_out)
@@ -52,12 +55,7 @@ def by_band_or_repeats(regression: Regression, held_out: bool = False) -> dict[s
         if freedom:
             noise = math.sqrt(float(error @ error) / freedom)
         elif above:
-            first = regression.recordings[0]
-            memory, deviation = autoregression_above(
-                residual, part.valid & ~part.starts, above, first.width, first.every
-            )
-            impulse = lfilter([1.0], np.concatenate(([1.0], -memory)), np.eye(1, SETTLE)[0])
-            noise = deviation * float(np.linalg.norm(impulse))
+            noise = _of_fast_part(regression, name, residual, above)
         else:
             continue
         floor = max(each.floors.get(name, 0.0) for each in regression.recordings)
@@ -83,6 +81,18 @@ def _left(regression: Regression) -> dict[str, tuple[float, Array]]:
         if np.any(good):
             out[name] = (float(np.sqrt(np.mean(residual[good] ** 2))), residual)
     return out
+
+
+def _of_fast_part(regression: Regression, name: str, residual: Array, above: float = FAST) -> float:
+    """Noise that a residual's part above this share of the rows' frequency is of, with a memory that it may have.
+
+    The response alone does not show it: the noise of what is differentiated is in the columns, and that of a slow
+    sensor has a memory.
+    """
+    first, part = regression.recordings[0], regression.parts[name]
+    memory, deviation = autoregression_above(residual, part.valid & ~part.starts, above, first.width, first.every)
+    impulse = lfilter([1.0], np.concatenate(([1.0], -memory)), np.eye(1, SETTLE)[0])
+    return deviation * float(np.linalg.norm(impulse))
 
 
 def _own(recording: Recording, name: str) -> float:
