@@ -1,13 +1,12 @@
 """Check of a user's own simulator before any verdict: what these recordings determine, limits, and its own steps."""
 
-import dataclasses
 import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from ranger_sim.foundation.user_error import UserError
-from ranger_sim.sysid.dataset import Array, Finding
+from ranger_sim.sysid.dataset import Finding
 from ranger_sim.sysid.free_simulation import numerical_floor
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 from ranger_sim.sysid.machine import Machine, Recording

@@ -183,12 +183,15 @@ class Simulator:
             pushed = {joint.rate: 0.5 * part_s * middle[on(joint.rate)] / self._inertia(joint, values)
                       for joint in machine.joints}  # fmt: skip
             before = {**after, **{name: after[name] + push for name, push in pushed.items()}}
-            after = dict(machine.step(before, middle, values, part_s))
+            after = {
+                name: np.broadcast_to(each, shape)
+                for name, each in machine.step(before, middle, values, part_s).items()
+            }
             after |= {name: after[name] + push for name, push in pushed.items()}
         seen = dict(machine.observe(states, driven.samples, values))
         for each in machine.outputs:
             seen[each.channel] = seen[each.channel] + driven.samples[shown(each.channel)]
-        f = np.stack([np.broadcast_to(after[name], shape)[0] for name in machine.states], axis=-1)
+        f = np.stack([after[name][0] for name in machine.states], axis=-1)
         h = np.stack([np.broadcast_to(seen[each.channel], shape)[0] for each in machine.outputs], axis=-1)
         return f, h
 
