@@ -77,10 +77,12 @@ def table(**columns):
     return Table(TIME_S, made, RUNS, "toy run", {"y_m": 0.6})
 
 
-@pytest.fixture(autouse=True)
-def as_it_steps(monkeypatch):
+@pytest.fixture(scope="module", autouse=True)
+def as_it_steps():
     """The toy's one step of Euler from sample to sample is what is worked out by hand here."""
-    monkeypatch.setattr(numerical_floor, "MOST_PARTS", 1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(numerical_floor, "MOST_PARTS", 1)
+        yield
 
 
 def middle(values):
