@@ -10,7 +10,7 @@ from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 
 ROUNDS = 4  # with other numerics, from the fit without them
 FINE_ENOUGH = 0.05  # of an output's noise: a quarter of a percent of its square. Chosen by us
-MORE, MOST_PARTS = 4, 32  # times as many steps; the most from sample to sample
+MORE, MOST_PARTS = 4, 64  # times as many steps; the most from sample to sample
 NARROW = 0.25  # of what is open at standstill
 FINER = 16  # steps of a check, for each of the simulator's
 OPEN = 1e-6  # of a state's size: a law that leaves less open is not open

@@ -113,6 +113,36 @@ def test_the_band_above_the_machine_s_motion_gives_the_noise_below_it_too():
     assert floor.channel == pytest.approx(0.1, rel=0.1) and noise_floor.far(floor)
 
 
+def with_a_column(noise, misfit=0.0, memory=0.0):
+    """An equation whose response is exact; its one column, of coefficient 3, has the noise. misfit: a slow one."""
+    random = generator(7, "noise floor")
+    rows = 4000
+    time = np.arange(rows)
+    shocks, error = noise * np.sqrt(1.0 - memory**2) * random.normal(size=rows), np.zeros(rows)
+    for row in range(1, rows):
+        error[row] = memory * error[row - 1] + shocks[row]
+    true = np.sin(0.02 * time) + np.sin(0.0411 * time)
+    table = Table(0.01 * time, {}, (slice(0, rows),), "run", {})
+    response = 3.0 * true + misfit * np.sin(0.0071 * time)
+    equation = Equation("force", "M", "mechanical", "N", response, {"slope": true + error}, time >= 0)
+    return noise_floor.by_channels(Regression([Recording(table, {}, {"force": equation})]))["force"]
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_noise_of_a_column_and_noise_with_a_memory_are_of_the_floor(memory):
+    """A differentiated encoder is in the columns: the response alone has shown sound axes 5 to 1e12 times above it."""
+    floor = with_a_column(0.01, memory=memory)
+    assert floor.left == pytest.approx(0.03, rel=0.1)
+    # the memory is the upper limit of what the fast part shows, which has more slow noise than the likeliest one
+    assert 0.03 / 1.1 < floor.channel < 0.03 * 2.2 and not noise_floor.far(floor)
+
+
+def test_what_is_slow_and_not_of_the_noise_is_far_above_the_floor():
+    floor = with_a_column(0.01, misfit=0.5)
+    assert floor.left == pytest.approx(0.5 * np.sqrt(0.5), rel=0.1)
+    assert floor.channel == pytest.approx(0.03, rel=0.1) and noise_floor.far(floor)
+
+
 def test_nothing_is_concluded_where_no_noise_is_known():
     made = recorded(generator(6, "noise floor").normal(size=2000), whitened=False)
     assert noise_floor.by_band_or_repeats(Regression([made])) == {}

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from ranger_sim.foundation.user_error import UserError
@@ -78,3 +79,14 @@ def test_steps_that_are_long_for_the_noise_are_named_with_what_to_change(machine
     found = own_model.steps(fit)
     assert {each.channel for each in found} >= named and bool(found) == bool(named)
     assert all("take more than 1 `parts`" in each.text for each in found)
+
+
+def test_more_steps_are_taken_where_one_is_too_long_and_no_more_where_it_is_not():
+    long, short = (machine.prepare(swung_up(1)).fit for machine in (Euler(), RungeKutta()))
+    assert long.simulator.numerics.parts > 1 and own_model.steps(long) == []
+    assert short.simulator.numerics.parts == RungeKutta.parts
+    # with them Euler's rule finds the parameters that Runge and Kutta's finds; with one step it does not
+    assert long.p_at == pytest.approx(short.p_at, rel=0.01)
+    alone = TrajectoryFit(Euler(), swung_up(1))
+    alone.settle()
+    assert np.max(np.abs(alone.p / short.p_at - 1.0)) > 0.05
