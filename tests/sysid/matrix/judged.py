@@ -42,6 +42,8 @@ def answer(levels, seed, name="", strength=0.0):
     record |= {"detected": result.detected, "causes": [f"{each.name} at {each.at}" for each in result.causes]}
     seen = result.evidence
     record |= {"unexplained": bool(seen.above_noise_floor or seen.learnable or seen.impossible)}  # exit code 3
+    floors = (seen.noise_floor or {}).values()
+    record |= {"times_floor": max((each.left / each.channel for each in floors), default=0.0)}
     record |= {"bic": result.causes[0].evidence.bic if result.causes else 0.0}
     errors = result.evidence.held_out_errors or {}
     record |= {"errors": {each: [value.before, value.after, value.black_box] for each, value in errors.items()}}
