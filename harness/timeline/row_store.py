@@ -36,7 +36,7 @@ class RowStore:
         self.failure: OSError | None = None  # of the spool: the disk is full
         if last_ns is None:
             self.spool = tempfile.TemporaryFile(prefix="ranger-sim-timeline-")  # noqa: SIM115
-            weakref.finalize(self, self.spool.close)  # also of a timeline that is never closed
+            weakref.finalize(self, discard, self.spool)  # also of a timeline that is never closed
 
     def take(self, last_time_ns: int, block: bytes) -> None:
         """Keep a block whose last row is of `last_time_ns`, and drop blocks that are too old."""
@@ -58,6 +58,7 @@ class RowStore:
         if self.failure is None:
             try:
                 self.spool.write(block)
+                self.spool.flush()
             except OSError as error:
                 self.failure = error
 
@@ -66,7 +67,6 @@ class RowStore:
         if self.failure is not None:
             raise OSError(self.failure.errno, self.failure.strerror, f"rows of the timeline in {tempfile.gettempdir()}")
         if self.spool is not None:
-            self.spool.flush()
             self.spool.seek(0)
             data = self.spool.read()
             self.spool.seek(0, 2)
@@ -84,7 +84,12 @@ class RowStore:
     def close(self) -> None:
         """Close the file."""
         if self.spool is not None:
-            with contextlib.suppress(OSError):  # a full disk, which `rows` reports
-                self.spool.close()
+            discard(self.spool)
         self.blocks.clear()
         self.held.clear()
+
+
+def discard(file: Any) -> None:
+    """Close a file whose content is not needed; what it still buffers may not fit on a full disk, as `rows` reports."""
+    with contextlib.suppress(OSError):
+        file.close()
