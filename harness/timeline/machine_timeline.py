@@ -124,7 +124,8 @@ class MachineTimeline:
         end = robot.loop.time - zero
         begin = self.begin_ns if self.last_ns is None else max(self.begin_ns, end - self.last_ns)
         samples = self.samples.rows(np.float64)
-        samples = samples[samples[:, 0] * 1e9 - zero >= begin]
+        chosen = samples[:, 0] * 1e9 - zero >= begin
+        samples = samples if chosen.all() else samples[chosen]
         found = Events(begin, end, name=self.name)
         found.instants = self._happenings()
         for instants in found.instants:
@@ -189,7 +190,8 @@ class MachineTimeline:
 
     def since(self, rows: np.ndarray, begin_ns: int, time_column: int = 0) -> np.ndarray:
         """The rows whose time, mostly the first number, is in the time to be shown."""
-        return rows[rows[:, time_column] - self.robot.start_ns >= begin_ns]
+        chosen = rows[:, time_column] - self.robot.start_ns >= begin_ns
+        return rows if chosen.all() else rows[chosen]  # hundreds of megabytes are not copied
 
     def detail(self, rows: np.ndarray, time_column: int = 0) -> np.ndarray:
         """The rows whose time is in the times in detail."""
