@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ranger_sim.ranger.timeline import Timeline
 
 LONGEST_NAP_S = 1.0  # so that Ctrl-C acts soon; chosen by us
+OPENED = (".pftrace", ".perfetto-trace")  # by `trace open`
 SHOWN_S = 0.02  # around the time: ten slots of the main brain, chosen by us
 DETAIL_S = 10.0  # a viewer in a browser opens 100 MB in seconds; chosen by us
 KEPT_S = 1.0  # the part of a long trace in a page for offline use: some 10 MB
@@ -101,9 +102,8 @@ def write(timeline: Timeline | None, given: argparse.Namespace, console: Console
             timeline.write(path)
     timeline.close()
     for path in paths_of(given):
-        console.print(
-            f"timeline: {path} (ranger-sim trace open {shlex.quote(str(path))})", highlight=False, soft_wrap=True
-        )
+        how = f" (ranger-sim trace open {shlex.quote(str(path))})" if path.suffix in OPENED else ""
+        console.print(f"timeline: {path}{how}", highlight=False, soft_wrap=True)
 
 
 def register(commands: Any) -> None:
@@ -140,7 +140,7 @@ def run_open(given: argparse.Namespace) -> int:
     """Show a timeline; 0 when it was read."""
     from ranger_sim.harness.timeline import moments
 
-    if given.file.suffix not in (".pftrace", ".perfetto-trace"):
+    if given.file.suffix not in OPENED:
         raise UserError(f"trace {given.file}: only .pftrace files can be opened; a .vcd opens in GTKWave or Surfer")
     asked_ns = None if given.at is None else round(given.at * 1e9)
     moment = moments.find(given.file, asked_ns)

@@ -51,6 +51,14 @@ def test_a_walk_writes_its_timeline_in_every_format_asked_for_and_walks_as_witho
     assert sorted(tmp_path.iterdir()) == sorted(paths)  # and nothing beside
 
 
+def test_a_file_that_trace_opens_is_printed_with_the_command_for_it(tmp_path, capsys):
+    pytest.importorskip("vcd")
+    one, other = tmp_path / "a.pftrace", tmp_path / "a.vcd"
+    assert cli.main(["walk", "--time", "5ms", "--trace", str(one), "--trace", str(other)]) == 0
+    shown = capsys.readouterr().err
+    assert f"timeline: {one} (ranger-sim trace open {one})\n" in shown and f"timeline: {other}\n" in shown
+
+
 def test_only_the_last_part_is_written_where_that_is_asked_for(tmp_path, capsys):
     path = tmp_path / "last.pftrace"
     assert cli.main([*RUN, "--trace", str(path), "--trace-last", "10ms"]) == 0
