@@ -199,8 +199,8 @@ class MachineTimeline:
         windows = self.windows()
         if len(windows) == 1 and windows[0][0] <= self.begin_ns:
             return rows
-        chosen = np.zeros(len(rows), dtype=bool)
-        for begin, end in windows:
+        chosen = time >= windows[-1][0]  # what ends after the present as well
+        for begin, end in windows[:-1]:
             chosen |= (time >= begin) & (time <= end)
         return rows[chosen]
 

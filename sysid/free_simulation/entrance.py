@@ -51,17 +51,21 @@ def least(recording: LinearisedRecording, state: Array, output: Array) -> float:
     power = float(np.mean((shown / recording.predictor.unit[None, :, None]) ** 2))
     if not power > 0.0:
         return np.inf
-    return min(surprise(recording, state, output, size / np.sqrt(power)) for size in SIZES)
+    found = [surprise(recording, state, output, size / np.sqrt(power)) for size in SIZES]
+    return min((each for each in found if np.isfinite(each)), default=np.inf)
 
 
 def surprise(recording: LinearisedRecording, state: Array, output: Array, size: float) -> float:
-    """That with a noise of this size; the parameters move with it."""
+    """That with a noise of this size; the parameters move with it. NaN where the predictor has no numbers."""
     fit, lin = recording.fit, recording.linear
     noisy = dataclasses.replace(
         lin, f_u=np.concatenate((lin.f_u, state), axis=2), h_u=np.concatenate((lin.h_u, output), axis=2)
     )
-    wide = Predictor(noisy, np.append(fit.noise_u, size), fit.open_outputs(), fit.open_steps(), fit.starts,
-                     AWAY * fit.size_x, recording.predictor)  # fmt: skip
+    try:
+        wide = Predictor(noisy, np.append(fit.noise_u, size), fit.open_outputs(), fit.open_steps(), fit.starts,
+                         AWAY * fit.size_x, recording.predictor)  # fmt: skip
+    except np.linalg.LinAlgError:
+        return np.nan
     missed = np.concatenate((fit.state[:, :, None], lin.f_p), axis=2)
     shown = np.concatenate((fit.output[:, :, None], lin.h_p), axis=2)
     white = (wide.white(wide.errors(missed, shown)) / wide.unit[None, :, None]).reshape(-1, missed.shape[2])

@@ -29,13 +29,13 @@ def moved(fit: TrajectoryFit) -> Array:
 def by_finer_steps(fit: TrajectoryFit) -> Array:
     """(outputs,) rms by which steps of a sixteenth move each output from row to row, in its noise.
 
-    After the parameters have taken what they can; where the last round was.
+    After the parameters have taken what they can; where `round_again` linearised.
     """
     now, predictor = fit.simulator, fit.predictor
     assert predictor is not None
     finer = now.stepping(dataclasses.replace(now.numerics, parts=FINER * now.numerics.parts))
     entering = fit.entering()
-    f, g = (each.at(fit.x, fit.p, each.driven(fit.u, entering))[0] for each in (now, finer))
+    f, g = (each.at(fit.x, fit.p_at, each.driven(fit.u, entering))[0] for each in (now, finer))
     moved: Array = g - f
     moved[fit.ends] = 0.0
     forced = np.concatenate((moved[:, :, None], fit.lin.f_p), axis=2)
