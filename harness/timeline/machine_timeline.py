@@ -94,8 +94,11 @@ class MachineTimeline:
 
     def _of_faults(self) -> list[tuple[int, int]]:
         """Times (ns, as the machine counts them) around the beginnings of the faults that began first."""
-        stamps = {time for fault in self.robot.faults for time in (fault.activated_ns, fault.acted_ns) if time >= 0}
-        return [(time - AROUND_NS, time + AROUND_NS) for time in sorted(stamps)[: 2 * MOST_FAULTS]]
+        begun = sorted(
+            (each for each in self.robot.faults if each.activated_ns >= 0), key=lambda each: each.activated_ns
+        )
+        stamps = {time for each in begun[:MOST_FAULTS] for time in (each.activated_ns, each.acted_ns) if time >= 0}
+        return [(time - AROUND_NS, time + AROUND_NS) for time in sorted(stamps)]
 
     def windows(self) -> list[tuple[int, int]]:
         """[(begin, end)] of the times that are kept in detail, ns since the run began, in order."""
@@ -207,7 +210,7 @@ class MachineTimeline:
     def _parts(self, found: Events) -> list[Slices]:
         """A track that shows which times are in detail, where some are not."""
         windows = self.windows()
-        if windows[0][0] <= found.begin_ns:
+        if len(windows) == 1 and windows[0][0] <= found.begin_ns:
             return []
         start, end = (np.array(each, dtype=np.int64) for each in zip(*windows, strict=True))
         names = ["boards, buses and links in detail"]

@@ -23,6 +23,11 @@ PLOTS = {
 WIDTH, LEFT, GAP, TOP, ROW = 860, 235, 45, 62, 44
 
 
+def inside(value: float, limits: tuple, ends: tuple) -> float:
+    """As `place`; values beyond the limits are drawn at the end."""
+    return place(min(max(value, limits[0]), limits[1]), limits, ends)
+
+
 def plot(name: str, rows: list[dict], ends: tuple[float, float], bottom: float) -> list[str]:
     """One candidate: an interval for each set of figures."""
     title, limits, ticks, printed, by_hand = PLOTS[name]
@@ -36,11 +41,11 @@ def plot(name: str, rows: list[dict], ends: tuple[float, float], bottom: float) 
     for number, row in enumerate(rows):
         y = TOP + (number + 0.5) * ROW
         tied = row["hypotheses"]
-        told = next((each["values"][name] for each in tied if name in each["wrong"]), None)
-        told = told or row["estimates"][name]
-        low, high = (place(min(max(end, limits[0]), limits[1]), limits, ends) for end in told["ci95"])
+        found = next((each["values"][name] for each in tied if name in each["wrong"]), None)
+        found = found or row["estimates"][name]
+        low, high = (inside(end, limits, ends) for end in found["ci95"])
         parts.append(line(low, y, high, y, BLUE, 4.0 if row["named"].count(name) else 2.0))
-        parts.append(f'<circle cx="{place(told["value"], limits, ends):g}" cy="{y:g}" r="5" fill="{BLUE}"/>')
+        parts.append(f'<circle cx="{inside(found["value"], limits, ends):g}" cy="{y:g}" r="5" fill="{BLUE}"/>')
     return parts
 
 

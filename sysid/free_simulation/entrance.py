@@ -68,8 +68,5 @@ def surprise(recording: LinearisedRecording, state: Array, output: Array, size: 
         return np.nan
     missed = np.concatenate((fit.state[:, :, None], lin.f_p), axis=2)
     shown = np.concatenate((fit.output[:, :, None], lin.h_p), axis=2)
-    white = (wide.white(wide.errors(missed, shown)) / wide.unit[None, :, None]).reshape(-1, missed.shape[2])
-    a, b = white[:, 1:], white[:, 0]
-    left = b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]
-    diagonal = wide.spread[:, np.arange(wide.o), np.arange(wide.o)]
-    return float(left @ left) + 2.0 * float(np.sum(np.log(diagonal)))
+    left = wide.left(missed, shown).reshape(-1)
+    return float(left @ left) + wide.surprise_of_spread

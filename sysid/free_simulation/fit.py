@@ -123,9 +123,7 @@ class TrajectoryFit:
     def surprise(self) -> float:
         """-2 log likelihood of the recording under the last round's simulator and noise, up to a constant."""
         assert self.predictor is not None
-        errors = self.response / self.predictor.unit
-        spread = self.predictor.spread[:, np.arange(errors.shape[1]), np.arange(errors.shape[1])]
-        return float(np.sum(errors**2) + 2.0 * np.sum(np.log(spread)))
+        return float(np.sum((self.response / self.predictor.unit) ** 2) + self.predictor.surprise_of_spread)
 
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "TrajectoryFit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
@@ -307,11 +305,8 @@ class TrajectoryFit:
                                  AWAY * self.size_x, first)  # fmt: skip
             missed = np.concatenate(((self.state - moved)[:, :, None], self.lin.f_p), axis=2)
             shown = np.concatenate((self.output[:, :, None], self.lin.h_p), axis=2)
-            white = (wide.white(wide.errors(missed, shown)) / wide.unit[None, :, None]).reshape(-1, 1 + len(self.p))
-            a, b = white[:, 1:], white[:, 0]
-            left = b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]
-            diagonal = wide.spread[:, np.arange(wide.o), np.arange(wide.o)]
-            found.append((float(left @ left), 2.0 * float(np.sum(np.log(diagonal)))))
+            left = wide.left(missed, shown).reshape(-1)
+            found.append((float(left @ left), wide.surprise_of_spread))
         inflated = max(1.0, min(square for square, _ in found) / len(left))
         scores = [square / inflated + spread for square, spread in found]
         best = int(np.argmin(scores))

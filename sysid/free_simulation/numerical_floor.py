@@ -40,11 +40,7 @@ def by_finer_steps(fit: TrajectoryFit) -> Array:
     moved[fit.ends] = 0.0
     forced = np.concatenate((moved[:, :, None], fit.lin.f_p), axis=2)
     shown = np.concatenate((np.zeros((*fit.y.shape, 1)), fit.lin.h_p), axis=2)
-    white = predictor.white(predictor.errors(forced, shown)) / predictor.unit[None, :, None]
-    stacked = white.reshape(-1, white.shape[2])
-    a, b = stacked[:, 1:], stacked[:, 0]
-    left = (b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]).reshape(fit.y.shape)
-    return np.asarray(np.sqrt(np.mean(left**2, axis=0)))
+    return np.asarray(np.sqrt(np.mean(predictor.left(forced, shown) ** 2, axis=0)))
 
 
 def take_finer_steps(fit: TrajectoryFit, rounds: int) -> bool:

@@ -142,6 +142,18 @@ class Predictor:
         """(n, o, k) of one deviation each, in the channels' units."""
         return (self.unspread @ errors) * self.unit[None, :, None]
 
+    def left(self, state: Array, output: Array) -> Array:
+        """(n, o) errors of the first of these forcings, of one deviation each, after the others took what they can."""
+        white = self.white(self.errors(state, output)) / self.unit[None, :, None]
+        stacked = white.reshape(-1, white.shape[2])
+        a, b = stacked[:, 1:], stacked[:, 0]
+        return np.asarray(b - a @ np.linalg.lstsq(a, b, rcond=1e-9)[0]).reshape(white.shape[:2])
+
+    @property
+    def surprise_of_spread(self) -> float:
+        """The part of -2 log likelihood, up to a constant, that is of the errors' spread and not of the errors."""
+        return 2.0 * float(np.sum(np.log(self.spread[:, np.arange(self.o), np.arange(self.o)])))
+
     def smoothed(self, x: Array, error: Array, f_u: Array, h_u: Array, noise_u: Array) -> tuple[Array, Array]:
         """(n, s) and (n, i): the most probable deviations of states and noisy inputs, given all samples.
 

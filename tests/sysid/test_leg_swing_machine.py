@@ -119,6 +119,7 @@ def test_what_is_of_no_known_kind_is_detected_and_given_a_part_and_no_name(fault
      ({"wound": 0.2}, "sensor")],
 )  # fmt: skip
 def test_the_part_is_that_where_it_enters_whichever_channel_shows_it(seed, fault, part):
+    """On two other seeds (8 and 9) a wound sensor is taken for a torque; docs/diagnose-report.md has the rates."""
     assert entrance.subsystem([LegSwing().prepare(swing(seed, **fault))]) == part
 
 

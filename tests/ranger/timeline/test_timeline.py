@@ -431,6 +431,7 @@ def test_a_part_in_detail_is_what_the_whole_has_there_and_all_else_is_there_as_a
             assert np.array_equal(slices.start_ns, mine.start_ns), path
             continue
         for begin, end in windows:
+            # a slot in which a part ends has no end there: up to one of the main brain, and its overrun
             expected, found = (
                 each.start_ns[(each.start_ns >= begin) & (each.end_ns <= end - 3_000_000)] for each in (slices, mine)
             )
@@ -439,7 +440,7 @@ def test_a_part_in_detail_is_what_the_whole_has_there_and_all_else_is_there_as_a
         for begin, end in windows:
             outside &= (mine.end_ns < begin) | (mine.start_ns > end)
         assert not outside.any(), path
-    # arrows: no other ones than the whole has, and all but those that cross an edge
+    # arrows: no other ones than the whole has, and all that are further from an edge than the longest wait
     arrows, all_arrows = arrows_of(part), arrows_of(whole)
     assert arrows <= all_arrows
     inside = {
@@ -448,3 +449,19 @@ def test_a_part_in_detail_is_what_the_whole_has_there_and_all_else_is_there_as_a
         if any(all(begin + 10**8 <= time <= end - 10**8 for *_, time in pair) for begin, end in windows)
     }
     assert len(inside) > 50_000 and inside <= arrows
+
+
+def test_parts_in_detail_are_shown_also_when_the_first_begins_with_the_run():
+    robot = Ranger(Scenario())
+    try:
+        timeline = Timeline(robot, detail_s=0.1)
+        for number in range(10):  # of which eight count
+            robot.inject("MCH.joint_encoder", "stuck", at=f"{200 + 20 * number} ms", until=f"{205 + 20 * number} ms")
+        robot.run_for(2.0)
+        events = timeline.events()
+    finally:
+        robot.close()
+    (first, last), [shown] = timeline.windows(), [each for each in events.slices if each.path == ("Detail",)]
+    assert first[0] == 0 and last[1] - last[0] == 10**8 and last[1] == events.end_ns
+    assert 1.34e9 <= first[1] < 1.36e9  # a second after the eighth begins, which stands still and acts a little later
+    assert np.column_stack([shown.start_ns, shown.end_ns]).tolist() == [list(first), list(last)]
