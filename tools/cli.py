@@ -145,6 +145,8 @@ def run(arguments: list[str], make: Callable[[str], argparse.ArgumentParser] = p
         return misuse(printable(text), program)
     except MemoryError:
         return misuse(f"{options.command}: out of memory" if program == PROGRAM else "out of memory", program)
+    finally:
+        interrupts.count_as_handled()
 
 
 def misuse(text: str, program: str = PROGRAM) -> int:

@@ -58,6 +58,15 @@ def end_at_once() -> None:
     _set(signal.SIG_DFL)
 
 
+def count_as_handled() -> None:
+    """Keep the exit code of a program whose KeyboardInterrupt was caught.
+
+    CPython marks one that ends exec(TEXT) (dataclasses and named tuples run text while a module loads) as unhandled,
+    and `python -m` then ends by SIGINT instead of with the exit code. The next text that runs removes the mark.
+    """
+    exec("")
+
+
 def leave_to_parent() -> None:
     """In a process that its parent ends: from now on ignore all of them."""
     _set(signal.SIG_IGN)

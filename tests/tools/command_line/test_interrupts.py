@@ -30,6 +30,16 @@ try:
 except KeyboardInterrupt:
     print("interrupted")
 """
+IN_TEXT = """
+import sys
+from ranger_sim.tools import cli, info
+
+def interrupted(_options):
+    exec("raise KeyboardInterrupt")  # as in the text of a dataclass, while its module loads
+
+info.run = interrupted
+sys.exit(cli.main(["info"]))
+"""
 PATIENCE_S = 60.0
 
 
@@ -40,3 +50,11 @@ def test_an_interrupt_that_python_dropped_is_raised_again(where, signal_name):
         [sys.executable, "-c", PROGRAM, where, signal_name], capture_output=True, text=True, timeout=PATIENCE_S
     )
     assert ended.stdout.split("\n")[-2] == "interrupted" and not ended.stderr and not ended.returncode
+
+
+def test_an_interrupt_in_text_that_python_runs_ends_a_command_with_its_code(tmp_path):
+    (tmp_path / "in_text.py").write_text(IN_TEXT, encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "-m", "in_text"], capture_output=True, text=True, timeout=PATIENCE_S, cwd=tmp_path
+    )
+    assert ended.returncode == 130 and ended.stderr == "ranger-sim: interrupted\n"
