@@ -5,7 +5,8 @@ modules must not be mixed. When anything fails, a message reports it, the reason
 libraries, and the whole robot runs interpreted (ranger_sim/loading.py reads the record).
 
 Each module is a separate extension module. The output of Cython and the compiler goes to build/setup.log; the terminal
-shows the progress of the build. In a checkout the libraries go to build/compiled, one folder per kind of Python.
+shows the progress of the build. In a checkout the libraries go to build/compiled, one folder per kind of Python. Where
+there is ccache, and CC names no other compiler, it keeps what was compiled: a fresh clone then compiles nothing.
 
 RANGER_SIM_BUILD_JOBS: how many modules are translated and compiled at once (default: one per processor).
 RANGER_SIM_ADDRESS: of the project's repository, for links of a release (dev/publication.py).
@@ -189,6 +190,8 @@ class OptionalBuild(build_ext):
 
     def build_extensions(self):
         """All modules. A library is linked under another name: one that a killed linker left would look up to date."""
+        if "CC" not in os.environ and compiler_type() == "unix" and shutil.which("ccache"):
+            self.compiler.set_executable("compiler_so", ["ccache", *self.compiler.compiler_so])
         link = self.compiler.link_shared_object
 
         def link_whole(objects, library, *arguments, **more):
