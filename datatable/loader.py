@@ -669,12 +669,11 @@ def normal_of(
 
 
 def read_errors(path: pathlib.Path, boards: dict[str, Board], faults: Faults) -> list[ErrorCode]:
-    """The error codes; rows with a fault are left out."""
+    """The error codes. Rows with a fault may be among them, as such a table is refused."""
     errors: list[ErrorCode] = []
     ids: dict[int, int] = {}
     names: dict[str, int] = {}
     for line, row in read_rows(path, ERROR_COLUMNS, faults):
-        before = len(faults.found)
         report = faults.at(path.name, line, row["name"] if NAME.fullmatch(row["name"]) else "")
         number = whole_of(row["id"], LARGEST_ID, "id", report)
         name = name_of(row["name"], report)
@@ -695,7 +694,7 @@ def read_errors(path: pathlib.Path, boards: dict[str, Board], faults: Faults) ->
         per_s = normal_of(row, "normal_per_s", users, report)
         at_start = normal_of(row, "normal_at_start", users, report)
         description = text_of(row, "description", True, report)
-        if number is not None and len(faults.found) == before:
+        if number is not None:
             errors.append(ErrorCode(number, name, tuple(users), description, per_s, at_start))
     return sorted(errors, key=lambda error: error.id)
 

@@ -84,6 +84,7 @@ VARIABLE_FAULTS = {
     "description that ends a comment": ("a parameter", "a */ b", 7, "GAIN", "description", "printable ASCII"),
     "unit with a quote": ("LEG_ANGLE,f32,rad", 'LEG_ANGLE,f32,"""rad"""', 3, "LEG_ANGLE", "unit", "printable"),
     "a cell too many": ("a parameter", "a parameter,more", 7, "'GAIN'", "", "has 13 cells, the header has 12"),
+    "a row of one cell": ("5,GAIN,f32,,1.5,PC,MB,,,,,a parameter", "GAIN", 7, "'GAIN'", "", "has 1 cells, the header"),
     "a column missing": ("id,name,type,unit,", "id,name,type,", 1, "", "header", "missing unit"),
     "an unknown column": ("period_ms", "rate", 1, "", "header", "missing period_ms; unknown 'rate'"),
     "columns in another order": ("id,name", "name,id", 1, "", "header", "another order"),

@@ -79,7 +79,7 @@ def test_parts_that_do_not_belong_together_are_reported(tmp_path, boards, rows, 
 
 
 def test_a_processor_without_a_model_and_a_clock_above_its_highest_are_refused(tmp_path):
-    """The LPC2194's user manual allows 60 MHz. Without a processor any clock is taken."""
+    """The user manuals allow the LPC2194 60 MHz and the LPC3250 208 MHz. Without a processor any clock is taken."""
     at = "slot_us = 1000\nrows = [["
     unknown = BOARDS.replace(at, 'processor = "STM32F4"\nclock_hz = 168_000_000\n' + at, 1)
     with pytest.raises(TableError, match=r"boards.toml:5 ARM processor: no model of 'STM32F4' \(available: LPC2194, "):
@@ -87,6 +87,12 @@ def test_a_processor_without_a_model_and_a_clock_above_its_highest_are_refused(t
     fast = unknown.replace("STM32F4", "LPC2194")
     with pytest.raises(TableError, match="ARM clock_hz: is 168000000, above the 60000000 Hz of an LPC2194"):
         table(tmp_path, fast)
+    for processor, highest in (("LPC2194", 60_000_000), ("LPC2194/01", 60_000_000), ("LPC3250", 208_000_000)):
+        named = unknown.replace("STM32F4", processor)
+        allowed = named.replace("168_000_000", str(highest))
+        assert table(tmp_path, allowed).board("ARM").clock_hz == highest
+        with pytest.raises(TableError, match=f"clock_hz: is {highest + 1}, above the {highest} Hz of an {processor}"):
+            table(tmp_path, named.replace("168_000_000", str(highest + 1)))
     assert table(tmp_path, fast.replace('processor = "LPC2194"\n', "")).board("ARM").clock_hz == 168_000_000
     elsewhere = unknown.replace("firmware = true", "firmware = false", 1)  # a board that runs somewhere else
     assert table(tmp_path, elsewhere).board("ARM").processor == "STM32F4"
