@@ -3,6 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ranger_sim.foundation import events
 from ranger_sim.foundation.events import NEVER, EventQueue
 from ranger_sim.foundation.numbers import integers
 
@@ -44,6 +45,24 @@ def test_all_integers_and_the_object_of_a_message_arrive():
     assert queue.take()
     assert (queue.a, queue.b, queue.c, queue.d, queue.e, queue.f) == (4, 5, 6, 7, 8, 9)
     assert queue.ref is thing
+
+
+def test_all_integers_of_a_message_that_is_not_urgent_arrive_behind_those_before_it():
+    queue = EventQueue(2)
+    for first in (100, 200, 300):
+        queue.put(*range(first, first + 9))
+    for first in (100, 200, 300):
+        assert queue.take()
+        fields = (queue.time, queue.order, queue.kind, queue.a, queue.b, queue.c, queue.d, queue.e, queue.f)
+        assert fields == tuple(range(first, first + 9)) and queue.ref is None
+
+
+def test_no_two_kinds_of_message_have_one_number():
+    names = [
+        "PIN_EDGE", "CAN_RX", "CAN_TX_DONE", "CAN_STATUS", "UART_BYTE", "SSP_SEGMENT", "CAN_REQUEST", "CAN_ABORT",
+        "CAN_MODE", "PWM_UPDATE", "PIN_OUTPUT", "SSP_START", "SSP_LOAD", "UART_OUTPUT", "CAN_FILTER",
+    ]  # fmt: skip
+    assert len({getattr(events, name) for name in names}) == len(names)
 
 
 @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 3), st.booleans()), max_size=300))

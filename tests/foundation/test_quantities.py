@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ranger_sim.foundation.quantities import (
+    SHARES,
     SLOPES,
     TIMES,
     duration_ns,
@@ -19,7 +20,7 @@ from ranger_sim.foundation.user_error import UserError
 
 @pytest.mark.parametrize(
     ("text", "ns"),
-    [("450 us", 450_000), ("50ms", 50_000_000), ("2 s", 2_000_000_000), ("0 ns", 0), ("1.5 min", 90_000_000_000)],
+    [("450 us", 450_000), ("50ms", 50_000_000), ("2 s", 2 * 10**9), ("0 ns", 0), ("7 ns", 7), ("1.5 min", 90 * 10**9)],
 )
 def test_a_duration_is_whole_nanoseconds(text, ns):
     assert nanoseconds(text) == ns
@@ -84,3 +85,8 @@ def test_a_duration_is_printed_in_the_unit_that_reads_best(ns, text):
 )
 def test_a_slope_in_percent_is_height_over_distance(text, rad):
     assert in_base_units(text, SLOPES) == pytest.approx(rad, abs=1e-8)
+
+
+def test_a_share_in_percent_is_a_hundredth_of_the_number():
+    assert in_base_units("70 %", SHARES) == pytest.approx(0.7, rel=1e-12)
+    assert in_base_units("0.7", SHARES) == 0.7

@@ -11,7 +11,7 @@ from ranger_sim import datatable
 from ranger_sim.can_bus.edge.external_bus import place_of
 from ranger_sim.firmware_sim.lpc2194 import image
 from ranger_sim.foundation import user_error
-from ranger_sim.foundation.user_error import UserError, unknown
+from ranger_sim.foundation.user_error import UserError, raised, unknown
 from ranger_sim.harness.campaigns import plan
 from ranger_sim.harness.faults.catalogue import Catalogue
 from ranger_sim.harness.processes.control import ask
@@ -84,4 +84,20 @@ def test_an_unknown_name_is_reported_with_all_of_a_few_names_or_the_near_ones_of
     many = [f"name_{number}" for number in range(13)]
     assert unknown("name", "nmae_12", many) == "unknown name 'nmae_12'; did you mean 'name_12' or 'name_2'?"
     assert unknown("name", "x", many) == f"unknown name 'x' (available: {', '.join(many)})"
-    assert unknown("name", "x", [f"name_{number}" for number in range(101)]) == "unknown name 'x'"
+    hundred = [f"name_{number}" for number in range(100)]
+    assert unknown("name", "x", hundred) == f"unknown name 'x' (available: {', '.join(hundred)})"
+    assert unknown("name", "x", [*hundred, "name_100"]) == "unknown name 'x'"
+
+
+def test_an_exception_has_the_innermost_place_in_a_file_or_of_all():
+    def inner(text):
+        ast.literal_eval(text)
+
+    def outer(text):
+        inner(text)
+
+    with pytest.raises(ValueError, match="malformed node") as caught:
+        outer("f()")
+    line = inner.__code__.co_firstlineno + 1
+    assert raised(caught.value, __file__).endswith(f" (test_user_error.py:{line})")
+    assert "(ast.py:" in raised(caught.value, "nowhere.py")
