@@ -46,6 +46,14 @@ def test_the_count_follows_the_routers_own_crystal():
     assert wires.of(0, 1)[-1] == (100 * MS - 4000 + 199, 100, 100)
 
 
+def test_turns_of_the_main_loop_take_as_long_as_the_crystals_new_rate_makes_them():
+    board = build().board
+    # idle, a pair of 60 and 25 cycles has a quarter of the 20 of a turn of four: 90 cycles of 60 MHz, then of 66 MHz
+    assert (board.pair_ns, board.route_ns[0]) == (1500, 1000)
+    board.retune(100_000_000, 0)
+    assert (board.pair_ns, board.route_ns[0]) == (1363, 909)
+
+
 def errors_but_the_first(board):
     """Errors of the router other than the SSP_LOW_RATE of its first tick, before which no exchange can have been."""
     assert board.errors.totals[errors.SSP_LOW_RATE] == 1
