@@ -289,6 +289,15 @@ def test_frames_of_two_rates_wait_for_each_other():
     assert utilisation(three, 500_000, 2_000_000) == Fraction(3 * length, 10 * MS)
 
 
+def test_the_most_nominal_bits_before_and_after_a_fast_phase():
+    """Up to BRS a frame has 17 bits, or 36 with 29 bits of identifier; a stuff bit comes behind bit 5 and each fourth
+    further one but the last; behind the CRC delimiter are nine: ACK, its delimiter and the end of frame.
+    """
+    assert fd_worst_case_phases(FLAG_FD | FLAG_BRS | 8)[0] == 17 + len([5, 9, 13]) + 9
+    extended = fd_worst_case_phases(FLAG_FD | FLAG_BRS | FLAG_EXTENDED | 8)[0]
+    assert extended == 36 + len([5, 9, 13, 17, 21, 25, 29, 33]) + 9
+
+
 @pytest.mark.parametrize("flags", [FLAG_FD | code for code in (0, 1, 8, 9, 12, 15)])
 @pytest.mark.parametrize("more", [0, FLAG_BRS, FLAG_EXTENDED, FLAG_BRS | FLAG_EXTENDED])
 def test_no_frame_lasts_longer_than_its_bound_counts(flags, more):

@@ -1,5 +1,6 @@
 """Files, error frames, records and interfaces of the kernel, line by line: whole answers to whole inputs."""
 
+import os
 import struct
 import sys
 
@@ -9,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ranger_sim.can_bus.edge import attach_records as wire
-from ranger_sim.can_bus.edge import check_bus, dbc, interfaces, linux_errors, logs
-from ranger_sim.can_bus.edge.candump import CandumpWriter, line_of_frame, read_candump
+from ranger_sim.can_bus.edge import check_bus, dbc, interfaces, linux_errors, logs, peers
+from ranger_sim.can_bus.edge.candump import CandumpWriter, frame_of_line, line_of_frame, read_candump
 from ranger_sim.can_bus.edge.check_bus import NotReadError, Traffic, check_link, check_traffic, parse_link, read_link
 from ranger_sim.can_bus.edge.messages import frame_of_message, message_of_frame
 from ranger_sim.can_bus.frame_bytes import data_of_words, words_of_data
@@ -103,6 +104,23 @@ def test_a_fault_in_a_line_is_reported_with_its_number(tmp_path, line, words):
 )
 def test_a_frame_is_the_line_that_candump_would_write(frame, text):
     assert line_of_frame("c", *frame) == text + "\n"
+
+
+@pytest.mark.parametrize("content", ["", "1G0", "10G", "100000", "1" + "00" * 65])
+def test_a_can_fd_line_has_a_digit_of_flags_and_up_to_64_bytes(content):
+    assert frame_of_line("(1.0) can1 123##1" + "00" * 64, fd=True)[2] == 0x123
+    with pytest.raises(ValueError, match="not a digit of flags and up to 64 bytes in hexadecimal"):
+        frame_of_line(f"(1.0) can1 123##{content}", fd=True)
+
+
+def test_a_limit_of_one_byte_reads_one_and_a_limit_of_none_reads_nothing():
+    out, into = os.pipe()
+    try:
+        os.write(into, b"abc")
+        assert [peers.read_ready(out, limit) for limit in (0, 1, 2)] == [b"", b"a", b"bc"]
+    finally:
+        os.close(out)
+        os.close(into)
 
 
 def test_a_writer_counts_lines_and_ends_with_a_whole_one_when_the_disk_is_full(tmp_path):

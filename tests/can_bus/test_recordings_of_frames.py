@@ -91,6 +91,20 @@ def test_a_torn_line_in_the_middle_is_named(tmp_path):
             assert len(found) + sum(count for _, count, _ in losses) == read == 400 and "line 101" in losses[0][2]
 
 
+@pytest.mark.parametrize(
+    ("stamps", "times_ms"),
+    [
+        (("0.000000", "0.010000", "0.010000", "0.020000"), [0, 10, 10, 20]),  # since the first, two at one time
+        (("0.000000", "0.010000", "0.005000", "0.020000"), [0, 10, 15, 35]),  # since the one before
+    ],
+)
+def test_stamps_on_candumps_screen_are_since_the_one_before_only_where_one_decreases(tmp_path, stamps, times_ms):
+    path = tmp_path / "screen.log"
+    path.write_text("".join(f" ({stamp})  can1  123   [1]  0A\n" for stamp in stamps))
+    found, read, losses = recorded(path)
+    assert [frame[1] for frame in found] == [time * MS for time in times_ms] and (read, losses) == (4, [])
+
+
 # ---- ASC
 
 HEAD = "date Thu Nov 5 09:30:00.000 am 2026\nbase hex  timestamps absolute\ninternal events logged\n"
