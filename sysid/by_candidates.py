@@ -282,7 +282,7 @@ def unclipped(machine: Machine, recording: Recording) -> Recording:
     for each in machine.quantities:
         if each.name in followed or each.name not in table:
             continue
-        cut = signals.clipped(table, table[each.name])
+        cut = signals.clipped(table, table[each.name], signals.counts_of(table, each.name))
         share = float(np.mean(cut))
         if share > MOST_CLIPPED:
             raise UserError(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ranger_sim.foundation.user_error import DataError, printable, unknown
+from ranger_sim.sysid.lattice import lattice_step
 
 Array = NDArray[np.float64]
 # Why samples are left out. Of the second kind nothing is lost: the same was there already, never was, or is not wanted.
@@ -153,6 +154,8 @@ class Table:
     """Channels on one time base. time_s, each column: shape (n,); `runs`: stretches without a gap, in order.
 
     unmeasured: by channel (n,), True where its value is a straight line over samples that it lacks.
+    counts: by channel whose rows are on straight lines between its samples, the step of the samples' own values, in its
+    unit, 0 where they have none: such rows show it no more.
     """
 
     time_s: Array
@@ -161,6 +164,7 @@ class Table:
     name: str = ""
     resolution: dict[str, float] = dataclasses.field(default_factory=dict)
     unmeasured: dict[str, NDArray[np.bool_]] = dataclasses.field(default_factory=dict)
+    counts: dict[str, float] = dataclasses.field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
@@ -187,6 +191,7 @@ class Table:
             self.name,
             self.resolution,
             {name: rows[which] for name, rows in self.unmeasured.items()},
+            self.counts,
         )
 
 
@@ -252,9 +257,11 @@ class Dataset:
         time_s = base.time_s
         inside = np.ones(len(time_s), dtype=bool)
         cuts = np.zeros(len(time_s), dtype=bool)  # a run ends before these
-        columns, unmeasured = {}, {}
+        columns, unmeasured, counts = {}, {}, {}
         for channel in chosen:
             columns[channel.name] = np.interp(time_s, channel.time_s, channel.value)
+            if not np.array_equal(channel.time_s, time_s):
+                counts[channel.name] = lattice_step(channel.value)
             steps = np.diff(channel.time_s)
             goes_on = channel.name in outputs and channel is not base
             limit = (LACKING if goes_on else longest_gap) * float(np.median(steps)) if len(steps) else 0.0
@@ -286,4 +293,5 @@ class Dataset:
             self.name,
             {channel.name: channel.resolution for channel in chosen},
             {name: rows[kept] for name, rows in unmeasured.items()},
+            counts,
         )

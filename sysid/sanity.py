@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ranger_sim.foundation.user_error import DataError
 from ranger_sim.sysid import headlines, order, wraps
 from ranger_sim.sysid.dataset import Array, Channel, Dataset, Finding
+from ranger_sim.sysid.lattice import lattice_step
 
 NOTE, WARNING, FATAL = "note", "warning", "fatal"
 KINDS = {
@@ -775,22 +776,3 @@ def _drift(first: Channel, second: Channel) -> float | None:
 def _part(channel: Channel, low: float, high: float) -> Channel:
     inside = (channel.time_s >= low) & (channel.time_s <= high)
     return dataclasses.replace(channel, time_s=channel.time_s[inside], value=channel.value[inside])
-
-
-def lattice_step(value: Array) -> float:
-    """The finest step of a quantised or printed channel; 0 when its values are not on a lattice."""
-    different = np.unique(value[np.isfinite(value)])
-    if len(different) < 4:
-        return 0.0
-    different = different[:20_000]
-    gaps = np.diff(different)
-    gaps = gaps[gaps > 1e-9 * (different[-1] - different[0])]
-    small = gaps[gaps < 1.5 * np.percentile(gaps, 5.0)]
-    step = float(np.median(small))
-    counts = np.concatenate(([0.0], np.cumsum(np.round(gaps / step))))
-    if (np.round(gaps / step) < 1.0).any():
-        return 0.0
-    places = np.concatenate(([0.0], np.cumsum(gaps)))
-    step = float(counts @ places / (counts @ counts))
-    off = places / step - counts
-    return step if float(np.sqrt(np.mean((off - off.mean()) ** 2))) < 0.15 else 0.0

@@ -14,7 +14,7 @@ from scipy import ndimage
 from scipy.signal import lfilter, savgol_filter
 
 from ranger_sim.sysid.dataset import Array, Table
-from ranger_sim.sysid.sanity import lattice_step
+from ranger_sim.sysid.lattice import lattice_step
 
 Rows = NDArray[np.bool_]
 
@@ -98,7 +98,13 @@ def uniform(table: Table) -> Table:
         table.name,
         table.resolution,
         {name: np.concatenate(parts) for name, parts in unmeasured.items()},
+        {name: counts_of(table, name) for name in table.columns},
     )
+
+
+def counts_of(table: Table, name: str) -> float:
+    """The step of a channel's values as they were recorded, in its unit; 0 where they are in none."""
+    return table.counts[name] if name in table.counts else lattice_step(table[name])
 
 
 def _inside(table: Table) -> np.ndarray:
@@ -124,12 +130,13 @@ def resting(table: Table, rate: Array, share: float = 0.01, shortest_s: float = 
     return out
 
 
-def on_one_count(table: Table, column: Array, rows: int) -> np.ndarray:
+def on_one_count(table: Table, column: Array, rows: int, count: float | None = None) -> np.ndarray:
     """True where a column in counts stays on one of them, or between two, for `rows` rows about each: (n,).
 
-    What it is rounded by is then one error for all of these rows, which noise from row to row does not show.
+    What it is rounded by is then one error for all of these rows, which noise from row to row does not show. count:
+    `counts_of` the channel, the column's own where it is not given.
     """
-    step = lattice_step(column)
+    step = lattice_step(column) if count is None else count
     if not step > 0.0:
         return np.zeros(len(column), dtype=bool)
 
@@ -140,18 +147,19 @@ def on_one_count(table: Table, column: Array, rows: int) -> np.ndarray:
     return per_run(table, reach, column) < 1.5 * step
 
 
-def clipped(table: Table, column: Array) -> np.ndarray:
+def clipped(table: Table, column: Array, count: float | None = None) -> np.ndarray:
     """True where a measured column is cut off at its largest or its smallest value.
 
     It then arrives there at its usual slope and stays for three samples or more at one number; a machine that rests at
     the end of its way slows down before. In counts it arrives there by a whole count however slow it is, so that it
-    must have passed more of them. All False for less than two such stretches, and for few different numbers.
+    must have passed more of them. All False for less than two such stretches, and for few different numbers. count:
+    `counts_of` the channel, the column's own where it is not given.
     """
     out = np.zeros(len(column), dtype=bool)
     if len(np.unique(column)) <= FEW_NUMBERS:
         return out
     usual = float(np.sqrt(np.mean(np.diff(column) ** 2)))
-    count = lattice_step(column)
+    count = lattice_step(column) if count is None else count
     back = max(FLAT, math.ceil(PASSED * count / usual))
     for extreme in (np.max(column), np.min(column)):
         arrivals, found = [], []

@@ -520,7 +520,7 @@ def _marked(machine: DeclaredMachine, table: Table) -> Table:
     """
     unmeasured, columns = {}, dict(table.columns)
     for name in (each.channel for each in machine.outputs):
-        rows = signals.clipped(table, table[name]) | table.unmeasured.get(name, False)
+        rows = signals.clipped(table, table[name], signals.counts_of(table, name)) | table.unmeasured.get(name, False)
         if not np.any(rows):
             continue
         share = float(np.mean(rows))

@@ -340,7 +340,8 @@ def _recording(fit: "_Fit") -> AnkleRecording:
         recording.findings.append(_filter_found(table))
     s = recording.signals = _signals(table, fit.runs)
     # a joint that rests on a count shows one error of rounding at all of its rows
-    valid = fit.valid & ~signals.on_one_count(table, table["joint_angle_rad"], ORDER * every)
+    count = signals.counts_of(table, "joint_angle_rad")
+    valid = fit.valid & ~signals.on_one_count(table, table["joint_angle_rad"], ORDER * every, count)
     sensitivity = np.zeros((len(table), ankle_motion.STATES, len(fit.base)))
     for number, run in enumerate(fit.runs):
         slopes = fit.sensitivities(number)

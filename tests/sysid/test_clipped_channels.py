@@ -5,9 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
-from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.dataset import Channel, Dataset, Table
+from ranger_sim.sysid.lattice import lattice_step
 from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.robot_joint import Joint
 from tests.sysid.test_scores_grow import run
@@ -70,4 +72,44 @@ def test_a_joint_that_creeps_to_its_last_count_and_rests_there_is_not_cut_off():
 def test_counts_that_are_cut_off_in_mid_swing_are_found():
     table = swinging(0.25)
     found = signals.clipped(table, table["angle_rad"])
+    assert np.count_nonzero(found) > 0.8 * np.count_nonzero(np.abs(table["angle_rad"]) == 0.25)
+
+
+STAMPS_S = np.round(np.arange(1000) * 1.001 - 0.003 * (np.arange(1000) % 7), 3)  # a clock that is off by 0.1 %
+
+
+def beside(channel, rate_hz=4.0):
+    """The channel's table on the stamps of a quicker one."""
+    time_s = np.arange(0.0, channel.time_s[-1], 1.0 / rate_hz)
+    return Dataset("run", {"quick_V": Channel("quick_V", "V", time_s, np.ones(len(time_s))), channel.name: channel}).table(
+        ["quick_V", channel.name]
+    )
+
+
+def made_even(channel):
+    """The channel's table on even stamps."""
+    return signals.uniform(Dataset("run", {channel.name: channel}).table([channel.name]))
+
+
+@pytest.mark.parametrize("rows_of, without", [(made_even, 60), (beside, 396)])
+def test_a_settled_channel_in_counts_is_not_cut_off_between_uneven_stamps(rows_of, without):
+    """A heated body, 20 to 65 C, in counts of 0.3223 C that the log rounds to 0.01 C.
+
+    A row between two samples is in no counts. Without those of the samples, as many of them as `without` were cut off.
+    """
+    noise = generator(3, "thermometer").normal(0.0, 0.1, 1000)
+    counts = np.round((20.0 + 45.0 * (1.0 - np.exp(-STAMPS_S / 120.0)) + noise) / 0.3223)
+    table = rows_of(Channel("T_degC", "degC", STAMPS_S, np.round(0.3223 * counts, 2)))
+    assert np.count_nonzero(signals.clipped(table, table["T_degC"])) == without
+    for part in (table, table.part(slice(0, 900))):
+        assert signals.counts_of(part, "T_degC") == pytest.approx(0.3223, rel=1e-3)
+        assert not np.any(signals.clipped(part, part["T_degC"], signals.counts_of(part, "T_degC")))
+
+
+@pytest.mark.parametrize("rows_of", [made_even, lambda channel: beside(channel, 3000.0)])
+def test_counts_that_are_cut_off_in_mid_swing_are_found_between_uneven_stamps(rows_of):
+    swings = swinging(0.25)
+    uneven_s = swings.time_s * 1.001 - 3e-6 * (np.arange(len(swings)) % 7)
+    table = rows_of(Channel("angle_rad", "rad", uneven_s, swings["angle_rad"]))
+    found = signals.clipped(table, table["angle_rad"], signals.counts_of(table, "angle_rad"))
     assert np.count_nonzero(found) > 0.8 * np.count_nonzero(np.abs(table["angle_rad"]) == 0.25)
