@@ -9,7 +9,6 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
-from ranger_sim.sysid.lattice import lattice_step
 from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.robot_joint import Joint
 from tests.sysid.test_scores_grow import run
@@ -81,9 +80,9 @@ STAMPS_S = np.round(np.arange(1000) * 1.001 - 0.003 * (np.arange(1000) % 7), 3) 
 def beside(channel, rate_hz=4.0):
     """The channel's table on the stamps of a quicker one."""
     time_s = np.arange(0.0, channel.time_s[-1], 1.0 / rate_hz)
-    return Dataset("run", {"quick_V": Channel("quick_V", "V", time_s, np.ones(len(time_s))), channel.name: channel}).table(
-        ["quick_V", channel.name]
-    )
+    return Dataset(
+        "run", {"quick_V": Channel("quick_V", "V", time_s, np.ones(len(time_s))), channel.name: channel}
+    ).table(["quick_V", channel.name])
 
 
 def made_even(channel):
