@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 
 from ranger_sim.loading import IS_COMPILED
 
@@ -74,7 +75,7 @@ def counted(seconds: float, folder: pathlib.Path) -> collections.Counter[str]:
     return found
 
 
-def table(counts: dict[str, float], most: int) -> str:
+def table(counts: Mapping[str, float], most: int) -> str:
     """Lines of Markdown: millions of instructions of each name, the most first, and their sum."""
     whole = sum(counts.values())
     rows = sorted(counts.items(), key=lambda each: -each[1])[:most]

@@ -370,6 +370,8 @@ def judge(
             walks = list(repeat(sized.direction, sized.size, there))
         if is_sound or is_as_repeated(view, mean, weights, best, walks):
             named = as_repeated(view, _sized(view, mean, weights, best), sum(mean.steps), walks)
+            if named.low < 0.0 < named.high:  # of either sign: a cause of which nothing is known
+                named = None
     scale = max(1.0, (distance * space.freedom - best.gain) / space.freedom)
     ties = tuple(each.direction for each in fits[1:] if most - each.gain < TIE * scale)
     return Verdict(

@@ -260,6 +260,17 @@ def test_an_effect_in_another_direction_is_detected_without_a_name(view):
     assert verdict.detected and verdict.named is None
 
 
+def test_a_cause_that_acts_alike_in_either_sign_is_detected_without_a_name(view):
+    """Only the square of its size counts, so that what is found has an interval from one sign to the other."""
+    line = view.directions[0].terms[0]
+    even = changed(view, terms=np.stack((np.zeros_like(line), line / 0.4, np.zeros_like(line))))
+    walk = made_up(9420, moved=0.4)
+    best = judged(even, *walk).fits[0]
+    assert best.direction.cause == "geometry" and best.low < 0.0 < best.high
+    assert judged(even, *walk).detected and judged(even, *walk).named is None
+    assert judged(view, *walk).named.direction.cause == "geometry"
+
+
 def test_a_missing_feature_leaves_the_others(view):
     leg, found = made_up(9500, moved=0.4)
     found[:, features.NAMES.index("leg state 5")] = np.nan
