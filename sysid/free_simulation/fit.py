@@ -293,7 +293,7 @@ class TrajectoryFit:
         assert self.predictor is not None
         first, now = self.predictor, self.simulator
         self.x, self.u, self.p, self.noise_y, self.predictor = here
-        driven, found = now.driven(self.u, self.entering()), []
+        driven, found, before = now.driven(self.u, self.entering()), [], np.zeros(0)
         f = now.at(self.x, self.p, driven)[0]
         for way in ways:
             self.simulator = now.stepping(way)
@@ -306,7 +306,11 @@ class TrajectoryFit:
             missed = np.concatenate(((self.state - moved)[:, :, None], self.lin.f_p), axis=2)
             shown = np.concatenate((self.output[:, :, None], self.lin.h_p), axis=2)
             left = wide.left(missed, shown).reshape(-1)
-            found.append((float(left @ left), wide.surprise_of_spread))
+            before = left if way is ways[0] else before
+            other = way.held ^ now.numerics.held
+            # A lag of the machine is of any size, a hold of half a row: what asks for more or less is not one
+            lag = bool(other) and other <= now.curving and not _is_whole(before, left)
+            found.append((np.inf if lag else float(left @ left), wide.surprise_of_spread))
         inflated = max(1.0, min(square for square, _ in found) / len(left))
         scores = [square / inflated + spread for square, spread in found]
         best = int(np.argmin(scores))
@@ -511,6 +515,15 @@ class TrajectoryFit:
         x, u = self.x, self.u
         self.round(final=True)
         self.x, self.u = x, u
+
+
+def _is_whole(before: Array, left: Array) -> bool:
+    """True where what was `before` asks for a change by about as much as was made, which leaves `left`; both (n o,).
+
+    Nearer to all of it than to nothing or to twice as much.
+    """
+    change = before - left
+    return 0.5 * float(change @ change) < float(before @ change) < 1.5 * float(change @ change)
 
 
 def _marked(machine: DeclaredMachine, table: Table) -> Table:

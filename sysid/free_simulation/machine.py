@@ -159,7 +159,8 @@ def _chosen(fit: TrajectoryFit) -> None:
     Where rows next to a jump weigh less, another way may be the likelier one again.
     """
     at_once = fit.simulator.shown_at_once(fit.u, fit.p)
-    for _ in range(len(fit.simulator.open_ways) + len(fit.simulator.staying) + 2 * len(at_once)):
+    now = fit.simulator
+    for _ in range(len(now.open_ways) + len(now.staying) + len(now.curving) + 2 * len(at_once)):
         if not fit.choose_way():
             break
         fit.settle_anew(AGAIN)

@@ -78,7 +78,8 @@ class Simulator:
         held = {*machine.held_inputs, *self.staying}
         settled = held | known
         curved = {name for name in inputs if name not in settled and signals.is_smooth(table, inputs[name])}
-        self.numerics = Numerics(machine.parts, frozenset(held), frozenset(curved), frozenset(machine.mean_inputs))
+        self.curving = frozenset(curved)  # as they look; a controller may still hold them from row to row
+        self.numerics = Numerics(machine.parts, frozenset(held), self.curving, frozenset(machine.mean_inputs))
         self.open_ways = [name for name in inputs if name not in settled and name not in curved]
         self.inside = np.zeros(len(table))  # 1 where a step has neighbours on both sides in its run
         for run in table.runs:
@@ -135,7 +136,8 @@ class Simulator:
 
         at_once: inputs that jump and that an output shows in the same row; their clock may be another one.
 
-        Known are inputs that the machine holds, and smooth ones. One that stays at a value and jumps is held, or jumps
+        Known are inputs that the machine holds. A smooth one is on a cubic, or a controller that computes it once a row
+        holds it. One that stays at a value and jumps is held, or jumps
         between the rows: a step of a slow log is somewhere before the row that first shows it, half a row on average.
         Of the others the row may be a point of straight lines, held until the next row, or the mean of the step that
         ends there; where they jump, the place of the jump inside a step may be open.
@@ -146,6 +148,7 @@ class Simulator:
             held = dataclasses.replace(now, held=now.held | alone, unsure=now.unsure - alone)
             between = dataclasses.replace(now, held=now.held - alone, unsure=now.unsure | alone)
             made += [each for each in (held, between) if each != now]
+        made += [dataclasses.replace(now, held=now.held ^ {name}) for name in sorted(self.curving)]
         for name in self.open_ways:
             alone = frozenset({name})
             lines = dataclasses.replace(now, held=now.held - alone, means=now.means - alone, unsure=now.unsure - alone)

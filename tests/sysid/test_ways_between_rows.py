@@ -42,11 +42,46 @@ def test_the_way_of_a_rough_input_is_found_and_nothing_is_named(way):
     assert gain.ci95[0] < 5.0 < gain.ci95[1]
 
 
-def test_a_smooth_input_has_one_way_only():
+def waved(seed, held, late_rows=0):
+    """The disc on a smooth voltage, held from row to row or not, and a speed that is shown `late_rows` late."""
+    random = generator(seed, "smooth ways")
+    time_s = STEP_s * np.arange(ROWS + 1)
+    phases = random.uniform(0.0, 2.0 * np.pi, 3)
+
+    def volts(at_s):
+        waves = zip((0.3, 0.9, 2.1), phases, strict=True)
+        return sum(2.0 * np.sin(2.0 * np.pi * hertz * at_s + phase) for hertz, phase in waves)
+
+    keeps, speed, now = np.exp(-STEP_s / FINER), np.zeros(ROWS), 0.0
+    for k in range(ROWS):
+        speed[k] = now
+        for part in range(FINER):
+            at_s = time_s[k] + (0.0 if held else (part + 0.5) / FINER * STEP_s)
+            now = keeps * now + (1.0 - keeps) * 5.0 * volts(at_s)
+    speed = np.concatenate((np.zeros(late_rows), speed[: ROWS - late_rows])) + NOISE * random.normal(size=ROWS)
+    columns = {"voltage_V": volts(time_s[:-1]), "speed_rad_per_s": speed}
+    return Table(time_s[:-1], columns, (slice(0, ROWS),), f"smooth {seed}", {})
+
+
+@pytest.mark.parametrize(("held", "way"), [(True, "held"), (False, "cubic")])
+def test_a_smooth_input_that_a_controller_holds_is_not_a_late_sensor(held, way):
+    result = diagnose(Disc(), [waved(3, held)], [waved(4, held)]).result
+    assert not result.detected and result.evidence.between_rows == {"smooth 3": {"voltage": way}}
+
+
+def test_a_sensor_that_is_three_rows_late_is_not_taken_for_half_a_row_of_a_hold():
+    result = diagnose(Disc(), [waved(3, False, 3)], [waved(4, False, 3)]).result
+    assert result.evidence.between_rows == {"smooth 3": {"voltage": "cubic"}}
+    [cause] = result.causes
+    low, high = cause.parameters["lag_s"].ci95
+    assert cause.name == "sensor_lag" and low < 3.0 * STEP_s < high
+
+
+def test_a_smooth_input_is_on_a_cubic_or_held():
     time_s = STEP_s * np.arange(ROWS)
     columns = {"voltage_V": np.sin(time_s), "speed_rad_per_s": np.cos(time_s)}
     fit = TrajectoryFit(Disc(), Table(time_s, columns, (slice(0, ROWS),), "smooth", {}))
-    assert len(fit.simulator.ways()) == 1 and fit.simulator.numerics.way("voltage") == "cubic"
+    assert [each.way("voltage") for each in fit.simulator.ways()] == ["cubic", "held"]
 
 
 def test_a_jump_is_in_the_step_in_which_it_is_and_in_its_neighbours():
