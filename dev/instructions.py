@@ -4,7 +4,7 @@
     python -m dev.instructions --modules 30      # also the modules that take the most
 
 Counted are two runs of different length; the difference is that of the seconds between, without start and imports.
-The count hardly depends on the processor or its load, so that it tells what a change costs where times do not.
+The count hardly depends on the processor or its load: it shows what a change costs where times do not.
 """
 
 import argparse
