@@ -97,6 +97,28 @@ def test_its_tests_pass_at_once_and_it_needs_nothing_of_ranger(tmp_path):
 GDB = next(filter(None, map(shutil.which, ("gdb", "gdb-multiarch"))), None)
 
 
+@pytest.mark.skipif(GDB is None, reason="no gdb (apt-get install gdb)")
+def test_the_editors_configuration_does_not_stop_where_a_reader_has_left(tmp_path):
+    """Python ignores SIGPIPE and gets an error; gdb stops at it all the same, unless it is set up otherwise."""
+    assert cli.main(["new", str(tmp_path / "wheel")]) == 0
+    both = json.loads((tmp_path / "wheel" / ".vscode" / "launch.json").read_text())["configurations"]
+    (chosen,) = (each for each in both if each["type"] == "cppdbg")
+    commands = [*(each["text"] for each in chosen["setupCommands"]), "run"]
+    program = (
+        "import socket; one, other = socket.socketpair(); other.close()\n"
+        "try:\n one.send(b'x')\nexcept BrokenPipeError:\n print('goes on')"
+    )
+    done = subprocess.run(
+        [GDB, "-nx", "-batch", *(part for each in commands for part in ("-ex", each))]
+        + ["--args", sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert "goes on" in done.stdout and "SIGPIPE" not in done.stdout, done.stdout + done.stderr
+
+
 @pytest.mark.skipif(not COMPILER, reason="no C compiler is installed here")
 @pytest.mark.skipif(GDB is None, reason="no gdb (apt-get install gdb)")
 def test_the_editors_configuration_debugs_a_boards_c_while_the_tests_run(tmp_path):
