@@ -293,7 +293,7 @@ class TrajectoryFit:
         assert self.predictor is not None
         first, now = self.predictor, self.simulator
         self.x, self.u, self.p, self.noise_y, self.predictor = here
-        driven, found, before = now.driven(self.u, self.entering()), [], np.zeros(0)
+        driven, lefts, spreads = now.driven(self.u, self.entering()), list[Array](), list[float]()
         f = now.at(self.x, self.p, driven)[0]
         for way in ways:
             self.simulator = now.stepping(way)
@@ -305,14 +305,16 @@ class TrajectoryFit:
                                  AWAY * self.size_x, first)  # fmt: skip
             missed = np.concatenate(((self.state - moved)[:, :, None], self.lin.f_p), axis=2)
             shown = np.concatenate((self.output[:, :, None], self.lin.h_p), axis=2)
-            left = wide.left(missed, shown).reshape(-1)
-            before = left if way is ways[0] else before
+            lefts.append(wide.left(missed, shown).reshape(-1))
+            spreads.append(wide.surprise_of_spread)
+        squares = [float(left @ left) for left in lefts]
+        for number, way in enumerate(ways):
             other = way.held ^ now.numerics.held
             # A lag of the machine is of any size, a hold of half a row: what asks for more or less is not one
-            lag = bool(other) and other <= now.curving and not _is_whole(before, left)
-            found.append((np.inf if lag else float(left @ left), wide.surprise_of_spread))
-        inflated = max(1.0, min(square for square, _ in found) / len(left))
-        scores = [square / inflated + spread for square, spread in found]
+            if other and other <= now.curving and not _is_whole(lefts[0], lefts[number]):
+                squares[number] = np.inf
+        inflated = max(1.0, min(squares) / len(lefts[0]))
+        scores = [square / inflated + spread for square, spread in zip(squares, spreads, strict=True)]
         best = int(np.argmin(scores))
         if best and scores[0] - scores[best] < CHOSEN:
             best = 0
