@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ranger_sim.sysid import by_candidates, model_file, noise_floor, predicted_ties, repairs
+from ranger_sim.sysid import by_candidates, intervals, model_file, noise_floor, plausibility, predicted_ties, repairs
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.free_simulation import entrance
 from ranger_sim.sysid.free_simulation.linearised import LinearisedRecording
@@ -32,7 +32,6 @@ from ranger_sim.sysid.results import (
 )
 
 RIVALS = 6  # that an answer lists
-Z95 = 1.96  # standard errors on each side of a 95 % interval
 NEXT = {
     frozenset(
         {"sensor_offset", "direction_friction"}
@@ -149,13 +148,11 @@ def _findings(found: Diagnosis, prepared: Sequence[Prepared]) -> list[RecordingF
 def _cause(found: Diagnosis, each: Named) -> Cause:
     """A named effect with its parameters, their intervals, and the evidence for it and against it."""
     extended = found.extended
-    parameters = {
-        name: _value(extended, full) for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
+    values = {
+        name: extended.values[full] for name, full in zip(each.effect.coefficients, each.coefficients, strict=True)
     }
-    parameters |= {name: Value(value, (value, value)) for name, value in each.shape.items()}
-    for name, (low, high) in found.intervals[each.effect.name].items():
-        near = parameters[name].ci95
-        parameters[name] = dataclasses.replace(parameters[name], ci95=(min(low, near[0]), max(high, near[1])))
+    known_to = intervals.whole(each, extended, found.intervals[each.effect.name])
+    parameters = {name: Value(value, known_to[name]) for name, value in (values | dict(each.shape)).items()}
     return Cause(
         name=each.effect.cause,
         at=each.effect.at,
@@ -193,8 +190,8 @@ def waves(extended: Regression, each: Named) -> dict[str, Value]:
         if size == 0.0:
             continue
         along, across = values / size, np.array([-values[1], values[0]]) / size
-        reach = Z95 * math.sqrt(max(0.0, float(along @ spread @ along)))
-        turn = min(math.pi, Z95 * math.sqrt(max(0.0, float(across @ spread @ across))) / size)
+        reach = intervals.Z95 * math.sqrt(max(0.0, float(along @ spread @ along)))
+        turn = min(math.pi, intervals.Z95 * math.sqrt(max(0.0, float(across @ spread @ across))) / size)
         phase = math.atan2(values[1], values[0])  # size cos(x - phase)
         out[f"amplitude{rest}"] = Value(size, (max(0.0, size - reach), size + reach))
         out["phase_twice_rad" if rest.startswith("_twice") else "phase_rad"] = Value(
@@ -246,12 +243,15 @@ def _subsystem(found: Diagnosis) -> str | None:
 
 
 def _impossible(found: Diagnosis) -> list[str]:
-    """Parameters whose whole interval is outside their limits: no machine has such values."""
+    """Parameters whose whole interval is outside their limits, with and without what the named causes add to them: no
+    machine has such values."""
     regression, out = found.extended, []
+    shared = plausibility.with_causes(regression, found.machine.parameters, found.named)
     for known in found.machine.parameters:
         if known.name in regression.values:
-            value, reach = regression.values[known.name], Z95 * _error(regression, known.name)
-            if value + reach < known.low or value - reach > known.high:
+            value, reach = regression.values[known.name], intervals.Z95 * _error(regression, known.name)
+            both = (value, value + shared.get(known.name, 0.0))
+            if all(plausibility.outside(known, each, reach) for each in both):
                 out.append(known.name)
     return out
 
@@ -266,7 +266,7 @@ def _known(had: Named, was: KnownEffect, extended: Regression) -> KnownCause:
 
 
 def _value(regression: Regression, name: str) -> Value:
-    value, reach = regression.values[name], Z95 * _error(regression, name)
+    value, reach = regression.values[name], intervals.Z95 * _error(regression, name)
     return Value(value, (value - reach, value + reach))
 
 

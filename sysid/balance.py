@@ -18,6 +18,7 @@ joint with friction usually have, so that a user need not know the catalogue. `m
 """
 
 import abc
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -32,10 +33,11 @@ SHARPER = 4.0  # times; the base mixes the two signs
 CLOSE = 1.0 - 1e-12  # of a sign that is not infinitely far from its middle
 SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
 PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
-LIMITS = (0.5, 0.7, 0.85)  # of the largest input: where it may saturate
-ZONES = (0.02, 0.05, 0.1, 0.2)  # of the largest input: where nothing may come of it
+LIMITS = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95)  # of the largest input: where it may saturate
+ZONES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the largest input: where nothing may come of it
 RADIAN = units.Unit(("rad",))
 SLOPE_S = 0.002  # Gaussian of a rate that is not measured
+SAME_WAY = 0.99  # correlation of a rate's integral with a channel, straight lines taken off: it is that channel's rate
 
 Shape = Mapping[str, float]
 Signals = Mapping[str, Array]
@@ -92,21 +94,38 @@ class Balance(abc.ABC):
         )
         return Recording(table, s, {self.response: made})
 
-    def _stand_ins(self, table: Table, s: Signals) -> dict[str, Array]:
-        """Columns that a measured rate has part in, by the angle instead, whose noise is another.
+    def _stand_ins(self, table: Table, s: dict[str, Array]) -> dict[str, Array]:
+        """Columns that a measured rate has part in, by its angle instead, whose noise is another.
 
         A rate's noise, differentiated, is larger than the acceleration in it; against its own column an inertia would
-        come out near zero, and what it should explain would be left to other terms.
+        come out near zero, and what it should explain would be left to other terms. So the joint's, and every rate of
+        which another channel is the integral.
         """
-        if not (self.angle and self.rate):
+        width = SLOPE_S / table.step_s
+        other = dict(s)
+        for name, (angle, ratio) in self._integrals(table, s).items():
+            other[name] = ratio * signals.derivative(table, s[angle], width)
+        if self.angle and self.rate:
+            rate = signals.derivative(table, s["angle"], width)
+            acceleration = signals.per_run(table, lambda part: np.gradient(part, table.step_s), rate)
+            other |= {"rate": rate, "acceleration": acceleration}
+        if all(other[name] is s[name] for name in s):
             return {}
-        rate = signals.derivative(table, s["angle"], SLOPE_S / table.step_s)
-        other = dict(s) | {
-            "rate": rate,
-            "acceleration": signals.per_run(table, lambda part: np.gradient(part, table.step_s), rate),
-        }
         there, instead = self.columns(s), self.columns(other)
         return {name: column for name, column in instead.items() if not np.array_equal(column, there[name])}
+
+    def _integrals(self, table: Table, s: Signals) -> dict[str, tuple[str, float]]:
+        """By rate the channel that is its integral, and how many of the rate's units one of that per second is."""
+        names = [each.name for each in self.quantities if each.name in s and each.name != self.response]
+        ways = {name: _bent(table, s[name]) for name in names}
+        found = {}
+        for name in names:
+            integral = _bent(table, signals.integral(table, s[name]))
+            alike = {other: _alike(integral, ways[other]) for other in names if other != name}
+            angle = max(alike, key=lambda other: alike[other], default="")
+            if angle and alike[angle] > SAME_WAY:
+                found[name] = (angle, float(integral @ ways[angle]) / float(ways[angle] @ ways[angle]))
+        return found
 
     def _add_joint(self, table: Table, s: dict[str, Array]) -> None:
         width = SLOPE_S / table.step_s
@@ -151,12 +170,13 @@ class Balance(abc.ABC):
         shapes: Sequence[Shape] = ({},),
         form: str = "",
         forms: int = 1,
+        scale: str | None = None,
     ) -> Effect:
         def columns(recording: Recording, shape: Shape, _: Values) -> Columns:
             return {self.response: np.column_stack(make(recording.signals, shape))}
 
         part = "sensor" if cause.startswith("sensor_") else "mechanical"
-        return Effect(cause, at, part, names, list(shapes), columns, form=form, forms=forms)
+        return Effect(cause, at, part, names, list(shapes), columns, form=form, forms=forms, scale=scale)
 
     def _lag(self) -> Effect:
         def columns(recording: Recording, _: Shape, values: Values) -> Columns:
@@ -195,9 +215,10 @@ class Balance(abc.ABC):
         def dead(s: Signals, p: Shape) -> list[Array]:
             return [-np.clip(s[name], -p["zone"], p["zone"])]
 
+        limits, zones = [{"limit": share * top} for share in LIMITS], [{"zone": share * top} for share in ZONES]
         return [
-            self._effect("saturation", name, ("share",), saturated, [{"limit": share * top} for share in LIMITS]),
-            self._effect("dead_zone", name, ("share",), dead, [{"zone": share * top} for share in ZONES]),
+            self._effect("saturation", name, ("share",), saturated, limits, scale="limit"),
+            self._effect("dead_zone", name, ("share",), dead, zones, scale="zone"),
         ]
 
     def _of_joint(self, recordings: Sequence[Recording]) -> list[Effect]:
@@ -248,6 +269,18 @@ class Balance(abc.ABC):
                 )
             )
         return found
+
+
+def _bent(table: Table, column: Array) -> Array:
+    """What a straight line in time leaves of a column."""
+    line = np.column_stack([np.ones(len(table)), table.time_s - table.time_s[0]])
+    return np.asarray(column - line @ np.linalg.lstsq(line, column, rcond=None)[0])
+
+
+def _alike(one: Array, other: Array) -> float:
+    """Correlation of two columns without a mean, 0 where one of them is nothing."""
+    sizes = math.sqrt(float(one @ one) * float(other @ other))
+    return float(one @ other) / sizes if sizes > 0.0 else 0.0
 
 
 def _top(rate: Array) -> float:

@@ -13,6 +13,7 @@ from ranger_sim.sysid.naming import Named, trials
 from ranger_sim.sysid.regression import Regression
 
 CHI2 = 3.84  # 95 % of one degree of freedom
+Z95 = 1.96  # standard errors on each side of a 95 % interval
 BETWEEN = 6  # shapes between two neighbours of the grid, where a shape is on a scale
 
 Intervals = dict[str, tuple[float, float]]
@@ -43,6 +44,26 @@ def profile(each: Named, base: Regression) -> tuple[Mapping[str, float], Interva
         for name, value in shape.items():
             _widen(intervals, name, value, value)
     return best[1], {name: _to_neighbours(name, ends, found) for name, ends in intervals.items()}
+
+
+def whole(each: Named, regression: Regression, profiled: Intervals) -> Intervals:
+    """The 95 % interval of every coefficient and shape of a named effect: its profile, and no less than 1.96 standard
+    errors in the regression with all named effects, where these depend on each other."""
+    found = {name: (value, value) for name, value in each.shape.items()}
+    for name, full in zip(each.effect.coefficients, each.coefficients, strict=True):
+        number = regression.names.index(full)
+        value = regression.values[full]
+        reach = Z95 * math.sqrt(max(0.0, float(regression.covariance[number, number])))
+        found[name] = (value - reach, value + reach)
+    for name, ends in profiled.items():
+        _widen(found, name, *ends)
+    return found
+
+
+def sign_is_known(each: Named, intervals: Intervals) -> bool:
+    """False where the interval of every coefficient has 0 in it."""
+    ends = [intervals[name] for name in each.effect.coefficients]
+    return any(low > 0.0 or high < 0.0 for low, high in ends)
 
 
 def _widen(intervals: Intervals, name: str, low: float, high: float) -> None:

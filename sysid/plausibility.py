@@ -164,12 +164,34 @@ def with_causes(regression: Regression, parameters: Sequence[Known], named: Sequ
     return {own[number]: float(value) for number, value in zip(taken, found, strict=True)}
 
 
+def surest_beyond(parameters: Sequence[Known], regression: Regression, named: Sequence[Named]) -> float:
+    """Standard errors by which the surest of these parameters is beyond its limits, with and without what the named
+    causes add to it. 0 where none is, and where one is so far beyond that no cause is named at all."""
+    shared = with_causes(regression, parameters, named)
+    surest = 0.0
+    for known in parameters:
+        if known.name not in regression.values:
+            continue
+        value, number = regression.values[known.name], regression.names.index(known.name)
+        error = math.sqrt(max(float(regression.covariance[number, number]), 1e-300))
+        both = (value, value + shared.get(known.name, 0.0))
+        if all(absurd(known, each, error) for each in both):
+            return 0.0
+        surest = max(surest, min(max(known.low - each, each - known.high) for each in both) / error)
+    return surest
+
+
+def outside(known: Known, value: float, reach: float) -> bool:
+    """True for a value beyond the limits by more than that."""
+    return value + reach < known.low or value - reach > known.high
+
+
 def absurd(known: Known, value: float, error: float) -> bool:
     """True for values surely beyond the limits; a little below zero is not absurd where the usual value is small."""
     reach = SURE * error
     if known.low >= 0.0 and known.value > 0.0 and value < 0.0:
         return value + reach < -OTHER_WAY * known.value
-    return value + reach < known.low or value - reach > known.high
+    return outside(known, value, reach)
 
 
 def explained(regression: Regression, name: str) -> float | None:

@@ -26,9 +26,9 @@ NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, 
 MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so many fit into the recording
 SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess falls off
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
-CLIPPED = (0.5, 0.7, 0.85, 0.95)  # quantiles of an input's size at which it may saturate
-LEAST_SHARE = 0.2  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
-DEAD = (0.02, 0.05, 0.1, 0.2)  # of an input's largest size
+CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
+LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
+DEAD = (0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
 
 
 class Declares(Protocol):
@@ -104,6 +104,7 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
         return Term(
             cause, name, "input", (coefficient,), lambda r, shape, values: {into(name): make(r.signals, shape)},
             shapes, lambda found: found[coefficient] > least, meaning, independent=True,
+            scale="limit" if shapes[0] else None,
         )  # fmt: skip
 
     made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]),

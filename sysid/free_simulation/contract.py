@@ -22,6 +22,11 @@ def check_columns(machine: DeclaredMachine, table: Table, given: Any, guess: Any
                     f"{machine.name}: {method} returns {name} of shape {np.shape(column)}; each has one for each of "
                     f"the {len(table)} rows"
                 )
+    for joint in machine.joints:
+        if joint.drive and joint.drive not in given:
+            raise ModelError(
+                f"{machine.name}: joint {joint.rate} is driven by {joint.drive}; inputs are {', '.join(given)}"
+            )
     missing = [name for name in machine.noisy_inputs if name not in given]
     if missing:
         raise ModelError(f"{machine.name}: noisy_inputs names {', '.join(missing)}; inputs are {', '.join(given)}")

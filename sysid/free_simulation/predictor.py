@@ -174,7 +174,8 @@ def _divided(a: Array, by: Array) -> Array:
         return np.asarray(a / by)
     if by.shape[1] == 2:
         one, both, two = by[:, :1, 0], by[:, :1, 1], by[:, 1:, 1]
-        share = 1.0 / (one * two - both * both)
+        with np.errstate(divide="ignore"):  # of a machine that runs away; its likelihood is judged as no number
+            share = 1.0 / (one * two - both * both)
         out = np.empty_like(a)
         out[:, :, 0] = (a[:, :, 0] * two - a[:, :, 1] * both) * share
         out[:, :, 1] = (a[:, :, 1] * one - a[:, :, 0] * both) * share

@@ -172,7 +172,12 @@ class Simulator:
         given |= at_ports
         between = {name: self._between_samples(name, c) for name, c in given.items()}
         shares = [(part + 0.5) / self.numerics.parts for part in range(self.numerics.parts)]
-        return Driven(given, [{name: at(share) for name, at in between.items()} for share in shares])
+        middles = [{name: at(share) for name, at in between.items()} for share in shares]
+        for joint in self.machine.joints:
+            if joint.drive:
+                for each in (given, *middles):
+                    each[joint.drive] = each[joint.drive] + each[on(joint.rate)]
+        return Driven(given, middles)
 
     def at(self, x: Array, p: Array, driven: Driven) -> tuple[Array, Array]:
         """(f, h) as (n, s) and (n, o). x: (n, s), p: (p,)."""
@@ -184,7 +189,7 @@ class Simulator:
         for middle in driven.middles:
             # half of a joint's push before the step and half after it: the position gets its share
             pushed = {joint.rate: 0.5 * part_s * middle[on(joint.rate)] / self._inertia(joint, values)
-                      for joint in machine.joints}  # fmt: skip
+                      for joint in machine.joints if not joint.drive}  # fmt: skip
             before = {**after, **{name: after[name] + push for name, push in pushed.items()}}
             after = {
                 name: np.broadcast_to(each, shape)

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from ranger_sim.foundation.user_error import ModelError
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Effect, Values
 
@@ -25,11 +26,13 @@ class Output:
 class Joint:
     """A state that is the rate of a moving part, so that friction can be sought there.
 
-    rate: the state. inertia: name of the parameter, or the number, by which a torque (a force) accelerates it; None:
-    what is found is an acceleration. position: the state that is its position; "": nothing periodic is sought. turns:
-    of the part that the periods belong to, per unit of position over 2 pi (a gear's ratio); periods: per turn. load:
-    signal with the transmitted torque, for friction that grows with it. slow: rate about which a smoothed sign turns;
-    0: a hundredth of the usual rate. unit: of torque or force in the names of coefficients.
+    rate: the state. inertia: name of the parameter, or the number, by which a torque (a force) accelerates it. drive:
+    name of the input that drives this joint, of a machine whose joints move each other; what is found then is a part of
+    that input, and moves all joints as it does. With neither what is found is an acceleration. position: the state that
+    is its position; "": nothing periodic is sought. turns: of the part that the periods belong to, per unit of position
+    over 2 pi (a gear's ratio); periods: per turn. load: signal with the transmitted torque, for friction that grows
+    with it. slow: rate about which a smoothed sign turns; 0: a hundredth of the usual rate. unit: of torque or force in
+    the names of coefficients.
     """
 
     rate: str
@@ -39,11 +42,18 @@ class Joint:
     periods: Sequence[float] = (1.0, 2.0, 3.0, 4.0)
     load: str = ""
     slow: float = 0.0
+    drive: str = ""
+
+    def __post_init__(self) -> None:
+        if self.drive and self.inertia is not None:
+            raise ModelError(
+                f"joint {self.rate}: it has the inertia {self.inertia} and the drive {self.drive}; one will do"
+            )
 
     @property
     def unit(self) -> str:
         """Of what enters, in names of coefficients."""
-        return "torque" if self.inertia is not None else "acceleration"
+        return "torque" if self.inertia is not None or self.drive else "acceleration"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -396,7 +396,11 @@ def _unique(path: pathlib.Path, line: int, cells: list[str], group: list[str]) -
         ]
     for name in names:
         if names.count(name) > 1:
-            raise DataError(f"{path.name}:{line}: two columns are called {name[:60]}")
+            first, second = [place for place, each in enumerate(names, 1) if each == name][:2]
+            raise DataError(
+                f"{path.name}:{line}: two columns are called {name[:60]}, columns {first} and {second}: one of them "
+                "needs another name in that line"
+            )
     return tuple(names)
 
 
