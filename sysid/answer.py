@@ -201,8 +201,13 @@ def waves(extended: Regression, each: Named) -> dict[str, Value]:
 
 
 def _channels(found: Diagnosis) -> list[ChannelMisfit]:
-    """Misfit of each equation, in total and in each regime: rms of the residual over its noise, both in deviations."""
+    """Misfit of each equation, in total and in each regime: rms of the residual over its noise, both in deviations.
+
+    The noise is what the named causes leave; without any, by candidates, what a flexible predictor cannot predict.
+    """
     plain, extended, recordings = found.plain, found.extended, found.recordings
+    unnamed = found.by_candidates and not found.named
+    tests = [each for each in found.before.tests if unnamed and each.p < found.level and "a line" not in each.features]
     out = []
     for equation in plain.equations:
         rows, good = plain.rows_of(equation), plain.good[equation]
@@ -211,6 +216,9 @@ def _channels(found: Diagnosis) -> list[ChannelMisfit]:
             continue
         scale = plain.whitening[equation].deviation
         better = extended.residual[extended.rows_of(equation)] * (extended.whitening[equation].deviation / scale)
+        better *= math.sqrt(
+            1.0 - max((min(1.0, each.share) for each in tests if each.equation == equation), default=0.0)
+        )
         noise = float(np.sqrt(np.mean(better**2)))
         names = ["all", *dict.fromkeys(name for r in recordings for name in r.regimes)]
         for name in names:

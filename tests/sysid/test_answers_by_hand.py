@@ -76,7 +76,7 @@ def test_a_value_is_reported_with_two_errors_either_way():
 def test_a_parameter_is_impossible_with_its_whole_interval_beyond_a_limit(low, high, wrong):
     regression = SimpleNamespace(values={"a": 2.0}, names=["a"], covariance=np.array([[(1.92 / 1.96) ** 2]]))
     machine = SimpleNamespace(parameters=[Known("a", "", 1.0, low, high, ""), Known("z", "", 1.0, 5.0, 6.0, "")])
-    found = SimpleNamespace(extended=regression, machine=machine)
+    found = SimpleNamespace(extended=regression, machine=machine, named=[])
     assert answer._impossible(found) == (["a"] if wrong else [])
 
 
@@ -121,7 +121,9 @@ def test_a_misfit_is_reported_for_all_rows_and_each_regime_of_fifty():
     before = Regression([one], noise=QUIET)
     louder = SimpleNamespace(whitening={"one": Whitening(np.zeros(0), 2.0)}, shared={})
     after = Regression([one], [{"one": extra[:, None]}], ["x"], noise=louder)
-    found = answer._channels(SimpleNamespace(plain=before, extended=after, recordings=[one]))
+    diagnosed = SimpleNamespace(plain=before, extended=after, recordings=[one], by_candidates=True, named=[named()])
+    diagnosed.before = SimpleNamespace(tests=[misfit.Test("one", "over a", 1.0, 1, 1e-9, 0.5)])  # names count instead
+    found = answer._channels(diagnosed)
     assert [(each.channel, each.regime) for each in found] == [("one", "all"), ("one", "many")]
 
     def left(*columns):
@@ -134,6 +136,21 @@ def test_a_misfit_is_reported_for_all_rows_and_each_regime_of_fifty():
         assert told.noise == pytest.approx(math.sqrt(np.mean(with_it**2)))
         share = 1.0 - np.mean(with_it[rows] ** 2) / np.mean(without[rows] ** 2)
         assert told.repeatable_fraction == pytest.approx(share)
+
+
+@pytest.mark.parametrize(
+    ("p", "features", "repeatable"),
+    [(1e-4, "the flexible predictor", 0.36), (0.5, "the flexible predictor", 0.0), (1e-9, "a line at 7 periods", 0.0)],
+)
+def test_without_a_name_the_noise_is_what_a_predictor_leaves(p, features, repeatable):
+    """0.36 of the square can be predicted: 0.8 of the rms is noise. A line's share is that of its neighbours."""
+    regression = Regression([plain(RNG.normal(size=N), {"p": np.ones(N)})], noise=QUIET)
+    found = SimpleNamespace(plain=regression, extended=regression, recordings=regression.recordings, level=0.01)
+    found.by_candidates, found.named = True, []
+    found.before = SimpleNamespace(tests=[misfit.Test("one", features, 1.0, 1, p, 0.36)])
+    (told,) = answer._channels(found)
+    assert told.repeatable_fraction == pytest.approx(repeatable)
+    assert told.noise == pytest.approx(math.sqrt(1.0 - repeatable) * told.rms)
 
 
 def test_letters_and_subsystems_are_those_of_the_equations():

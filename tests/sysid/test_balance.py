@@ -138,3 +138,54 @@ def test_an_inertia_is_found_where_the_rates_noise_exceeds_the_acceleration():
     assert np.std(noise) > 2.0 * np.std(acceleration)
     found = diagnose(Joint(), [Table(t, columns, (slice(0, len(t)),), "noisy")]).result
     assert found.evidence.parameters["inertia_As2_per_rad"].value == pytest.approx(0.2, rel=0.05)
+
+
+class Elbow(Balance):
+    """A joint of which another one's acceleration is a part; the shoulder's channels have no declared role."""
+
+    name = "elbow"
+    quantities = (
+        Quantity("shoulder_deg", "deg", "of the shoulder"),
+        Quantity("shoulder_rate", "rad/s", "of the shoulder"),
+        Quantity("angle_rad", "rad", "of the elbow"),
+        Quantity("rate_rad_per_s", "rad/s", "of the elbow"),
+        Quantity("torque_Nm", "N m", "of the elbow", drives=False),
+    )
+    parameters = (
+        Known("inertia", "kg m^2", 0.1, 0.0, 10.0, ""),
+        Known("coupling", "kg m^2", 0.1, 0.0, 10.0, ""),
+        Known("coulomb", "N m", 0.1, 0.0, 10.0, ""),
+    )
+    response, angle, rate = "torque_Nm", "angle_rad", "rate_rad_per_s"
+
+    def columns(self, s):
+        shoulder = np.gradient(s["shoulder_rate"], s["t"])
+        return {"inertia": s["acceleration"], "coupling": shoulder, "coulomb": s["direction"]}
+
+
+def test_a_coupling_is_found_where_another_joints_rate_is_noisy():
+    """0.05 kg m^2; the differences of the shoulder's rate have five times the noise that they have acceleration."""
+    draw = generator(5, "elbow")
+    t = 0.002 * np.arange(20_000)
+    ways = [((1.0, 2.1, 0.3), (0.3, 6.1, 1.0)), ((0.8, 1.7, 0.9), (0.3, 4.9, 0.2))]
+    angles, rates, accelerations = (
+        [sum(made(size, turn, phase) for size, turn, phase in way) for way in ways]
+        for made in (
+            lambda size, turn, phase: size * np.sin(turn * t + phase),
+            lambda size, turn, phase: size * turn * np.cos(turn * t + phase),
+            lambda size, turn, phase: -size * turn**2 * np.sin(turn * t + phase),
+        )
+    )
+    torque = 0.1 * accelerations[1] + 0.05 * accelerations[0] + 0.2 * np.sign(rates[1])
+    columns = {
+        "shoulder_deg": np.degrees(angles[0] + 2e-5 * draw.normal(size=len(t))),
+        "shoulder_rate": rates[0] + 0.1 * draw.normal(size=len(t)),
+        "angle_rad": angles[1] + 2e-5 * draw.normal(size=len(t)),
+        "rate_rad_per_s": rates[1] + 0.1 * draw.normal(size=len(t)),
+        "torque_Nm": torque + 0.02 * draw.normal(size=len(t)),
+    }
+    table = Table(t, columns, (slice(0, len(t)),), "elbow")
+    stand_ins = Elbow().prepare(table).equations["torque_Nm"].stand_ins
+    assert np.corrcoef(stand_ins["coupling"], accelerations[0])[0, 1] > 0.8  # 0.2 of the column itself
+    found = diagnose(Elbow(), [table]).result
+    assert not found.causes and found.evidence.parameters["coupling"].value == pytest.approx(0.05, rel=0.1)

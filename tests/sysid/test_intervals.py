@@ -6,9 +6,9 @@ from scipy import stats
 
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.intervals import profile
+from ranger_sim.sysid.intervals import profile, sign_is_known, whole
 from ranger_sim.sysid.machine import Effect, Equation, Recording
-from ranger_sim.sysid.naming import select
+from ranger_sim.sysid.naming import refit, select
 from ranger_sim.sysid.regression import Regression
 
 SIZE = 1500
@@ -73,3 +73,31 @@ def test_at_the_best_shape_alone_the_interval_would_be_too_short():
     column = made.columns([bump(made.recordings[0], {"width": TRUE_WIDTH}, {})])
     alone = 2.0 * 1.96 / float(np.linalg.norm(column))
     assert intervals["height"][1] - intervals["height"][0] > 1.05 * alone
+
+
+@pytest.mark.parametrize(
+    ("ends", "known"),
+    [
+        ({"height": (0.1, 0.4), "width": (-1.0, 2.0)}, True),  # a shape has no sign to know
+        ({"height": (-0.4, -0.1), "width": (0.5, 2.0)}, True),
+        ({"height": (-0.1, 0.4), "width": (0.5, 2.0)}, False),
+        ({"height": (0.0, 0.4), "width": (0.5, 2.0)}, False),
+    ],
+)
+def test_the_sign_of_a_size_is_known_where_its_interval_has_no_zero(ends, known):
+    (named,) = select([effect("width")], regression(1))
+    assert sign_is_known(named, ends) == known
+
+
+def test_the_whole_interval_is_its_profile_and_the_regressions_error():
+    made = regression(2)
+    (named,) = select([effect("width")], made)
+    extended = refit(made, [named])
+    number = extended.names.index(*named.coefficients)
+    value, error = extended.values[named.coefficients[0]], float(np.sqrt(extended.covariance[number, number]))
+    near, far = (value - 0.1 * error, value + 0.1 * error), (value - 9.0 * error, value + error)
+    assert whole(named, extended, {"height": near, "width": (0.5, 0.9)}) == {
+        "height": pytest.approx((value - 1.96 * error, value + 1.96 * error)),
+        "width": (min(0.5, named.shape["width"]), max(0.9, named.shape["width"])),
+    }
+    assert whole(named, extended, {"height": far})["height"] == pytest.approx((far[0], value + 1.96 * error))

@@ -1,6 +1,7 @@
 """Fits of data that are not what they say: found by their parameters, and no cause is named from them."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -297,3 +298,19 @@ def test_a_parameter_that_is_a_part_next_to_a_named_cause_is_not_judged_alone():
     assert not plausibility.look(machine, regression, [cause]).findings
     (alone,) = plausibility.look(machine, regression).findings
     assert (alone.channel, alone.kind) == ("mass_kg", "other_machine")
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "sure"),
+    [
+        (-0.4, 0.1, 4.0),  # below zero, and by less than half of what it usually is
+        (-0.4, 0.01, 40.0),
+        (0.3, 0.1, 0.0),
+        (-0.9, 0.05, 0.0),  # so far that no cause is named at all
+        (12.0, 1.0, 2.0),
+    ],
+)
+def test_how_surely_a_parameter_is_beyond_its_limits_is_in_standard_errors(value, error, sure):
+    weight = Known("weight", "N m", 1.0, 0.0, 10.0, "")
+    regression = SimpleNamespace(names=["weight"], values={"weight": value}, covariance=np.array([[error**2]]))
+    assert plausibility.surest_beyond([weight], regression, []) == pytest.approx(sure)
