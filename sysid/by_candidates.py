@@ -42,7 +42,9 @@ MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likel
 SMALL = 0.2
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
-ABOVE_NUMERICS = 3.0  # times what numerics move it by: a named effect is at least so large
+# Times what numerics move it by: a named effect is at least so large. A lag is a stamp's, up to half a row, in one of
+# the ways in which an input may go between its rows where it is below twice of the half row between these
+ABOVE_NUMERICS, LAG_ABOVE_NUMERICS = 3.0, 2.0
 BLOCKS = 30  # of the coefficients' errors: each longer than the memory of most residuals
 MORE_PREDICTED = 1.5  # times: a narrower band in which so much more of the residual is predictable is the better one
 LEVEL = 0.01  # chance of a predictable residual in any equation of a sound recording
@@ -121,12 +123,15 @@ def diagnose(
         progress("numerics", 0.7)
         recordings = simulations.again(recordings, found.named, found.with_named)
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
-        below = [each.effect.name for each in found.named if _below(floor, found, each.effect)]
+        below = [each for each in found.named if _below(floor, found, each.effect)]
         if not below:
             break
-        small += below
-        effects = [each for each in effects if each.name not in small]
+        small += [each.effect.name for each in below]
+        effects = [each for each in effects if not any(one.effect.excludes(each) for one in below)]  # in all its forms
+        lags = [each for each in below if each.effect.cause == "sensor_lag"]
+        skews.extend(lags)  # of the sensor or of the input's way to the machine: it is there
         found = selected(recordings, held, 0.7)
+        before = predictability.test(found.base, predictor.columns(recordings), seed) if lags else before
     progress("what is left", 0.75)
     known_to: dict[str, intervals.Intervals] = {}
     extended = found.with_named
@@ -279,7 +284,8 @@ def _below(floor: Mapping[str, tuple[float, ...]], found: likelihood.Selection, 
     for each in found.named:
         if each.effect is effect and effect.name in floor:
             size = math.hypot(*(found.with_named.values[name] for name in each.coefficients))
-            return size < ABOVE_NUMERICS * math.hypot(*floor[effect.name])
+            times = LAG_ABOVE_NUMERICS if effect.cause == "sensor_lag" else ABOVE_NUMERICS
+            return size < times * math.hypot(*floor[effect.name])
     return False
 
 

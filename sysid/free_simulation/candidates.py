@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from ranger_sim.sysid.dataset import Array, Table
@@ -28,7 +29,7 @@ SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess fal
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
 LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
-DEAD = (0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
+DEAD = (0.002, 0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
 
 
 class Declares(Protocol):
@@ -186,11 +187,15 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
 
 
 def delayed(table: Table, column: Array, lag_s: float) -> Array:
-    """A column (n,) as it was `lag_s` before, by straight lines; a run's first value before its start."""
+    """A column (n,) as it was `lag_s` before, on cubics between its rows; a run's first value before its start.
+
+    Straight lines would smooth what is late by half a row, as another sensor does.
+    """
     out = np.empty_like(column)
     for run in table.runs:
-        stamps = table.time_s[run]
-        out[run] = np.interp(stamps - lag_s, stamps, column[run])
+        stamps, values = table.time_s[run], column[run]
+        before = np.maximum(stamps - lag_s, stamps[0])
+        out[run] = CubicSpline(stamps, values)(before) if len(stamps) > 1 else values
     return out
 
 

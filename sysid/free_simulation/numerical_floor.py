@@ -2,17 +2,21 @@
 
 import copy
 import dataclasses
+import itertools
 
 import numpy as np
 
 from ranger_sim.sysid.dataset import Array
-from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
+from ranger_sim.sysid.free_simulation.fit import CHOSEN, TrajectoryFit
+from ranger_sim.sysid.free_simulation.simulator import Numerics
 
 ROUNDS = 4  # with other numerics, from the fit without them
 FINE_ENOUGH = 0.05  # of an output's noise: a quarter of a percent of its square. Chosen by us
+MORE_ROUNDS = 12  # where a lag starts elsewhere
 MORE, MOST_PARTS = 4, 64  # times as many steps; the most from sample to sample
 NARROW = 0.25  # of what is open at standstill
 FINER = 16  # steps of a check, for each of the simulator's
+LEAST_LAG = 0.01  # samples: a delay has a size
 OPEN = 1e-6  # of a state's size: a law that leaves less open is not open
 
 
@@ -23,6 +27,10 @@ def moved(fit: TrajectoryFit) -> Array:
     for other in _otherwise(fit):
         other.settle(ROUNDS)
         out.append(other.p[count:] - fit.p_at[count:])
+    for other in _held_otherwise(fit):
+        other.settle(MORE_ROUNDS)
+        if other.surprise - fit.surprise < CHOSEN:  # the data do not show which it is
+            out.append(other.p[count:] - fit.p_at[count:])
     return np.array(out)
 
 
@@ -71,9 +79,36 @@ def _otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
         variants.append(straight)
     if np.any(fit.loose() > OPEN * fit.size_x):
         variants.append(dataclasses.replace(now, open_share=NARROW))
+    return [_with(fit, variant) for variant in variants]
+
+
+def _held_otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
+    """Where a lag acts, fits with a smooth input held from row to row, or on its cubic where it is held now.
+
+    What is held is late by half a row, so that the lag starts with half a row less, or more; at its shape, and at that
+    of its new size.
+    """
+    now = fit.simulator.numerics
+    lags = [each for each in fit.acting if each.term.cause == "sensor_lag"]
     made = []
-    for variant in variants:
-        other = copy.copy(fit)
-        other.simulator = fit.simulator.stepping(variant)
+    for name, same_shape in itertools.product(sorted(fit.simulator.curving) if lags else (), (True, False)):
+        other = _with(fit, dataclasses.replace(now, held=now.held ^ {name}))
+        later_s = (0.5 if name in now.held else -0.5) * fit.step_s
+        other.acting, other.p = [], fit.p.copy()
+        first = len(fit.simulator.names)
+        for each in fit.acting:
+            if each in lags:
+                other.p[first] += later_s
+                if each.term.scale is not None and not same_shape:
+                    lag_s = max(float(other.p[first]), LEAST_LAG * fit.step_s)
+                    each = dataclasses.replace(each, shape={**each.shape, each.term.scale: lag_s})
+            other.acting.append(each)
+            first += len(each.coefficients)
         made.append(other)
     return made
+
+
+def _with(fit: TrajectoryFit, numerics: Numerics) -> TrajectoryFit:
+    other = copy.copy(fit)
+    other.simulator = fit.simulator.stepping(numerics)
+    return other
