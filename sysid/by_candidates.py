@@ -455,11 +455,12 @@ def _sure(regression: Regression, each: Named) -> float:
 
 
 def _add_numerics(regression: Regression, named: Sequence[Named], floor: Mapping[str, tuple[float, ...]]) -> None:
-    """Widen the covariance by what numerics move each coefficient by, as a further error at 95 %."""
+    """Widen the covariance so that a 95 % interval is longer at each end by what numerics move the coefficient by."""
     for each in named:
         for name, moved in zip(each.coefficients, floor.get(each.effect.name, ()), strict=False):
             number = regression.names.index(name)
-            regression.covariance[number, number] += (moved / intervals.Z95) ** 2
+            error = math.sqrt(max(0.0, float(regression.covariance[number, number])))
+            regression.covariance[number, number] = (error + moved / intervals.Z95) ** 2
 
 
 def smallest(effects: Sequence[Effect], regression: Regression, threshold: float) -> list[Visible]:

@@ -7,6 +7,7 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.free_simulation import Term, filtered, into
+from ranger_sim.sysid.free_simulation.candidates import delayed
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 from ranger_sim.sysid.pipeline import diagnose
 from tests.sysid.test_noise_floor import Disc, STEP_s
@@ -75,6 +76,28 @@ def test_a_sensor_that_is_three_rows_late_is_not_taken_for_half_a_row_of_a_hold(
     [cause] = result.causes
     low, high = cause.parameters["lag_s"].ci95
     assert cause.name == "sensor_lag" and low < 3.0 * STEP_s < high
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_next_to_a_late_sensor_a_hold_is_a_part_of_what_is_known_of_the_lag(held):
+    """Three rows: late by 3.5 on a cubic or by 3 of what is held, which these data do not show apart."""
+    result = diagnose(Disc(), [waved(3, held, 3)], [waved(4, held, 3)]).result
+    [cause] = result.causes
+    low, high = cause.parameters["lag_s"].ci95
+    assert cause.name == "sensor_lag" and low < 3.0 * STEP_s < high
+    assert STEP_s < high - low < 1.3 * STEP_s  # half a row either way, and the noise
+
+
+def test_what_is_late_is_on_cubics_between_the_rows():
+    """Of a wave of 40 rows: straight lines are off by (2 pi / 40)^2 / 8 of it, cubics by a hundredth of that."""
+    table = Table(0.1 * np.arange(400), {}, (slice(0, 150), slice(150, 400)), "late", {})
+    wave = np.sin(2.0 * np.pi / 4.0 * table.time_s)
+    found = delayed(table, wave, 0.05)
+    true = np.sin(2.0 * np.pi / 4.0 * (table.time_s - 0.05))
+    inside = np.ones(400, dtype=bool)
+    inside[[0, 150]] = False
+    assert found[inside] == pytest.approx(true[inside], abs=3e-5)
+    assert found[[0, 150]].tolist() == wave[[0, 150]].tolist()  # nothing is known of before a run
 
 
 def test_a_smooth_input_is_on_a_cubic_or_held():

@@ -119,7 +119,8 @@ def numerics(answer: dict[str, Any]) -> list[str]:
             sizes = ", ".join(f"{name} by {size:.2g}" for name, size in moved.items())
             lines.append(f"{each['name']} at {each['at']}: half the step and other ways between samples move {sizes}")
     lines += [
-        f"{name} is hardly larger than what the simulator's numerics, and other ways of its inputs between rows, move it by: not named"
+        f"{name} is hardly larger than what the simulator's numerics, and other ways of its inputs between rows, "
+        "move it by: not named"
         for name in answer["evidence"].get("below_numerics", ())
     ]
     return lines
