@@ -31,6 +31,7 @@ from ranger_sim.sysid.results import (
     WithoutForm,
 )
 
+LITTLE = 0.01  # of a parameter's usual value: so far beyond a limit the errors of a model take it
 RIVALS = 6  # that an answer lists
 NEXT = {
     frozenset(
@@ -259,6 +260,7 @@ def _impossible(found: Diagnosis) -> list[str]:
         if known.name in regression.values:
             value, reach = regression.values[known.name], intervals.Z95 * _error(regression, known.name)
             both = (value, value + shared.get(known.name, 0.0))
+            reach += LITTLE * abs(known.value)
             if all(plausibility.outside(known, each, reach) for each in both):
                 out.append(known.name)
     return out

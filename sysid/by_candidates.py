@@ -133,45 +133,20 @@ def diagnose(
         found = selected(recordings, held, 0.7)
         before = predictability.test(found.base, predictor.columns(recordings), seed) if lags else before
     progress("what is left", 0.75)
-    known_to: dict[str, intervals.Intervals] = {}
-    extended = found.with_named
-    while (
-        found.named
-    ):  # a cause is not named with 0 in its interval, or where parameters are impossible nearly as surely
-        for each in found.named:
-            others = [other for other in found.named if other is not each]
-            base = naming.refit(found.base, others, [*skews, *others]) if others else found.base
-            each.shape, known_to[each.effect.name] = intervals.profile(each, base)
-        extended = naming.refit(found.base, found.named, [*skews, *found.named])
-        _widen(extended)
-        _add_numerics(extended, found.named, floor)
-        absurd = plausibility.surest_beyond(machine.parameters, extended, found.named)
-        least = SURER * absurd if absurd > intervals.Z95 else 0.0
-        unsure = [
-            each
-            for each in found.named
-            if not intervals.sign_is_known(each, intervals.whole(each, extended, known_to[each.effect.name]))
-            or _sure(extended, each) < least
-        ]
-        if not unsure:
-            break
-        found.named.remove(min(unsure, key=lambda each: _sure(extended, each)))
-        extended = found.base
-    if not found.named:
-        _widen(extended)
+    judged = held or (recordings if hasattr(machine, "free") else [])
+    if hasattr(machine, "free"):
+        judged = [machine.free(each) for each in judged]
+    judge = Held(judged, skews, found.base.values) if judged else None
+    extended, known_to = _sure_names(machine, found, skews, floor, judge if held else None, seed)
     after = predictability.test(extended, predictor.columns(recordings), seed) if found.named else before
     progress("gain", 0.85)
     errors = None
     floors = noise_floor.by_channels(extended)
-    judged = held or (recordings if hasattr(machine, "free") else [])
-    if hasattr(machine, "free"):
-        judged = [machine.free(each) for each in judged]
-    if judged and not found.named:
-        judge = Held(judged, skews, found.base.values)
+    if judge is not None and not found.named:
         floors = noise_floor.farther(floors, noise_floor.by_channels(judge.base, judge.sizes, bool(held)))
-    if held:
+    if held and judge is not None:
         lasting = predictability.predictor(machine, recordings, seed, without=("t",))  # another run has its own time
-        errors = Held(judged, skews, found.base.values).errors(found.named, extended, found.base, lasting, seed)
+        errors = judge.errors(found.named, extended, found.base, lasting, seed)
     return Diagnosis(
         machine,
         list(recordings),
@@ -206,6 +181,51 @@ def diagnose(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def _sure_names(
+    machine: Machine,
+    found: likelihood.Selection,
+    fixed: Sequence[Named],
+    floor: Mapping[str, tuple[float, ...]],
+    judge: Held | None,
+    seed: int,
+) -> tuple[Regression, dict[str, intervals.Intervals]]:
+    """(regression with the causes that stay, their profiles by name); found loses the others.
+
+    A cause has no name with 0 in its interval, where parameters are impossible nearly as surely, and where all causes
+    together make held-out data worse; the least sure one goes first.
+    """
+    profiles: dict[str, intervals.Intervals] = {}
+    extended = found.with_named
+    while found.named:
+        for each in found.named:
+            others = [other for other in found.named if other is not each]
+            base = naming.refit(found.base, others, [*fixed, *others]) if others else found.base
+            each.shape, profiles[each.effect.name] = intervals.profile(each, base)
+        extended = naming.refit(found.base, found.named, [*fixed, *found.named])
+        _widen(extended)
+        _add_numerics(extended, found.named, floor)
+        absurd = plausibility.surest_beyond(machine.parameters, extended, found.named)
+        least = SURER * absurd if absurd > intervals.Z95 else 0.0
+        unsure = [
+            each
+            for each in found.named
+            if not intervals.sign_is_known(each, intervals.whole(each, extended, profiles[each.effect.name]))
+            or _sure(extended, each) < least
+        ]
+        loses = False
+        if not unsure and judge is not None:
+            loses = gained(judge.errors(found.named, extended, found.base, None, seed).values())[0] < 0.0
+        if not unsure and not loses:
+            break
+        weakest = min(unsure or found.named, key=lambda each: _sure(extended, each))
+        found.named.remove(weakest)
+        found.refused += [weakest] if loses else []
+        extended = found.base
+    if not found.named:
+        _widen(extended)
+    return extended, profiles
 
 
 def _left_over(
@@ -514,10 +534,11 @@ def _needed_s(found: Diagnosis) -> dict[str, float]:
     if found.detected:
         return {}
     seconds = sum(len(each.table) * each.table.step_s for each in found.recordings)
+    far = [name for name, each in found.floors.items() if noise_floor.far(each)]  # more of the same shows no more
     return {
         name: math.ceil(seconds * FEWEST_STRETCHES / number)
         for name, number in found.stretches.items()
-        if number < FEWEST_STRETCHES and name not in _learnable(found)
+        if number < FEWEST_STRETCHES and name not in (*_learnable(found), *far)
     }
 
 

@@ -213,10 +213,15 @@ def named_by(dataset: Dataset, quantities: Sequence[Quantity]) -> Dataset:
 
 
 def _alike(dataset: Dataset, name: str, unit: units.Unit | None) -> Channel | None:
-    """The channel that has this name but for the unit at its end; unit: of a name without one."""
+    """The channel that has this name but for the unit at its end, or has its unit in a row of its file and not in its
+    name; unit: of a name without one."""
     stem, of_name = units.split(name)
     unit = of_name or unit
-    return dataset.channels.get(units.si_name(stem, unit)) if unit is not None else None
+    if unit is None:
+        return None
+    bare = dataset.channels.get(stem)
+    there = units.unit_of(bare.unit) if bare is not None and bare.unit else None
+    return dataset.channels.get(units.si_name(stem, unit)) or (bare if there and unit.same_kind(there) else None)
 
 
 def _renamed(

@@ -20,6 +20,7 @@ from ranger_sim.sysid.regression import Part, Regression
 SURE = 5.0  # standard errors beyond a limit: chance and a small model error do not reach that far
 OTHER_WAY = 0.5  # of its known value: this far on the other side of zero a sign is wrong, in the data or in the model
 FACTOR = 5.0  # to the simulation's value: between a machine of the same kind and rpm taken for rad/s (9.5)
+NOTHING = 1e-4  # of its known value: less than any unit makes of it; a parameter may be 0
 CLEAR = 0.2  # relative error up to which a factor is reported
 EXPLAINED = 0.2  # of an equation's balance: below it the channels do not belong together
 # Or below this share where the residual moves slowly, as a machine does and a sensor's noise does not. Chosen by us:
@@ -100,7 +101,8 @@ def look(
             text = f"it comes out as {whole:.4g} {known.unit}{together}, which no machine has"
             findings.append(_finding(known.name, "impossible", whole, known.unit, text))
         elif known.value * value * whole != 0.0 and error < CLEAR * min(abs(value), abs(whole)):
-            if not any(1.0 / FACTOR <= abs(each / known.value) <= FACTOR for each in (value, whole)):
+            nothing = known.low <= 0.0 and abs(whole) < NOTHING * abs(known.value)  # as the machine may have of it
+            if not nothing and not any(1.0 / FACTOR <= abs(each / known.value) <= FACTOR for each in (value, whole)):
                 simulated = _of_a_simulator(regression) and not by_candidates
                 findings.append(_factor(known, whole, together, simulated))
     few = {name: each.few for recording in regression.recordings for name, each in recording.equations.items()}
