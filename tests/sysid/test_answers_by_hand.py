@@ -11,10 +11,22 @@ from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.plant import terms as plant_terms
 from ranger_sim.plant.electrics.motor_parameters import ANKLE_MOTOR, HIP_MOTOR
-from ranger_sim.sysid import answer, intervals, isolability, misfit, model_terms, plausibility, residual_term, results
+from ranger_sim.sysid import (
+    answer,
+    by_candidates,
+    intervals,
+    isolability,
+    misfit,
+    model_terms,
+    naming,
+    plausibility,
+    residual_term,
+    results,
+)
 from ranger_sim.sysid.dataset import Channel, Dataset, Table
 from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect
 from ranger_sim.sysid.experiment_models import SAMPLES, Equation
+from ranger_sim.sysid.likelihood import Selection
 from ranger_sim.sysid.machine import Effect, Known, Recording
 from ranger_sim.sysid.machine import Equation as Balance
 from ranger_sim.sysid.machines.walk import timebase
@@ -496,3 +508,42 @@ def test_a_parameter_is_reported_alone_where_the_others_leave_a_twentieth_of_its
     assert (found is not None) is told
     if told:
         assert found.value == pytest.approx(3.0, rel=0.02) and found.equation == "one"
+
+
+# --- names that held-out data take back ------------------------------------------------------------------------------
+
+
+def judged(before, after):
+    """A judge of held-out data whose errors are these."""
+    error = results.HeldOutError(before, after, None, (0.0, 2.0))
+    return SimpleNamespace(errors=lambda named, *_: {"one": error if named else None})
+
+
+@pytest.mark.parametrize(("after", "stays"), [(0.99, True), (1.01, False)])
+def test_a_cause_that_makes_held_out_data_worse_is_refused(after, stays):
+    x = RNG.normal(size=N)
+    base = Regression([plain(0.5 * x + 0.1 * RNG.normal(size=N), {"p": np.ones(N)})], noise=QUIET)
+    effect = Effect("drag", "there", "mechanical", ("size",), ({},), lambda *_: {"one": x[:, None]})
+    one = Named(effect, {}, 50.0, 1, 1e-9, 30.0, [], [])
+    found = Selection([one], [], base, naming.refit(base, [one]), [], [])
+    machine = SimpleNamespace(parameters=[Known("p", "N", 0.0, -1.0, 1.0, "")])
+    extended, _ = by_candidates._sure_names(machine, found, [], {}, judged(1.0, after), 0)
+    assert (found.named, found.refused) == (([one], []) if stays else ([], [one]))
+    assert ("drag@there:size" in extended.names) == stays
+
+
+def test_more_of_what_is_far_above_its_noise_is_not_asked_for():
+    """10 s with 5 of 20 independent stretches would be 40 s; what leaves 20 times its noise is not short of data."""
+    table = Table(0.01 * np.arange(1000), {}, (slice(0, 1000),), "log")
+    floors = {"near": results.NoiseFloor(1.0, 0.9, "N", False), "far": results.NoiseFloor(20.0, 1.0, "N", False)}
+    found = SimpleNamespace(detected=False, recordings=[SimpleNamespace(table=table)], floors=floors, errors=None)
+    found.stretches = {"near": 5.0, "far": 5.0}
+    assert by_candidates._needed_s(found) == {"near": 40}
+
+
+def test_a_hundredth_of_its_usual_value_beyond_a_limit_is_not_impossible():
+    damping = Known("damping", "", 0.04, 0.0, 1.0, "")
+    for value, wrong in ((-2e-6, []), (-3.9e-4, []), (-4.1e-4, ["damping"])):
+        regression = SimpleNamespace(values={"damping": value}, names=["damping"], covariance=np.array([[1e-20]]))
+        found = SimpleNamespace(extended=regression, machine=SimpleNamespace(parameters=[damping]), named=[])
+        assert answer._impossible(found) == wrong

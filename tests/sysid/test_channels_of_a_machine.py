@@ -60,6 +60,16 @@ def test_a_channel_in_another_kind_of_unit_is_refused_by_both_names(tmp_path):
         named_by(recording, [Quantity("current", "A", "")])
 
 
+def test_a_unit_in_a_row_of_its_own_counts_as_one_in_the_name(tmp_path):
+    path = tmp_path / "rows.csv"
+    lines = ["t;torque;angle;load", "s;Nm;deg;"] + [f"{0.01 * k:.2f};{k};{k};{k}" for k in range(ROWS)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    wanted = [Quantity(name, unit, "") for name, unit in (("torque_Nm", "N m"), ("angle_rad", "rad"), ("load_N", "N"))]
+    made = named_by(open_recording(path), wanted)
+    assert {"torque_Nm", "angle_rad"} <= set(made.channels) and "load_N" not in made.channels
+    assert made["angle_rad"].value[45] == pytest.approx(np.pi / 4.0)
+
+
 def test_channels_without_a_unit_and_channels_of_no_quantity_stay_as_they_are(tmp_path):
     recording = _recording(tmp_path, "load,spare_V", np.column_stack((np.arange(ROWS), np.arange(ROWS))))
     made = named_by(recording, [Quantity("load", "N m", "")])
