@@ -31,7 +31,6 @@ from ranger_sim.sysid.results import (
     WithoutForm,
 )
 
-LITTLE = 0.01  # of a parameter's usual value: so far beyond a limit the errors of a model take it
 RIVALS = 6  # that an answer lists
 NEXT = {
     frozenset(
@@ -217,9 +216,8 @@ def _channels(found: Diagnosis) -> list[ChannelMisfit]:
             continue
         scale = plain.whitening[equation].deviation
         better = extended.residual[extended.rows_of(equation)] * (extended.whitening[equation].deviation / scale)
-        better *= math.sqrt(
-            1.0 - max((min(1.0, each.share) for each in tests if each.equation == equation), default=0.0)
-        )
+        predicted = max((each.share for each in tests if each.equation == equation), default=0.0)
+        better *= math.sqrt(max(0.0, 1.0 - predicted))
         noise = float(np.sqrt(np.mean(better**2)))
         names = ["all", *dict.fromkeys(name for r in recordings for name in r.regimes)]
         for name in names:
@@ -260,7 +258,7 @@ def _impossible(found: Diagnosis) -> list[str]:
         if known.name in regression.values:
             value, reach = regression.values[known.name], intervals.Z95 * _error(regression, known.name)
             both = (value, value + shared.get(known.name, 0.0))
-            reach += LITTLE * abs(known.value)
+            reach += plausibility.LITTLE * abs(known.value)
             if all(plausibility.outside(known, each, reach) for each in both):
                 out.append(known.name)
     return out

@@ -20,6 +20,7 @@ from ranger_sim.sysid.regression import Part, Regression
 SURE = 5.0  # standard errors beyond a limit: chance and a small model error do not reach that far
 OTHER_WAY = 0.5  # of its known value: this far on the other side of zero a sign is wrong, in the data or in the model
 FACTOR = 5.0  # to the simulation's value: between a machine of the same kind and rpm taken for rad/s (9.5)
+LITTLE = 0.01  # of its known value: so far beyond a limit the errors of a model take it
 NOTHING = 1e-4  # of its known value: less than any unit makes of it; a parameter may be 0
 CLEAR = 0.2  # relative error up to which a factor is reported
 EXPLAINED = 0.2  # of an equation's balance: below it the channels do not belong together
@@ -170,16 +171,18 @@ def surest_beyond(parameters: Sequence[Known], regression: Regression, named: Se
     """Standard errors by which the surest of these parameters is beyond its limits, with and without what the named
     causes add to it. 0 where none is, and where one is so far beyond that no cause is named at all."""
     shared = with_causes(regression, parameters, named)
+    in_part = {name for each in regression.recordings for name in each.in_part} - set(shared)
     surest = 0.0
     for known in parameters:
-        if known.name not in regression.values:
+        if known.name not in regression.values or known.name in in_part:
             continue
         value, number = regression.values[known.name], regression.names.index(known.name)
         error = math.sqrt(max(float(regression.covariance[number, number]), 1e-300))
         both = (value, value + shared.get(known.name, 0.0))
         if all(absurd(known, each, error) for each in both):
             return 0.0
-        surest = max(surest, min(max(known.low - each, each - known.high) for each in both) / error)
+        beyond = min(max(known.low - each, each - known.high) for each in both) - LITTLE * abs(known.value)
+        surest = max(surest, beyond / error)
     return surest
 
 

@@ -303,14 +303,15 @@ def test_a_parameter_that_is_a_part_next_to_a_named_cause_is_not_judged_alone():
 @pytest.mark.parametrize(
     ("value", "error", "sure"),
     [
-        (-0.4, 0.1, 4.0),  # below zero, and by less than half of what it usually is
-        (-0.4, 0.01, 40.0),
+        (-0.4, 0.1, 3.9),  # below zero, and by less than half of what it usually is; a hundredth of that is nothing
+        (-0.4, 0.01, 39.0),
         (0.3, 0.1, 0.0),
         (-0.9, 0.05, 0.0),  # so far that no cause is named at all
-        (12.0, 1.0, 2.0),
+        (12.0, 1.0, 1.99),
     ],
 )
 def test_how_surely_a_parameter_is_beyond_its_limits_is_in_standard_errors(value, error, sure):
     weight = Known("weight", "N m", 1.0, 0.0, 10.0, "")
     regression = SimpleNamespace(names=["weight"], values={"weight": value}, covariance=np.array([[error**2]]))
+    regression.recordings = []
     assert plausibility.surest_beyond([weight], regression, []) == pytest.approx(sure)
