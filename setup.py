@@ -49,8 +49,8 @@ TOGETHER = [
     "-fvisibility=hidden",
 ]  # direct calls of Python's functions, for compilers that support it
 # The compiler needs a third of the time for -Og. Each of these modules runs at least half a per cent of a walk's
-# instructions (callgrind), together 87 %, or carries the messages of boards in separate processes, at every turn of
-# `up`. For the others the time is not worth it.
+# instructions (callgrind), together 87 %, or is what `--trace` needs, or carries the messages of boards in separate
+# processes, at every turn of `up`. For the others the time is not worth it.
 OPTIMISE, OPTIMISE_LITTLE = "-O2", "-Og"
 OFTEN_RUN = (
     "ranger_sim.boards.can_router",
@@ -65,6 +65,7 @@ OFTEN_RUN = (
     "ranger_sim.can_bus.bus",
     "ranger_sim.can_bus.frame",
     "ranger_sim.datatable.store",
+    "ranger_sim.firmware_sim.activity",
     "ranger_sim.firmware_sim.alarm",
     "ranger_sim.firmware_sim.analog",
     "ranger_sim.firmware_sim.arm7.core",
@@ -88,11 +89,14 @@ OFTEN_RUN = (
     "ranger_sim.firmware_sim.scheduler",
     "ranger_sim.firmware_sim.vic",
     "ranger_sim.foundation.events",
+    "ranger_sim.foundation.row_stream",
     "ranger_sim.harness.lockstep",
     "ranger_sim.harness.processes.channel",
     "ranger_sim.harness.processes.endpoint",
     "ranger_sim.harness.processes.remote_board",
     "ranger_sim.harness.processes.stage",
+    "ranger_sim.harness.records.sampler",
+    "ranger_sim.harness.timeline.packing",
     "ranger_sim.harness.wiring.board_wires",
     "ranger_sim.harness.wiring.imu_wire",
     "ranger_sim.plant.electrics.drive",

@@ -38,7 +38,7 @@ stopped has only a SLOT_BEGAN, and a processor that begins anew counts its slots
 its outer one.
 
 **How to read it.** `newest()`: the rows that are kept, the oldest first, in one flat array. `sinks`: each is called as
-`sink(time_ns, rows)`, rows as bytes, whenever the ring is full and at `flush()`; it gets every row written since it
+`sink(time_ns, rows)`, rows as bytes, a part of the ring at a time and at `flush()`; it gets every row written since it
 was added to the list, once.
 """
 
@@ -69,6 +69,8 @@ ACTIVITY_COLUMNS: Final = 8
 
 # 2 MiB: about half a second of a motor board that walks (56 rows a millisecond)
 USUAL_ROWS = 32_768
+# 64 KiB: still in the processor's cache, and the C library uses the memory of a dropped part again
+PART: Final = 1024 * ACTIVITY_COLUMNS
 
 
 @cython.final
@@ -85,6 +87,7 @@ class ActivityLog(RowStream):
 
     sinks: list
     handed: cython.longlong
+    due: cython.longlong
     laps: cython.longlong
     keep_ns: cython.longlong
     code_open: cython.bint
@@ -109,6 +112,7 @@ class ActivityLog(RowStream):
         RowStream.__init__(self, "q", ACTIVITY_COLUMNS, False, block_rows=rows)
         self.sinks = []
         self.handed = 0  # up to here (a place in the ring) the sinks have everything
+        self.due = min(PART, self.capacity)  # and from here on they get the rest
         self.laps = 0
         self.keep_ns = 0
         self.code_open = False
@@ -148,6 +152,7 @@ class ActivityLog(RowStream):
             self.used = 0
             self.handed = 0
             self.laps += 1
+        self.due = min(self.used + PART, self.capacity)
 
     @property
     def written(self) -> int:
@@ -186,7 +191,10 @@ class ActivityLog(RowStream):
         self.numbers[at + COLUMN_LATENCY] = latency
         self.numbers[at + COLUMN_ROW] = row
         self.numbers[at + COLUMN_ITEMS] = items
-        self.finish_row(end)
+        self.used = at + ACTIVITY_COLUMNS
+        self.last_time_ns = end
+        if self.used >= self.due:
+            self.flush()
 
     @cython.ccall
     def begin_code(

@@ -28,6 +28,7 @@ from ranger_sim.firmware_sim.edge_line import EdgeLine
 from ranger_sim.firmware_sim.legend import InterruptLegend, Legend, TaskLegend
 from ranger_sim.firmware_sim.peripheral import Peripheral, Unclaimed
 from ranger_sim.firmware_sim.scheduler import (
+    NORMAL_TASK,
     OCCASIONAL_TASK,
     WAIT_TASK,
     Occasional,
@@ -558,6 +559,7 @@ class Microcontroller(Chip):
     def _serve(self, source: InterruptSource, queue: EventQueue, time: cython.longlong) -> None:
         """Run the handler of `source`, which waits no longer, at `time` and let its cycles pass."""
         busy: cython.longlong
+        count: cython.longlong
         requested: cython.longlong = source.requested  # the handler may request the next service
         source.served += 1
         self.background_wanted = True
@@ -568,9 +570,10 @@ class Microcontroller(Chip):
             self.stolen_cycles += source.base_cycles
             busy = source.base_ns
         else:
-            busy = self._note_service(source, 0 if items is None else items)
+            count = 0 if items is None else items
+            busy = self._note_service(source, count)
             if self.scheduler.recording:
-                self._log_service(source, 0 if items is None else items, time, requested)
+                self._log_service(source, count, time, requested, busy)
         if source.bit >= FIRST_FIQ:
             self.fiq_free = time + busy
         self.irq_free = (self.irq_free if self.irq_free > time else time) + busy
@@ -590,21 +593,24 @@ class Microcontroller(Chip):
     @cython.cfunc
     @cython.final
     def _log_service(
-        self, source: InterruptSource, items: cython.longlong, time: cython.longlong, requested: cython.longlong
+        self,
+        source: InterruptSource,
+        items: cython.longlong,
+        time: cython.longlong,
+        requested: cython.longlong,
+        busy: cython.longlong,
     ) -> cython.longlong:
-        """Write a service of `source` from `time` on into the log; returns its latency (ns)."""
+        """Write a service of `source` that takes `busy` ns from `time` on into the log; returns its latency (ns)."""
         log: ActivityLog = self.scheduler.log
         cycles: cython.longlong = source.base_cycles + source.per_item * items + self.extra_cycles
         latency: cython.longlong = time + source.latency_ns - requested
         row: cython.longlong = self.scheduler.row
-        end: cython.longlong
         if self.irq_free <= time:
             log.end_irq(self.irq_free)
         if self.code_time <= time:  # nothing is interrupted: the code before it is complete
             log.end_code(self.code_time)
         if source.bit >= FIRST_FIQ:
-            end = time + int(cycles * self.ns_per_cycle)
-            log.put(INTERRUPT_RAN, source.number, time, end, cycles, latency, row, items)
+            log.put(INTERRUPT_RAN, source.number, time, time + busy, cycles, latency, row, items)
         else:
             log.begin_irq(source.number, time, cycles, latency, row, items)
         return latency
@@ -665,6 +671,9 @@ class Microcontroller(Chip):
         items: cython.longlong = 0
         if self.scheduler.recording:
             self._log_end_of_code()
+        if task.kind == NORMAL_TASK:
+            self._spent(task, run(task.code, task.owner))
+            return True
         if task.kind == WAIT_TASK:
             return self._begin_wait(task)
         if task.kind == OCCASIONAL_TASK:
