@@ -96,6 +96,7 @@ OFTEN_RUN = (
     "ranger_sim.harness.processes.remote_board",
     "ranger_sim.harness.processes.stage",
     "ranger_sim.harness.records.sampler",
+    "ranger_sim.harness.timeline.activity_parts",
     "ranger_sim.harness.timeline.packing",
     "ranger_sim.harness.wiring.board_wires",
     "ranger_sim.harness.wiring.imu_wire",

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.can_bus.frame_log import FrameTimes
-from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS, COLUMN_END
-from ranger_sim.foundation.events import PIN_OUTPUT
+from ranger_sim.firmware_sim.activity import ACTIVITY_COLUMNS
+from ranger_sim.foundation.events import NEVER, PIN_OUTPUT
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.records.activity import activity_of
@@ -135,9 +135,9 @@ class MachineTimeline:
             instants.events = [event for event in instants.events if begin <= event.time_ns <= end]
         found.slices += self._parts(found)
         self._add_states(found)
-        gaps = [until + zero for _, until in self.windows()[:-1]]
+        windows = self._detail_windows()
         processors = {
-            name: Processor(robot.boards[name].legend(), self.detail(store.rows(), COLUMN_END), zero, gaps)
+            name: Processor(robot.boards[name].legend(), store.parts(), zero, windows)
             for name, store in self.activity.items()
         }
         for processor in processors.values():
@@ -196,15 +196,22 @@ class MachineTimeline:
         chosen = rows[:, time_column] - self.robot.start_ns >= begin_ns
         return rows if chosen.all() else rows[chosen]  # hundreds of megabytes are not copied
 
-    def detail(self, rows: np.ndarray, time_column: int = 0) -> np.ndarray:
-        """The rows whose time is in the times in detail."""
-        time = rows[:, time_column] - self.robot.start_ns
+    def _detail_windows(self) -> list[tuple[int, int]]:
+        """[(begin, end)] of the times in detail, as the machine counts them; the last also has what ends later."""
         windows = self.windows()
         if len(windows) == 1 and windows[0][0] <= self.begin_ns:
+            return [(-NEVER, NEVER)]
+        zero = self.robot.start_ns
+        return [*((begin + zero, end + zero) for begin, end in windows[:-1]), (windows[-1][0] + zero, NEVER)]
+
+    def detail(self, rows: np.ndarray) -> np.ndarray:
+        """The rows whose time, their first number, is in the times in detail."""
+        windows = self._detail_windows()
+        if windows == [(-NEVER, NEVER)]:
             return rows
-        chosen = time >= windows[-1][0]  # what ends after the present as well
-        for begin, end in windows[:-1]:
-            chosen |= (time >= begin) & (time <= end)
+        chosen = np.zeros(len(rows), dtype=bool)
+        for begin, end in windows:
+            chosen |= (rows[:, 0] >= begin) & (rows[:, 0] <= end)
         return rows[chosen]
 
     def _parts(self, found: Events) -> list[Slices]:

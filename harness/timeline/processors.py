@@ -6,72 +6,83 @@ from typing import Any
 import numpy as np
 
 from ranger_sim.firmware_sim.activity import (
+    ACTIVITY_COLUMNS,
     COLUMN_CYCLES,
     COLUMN_END,
     COLUMN_ITEMS,
     COLUMN_KIND,
-    COLUMN_LATENCY,
     COLUMN_NUMBER,
     COLUMN_ROW,
     COLUMN_START,
-    INTERRUPT_RAN,
-    MAIN_LOOP_RAN,
     SLOT_BEGAN,
     SLOT_ENDED,
     SLOT_OVERRAN,
     TASK_DROPPED,
-    TASK_RAN,
-    WAIT_RAN,
 )
 from ranger_sim.foundation.events import NEVER
+from ranger_sim.harness.timeline.activity_parts import (
+    COLUMNS,
+    CYCLES,
+    END,
+    FAST,
+    LATENCY,
+    NUMBER,
+    OTHERS,
+    SERVICES,
+    START,
+    TASKS,
+    TURNS,
+    ActivityParts,
+)
 from ranger_sim.harness.timeline.model import Instant, Instants, Slices
 
 
 class Processor:
-    """One board's activity. `rows`: of its ActivityLog; `legend`: the meaning of their numbers; `gaps_ns`: the ends of
-    the times that the rows are of, where more than one.
+    """One board's activity. `rows`: of its ActivityLog, one array or more after one another; `legend`: the meaning of
+    their numbers; `windows`: (begin, end) of the times that the rows are of, in which each ends; None: all.
 
     `slots`, with the tasks inside. `services`: the interrupts, the fast ones inside those that they interrupted.
     `turns` of the main loop. `services_asked_ns`, `fast_asked_ns`: when each of them was requested.
     """
 
-    def __init__(self, legend: Any, rows: np.ndarray, zero_ns: int, gaps_ns: Sequence[int] = ()) -> None:
+    def __init__(
+        self,
+        legend: Any,
+        rows: Sequence[np.ndarray],
+        zero_ns: int,
+        windows: Sequence[tuple[int, int]] | None = None,
+    ) -> None:
         self.name = legend.board
-        self.gaps = np.array([*gaps_ns, NEVER], dtype=np.int64) + 1
+        windows = windows if windows is not None else [(-NEVER, NEVER)]
+        self.gaps = np.array([*(end for _, end in windows[:-1]), NEVER], dtype=np.int64) + 1
         self.legend = legend
         self.zero_ns = zero_ns
-        kind = rows[:, COLUMN_KIND]
-        self.tasks = self._tasks(rows[(kind == TASK_RAN) | (kind == WAIT_RAN)])
-        self.slots = self._slots(rows[kind == SLOT_ENDED], rows[kind == SLOT_BEGAN], rows[kind == SLOT_OVERRAN])
+        parts = parted(legend, rows, windows)
+        kind = parts[OTHERS][:, COLUMN_KIND]
+        self.tasks = self._tasks(parts[TASKS])
+        slots = (parts[OTHERS][kind == each] for each in (SLOT_ENDED, SLOT_BEGAN, SLOT_OVERRAN))
+        self.slots = self._slots(*slots)
         self.slots.inside = self.tasks
-        services = rows[kind == INTERRUPT_RAN]
-        fast = np.array([source.fast for source in legend.interrupts] or [False])
-        is_fast = fast[services[:, COLUMN_NUMBER]]
-        self.fast = self._services(services[is_fast])
-        self.services = self._services(services[~is_fast])
+        self.fast = self._services(parts[FAST])
+        self.services = self._services(parts[SERVICES])
         self.services.inside = self.fast
         self.fast_asked_ns, self.services_asked_ns = self._asked(self.fast), self._asked(self.services)
-        self.turns = self._turns(rows[kind == MAIN_LOOP_RAN])
-        self.overruns = self._overruns(rows[(kind == SLOT_OVERRAN) | (kind == TASK_DROPPED)])
+        self.turns = self._turns(parts[TURNS])
+        self.overruns = self._overruns(parts[OTHERS][(kind == SLOT_OVERRAN) | (kind == TASK_DROPPED)])
 
     def tracks(self) -> list[Slices]:
         """All tracks that are not empty."""
         found = [self.slots, self.services, self.turns]
         return [slices for slices in found if len(slices) or (slices.inside is not None and len(slices.inside))]
 
-    def _made(self, track: str, names: list[str], rows: np.ndarray, name: np.ndarray, **notes: np.ndarray) -> Slices:
-        start, end = rows[:, COLUMN_START] - self.zero_ns, rows[:, COLUMN_END] - self.zero_ns
+    def _made(self, track: str, names: list[str], part: np.ndarray, name: np.ndarray, **notes: np.ndarray) -> Slices:
+        start, end = part[START] - self.zero_ns, part[END] - self.zero_ns
         return Slices(("Boards", self.name, track), names, start, end, name, dict(notes))
 
-    def _tasks(self, rows: np.ndarray) -> Slices:
-        """Tasks and waits; of an occasional list its entry, directly followed by the list's own row."""
-        if len(rows) > 1:
-            lists = np.array([bool(task.entries) for task in self.legend.tasks])
-            same = (rows[1:, COLUMN_START] == rows[:-1, COLUMN_START]) & (rows[1:, COLUMN_END] == rows[:-1, COLUMN_END])
-            doubled = np.append(False, same & lists[rows[1:, COLUMN_NUMBER]])
-            rows = rows[~doubled]
+    def _tasks(self, part: np.ndarray) -> Slices:
+        """Tasks and waits; of an occasional list its entry."""
         names = [task.name for task in self.legend.tasks]
-        return self._made("slots", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES])
+        return self._made("slots", names, part, part[NUMBER], cycles=part[CYCLES])
 
     def _slots(self, rows: np.ndarray, begun: np.ndarray, overrun: np.ndarray) -> Slices:
         """One slice per slot, named by its row. A slot that waits for the end of an overrun one begins after that.
@@ -94,19 +105,18 @@ class Processor:
         open_[:, COLUMN_CYCLES] = (open_[:, COLUMN_END] - open_[:, COLUMN_START]) * self.legend.cycles_per_ns
         rows = np.concatenate([rows, open_])
         rows = rows[np.argsort(rows[:, COLUMN_START], kind="stable")]
-        slots = self._made("slots", names, rows, rows[:, COLUMN_ROW], cycles=rows[:, COLUMN_CYCLES])
+        times = rows[:, [COLUMN_START, COLUMN_END]].T
+        slots = self._made("slots", names, times, rows[:, COLUMN_ROW], cycles=rows[:, COLUMN_CYCLES])
         if len(slots):
             slots.start_ns[1:] = np.maximum(slots.start_ns[1:], slots.end_ns[:-1])
         return slots
 
-    def _services(self, rows: np.ndarray) -> Slices:
+    def _services(self, part: np.ndarray) -> Slices:
         names = [source.name for source in self.legend.interrupts]
-        order = np.argsort(rows[:, COLUMN_START], kind="stable")
-        rows = rows[order]
-        latency_us = rows[:, COLUMN_LATENCY] * 1e-3
-        return self._made(
-            "interrupts", names, rows, rows[:, COLUMN_NUMBER], cycles=rows[:, COLUMN_CYCLES], latency_us=latency_us
-        )
+        if (part[START, 1:] < part[START, :-1]).any():
+            part = part[:, np.argsort(part[START], kind="stable")]
+        notes = {"cycles": part[CYCLES], "latency_us": part[LATENCY] * 1e-3}
+        return self._made("interrupts", names, part, part[NUMBER], **notes)
 
     def _asked(self, services: Slices) -> np.ndarray:
         """Request times; start and latency are those of the way to the handler, with the source's own latency."""
@@ -115,8 +125,8 @@ class Processor:
         asked_ns: np.ndarray = services.start_ns + np.array([*ways_ns, 0])[services.name] - latency_ns
         return asked_ns
 
-    def _turns(self, rows: np.ndarray) -> Slices:
-        return self._made("main loop", ["turn"], rows, np.zeros(len(rows), dtype=np.int64))
+    def _turns(self, part: np.ndarray) -> Slices:
+        return self._made("main loop", ["turn"], part, np.zeros_like(part[NUMBER]))
 
     def _overruns(self, rows: np.ndarray) -> Instants:
         """Each slot that a tick found unfinished, with the names of the dropped tasks."""
@@ -131,3 +141,19 @@ class Processor:
                 notes["functions"] = ", ".join(dropped[time])
             events.append(Instant(time - self.zero_ns, f"row {int(row[COLUMN_ROW])} overran", notes))
         return Instants(("Boards", self.name, "overruns"), events)
+
+
+def parted(legend: Any, rows: Sequence[np.ndarray], windows: Sequence[tuple[int, int]]) -> list[np.ndarray]:
+    """The columns of each part (ActivityParts), and the rows of OTHERS."""
+    fast, lists = [source.fast for source in legend.interrupts], [bool(task.entries) for task in legend.tasks]
+    parts = ActivityParts([time for window in windows for time in window], fast, lists)
+    flat: list[Any] = [each.reshape(-1) for each in rows]
+    for each in flat:
+        parts.count(each)
+    parts.make_room(lambda room, columns: np.empty(room * columns, dtype=np.int64))
+    for each in flat:
+        parts.take(each)
+    columns = [
+        kept.reshape(COLUMNS, -1)[:, :count] for kept, count in zip(parts.kept[:OTHERS], parts.counts, strict=False)
+    ]
+    return [*columns, parts.kept[OTHERS].reshape(-1, ACTIVITY_COLUMNS)]

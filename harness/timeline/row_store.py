@@ -2,6 +2,7 @@
 
 import collections
 import contextlib
+import mmap
 import tempfile
 import weakref
 from collections.abc import Callable
@@ -64,15 +65,17 @@ class RowStore:
 
     def rows(self, kind: type = np.int64) -> np.ndarray:
         """Everything kept: array (rows, columns). OSError where the file could not take everything."""
+        parts = self.parts(kind)
+        return parts[0] if len(parts) == 1 else np.concatenate([np.empty((0, self.columns), dtype=kind), *parts])
+
+    def parts(self, kind: type = np.int64) -> list[np.ndarray]:
+        """The same as arrays that follow one another, without a copy."""
         if self.failure is not None:
             raise OSError(self.failure.errno, self.failure.strerror, f"rows of the timeline in {tempfile.gettempdir()}")
-        if self.spool is not None:
-            self.spool.seek(0)
-            data = self.spool.read()
-            self.spool.seek(0, 2)
-        else:
-            data = b"".join((*self.held, *(block for _, block in self.blocks)))
-        return np.frombuffer(data, dtype=kind).reshape(-1, self.columns)
+        blocks: list[Any] = [*self.held, *(block for _, block in self.blocks)]
+        if self.spool is not None and self.spool.tell():
+            blocks = [mmap.mmap(self.spool.fileno(), 0, access=mmap.ACCESS_READ)]
+        return [np.frombuffer(block, dtype=kind).reshape(-1, self.columns) for block in blocks]
 
     @property
     def size(self) -> int:

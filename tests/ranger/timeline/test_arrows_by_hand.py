@@ -255,7 +255,7 @@ LEGEND = Legend(
 
 
 def processor(*rows):
-    return Processor(LEGEND, np.array(rows, dtype=np.int64), 1000)
+    return Processor(LEGEND, [np.array(rows, dtype=np.int64)], 1000)
 
 
 def spans(made):
@@ -291,7 +291,7 @@ def test_a_processors_slots_tasks_interrupts_and_turns_are_slices():
 
 
 def test_an_empty_processor_has_no_tracks_and_one_with_fast_interrupts_alone_has_theirs():
-    empty = Processor(LEGEND, np.zeros((0, 8), dtype=np.int64), 0)
+    empty = Processor(LEGEND, [], 0)
     assert empty.tracks() == []
     fast = processor(row(activity.INTERRUPT_RAN, 1, 1120, 1130, 4, 3))
     assert fast.tracks() == [fast.services]
