@@ -54,11 +54,11 @@ class ActivityParts:
     rooms: cython.longlong[::1]
     counts: cython.longlong[::1]
     kept: list
-    tasks: cython.longlong[::1]
-    services: cython.longlong[::1]
-    fasts: cython.longlong[::1]
-    turns: cython.longlong[::1]
-    others: cython.longlong[::1]
+    tasks: cython.p_longlong
+    services: cython.p_longlong
+    fasts: cython.p_longlong
+    turns: cython.p_longlong
+    others: cython.p_longlong
     last_start: cython.longlong
     last_end: cython.longlong
 
@@ -98,16 +98,27 @@ class ActivityParts:
     def make_room(self, made) -> None:
         """Call `made(rows, columns)` for the flat array of each part, between `count` and `take`."""
         self.kept = [made(self.rooms[part], ACTIVITY_COLUMNS if part == OTHERS else COLUMNS) for part in range(PARTS)]
-        self.tasks, self.services, self.fasts, self.turns, self.others = self.kept
+        tasks: cython.longlong[::1] = self.kept[TASKS]
+        services: cython.longlong[::1] = self.kept[SERVICES]
+        fasts: cython.longlong[::1] = self.kept[FAST]
+        turns: cython.longlong[::1] = self.kept[TURNS]
+        others: cython.longlong[::1] = self.kept[OTHERS]
+        self.tasks = cython.address(tasks[0]) if cython.compiled else tasks
+        self.services = cython.address(services[0]) if cython.compiled else services
+        self.fasts = cython.address(fasts[0]) if cython.compiled else fasts
+        self.turns = cython.address(turns[0]) if cython.compiled else turns
+        self.others = cython.address(others[0]) if cython.compiled else others
 
     @cython.ccall
-    def take(self, rows: cython.const[cython.longlong][::1]) -> None:
-        """Part `rows`."""
+    def take(self, given: cython.const[cython.longlong][::1]) -> None:
+        """Part the rows `given`."""
         at: cython.longlong
         column: cython.longlong
         part: cython.longlong
         place: cython.longlong
-        for at in range(0, len(rows), ACTIVITY_COLUMNS):
+        rows: cython.p_longlong  # a memoryview, as an argument of each call below, would be 208 bytes
+        rows = cython.cast(cython.p_longlong, cython.address(given[0])) if cython.compiled else given
+        for at in range(0, len(given), ACTIVITY_COLUMNS):
             if not self._wanted(rows[at + COLUMN_END]):
                 continue
             part = self._part(rows[at + COLUMN_KIND], rows[at + COLUMN_NUMBER])
@@ -137,10 +148,10 @@ class ActivityParts:
     @cython.cfunc
     def _keep(
         self,
-        columns: cython.longlong[::1],
+        columns: cython.p_longlong,
         room: cython.longlong,
         place: cython.longlong,
-        rows: cython.const[cython.longlong][::1],
+        rows: cython.p_longlong,
         at: cython.longlong,
     ) -> cython.longlong:
         columns[place] = rows[at + COLUMN_START]
