@@ -1,6 +1,5 @@
 """`MachineTimeline`: records kept during a run of any machine, and the events made from them on request."""
 
-import itertools
 import pathlib
 from collections.abc import Iterable
 from typing import Any
@@ -13,9 +12,9 @@ from ranger_sim.foundation.events import NEVER, PIN_OUTPUT
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.harness.records.activity import activity_of
-from ranger_sim.harness.step_watch import StepWatch
 from ranger_sim.harness.timeline import arrows, files, happenings
 from ranger_sim.harness.timeline.frames import BusFrames
+from ranger_sim.harness.timeline.gathering import Gathering
 from ranger_sim.harness.timeline.model import Counter, Events, Instants, Slices, changes
 from ranger_sim.harness.timeline.processors import Processor
 from ranger_sim.harness.timeline.row_store import RowStore
@@ -24,7 +23,6 @@ OUTPUT_COLUMNS = 5  # a row of BoardWires: ns, kind, three numbers
 AROUND_NS = 1_000_000_000  # in detail, before and after a fault begins to act; chosen by us
 MOST_FAULTS = 8  # that are shown so: each takes 50 MB of memory, 100 when it acts long after it was activated
 NEAR_NS = 200_000_000  # between two times in detail: the time between is shown as well, so that no arrow crosses a gap
-GATHER_NS = 50_000_000  # of seven boards each every 0.35 s: some 2 MB of a motor board (chosen by us)
 
 
 class MachineTimeline:
@@ -251,24 +249,6 @@ class MachineTimeline:
         for wires in self.robot.loop.wires:
             wires.watch = None
         self.streams, self.stores = [], []
-
-
-class Gathering(StepWatch):
-    """Fetches the records of boards in other processes, one after another, before they keep too much.
-
-    Only for a timeline that keeps everything: each board keeps the last seconds itself until the end.
-    """
-
-    def __init__(self, timeline: MachineTimeline) -> None:
-        StepWatch.__init__(self)
-        self.timeline = timeline
-        self.names = itertools.cycle(tuple(timeline.activity))
-        self.next_ns = 0
-
-    def before_step(self, now_ns: int) -> None:
-        if now_ns >= self.next_ns and self.timeline.robot.loop.side_by_side:
-            self.next_ns = now_ns + GATHER_NS
-            self.timeline.gather(next(self.names))
 
 
 def body(names: dict[str, str], rows: np.ndarray, zero_ns: int) -> list[Counter]:
