@@ -56,5 +56,5 @@ def table_place(
     mixed: cython.ulonglong = one & 0x1FFFFFFF
     mixed = mixed * 31 + (two & 0x7FFFFFFF)
     mixed = mixed * 31 + (three & 0x7FFFFFFF)
-    mixed = mixed * 0x1E3779B1  # a larger one, or a mask of more bits, would be an object of Python
+    mixed = (mixed & 0x7FFFFFFF) * 0x1E3779B1  # larger numbers would be objects of Python, and go over 64 bits
     return (mixed >> 24 ^ mixed) & (size - 1)
