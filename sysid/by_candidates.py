@@ -122,6 +122,7 @@ def diagnose(
     while found.named and hasattr(machine, "numerical"):  # what is named instead of a small effect may be small as well
         progress("numerics", 0.7)
         recordings = simulations.again(recordings, found.named, found.with_named)
+        held = simulations.again(held, found.named, found.with_named)  # where the causes are judged
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
         below = [each for each in found.named if _below(floor, found, each.effect)]
         if not below:
@@ -194,7 +195,7 @@ def _sure_names(
     """(regression with the causes that stay, their profiles by name); found loses the others.
 
     A cause has no name with 0 in its interval, where parameters are impossible nearly as surely, and where all causes
-    together make held-out data worse; the least sure one goes first.
+    together surely make held-out data worse; the least sure one goes first.
     """
     profiles: dict[str, intervals.Intervals] = {}
     extended = found.with_named
@@ -216,7 +217,7 @@ def _sure_names(
         ]
         loses = False
         if not unsure and judge is not None:
-            loses = gained(judge.errors(found.named, extended, found.base, None, seed).values())[0] < 0.0
+            loses = float(gained(judge.errors(found.named, extended, found.base, None, seed).values())[2][1]) < 0.0
         if not unsure and not loses:
             break
         weakest = min(unsure or found.named, key=lambda each: _sure(extended, each))
