@@ -89,7 +89,7 @@ class ActivityParts:
 
     @cython.ccall
     def count(self, rows: cython.const[cython.longlong][::1]) -> None:
-        """Make room for `rows`."""
+        """Count `rows`, whose parts need places."""
         at: cython.longlong
         for at in range(0, len(rows), ACTIVITY_COLUMNS):
             if self._wanted(rows[at + COLUMN_END]):

@@ -17,7 +17,7 @@ def first_same(
 ) -> None:
     """Fill `found` with the first row of `offered` of the same three numbers that is not earlier, for each of `wanted`.
 
-    -1: there is none. Both are in order of time (ns).
+    -1 where no row is. Both are in order of time (ns).
     """
     row: cython.longlong
     place: cython.longlong
