@@ -37,8 +37,8 @@ def check_target(path: pathlib.Path) -> None:
     """Check before a run: the suffix is known, its writer is installed, and a file can be written there."""
     format_of(path)
     importlib.import_module(LIBRARIES[path.suffix])
-    if path.is_dir():
-        raise UserError(f"trace {path}: that is a folder, not a file")
+    if path.exists() and not path.is_file():
+        raise UserError(f"trace {path}: that is {'a folder' if path.is_dir() else 'a device or a pipe'}, not a file")
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
@@ -50,6 +50,7 @@ def write(events: Events, path: pathlib.Path, title: str) -> None:
     """Write the timeline into `path`, whole or not at all."""
     writer = format_of(path)
     check_target(path)
+    path = path.resolve()  # of a link its file
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
             partial = pathlib.Path(folder) / path.name

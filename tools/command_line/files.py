@@ -6,6 +6,8 @@ import tempfile
 
 from ranger_sim.foundation.user_error import UserError
 
+OPEN_FILES = ("/dev", "/dev/fd", "/proc/self/fd")  # /dev/stdout, /dev/fd/63 of a shell's >(...)
+
 
 def writable_folder(name: str | pathlib.Path) -> pathlib.Path:
     """Return the folder, made if missing; UserError if it is not writable."""
@@ -28,12 +30,25 @@ def json_target(option: str | None) -> pathlib.Path | None:
     path = pathlib.Path(option or "")
     if path.is_dir():
         raise UserError(f"--json {option!r}: this is a folder, give a file or -")
-    writable_folder(path.parent)
+    if not is_stream(path):
+        writable_folder(path.resolve().parent)
     return path
 
 
+def is_stream(path: pathlib.Path) -> bool:
+    """True for a device, a pipe, or an open file by its number: written into, where a file would be replaced."""
+    return str(path.parent) in OPEN_FILES or (path.exists() and not path.is_file())
+
+
 def replace_file(path: pathlib.Path, content: bytes) -> None:
-    """Write the file whole or not at all. OSError that names it, where the disk is full."""
+    """Write the file whole or not at all; a link stays and its file is written, a stream gets the content.
+
+    OSError that names it, where the disk is full.
+    """
+    if is_stream(path):
+        path.write_bytes(content)
+        return
+    path = path.resolve()
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.name, delete=False) as handle:
         temporary = pathlib.Path(handle.name)
         try:

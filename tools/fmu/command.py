@@ -41,8 +41,8 @@ def run(options: argparse.Namespace) -> int:
     path = pathlib.Path(options.file)
     if path.suffix != ".fmu":
         raise UserError(f"fmu {options.file!r}: a file that ends in .fmu is expected")
-    if path.is_dir():
-        raise UserError(f"fmu {options.file!r}: this is a folder")
+    if path.exists() and not path.is_file():
+        raise UserError(f"fmu {options.file!r}: this is {'a folder' if path.is_dir() else 'a device or a pipe'}")
     importlib.import_module("pythonfmu3")  # before anything is made
     writable_folder(path.parent)
     scenario = Scenario(
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
         battery_charge=options.battery,
         battery_capacity_Wh=options.battery_capacity,
     )
-    quantities = export(path, given_of(scenario))
+    quantities = export(path.resolve(), given_of(scenario))
     counts = [sum(each.causality == what for each in quantities) for what in ("parameter", "input", "output")]
     print(f"{path}: body {options.body}, {counts[0]} parameters, {counts[1]} inputs, {counts[2]} outputs; FMI 3.0")
     return 0
