@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-# (every index below is a column of a whole row, or counts rows for which `count` has made room)
+# (every index below is a column of a whole row, or is below the number of rows that `count` has found)
 """Parts the rows of an activity log by what they are of, into columns."""
 
 import array
@@ -51,7 +51,7 @@ class ActivityParts:
     windows: cython.longlong[::1]
     fast: cython.longlong[::1]
     lists: cython.longlong[::1]
-    rooms: cython.longlong[::1]
+    sizes: cython.longlong[::1]
     counts: cython.longlong[::1]
     kept: list
     tasks: cython.p_longlong
@@ -66,7 +66,7 @@ class ActivityParts:
         self.windows = array.array("q", windows)
         self.fast = array.array("q", [*fast, 0])
         self.lists = array.array("q", [*lists, 0])
-        self.rooms = integers(PARTS)
+        self.sizes = integers(PARTS)
         self.counts = integers(PARTS)
         self.kept = []
         self.last_start, self.last_end = -1, -1
@@ -93,11 +93,11 @@ class ActivityParts:
         at: cython.longlong
         for at in range(0, len(rows), ACTIVITY_COLUMNS):
             if self._wanted(rows[at + COLUMN_END]):
-                self.rooms[self._part(rows[at + COLUMN_KIND], rows[at + COLUMN_NUMBER])] += 1
+                self.sizes[self._part(rows[at + COLUMN_KIND], rows[at + COLUMN_NUMBER])] += 1
 
-    def make_room(self, made) -> None:
+    def allocate(self, made) -> None:
         """Call `made(rows, columns)` for the flat array of each part, between `count` and `take`."""
-        self.kept = [made(self.rooms[part], ACTIVITY_COLUMNS if part == OTHERS else COLUMNS) for part in range(PARTS)]
+        self.kept = [made(self.sizes[part], ACTIVITY_COLUMNS if part == OTHERS else COLUMNS) for part in range(PARTS)]
         tasks: cython.longlong[::1] = self.kept[TASKS]
         services: cython.longlong[::1] = self.kept[SERVICES]
         fasts: cython.longlong[::1] = self.kept[FAST]
@@ -126,13 +126,13 @@ class ActivityParts:
             if part == TASKS:
                 if self._doubled(rows[at + COLUMN_START], rows[at + COLUMN_END], rows[at + COLUMN_NUMBER]):
                     continue
-                self._keep(self.tasks, self.rooms[TASKS], place, rows, at)
+                self._keep(self.tasks, self.sizes[TASKS], place, rows, at)
             elif part == SERVICES:
-                self._keep(self.services, self.rooms[SERVICES], place, rows, at)
+                self._keep(self.services, self.sizes[SERVICES], place, rows, at)
             elif part == FAST:
-                self._keep(self.fasts, self.rooms[FAST], place, rows, at)
+                self._keep(self.fasts, self.sizes[FAST], place, rows, at)
             elif part == TURNS:
-                self._keep(self.turns, self.rooms[TURNS], place, rows, at)
+                self._keep(self.turns, self.sizes[TURNS], place, rows, at)
             else:
                 for column in range(ACTIVITY_COLUMNS):
                     self.others[place * ACTIVITY_COLUMNS + column] = rows[at + column]
@@ -149,14 +149,14 @@ class ActivityParts:
     def _keep(
         self,
         columns: cython.p_longlong,
-        room: cython.longlong,
+        size: cython.longlong,
         place: cython.longlong,
         rows: cython.p_longlong,
         at: cython.longlong,
     ) -> cython.longlong:
         columns[place] = rows[at + COLUMN_START]
-        columns[END * room + place] = rows[at + COLUMN_END]
-        columns[NUMBER * room + place] = rows[at + COLUMN_NUMBER]
-        columns[CYCLES * room + place] = rows[at + COLUMN_CYCLES]
-        columns[LATENCY * room + place] = rows[at + COLUMN_LATENCY]
+        columns[END * size + place] = rows[at + COLUMN_END]
+        columns[NUMBER * size + place] = rows[at + COLUMN_NUMBER]
+        columns[CYCLES * size + place] = rows[at + COLUMN_CYCLES]
+        columns[LATENCY * size + place] = rows[at + COLUMN_LATENCY]
         return place

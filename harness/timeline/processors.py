@@ -150,7 +150,7 @@ def parted(legend: Any, rows: Sequence[np.ndarray], windows: Sequence[tuple[int,
     flat: list[Any] = [each.reshape(-1) for each in rows]
     for each in flat:
         parts.count(each)
-    parts.make_room(lambda room, columns: np.empty(room * columns, dtype=np.int64))
+    parts.allocate(lambda size, columns: np.empty(size * columns, dtype=np.int64))
     for each in flat:
         parts.take(each)
     columns = [

@@ -83,8 +83,8 @@ CASES = {
 
 @pytest.mark.parametrize(("cause", "limit"), [("saturation", 0.6), ("saturation", 3.3), ("dead_zone", 0.9)])
 def test_a_limit_is_found_below_the_inputs_median_and_near_its_top(cause, limit):
-    """The rounds of fits end within a part of the grid's steps, which are a third and more: a limit of the first grid
-    alone would be off by 15 % and a share by 20 %. The saturation at 3.3 is in no more than 3 % of the rows."""
+    """Steps of the grid are a sixth of a limit and more; a share is wrong with its limit. Noise alone moves the share
+    of 3.3, which 2 % of the rows exceed, by a hundredth."""
     bend = CASES[cause](limit)
     result = diagnose(Pendulum(), [swung(13, bend)], [swung(14, bend)]).result
     (found,) = result.causes
