@@ -111,7 +111,6 @@ OFTEN_RUN = (
     "ranger_sim.plant.sensors.absolute_encoder",
     "ranger_sim.plant.sensors.imu",
     "ranger_sim.plant.sensors.incremental_encoder",
-    "ranger_sim.ranger.timeline.same_content",
 )
 DIRECTIVES = {
     "always_allow_keywords": False,  # no keywords for functions of no or one argument: called directly from tables

@@ -22,10 +22,8 @@ from ranger_sim.boards.modules.ssp_link import EXCHANGE_NS
 from ranger_sim.harness.timeline.arrows import FlowBook, containing, publish
 from ranger_sim.harness.timeline.frames import BusFrames
 from ranger_sim.harness.timeline.model import Slices
-from ranger_sim.harness.timeline.perfetto_file import column
 from ranger_sim.harness.timeline.processors import Processor
 from ranger_sim.ranger import wiring
-from ranger_sim.ranger.timeline.same_content import first_same
 
 ROUTER, MAIN_BRAIN = "CSR", "MB"
 RECEIVE_TASK = "can_rx_dispatch_all"
@@ -220,19 +218,27 @@ def first_after(passing: Passing, content: np.ndarray, time_ns: np.ndarray) -> n
     found = np.full(len(passing.rows), -1, dtype=np.int64)
     if len(passing.rows) == 0 or len(content) == 0:
         return found
-    wanted, offered = (np.argsort(time, kind="stable") for time in (passing.time_ns, time_ns))
-    place = np.empty(len(wanted), dtype=np.int64)
-    first_same(*flat(passing.content, passing.time_ns, wanted), *flat(content, time_ns, offered), column(place))
-    there = place >= 0
-    row = offered[place[there]]
-    there[there] = time_ns[row] - passing.time_ns[wanted[there]] <= LONGEST_WAY_NS
-    found[wanted[there]] = offered[place[there]]
+    number = numbered(np.concatenate([passing.content, content]))
+    _, moment = np.unique(np.concatenate([passing.time_ns, time_ns]), return_inverse=True)
+    # one integer of both, lower for an earlier moment
+    keys = number << 32 | moment.reshape(-1)
+    wanted, offered = number[: len(found)], number[len(found) :]
+    order = np.argsort(keys[len(found) :], kind="stable")
+    place = np.searchsorted(keys[len(found) :][order], keys[: len(found)])
+    there = place < len(order)
+    row = order[place[there]]
+    same = (offered[row] == wanted[there]) & (time_ns[row] - passing.time_ns[there] <= LONGEST_WAY_NS)
+    found[np.flatnonzero(there)[same]] = row[same]
     return found
 
 
-def flat(content: np.ndarray, time_ns: np.ndarray, order: np.ndarray) -> tuple[Any, Any]:
-    """(content, times) in this order, as compiled loops take them."""
-    return column(content[order].reshape(-1)), column(time_ns[order])
+def numbered(content: np.ndarray) -> np.ndarray:
+    """A number for each row of (identifier, two words of 32 bits): the same for the same row."""
+    _, words = np.unique(
+        content[:, 1].astype(np.uint64) << np.uint64(32) | content[:, 2].astype(np.uint64), return_inverse=True
+    )
+    _, number = np.unique(words.reshape(-1) << 29 | content[:, 0], return_inverse=True)  # identifiers have 29 bits
+    return number.reshape(-1)
 
 
 def once(rows: np.ndarray, targets: np.ndarray, slices: Slices) -> tuple[np.ndarray, Slices, np.ndarray]:
