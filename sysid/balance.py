@@ -26,11 +26,12 @@ import numpy as np
 from ranger_sim.foundation.user_error import UserError
 from ranger_sim.sysid import signals, units
 from ranger_sim.sysid.dataset import Array, Table
-from ranger_sim.sysid.machine import Columns, Effect, Equation, Known, Quantity, Recording, Values
+from ranger_sim.sysid.machine import PARAMETER, Columns, Effect, Equation, Known, Quantity, Recording, Values
 
 AT_REST = 0.01  # of the fastest rate: about it the sign of the rate turns
 SHARPER = 4.0  # times; the base mixes the two signs
 CLOSE = 1.0 - 1e-12  # of a sign that is not infinitely far from its middle
+SETTLED = (0.05, 0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
 PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
 LIMITS = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95)  # of the largest input: where it may saturate
@@ -152,6 +153,7 @@ class Balance(abc.ABC):
                 found += self._of_input(each.name, max(float(np.max(np.abs(r.signals[each.name]))) for r in recordings))
         if self.angle or self.rate:
             found += self._of_joint(recordings)
+        found += self._of_parameters(recordings)
         own = self.more(recordings[0].signals)
         for cause, columns in own.items():
             names = tuple(f"size_{number}" for number in range(1, 1 + len(columns))) if len(columns) > 1 else ("size",)
@@ -175,7 +177,7 @@ class Balance(abc.ABC):
         def columns(recording: Recording, shape: Shape, _: Values) -> Columns:
             return {self.response: np.column_stack(make(recording.signals, shape))}
 
-        part = "sensor" if cause.startswith("sensor_") else "mechanical"
+        part = "sensor" if cause.startswith("sensor_") else PARAMETER if cause == "parameter_drift" else "mechanical"
         return Effect(cause, at, part, names, list(shapes), columns, form=form, forms=forms, scale=scale)
 
     def _lag(self) -> Effect:
@@ -221,6 +223,26 @@ class Balance(abc.ABC):
             self._effect("dead_zone", name, ("share",), dead, zones, scale="zone"),
         ]
 
+    def _of_parameters(self, recordings: Sequence[Recording]) -> list[Effect]:
+        """Drifts of the parameters; one whose column is a constant drifts as the response's sensor does."""
+        first = recordings[0].equations[self.response].columns
+        longest_s = max(float(np.ptp(each.table.time_s)) for each in recordings)
+        settled = [{"tau_s": share * longest_s} for share in SETTLED]
+        found = []
+        for name in (each.name for each in self.parameters if each.name in first and np.ptp(first[each.name]) > 0.0):
+
+            def ramp(s: Signals, _: Shape, name: str = name) -> list[Array]:
+                return [self.columns(s)[name] * s["t"]]
+
+            def settling(s: Signals, p: Shape, name: str = name) -> list[Array]:
+                return [self.columns(s)[name] * -np.expm1(-s["t"] / p["tau_s"])]
+
+            found += [
+                self._effect("parameter_drift", name, ("per_s",), ramp, form="ramp"),
+                self._effect("parameter_drift", name, ("change",), settling, settled, form="settling", scale="tau_s"),
+            ]
+        return found
+
     def _of_joint(self, recordings: Sequence[Recording]) -> list[Effect]:
         top = max(_top(each.signals["rate"]) for each in recordings)
         reach = max(float(np.ptp(each.signals["angle"])) for each in recordings)
@@ -255,7 +277,6 @@ class Balance(abc.ABC):
             self._effect("stribeck", joint, ("excess",), slow, [{"speed": share * top} for share in SPEEDS]),
             self._effect("direction_friction", joint, ("size",), lambda s, _: [np.abs(s["rate"])]),
             self._load_friction(joint),
-            self._effect("friction_drift", joint, ("per_s",), lambda s, _: [s["direction"] * s["t"]]),
             self._effect("spring", joint, ("size",), lambda s, _: [s["angle"]]),
             self._effect("once_per_turn", joint, ("cosine", "sine"), waves, [{"periods": n} for n in PERIODS]),
         ]

@@ -185,13 +185,14 @@ def named_by(dataset: Dataset, quantities: Sequence[Quantity]) -> Dataset:
     """The dataset with its channels called, and in the units, as a user's machine has them; others keep their names.
 
     A file's channel is in SI and has its unit in its name: "speed [rpm]" is speed_rad_per_s. A quantity "speed_rpm",
-    "speed_rad_s", or "speed" in rad/s is that channel. DataError for a channel in another kind of unit.
+    "speed_rad_s", or "speed" in rad/s is that channel; the unit in a quantity's name counts where it has no known other
+    one. DataError for a channel in another kind of unit.
     """
     found: dict[str, Channel] = {}
     repairs: list[Repair] = []
     renamed: dict[str, str] = {}
     for wanted in quantities:
-        unit = units.unit_of(wanted.unit) if wanted.unit else None
+        unit = (units.unit_of(wanted.unit) if wanted.unit else None) or units.split(wanted.name)[1]
         channel = dataset.channels.get(wanted.name) or _alike(dataset, wanted.name, unit)
         if channel is None:
             continue

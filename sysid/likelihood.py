@@ -267,6 +267,8 @@ def select(
                 for one, each in zip(options, extensions, strict=True)
             ]
             best = int(np.argmin(errors))
+            if best and regression.size * math.log(errors[0] / max(errors[best], 1e-300)) < naming.TIE:
+                best = 0  # no better there: the likeliest one here
         found, extended = options[best], extensions[best]
         in_doubt = _simpler_in_doubt(found, named, base, fixed, ranked, near, chance, threshold)
         if in_doubt is not found:

@@ -15,8 +15,9 @@ ATOMS: dict[str, tuple[str, float]] = {
     "min": ("s", 60.0), "h": ("s", 3600.0), "d": ("s", 86400.0), "sec": ("s", 1.0),
     "A": ("A", 1.0), "mA": ("A", 1e-3), "uA": ("A", 1e-6), "kA": ("A", 1e3), "Amp": ("A", 1.0),
     "V": ("V", 1.0), "mV": ("V", 1e-3), "uV": ("V", 1e-6), "kV": ("V", 1e3), "Volt": ("V", 1.0),
-    "W": ("W", 1.0), "mW": ("W", 1e-3), "kW": ("W", 1e3),
-    "J": ("J", 1.0), "Wh": ("J", 3600.0), "kWh": ("J", 3.6e6),
+    "W": ("W", 1.0), "mW": ("W", 1e-3), "kW": ("W", 1e3), "MW": ("W", 1e6),
+    "J": ("J", 1.0), "mJ": ("J", 1e-3),
+    "kJ": ("J", 1e3), "MJ": ("J", 1e6), "Wh": ("J", 3600.0), "kWh": ("J", 3.6e6),
     "ohm": ("ohm", 1.0), "Ohm": ("ohm", 1.0), "mohm": ("ohm", 1e-3), "Ω": ("ohm", 1.0), "mH": ("H", 1e-3),
     "rad": ("rad", 1.0), "mrad": ("rad", 1e-3), "deg": ("rad", math.pi / 180.0), "°": ("rad", math.pi / 180.0),
     "degree": ("rad", math.pi / 180.0), "degrees": ("rad", math.pi / 180.0),
@@ -24,6 +25,8 @@ ATOMS: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0), "mm": ("m", 1e-3), "cm": ("m", 1e-2), "um": ("m", 1e-6), "µm": ("m", 1e-6), "km": ("m", 1e3),
     "N": ("N", 1.0), "mN": ("N", 1e-3), "kN": ("N", 1e3),
     "Nm": ("Nm", 1.0), "mNm": ("Nm", 1e-3), "Nmm": ("Nm", 1e-3), "Ncm": ("Nm", 1e-2), "kNm": ("Nm", 1e3),
+    "l": ("m3", 1e-3), "L": ("m3", 1e-3), "ml": ("m3", 1e-6), "mL": ("m3", 1e-6),
+    "mol": ("mol", 1.0), "mmol": ("mol", 1e-3), "kmol": ("mol", 1e3),
     "kg": ("kg", 1.0), "Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "bar": ("Pa", 1e5),
     "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3), "MHz": ("Hz", 1e6),
     "counts": ("counts", 1.0), "count": ("counts", 1.0), "K": ("K", 1.0),
@@ -56,7 +59,8 @@ SPELT_OUT = {
     "volt": "V", "volts": "V", "ampere": "A", "amperes": "A", "amp": "A", "amps": "A", "watt": "W", "watts": "W",
     "newton": "N", "newtons": "N", "radian": "rad", "radians": "rad",
 }  # fmt: skip
-AMBIGUOUS_ALONE = ("min", "h", "d")  # current_min is a minimum; units by themselves only behind a word for time
+# current_min is a minimum and hip_l the left one; units of time by themselves only behind a word for it
+AMBIGUOUS_ALONE = ("min", "h", "d", "l", "L")
 WORDS_OF_NAMES = ("enum", "bool", "boolean", "state", "flag", "none", "unitless")  # walk_state is a name
 TIME_WORDS = ("t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "zeit")
 SUPERSCRIPTS = str.maketrans("⁻−¹²³⁴", "--1234")
@@ -152,6 +156,8 @@ def _of_words(words: list[str]) -> Unit | None:
         name, size = ATOMS[match[1]]
         exponent = int(match[2] or 1)
         factor *= size ** (-exponent if below else exponent)
+        if name == "m3":  # litres
+            name, exponent = "m", 3 * exponent
         sides[below].append(name + (str(exponent) if exponent > 1 else ""))
     if not below and len(sides[0]) == 2 and sides[0][0] in ("rad", "m") and sides[0][1] in ("s", "s2"):
         sides = (sides[0][:1], sides[0][1:])  # speed_rad_s, accel_m_s2: products of these are never measured
@@ -190,6 +196,9 @@ def split(column: str) -> tuple[str, Unit | None]:
         if len(words) == 1 and words[0] in AMBIGUOUS_ALONE and stem.lower() not in TIME_WORDS:
             continue
         unit = _of_words(words)
+        unknown = words[0] == "per" and "_" in stem and unit is not None and not unit.is_si
+        if unknown or stem.endswith("_per"):
+            return _plain(column), None  # perhaps a part of a unit only: Q_BTU_per_h
         if unit is not None and stem:
             return stem, unit
     return _plain(column), None

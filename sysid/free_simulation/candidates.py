@@ -2,7 +2,8 @@
 
 At every output an offset, a scale, a drift and a lag, as a pure delay or as a filter; at every input an offset, a
 saturation and a dead zone; at every joint that the machine declares viscous, Coulomb and Stribeck friction, friction
-that differs between the directions or grows with the load, drag, and what is periodic in the position. Lags, speeds,
+that differs between the directions or grows with the load, drag, and what is periodic in the position; at every
+parameter a drift. Lags, speeds,
 limits and periods are on grids that suit the recordings. They enter at places that the engine adds to the simulator
 (`simulator.py`), so that `step` and `observe` need not know of them.
 
@@ -19,8 +20,8 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from ranger_sim.sysid.dataset import Array, Table
-from ranger_sim.sysid.free_simulation.terms import Joint, Output, Shape, Term, into, on, sensed, shown
-from ranger_sim.sysid.machine import Recording
+from ranger_sim.sysid.free_simulation.terms import Joint, Output, Shape, Term, into, of, on, sensed, shown
+from ranger_sim.sysid.machine import PARAMETER, Known, Recording
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, but for the shortest
@@ -29,6 +30,7 @@ SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess fal
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
 LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
+SETTLED = (0.05, 0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 DEAD = (0.002, 0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
 
 
@@ -37,6 +39,7 @@ class Declares(Protocol):
 
     outputs: tuple[Output, ...]
     joints: tuple[Joint, ...]
+    parameters: tuple[Known, ...]
 
 
 Signal = Callable[[Mapping[str, Array], Shape], Array]
@@ -51,6 +54,8 @@ def candidates(machine: Declares, inputs: Sequence[str], recordings: Sequence[Re
         made += at_input(name, recordings)
     for joint in machine.joints:
         made += at_joint(joint, recordings)
+    for known in machine.parameters:
+        made += at_parameter(known, recordings)
     return made
 
 
@@ -186,6 +191,28 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
     return made
 
 
+def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
+    """A parameter that does not stay as it is: a wall that fouls, a friction that warms up, a battery that ages."""
+    unit = f"_{_word(known.unit)}" if known.unit else ""
+    longest_s = max(float(np.ptp(each.table.time_s)) for each in recordings)
+
+    def term(form: str, coefficient: str, make: Callable[[Array, Shape], Array], words: str, shapes: Sequence[Shape],
+             scale: str | None = None) -> Term:  # fmt: skip
+        return Term(
+            "parameter_drift", known.name, PARAMETER, (coefficient,),
+            lambda r, shape, values: {of(known.name): make(r.table.time_s - r.table.time_s[0], shape)}, shapes,
+            meaning=f"{known.name} changes during the run: {words}", independent=True, form=form, scale=scale,
+        )  # fmt: skip
+
+    drift, change = f"drift{unit}_per_s", f"change{unit}"
+    return [
+        term("ramp", drift, lambda t, _: t, f"value + {drift} * time since the recording's start", [{}]),
+        term("settling", change, lambda t, shape: -np.expm1(-t / shape["tau_s"]),
+             f"value + {change} * (1 - exp(-time since the recording's start / tau_s))",
+             [{"tau_s": share * longest_s} for share in SETTLED], "tau_s"),
+    ]  # fmt: skip
+
+
 def delayed(table: Table, column: Array, lag_s: float) -> Array:
     """A column (n,) as it was `lag_s` before, on cubics between its rows; a run's first value before its start.
 
@@ -221,4 +248,4 @@ def _lags(recordings: Sequence[Recording]) -> list[float]:
 
 def _word(unit: str) -> str:
     """A unit as part of a name."""
-    return unit.replace("/", "_per_").replace(" ", "").replace("^", "") or "unit"
+    return unit.replace("/", "_per_").translate(str.maketrans("", "", " ^()")) or "unit"

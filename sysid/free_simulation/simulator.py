@@ -11,7 +11,8 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.integration import Quantities
 from ranger_sim.sysid.free_simulation.predictor import Jacobians, forcing
-from ranger_sim.sysid.free_simulation.terms import Joint, Port, into, on, shown
+from ranger_sim.sysid.free_simulation.terms import Joint, Port, into, of, on, shown
+from ranger_sim.sysid.machine import PARAMETER
 
 NUDGE = 1e-6  # of a quantity's size: step of a central difference
 
@@ -183,10 +184,11 @@ class Simulator:
         """(f, h) as (n, s) and (n, o). x: (n, s), p: (p,)."""
         machine, shape = self.machine, (1, len(x))
         states = {name: x[None, :, i] for i, name in enumerate(machine.states)}
-        values = {name: p[None, None, i] for i, name in enumerate(self.names)}
+        known = {name: p[None, None, i] for i, name in enumerate(self.names)}
         after: Quantities = states
         part_s = self.step_s / self.numerics.parts
         for middle in driven.middles:
+            values = {name: value + middle[of(name)] for name, value in known.items()}
             # half of a joint's push before the step and half after it: the position gets its share
             pushed = {joint.rate: 0.5 * part_s * middle[on(joint.rate)] / self._inertia(joint, values)
                       for joint in machine.joints if not joint.drive}  # fmt: skip
@@ -196,6 +198,7 @@ class Simulator:
                 for name, each in machine.step(before, middle, values, part_s).items()
             }
             after |= {name: after[name] + push for name, push in pushed.items()}
+        values = {name: value + driven.samples[of(name)] for name, value in known.items()}
         seen = dict(machine.observe(states, driven.samples, values))
         for each in machine.outputs:
             seen[each.channel] = seen[each.channel] + driven.samples[shown(each.channel)]
@@ -271,13 +274,17 @@ class Simulator:
         f_q, h_q = np.zeros((*f.shape, len(self.ports))), np.zeros((*h.shape, len(self.ports)))
         outputs = {shown(each.channel): number for number, each in enumerate(self.machine.outputs)}
         noisy = {into(name): number for number, name in enumerate(self.noisy)}
+        own = {of(name): number for number, name in enumerate(self.names)}
         for number in by:
             name = self.ports[number].name
-            # what the engine adds itself is known: an output's port moves it alone, a noisy input's as its noise does
+            # what the engine adds itself is known: an output's port moves it alone, a noisy input's as its noise does,
+            # and a parameter's as the parameter
             if name in outputs:
                 h_q[:, outputs[name], number] = 1.0
             elif name in noisy:
                 f_q[:, :, number], h_q[:, :, number] = f_u[:, :, noisy[name]], h_u[:, :, noisy[name]]
+            elif name in own:
+                f_q[:, :, number], h_q[:, :, number] = f_p[:, :, own[name]], h_p[:, :, own[name]]
             else:
                 f_q[:, :, number], h_q[:, :, number] = derivative(3, 1.0, number)
         return Jacobians(f, h, f_x, f_u, f_p, f_q, h_x, h_u, h_p, h_q)
@@ -287,4 +294,5 @@ def _own_ports(machine: DeclaredMachine, inputs: Sequence[str]) -> list[Port]:
     """The ports that the engine adds to a machine."""
     made = [Port(shown(each.channel), each.unit, "sensor") for each in machine.outputs]
     made += [Port(into(name), "", "input") for name in inputs]
-    return made + [Port(on(each.rate), "", "mechanical") for each in machine.joints]
+    made += [Port(on(each.rate), "", "mechanical") for each in machine.joints]
+    return made + [Port(of(each.name), each.unit, PARAMETER) for each in machine.parameters]

@@ -90,6 +90,11 @@ def on(rate: str) -> str:
     return f"on {rate}"
 
 
+def of(parameter: str) -> str:
+    """Name of the port at a parameter, which the engine adds to its value."""
+    return f"of {parameter}"
+
+
 @dataclasses.dataclass(frozen=True)
 class Term:
     """A candidate cause, as `Effect`, given by its input at the ports.

@@ -49,14 +49,15 @@ def thrust_stand(cause, size, seed, seconds=20.0, rate_hz=200.0):
         return (v - constant * speed) / (resistance * (1.0 + (size * heat if cause == "heating" else 0.0)))
 
     def rates(state, v):
-        speed, heat, lagging = state
+        speed, heat, lagging, clock_s = state
+        bearing = 2.1e-5 * (1.0 + (size * math.exp(-clock_s / 3.0) if cause == "warming" else 0.0))
         i = current(speed, heat, v)
-        torque = constant * i - 2.1e-5 * speed - 1.15e-7 * speed * speed
+        torque = constant * i - bearing * speed - 1.15e-7 * speed * speed
         torque -= math.copysign(size, speed) if cause == "coulomb" else 0.0
         filtered = (thrust * speed * speed - lagging) / size if cause == "lag" else 0.0
-        return torque / 4.2e-5, (i * i / 100.0 - heat) / 8.0, filtered
+        return torque / 4.2e-5, (i * i / 100.0 - heat) / 8.0, filtered, 1.0
 
-    done = integrated(rates, [400.0, 0.0, thrust * 400.0**2], volts.tolist(), 1.0 / rate_hz)
+    done = integrated(rates, [400.0, 0.0, thrust * 400.0**2, 0.0], volts.tolist(), 1.0 / rate_hz)
     v = volts[:-1:FINE]
     pull = done[:, 2] if cause == "lag" else thrust * done[:, 0] ** 2
     pull = pull * (1.0 + (size if cause == "scale" else 0.0)) + (size if cause == "offset" else 0.0)
@@ -79,14 +80,15 @@ def heated_rod(cause, size, seed, seconds=6000.0, step_s=5.0):
     air = 22.0
 
     def rates(state, watts):
-        hot, cold = state
+        hot, cold, clock_s = state
+        loss = 0.35 / (1.0 + (0.35 * size * clock_s if cause == "fouling" else 0.0))  # a layer grows, in series
         through = 1.6 * (hot - cold)
         given = watts * (1.0 - (size if cause == "heater" else 0.0)) - through - 0.25 * (hot - air)
         given -= size * ((hot + 273.15) ** 4 - (air + 273.15) ** 4) if cause == "radiation" else 0.0
-        return given / 150.0, (through - 0.35 * (cold - air)) / 220.0
+        return given / 150.0, (through - loss * (cold - air)) / 220.0, 1.0
 
     held = np.repeat(power, FINE)
-    out, state = [], [air, air]
+    out, state = [], [air, air, 0.0]
     for number in range(rows):  # the power of a sample until the next
         part = held[number * FINE : (number + 1) * FINE].tolist()
         out.append(state)
@@ -113,16 +115,16 @@ def elastic_joint(cause, size, seed, seconds=20.0, rate_hz=250.0):
     torque *= 8.0 / np.max(np.abs(torque))
 
     def rates(state, given):
-        motor, link, motor_rate, link_rate = state
+        motor, link, motor_rate, link_rate, clock_s = state
         twist = motor - link
-        through = 180.0 * twist + 0.15 * (motor_rate - link_rate)
+        through = (180.0 + (size * clock_s if cause == "softening" else 0.0)) * twist + 0.15 * (motor_rate - link_rate)
         through += size * twist**3 if cause == "cubic" else 0.0
         load = 0.06 * link_rate
         load += size * math.sin(link) if cause == "gravity" else 0.0
         load += size * link_rate * abs(link_rate) if cause == "drag" else 0.0
-        return motor_rate, link_rate, (given - through - 0.12 * motor_rate) / 0.02, (through - load) / 0.11
+        return motor_rate, link_rate, (given - through - 0.12 * motor_rate) / 0.02, (through - load) / 0.11, 1.0
 
-    done = integrated(rates, [0.0] * 4, torque.tolist(), 1.0 / rate_hz)
+    done = integrated(rates, [0.0] * 5, torque.tolist(), 1.0 / rate_hz)
     angles = done[:, :2] + 2e-4 * draw.normal(size=(rows, 2))
     angles[:, 1] *= 1.0 + (size if cause == "scale" else 0.0)
     count = 2.0 * np.pi / 16384

@@ -62,7 +62,7 @@ def test_a_joint_has_its_frictions_and_its_sensors_as_candidates():
     causes = {each.cause for each in joint.effects([joint.prepare(table)])}
     assert causes == {
         "sensor_offset", "sensor_drift", "sensor_lag", "viscous_friction", "coulomb_friction", "drag", "stribeck",
-        "direction_friction", "load_friction", "friction_drift", "spring", "once_per_turn", "gravity",
+        "direction_friction", "load_friction", "parameter_drift", "spring", "once_per_turn", "gravity",
     }  # fmt: skip
 
 

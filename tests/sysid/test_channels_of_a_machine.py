@@ -48,6 +48,17 @@ def test_a_machine_in_degrees_has_degrees(tmp_path, header, unit, factor):
     assert made.repairs[-1].text.endswith("is called angle_deg, in deg")
 
 
+@pytest.mark.parametrize(
+    ("header", "name", "unit"),
+    [("Q_BTU_per_h", "Q_BTU_per_h", "BTU/h"), ("heat_kJ_per_h", "heat_kJ_per_h", "kJ/h"), ("F_per_h", "F_per_h", "1/h"),
+     ("F_per_h", "F_per_h", "changes/h"), ("F_per_h", "F_per_h", ""), ("speed_rpm", "speed_rpm", "turns of it")],
+)  # fmt: skip
+def test_a_quantity_called_as_in_the_file_has_the_numbers_of_the_file(tmp_path, header, name, unit):
+    """Also where the machine has no known unit: a heat per hour was 3,600 times too small."""
+    made = named_by(_recording(tmp_path, header, np.arange(ROWS)), [Quantity(name, unit, "")])
+    assert made[name].value == pytest.approx(np.arange(ROWS), rel=1e-12)
+
+
 def test_kelvin_and_celsius_differ_by_their_zero(tmp_path):
     recording = _recording(tmp_path, "plate_C", np.full(ROWS, 20.0) + np.arange(ROWS))
     made = named_by(recording, [Quantity("plate_K", "K", "")])

@@ -8,11 +8,11 @@ from ranger_sim.sysid import units
 from ranger_sim.sysid.units import unit_of
 
 PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
-BASES = ("s", "A", "V", "W", "ohm", "H", "rad", "m", "N", "Nm", "Pa", "Hz", "K")
+BASES = ("s", "A", "V", "W", "ohm", "H", "rad", "m", "N", "Nm", "Pa", "Hz", "K", "J", "mol")
 HOUR_s = 60.0 * 60.0
 OTHERS = {  # a word: (what it is in SI, its SI unit)
     "min": (60.0, "s"), "h": (HOUR_s, "s"), "d": (24.0 * HOUR_s, "s"),
-    "sec": (1.0, "s"), "Amp": (1.0, "A"), "Volt": (1.0, "V"), "J": (1.0, "J"),
+    "sec": (1.0, "s"), "Amp": (1.0, "A"), "Volt": (1.0, "V"),
     "Wh": (HOUR_s, "J"), "kWh": (1e3 * HOUR_s, "J"), "Ohm": (1.0, "ohm"), "Ω": (1.0, "ohm"), "bar": (1e5, "Pa"),
     "deg": (math.radians(1.0), "rad"), "°": (math.radians(1.0), "rad"), "degree": (math.radians(1.0), "rad"),
     "degrees": (math.radians(1.0), "rad"), "rev": (math.radians(360.0), "rad"), "turn": (math.radians(360.0), "rad"),
@@ -31,7 +31,10 @@ def meant(word):
     raise AssertionError(f"{word}: no prefix and base of which it is made")
 
 
-@pytest.mark.parametrize("word", sorted(units.ATOMS))
+LITRES = {"l": 1e-3, "L": 1e-3, "ml": 1e-6, "mL": 1e-6}
+
+
+@pytest.mark.parametrize("word", sorted(units.ATOMS.keys() - LITRES))
 def test_each_word_is_worth_what_its_prefix_says(word):
     factor, base = meant(word)
     # beside something else, for K alone is a temperature
@@ -39,6 +42,21 @@ def test_each_word_is_worth_what_its_prefix_says(word):
     assert found.factor == pytest.approx(factor, rel=1e-15) and found.numerator == ("W", base)
     below = unit_of(f"W/{word}2")
     assert below.factor == pytest.approx(factor**-2, rel=1e-14) and below.denominator == (f"{base}2",)
+
+
+@pytest.mark.parametrize("word", LITRES)
+def test_a_litre_is_a_volume_in_cubic_metres(word):
+    density, flow = unit_of(f"kg/{word}"), unit_of(f"{word}/min")
+    assert density.same_kind(unit_of("kg/m3")) and flow.same_kind(unit_of("m^3/s"))
+    assert density.factor == pytest.approx(1.0 / LITRES[word]) and flow.factor == pytest.approx(LITRES[word] / 60.0)
+    assert units.split("hip_l") == ("hip_l", None)  # the left one
+
+
+def test_a_part_of_an_unknown_unit_is_not_a_unit():
+    assert units.split("Q_BTU_per_h") == ("Q_BTU_per_h", None)
+    assert units.split("x_BTU_per_s2_per_h") == ("x_BTU_per_s2_per_h", None)
+    stem, unit = units.split("Q_kJ_per_h")
+    assert (stem, unit.text, unit.factor) == ("Q", "J/s", pytest.approx(1000.0 / 3600.0))
 
 
 @pytest.mark.parametrize(
