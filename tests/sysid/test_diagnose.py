@@ -182,7 +182,7 @@ def test_a_machine_of_the_users_own_is_diagnosed_by_the_command(own_machine, cap
     )
     assert code == 1
     said = capsys.readouterr().out
-    assert said.startswith("cart: the mechanical part is wrong: drag at cart.")
+    assert said.startswith("cart: the mechanical part is wrong: drag at cart, ")
     told = json.loads((own_machine / "a.json").read_text(encoding="utf-8"))
     assert told["causes"][0]["name"] == "drag"
     assert told["model_file"] == "found/extended.toml"

@@ -177,7 +177,7 @@ def test_a_users_arm_is_diagnosed_by_the_command(tmp_path, monkeypatch, capsys):
     one, other = str(tmp_path / "7.csv"), str(tmp_path / "8.csv")
     arguments = ["--experiment", "examples.servo_arm:ServoArm", "--json", str(tmp_path / "found.json")]
     assert main(["diagnose", one, "--holdout", other, *arguments]) == 1
-    assert "servo-arm: the electrical part is wrong: supply_sag at supply." in capsys.readouterr().out
+    assert "servo-arm: the electrical part is wrong: supply_sag at supply, " in capsys.readouterr().out
     told = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
     (cause,) = told["causes"]
     low, high = cause["parameters"]["per_V"]["ci95"]

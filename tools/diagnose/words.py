@@ -6,6 +6,7 @@ from typing import Any
 
 from ranger_sim.sysid import inspection, plausibility
 from ranger_sim.sysid.diagnosis import Diagnosis
+from ranger_sim.sysid.machine import PARAMETER
 from ranger_sim.sysid.naming import PAYS, TIE
 
 
@@ -30,8 +31,35 @@ def sentence(found: Diagnosis) -> str:
             f"{name}: something is wrong in the {answer['subsystem']} part, and no cause of the catalogue explains it"
             f"{also}.{learned(answer)} Fitted parameters are not physical until it is resolved."
         )
-    names = " and ".join(f"{each['name']} at {each['at']}" for each in answer["causes"])
-    return f"{name}: the {answer['subsystem']} part is wrong: {names}."
+    names = " and ".join(f"{each['name']} at {each['at']}{_size(each)}" for each in answer["causes"])
+    part = answer["subsystem"]
+    what = "a parameter changes during the run" if part == PARAMETER else f"the {part} part is wrong"
+    return f"{name}: {what}: {names}{_gained(answer)}."
+
+
+def _size(cause: dict[str, Any]) -> str:
+    """How large a cause is and how sure: its values with their 95 % intervals, after a comma."""
+    values = (
+        f"{name} {each['value']:.4g} ({each['ci95'][0]:.4g} to {each['ci95'][1]:.4g})"
+        for name, each in sizes(cause).items()
+    )
+    return "".join(f", {each}" for each in values)
+
+
+def _gained(answer: dict[str, Any]) -> str:
+    """The errors of the equation that gains most on held-out data, after a semicolon; "" without such data."""
+    errors = answer["evidence"].get("held_out_errors") or {}
+    if not errors:
+        return ""
+    name = min(errors, key=lambda each: errors[each]["after"] / max(errors[each]["before"], 1e-300))
+    return f"; {_errors(name, errors[name], named=True)}"
+
+
+def _errors(name: str, each: dict[str, Any], named: bool) -> str:
+    """The errors of an equation on held-out data: before, after where causes are named, and of a black box."""
+    text = f"held-out error of {name}: {each['before']:.2%} before"
+    text += f", {each['after']:.2%} after" if named else ""
+    return text + (f", {each['black_box']:.2%} by a black box" if each["black_box"] is not None else "")
 
 
 def nothing(answer: dict[str, Any]) -> str:
@@ -78,15 +106,8 @@ def _left(evidence: dict[str, Any], name: str) -> str:
 
 def held_out(answer: dict[str, Any]) -> list[str]:
     """The three errors on held-out data, an equation a line; empty without held-out data."""
-    lines = []
-    for name, each in (answer["evidence"].get("held_out_errors") or {}).items():
-        text = f"held-out error of {name}: {each['before']:.2%} before"
-        if answer["causes"]:
-            text += f", {each['after']:.2%} after"
-        if each["black_box"] is not None:
-            text += f", {each['black_box']:.2%} by a black box"
-        lines.append(text)
-    return lines
+    errors = answer["evidence"].get("held_out_errors") or {}
+    return [_errors(name, each, bool(answer["causes"])) for name, each in errors.items()]
 
 
 def unseen(answer: dict[str, Any]) -> list[str]:
