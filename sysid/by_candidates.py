@@ -265,7 +265,15 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
         naming.take(chosen, tried, base)
     acting = [(each.effect, each.shape) for each in had]
     acting += [(each.effect, each.shape) for each in likeliest]
-    return cast(Recording, machine.about_all(recording, acting))  # type: ignore[attr-defined]
+    kinds = dict.fromkeys(each.subsystem for each in effects)
+    families = [[(each, shape) for each in effects if each.subsystem == kind and _is_simple(each)
+                 for shape in each.shapes] for kind in kinds]  # fmt: skip
+    return cast(Recording, machine.about_all(recording, acting, families))  # type: ignore[attr-defined]
+
+
+def _is_simple(effect: Effect) -> bool:
+    """True for an effect that can act next to others from the start: one shape, or the limits of an input."""
+    return len(effect.shapes) == 1 or effect.cause in ("saturation", "dead_zone")
 
 
 def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequence[Named]) -> list[Effect]:

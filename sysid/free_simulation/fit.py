@@ -125,6 +125,13 @@ class TrajectoryFit:
         assert self.predictor is not None
         return float(np.sum((self.response / self.predictor.unit) ** 2) + self.predictor.surprise_of_spread)
 
+    @property
+    def lost(self) -> bool:
+        """True where the fit ended far off, or left errors above the noise with a parameter at its limit."""
+        own = self.p_at[: self.count]
+        at_limit = np.any((own <= self.low[: self.count]) | (own >= self.high[: self.count]))
+        return not self.cost < FAR_OFF or bool(at_limit) and not self.cost < MISSED
+
     def acted_on(self, acting: Sequence[Acting], fixed: bool) -> "TrajectoryFit":
         """A fit that continues from here with effects in the simulator; their coefficients follow the parameters."""
         new, count = copy.copy(self), self.count

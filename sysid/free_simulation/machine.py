@@ -119,21 +119,35 @@ class SimulatedMachine(DeclaredMachine):
         _chosen(fit)
         return linearised.one_step_ahead(fit)
 
-    def about_all(self, recording: Recording, effects: Sequence[tuple[Effect, Shape]]) -> Recording:
-        """The recording linearised where the simulator fits with all of these effects in it, and not only without."""
-        acting = [
-            Acting(effect.term, shape, (0.0,) * len(effect.coefficients))
-            for effect, shape in effects
-            if isinstance(effect, SimulatedEffect) and effect.term is not None
-        ]
-        if not acting:
-            return recording
-        fit = _fit(recording)
-        tried = fit.with_all(acting)
-        tried.settle(follow=True)
-        _chosen(tried)
-        made = linearised.one_step_ahead(tried)
-        return made if tried.surprise < fit.surprise else recording
+    def about_all(
+        self,
+        recording: Recording,
+        effects: Sequence[tuple[Effect, Shape]],
+        families: Sequence[Sequence[tuple[Effect, Shape]]] = (),
+    ) -> Recording:
+        """The recording linearised where the simulator fits with all of these effects in it, and not only without.
+
+        families: tried one after the other as well, as long as the simulator is lost; where it ended without its fault
+        the likeliest effects need not be the right ones.
+        """
+        best = fit = _fit(recording)
+        for number, each in enumerate((effects, *families)):
+            if number and not best.lost:
+                break
+            acting = [
+                Acting(effect.term, shape, (0.0,) * len(effect.coefficients))
+                for effect, shape in each
+                if isinstance(effect, SimulatedEffect) and effect.term is not None
+            ]
+            if not acting:
+                continue
+            tried = fit.with_all(acting)
+            tried.settle(follow=True)
+            _chosen(tried)
+            made = linearised.one_step_ahead(tried)
+            if tried.surprise < best.surprise:
+                best, recording = tried, made
+        return recording
 
     def numerical(self, recording: Recording) -> Array:
         """(variants, coefficients): what the coefficients of what acts move by with other numerics."""
