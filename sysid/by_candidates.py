@@ -40,6 +40,7 @@ from ranger_sim.sysid.three_numbers import Held, gained
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
 # Of the likeliest one's score: what explains less hardly moves where the simulator ends. Chosen by us
 SMALL = 0.2
+FEW_SHAPES = 4  # of a candidate that acts at all of them while a simulator is lost
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 # Times what numerics move it by: a named effect is at least so large. A lag is a stamp's, up to half a row, in one of
@@ -272,8 +273,8 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
 
 
 def _is_simple(effect: Effect) -> bool:
-    """True for an effect that can act next to others from the start: one shape, or the limits of an input."""
-    return len(effect.shapes) == 1 or effect.cause in ("saturation", "dead_zone")
+    """True for an effect that can act next to others from the start: with few shapes, or the limits of an input."""
+    return len(effect.shapes) <= FEW_SHAPES or effect.cause in ("saturation", "dead_zone")
 
 
 def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequence[Named]) -> list[Effect]:

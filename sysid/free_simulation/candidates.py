@@ -243,7 +243,7 @@ def _lags(recordings: Sequence[Recording]) -> list[float]:
     table = min((each.table for each in recordings), key=len)
     most = min(float(MOST_LAG_SAMPLES), len(table) / LAGS_IN_A_RECORDING)
     grid = itertools.takewhile(lambda lag: lag <= most, (FINEST_LAG * COARSER**n for n in itertools.count()))
-    return [each * table.step_s for each in grid]
+    return [each * table.step_s for each in (*grid, most)]
 
 
 def _word(unit: str) -> str:
