@@ -285,7 +285,8 @@ def _error(regression: Regression, name: str) -> float:
 
 def _letters(each: Named, recordings: Sequence[Recording]) -> str:
     made = each.effect.columns(recordings[0], each.shape, {name: 1.0 for name in _parameter_names(recordings)})
-    return "".join(recordings[0].equations[name].letter for name in made if name in recordings[0].equations)
+    letters = (recordings[0].equations[name].letter for name in made if name in recordings[0].equations)
+    return "".join(dict.fromkeys(letters))
 
 
 def _parameter_names(recordings: Sequence[Recording]) -> list[str]:
