@@ -165,10 +165,11 @@ class Steps:
         wanted.replace(kept)
 
     def bytecode(self):
-        """Bytecode of all packages where Python is told to write none later: tests start many programs."""
+        """Bytecode of all packages and of ours where Python is told to write none later: tests start many programs."""
         [packages] = (self.venv / "lib").glob("python*/site-packages")
+        ours = sorted({each.resolve() for each in (HERE / "ranger_sim").iterdir() if each.is_dir()})
         if sys.dont_write_bytecode:
-            self.run([self.python, "-m", "compileall", "-q", "-j", "0", packages])
+            self.run([self.python, "-m", "compileall", "-q", "-j", "0", packages, HERE / "ranger_sim", *ours])
 
     def library(self):
         """Compile what changed. Without a compiler the sources run interpreted, and this is reported."""
