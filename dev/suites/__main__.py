@@ -8,6 +8,7 @@ under ten popular pytest plugins, alone and in pairs. --json FILE writes the num
 """
 
 import argparse
+import concurrent.futures
 import dataclasses
 import json
 import os
@@ -28,6 +29,7 @@ LONGEST_S = 900.0
 OTHERS = ("randomly", "asyncio", "repeat", "html", "instafail", "pytest_cov")
 WITHOUT = [text for name in OTHERS for text in ("-p", f"no:{name}")]
 SHOWN = 40  # tests of a suite
+AT_ONCE = 2  # suites: they wait for the wall clock most of the time; python-can takes as long as the others together
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,6 +221,37 @@ def ours_beside_libraries(python: pathlib.Path, folder: pathlib.Path) -> list[st
     return wrong or [f"pytest ended with {done.returncode}"] * (done.returncode != 0)
 
 
+def compared(python: pathlib.Path, name: str, folder: pathlib.Path) -> tuple[list[str], dict[str, object], list[str]]:
+    """A suite on both buses, one after the other: lines to print, numbers, and what is wrong."""
+    suite = SUITES[name]
+    folder.mkdir(exist_ok=True)
+    top = unpacked(suite, folder)
+    virtual, ours = (run(python, suite, top, on_ours) for on_ours in (False, True))
+    count = len(virtual.passed | virtual.failed)
+    numbers: dict[str, object] = {"version": suite.version, "tests": count, "virtual": len(virtual.passed)}
+    numbers |= {"ranger_sim": len(ours.passed), "seconds": [virtual.seconds, ours.seconds]}
+    taken = f"{virtual.seconds:.0f}, {ours.seconds:.0f}"
+    lines = [f"{name:12} {len(virtual.passed):5} of {count:4} {len(ours.passed):5} of {count:4} {taken:>16}"]
+    wrong: list[str] = []
+    only_ours = sorted((virtual.passed - ours.passed) | (ours.failed - virtual.failed))
+    expected, races = EXPECTED.get(name, {}), RACES.get(name, {})
+    if any(not any(part in test for part in expected | races) for test in only_ours):
+        # their tests wait for the wall clock: one that passes the second time was late
+        again = run(python, suite, top, on_ours=True)
+        only_ours = [test for test in only_ours if test not in again.passed]
+    for test in only_ours[:SHOWN]:
+        reason = next((text for part, text in (expected | races).items() if part in test), None)
+        lines.append(f"    {test}: {reason or 'fails on our bus only'}")
+        wrong += [test] * (reason is None)
+    for part in expected:
+        if not any(part in test for test in only_ours):
+            lines.append(f"    {part}: passes now; take it out of EXPECTED")
+            wrong.append(part)
+    if not count:
+        wrong.append(f"{name}: no test ran")
+    return lines, numbers, wrong
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command."""
     parser = argparse.ArgumentParser(prog="python -m dev.suites", description=__doc__.partition("\n")[0])
@@ -244,35 +277,13 @@ def main(arguments: list[str] | None = None) -> int:
         names.remove(PLUGINS)
         wrong += plugins.in_pairs(python, options.folder / PLUGINS)
     print(f"{'suite':12} {'virtual':>12} {'ranger_sim':>12} {'seconds':>16}")
-    for name in names:
-        suite = SUITES[name]
-        folder = options.folder / name
-        folder.mkdir(exist_ok=True)
-        top = unpacked(suite, folder)
-        virtual, ours = (run(python, suite, top, on_ours) for on_ours in (False, True))
-        count = len(virtual.passed | virtual.failed)
-        numbers[name] = {"version": suite.version, "tests": count, "virtual": len(virtual.passed)}
-        numbers[name] |= {"ranger_sim": len(ours.passed), "seconds": [virtual.seconds, ours.seconds]}
-        taken = f"{virtual.seconds:.0f}, {ours.seconds:.0f}"
-        print(
-            f"{name:12} {len(virtual.passed):5} of {count:4} {len(ours.passed):5} of {count:4} {taken:>16}", flush=True
-        )
-        only_ours = sorted((virtual.passed - ours.passed) | (ours.failed - virtual.failed))
-        expected, races = EXPECTED.get(name, {}), RACES.get(name, {})
-        if any(not any(part in test for part in expected | races) for test in only_ours):
-            # their tests wait for the wall clock: one that passes the second time was late
-            again = run(python, suite, top, on_ours=True)
-            only_ours = [test for test in only_ours if test not in again.passed]
-        for test in only_ours[:SHOWN]:
-            reason = next((text for part, text in (expected | races).items() if part in test), None)
-            print(f"    {test}: {reason or 'fails on our bus only'}", flush=True)
-            wrong += [test] * (reason is None)
-        for part in expected:
-            if not any(part in test for test in only_ours):
-                print(f"    {part}: passes now; take it out of EXPECTED")
-                wrong.append(part)
-        if not count:
-            wrong.append(f"{name}: no test ran")
+    with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+        for name, (line, found, faults) in zip(
+            names, pool.map(lambda name: compared(python, name, options.folder / name), names), strict=True
+        ):
+            print("\n".join(line), flush=True)
+            numbers[name] = found
+            wrong += faults
     if options.json:
         options.json.write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
     return 1 if wrong else 0
