@@ -43,6 +43,9 @@ SANITIZING = (
     "-fno-sanitize=vptr",
 )
 COVERING = ("-O0", "--coverage")
+# Objects of our own sources by command, source and state: four fifths of a small firmware's compilation, and the same
+# for every firmware that this process builds.
+_OURS: dict[tuple[str, ...], bytes] = {}
 
 MESSAGE = re.compile(
     r"^(?P<file>[^:\s][^:]*):(?P<line>\d+)(?::\d+)?: (?P<kind>fatal error|error|warning): (?P<text>.*)$"
@@ -130,9 +133,7 @@ def _compile(
     output: list[str] = []
     objects = [str(making / "runtime.o")]
     counting = ["-DFW_COVERAGE"] if "--coverage" in watching else []
-    code, text = run_compiler([program, *OPTIONS, *counting, f"-I{INCLUDE}", "-c", str(RUNTIME), "-o", objects[0]])
-    if code:
-        raise FirmwareError(f"{RUNTIME} does not compile with {program}:", *text[:20])
+    compile_ours([program, *OPTIONS, *counting, f"-I{INCLUDE}"], RUNTIME, headers_in((INCLUDE,)), making / "runtime.o")
     failed = False
     for number, source in enumerate(sources):
         place = making / f"{number}-{source.stem}.o"
@@ -150,6 +151,20 @@ def _compile(
     if failed:
         raise FirmwareError(*errors_in(manifest, output))
     return tuple(line for line in map(message_of, output) if line and " warning: " in line)
+
+
+def compile_ours(
+    command: Sequence[str], source: pathlib.Path, headers: Sequence[pathlib.Path], place: pathlib.Path
+) -> None:
+    """Compile a source of this package to `place`, or write there what this process has compiled of it before."""
+    key = (*command, state_of((), [source, *headers]))
+    if key in _OURS:
+        place.write_bytes(_OURS[key])
+        return
+    code, text = run_compiler([*command, "-c", str(source), "-o", str(place)])
+    if code:
+        raise FirmwareError(f"{source} does not compile with {command[0]}:", *text[:20])
+    _OURS[key] = place.read_bytes()
 
 
 def run_compiler(command: list[str]) -> tuple[int, list[str]]:

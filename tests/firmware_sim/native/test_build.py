@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from ranger_sim.firmware_sim.native import build as building
 from ranger_sim.firmware_sim.native import library
 from ranger_sim.firmware_sim.native.build import build
 from ranger_sim.firmware_sim.native.library import Library
@@ -68,6 +69,29 @@ def test_without_a_compiler_the_names_tried_are_reported(tmp_path, monkeypatch):
     assert lines(build, load(folder)) == [
         "no C compiler is installed here (looked for cc, gcc, clang); firmware in C needs one"
     ]
+
+
+@needs_compiler
+def test_a_process_compiles_our_own_source_once_and_again_when_it_has_changed(tmp_path, monkeypatch):
+    compiled = []
+
+    def keeps(command, run=building.run_compiler):
+        compiled.extend(command[command.index("-c") + 1 :][:1] if "-c" in command else ())
+        return run(command)
+
+    monkeypatch.setattr(building, "_OURS", {})
+    monkeypatch.setattr(building, "run_compiler", keeps)
+    folders = [folder_with(tmp_path / name, TIMER + SCHEDULE + START) for name in ("one", "two")]
+    for folder in folders:
+        library_of(folder)
+    runtime = building.RUNTIME
+    assert compiled == [str(runtime), str(folders[0] / "small.c"), str(folders[1] / "small.c")]
+    changed = tmp_path / "runtime.c"
+    monkeypatch.setattr(building, "RUNTIME", changed)
+    changed.write_bytes(runtime.read_bytes())
+    library_of(folder_with(tmp_path / "three", TIMER + SCHEDULE + START))
+    changed.write_bytes(runtime.read_bytes() + b"#error later\n")
+    assert lines(build, load(folders[0]))[0].startswith(f"{changed} does not compile with ")
 
 
 @needs_compiler
