@@ -10,6 +10,7 @@ under ten popular pytest plugins, alone and in pairs. --json FILE writes the num
 import argparse
 import concurrent.futures
 import dataclasses
+import itertools
 import json
 import os
 import pathlib
@@ -29,14 +30,14 @@ LONGEST_S = 900.0
 OTHERS = ("randomly", "asyncio", "repeat", "html", "instafail", "pytest_cov")
 WITHOUT = [text for name in OTHERS for text in ("-p", f"no:{name}")]
 SHOWN = 40  # tests of a suite
-AT_ONCE = 2  # suites: they wait for the wall clock most of the time; python-can takes as long as the others together
+AT_ONCE = 2  # suites: they wait for the wall clock most of the time
 
 
 @dataclasses.dataclass(frozen=True)
 class Suite:
     """One project's tests. environment: variables that they read; lacking: modules that
     the tests import and the source package does not have, with what they use of them; changed: a file, a line of it,
-    and the line that replaces it.
+    and the line that replaces it; alone: its tests look for buses of this machine, so no other suite may have one.
     """
 
     package: str
@@ -45,6 +46,7 @@ class Suite:
     environment: tuple[tuple[str, str], ...] = ()
     lacking: tuple[tuple[str, str], ...] = ()
     changed: tuple[str, str, str] | None = None
+    alone: bool = False
 
 
 SCRIPTS = ("viewer", "bridge", "logger", "player", "scripts")
@@ -55,6 +57,7 @@ SUITES = {
         # the first needs a maker's library, the others put parts of their own into `virtual`
         tests=("test", *(f"--ignore=test/test_{name}.py" for name in ("interface_canalystii", *SCRIPTS))),
         environment=(("CI", "1"),),
+        alone=True,
     ),
     "canopen": Suite("canopen", "2.4.1"),
     "can-isotp": Suite(
@@ -221,9 +224,12 @@ def ours_beside_libraries(python: pathlib.Path, folder: pathlib.Path) -> list[st
     return wrong or [f"pytest ended with {done.returncode}"] * (done.returncode != 0)
 
 
-def compared(python: pathlib.Path, name: str, folder: pathlib.Path) -> tuple[list[str], dict[str, object], list[str]]:
-    """A suite on both buses, one after the other: lines to print, numbers, and what is wrong."""
+def compared(
+    python: pathlib.Path, name: str, folder: pathlib.Path
+) -> tuple[str, list[str], dict[str, object], list[str]]:
+    """A suite on both buses, one after the other: its name, lines to print, numbers, and what is wrong."""
     suite = SUITES[name]
+    folder = folder / name
     folder.mkdir(exist_ok=True)
     top = unpacked(suite, folder)
     virtual, ours = (run(python, suite, top, on_ours) for on_ours in (False, True))
@@ -249,7 +255,7 @@ def compared(python: pathlib.Path, name: str, folder: pathlib.Path) -> tuple[lis
             wrong.append(part)
     if not count:
         wrong.append(f"{name}: no test ran")
-    return lines, numbers, wrong
+    return name, lines, numbers, wrong
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -277,13 +283,13 @@ def main(arguments: list[str] | None = None) -> int:
         names.remove(PLUGINS)
         wrong += plugins.in_pairs(python, options.folder / PLUGINS)
     print(f"{'suite':12} {'virtual':>12} {'ranger_sim':>12} {'seconds':>16}")
-    with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
-        for name, (line, found, faults) in zip(
-            names, pool.map(lambda name: compared(python, name, options.folder / name), names), strict=True
-        ):
-            print("\n".join(line), flush=True)
-            numbers[name] = found
-            wrong += faults
+    names.sort(key=lambda name: not SUITES[name].alone)
+    for alone, group in itertools.groupby(names, lambda name: SUITES[name].alone):
+        with concurrent.futures.ThreadPoolExecutor(1 if alone else AT_ONCE) as pool:
+            for name, lines, found, faults in pool.map(lambda name: compared(python, name, options.folder), group):
+                print("\n".join(lines), flush=True)
+                numbers[name] = found
+                wrong += faults
     if options.json:
         options.json.write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
     return 1 if wrong else 0
