@@ -23,7 +23,7 @@ walk: $(VENV)/.walk
 	@echo "    $(VENV)/bin/ranger-sim new my-machine    # boards in C, a bus and a body of your own, with tests"
 
 # Tests of a robot at a pace of the wall clock have both cores to themselves; the others go side by side.
-WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_daq.py tests/system/test_processes.py \
+WITH_A_CLOCK = tests/system/test_attached_clients.py tests/system/test_processes.py \
 	tests/tools/run/test_up_view.py tests/tools/panel/test_page.py tests/tools/panel/test_live.py \
 	tests/tools/panel/test_reader.py tests/test_watched.py tests/vm
 # Run by `make docs`.
