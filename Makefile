@@ -41,7 +41,7 @@ NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_201
 	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/walking/test_walking.py)
 
 test-interpreted: $(VENV)/.all
-	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
+	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
 	$(RUN) -m pytest -q -rs -n 2 -m both_ways tests/system/test_determinism.py
 
 docs: $(VENV)/.all

@@ -20,23 +20,44 @@ DEBUGGERS = ("gdb-multiarch", "arm-none-eabi-gdb")
 OURS = ("anon_inode", "pipe", "socket")  # kinds of descriptors that a test may leave open only by mistake
 
 # Files that take longest, the longest first: side by side they begin before the many short ones, so that at the end
-# neither process waits for the other (from some 240 s down to 40 s each, 23 November 2026, AMD EPYC).
+# neither process waits for the other (from 160 s of processor down to 15 s each, 29 November 2026, Intel Xeon). The
+# last five take as long interpreted (`make test-interpreted`).
 LONGEST = (
-    "blind/test_bounds.py",
-    "system/test_determinism.py",
-    "system/test_campaigns.py",
     "sysid/test_leg_swing_machine.py",
-    "blind/test_generator.py",
-    "system/test_campaign_designs.py",
+    "harness/processes/test_firmware_that_breaks.py",
+    "system/test_campaigns.py",
+    "sysid/test_ankle_machine.py",
+    "sysid/test_diagnose.py",
     "test_packaging.py",
+    "system/test_determinism.py",
+    "tools/panel/test_page_of_recordings.py",
+    "tools/test_bench.py",
+    "ranger/testing/test_firmware_in_tests.py",
     "test_wheel.py",
+    "tools/command_line/test_missing_libraries.py",
+    "sysid/test_driven_joints.py",
+    "tools/panel/test_keyboard.py",
+    "ranger/faults/test_sensor_faults.py",
+    "system/test_campaign_designs.py",
+    "sysid/test_api.py",
+    "ranger/testing/test_forked_tests.py",
+    "ranger/testing/test_forked_tests_among_plugins.py",
+    "sysid/test_identify.py",
+    "sysid/test_free_simulation.py",
+    "blind/test_generator.py",
+    "tools/panel/test_comparison.py",
+    "boards/test_main_brain_walks_the_bare_body.py",
+    "harness/test_supervision.py",
+    "can_bus/test_fd_bus.py",
+    "plant/test_ranger_plant.py",
+    "firmware_sim/native/test_sanitizers.py",
 )
 
 
 def pytest_collection_modifyitems(items):
     """The longest files first; each file stays whole and as it is."""
     places = {f"tests/{name}": place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.location[0], len(places)))
+    items.sort(key=lambda item: places.get(item.nodeid.partition("::")[0], len(places)))
 
 
 def descriptors_of_this_process():
