@@ -1,5 +1,7 @@
 """Functions of a program in C, as tasks, handlers and hooks of a board."""
 
+from typing import Any
+
 import cython
 
 from ranger_sim.firmware_sim.native.library import address
@@ -46,3 +48,12 @@ class Function:
     def turn(self) -> cython.longlong:
         """Run a function with a result of 64 bits: a turn of a main loop, or the address of a structure."""
         return call_turn(self.code)
+
+
+def function(given: Any) -> Any:
+    """A `Function` for tables of tasks and handlers.
+
+    Its class is hidden from the callers' C, where a method of a known class is not bound to its object but wrapped,
+    which calls.pxd does not see through.
+    """
+    return Function(given)

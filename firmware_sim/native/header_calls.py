@@ -11,7 +11,7 @@ import cython
 from ranger_sim.can_bus.fd_frame import LONGEST
 from ranger_sim.can_bus.frame import HIGHEST_EXTENDED, HIGHEST_STANDARD, LENGTH_CODE
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.native.functions import Function
+from ranger_sim.firmware_sim.native.functions import function
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
 from ranger_sim.firmware_sim.native.program import answer_by, pointer
 from ranger_sim.firmware_sim.native.started import Started
@@ -149,16 +149,16 @@ class Calls:
     mail: cython.p_longlong
     phase_ns: cython.longlong
     hardware: object
-    timers: object
-    pwms: object
-    adcs: object
-    adcxs: object
-    spis: object
-    ssps: object
-    masters: object
-    uarts: object
-    cans: object
-    fds: object
+    timers: Started
+    pwms: Started
+    adcs: Started
+    adcxs: Started
+    spis: Started
+    ssps: Started
+    masters: Started
+    uarts: Started
+    cans: Started
+    fds: Started
     canfd_mail: object
     accepted: object
 
@@ -330,23 +330,23 @@ class Calls:
         elif call == CALL_CANFD_TRANSMIT:
             return self.canfd_transmit(a, b)
         elif call == CALL_CANFD_BUFFER_FREE:
-            return self.fds[a].buffer_free(self.buffer(b))
+            return self.fds.at(a).buffer_free(self.buffer(b))
         elif call == CALL_CANFD_ABORT:
-            self.fds[a].abort(self.buffer(b))
+            self.fds.at(a).abort(self.buffer(b))
         elif call == CALL_CANFD_RECEIVE:
             return self.canfd_receive(a)
         elif call == CALL_CANFD_CLEAR_OVERRUN:
-            self.fds[a].clear_overrun()
+            self.fds.at(a).clear_overrun()
         elif call == CALL_CANFD_GSR:
-            return self.fds[a].GSR()
+            return self.fds.at(a).GSR()
         elif call == CALL_CANFD_ICR:
-            return self.fds[a].read_ICR()
+            return self.fds.at(a).read_ICR()
         elif call == CALL_CANFD_MOD:
-            return self.fds[a].MOD
+            return self.fds.at(a).MOD
         elif call == CALL_CANFD_WRITE_MOD:
-            self.fds[a].write_MOD(b)
+            self.fds.at(a).write_MOD(b)
         elif call == CALL_CANFD_WRITE_IER:
-            self.fds[a].write_IER(b)
+            self.fds.at(a).write_IER(b)
         return 0
 
     @cython.ccall
@@ -361,6 +361,32 @@ class Calls:
         if number in started:
             raise FirmwareError(f"{started.what} {number} is started twice")
 
+    # --- the devices, of which C knows the class ----------------------------------------------------------
+
+    @cython.cfunc
+    def timer(self, number: cython.longlong) -> TimerCapture:
+        return self.timers.at(number)
+
+    @cython.cfunc
+    def pwm(self) -> Pwm:
+        return self.pwms.at(0)
+
+    @cython.cfunc
+    def adc(self) -> AdcInternal:
+        return self.adcs.at(0)
+
+    @cython.cfunc
+    def adcx(self) -> Ads7871:
+        return self.adcxs.at(0)
+
+    @cython.cfunc
+    def spi(self, number: cython.longlong) -> SpiEncoder:
+        return self.spis.at(number)
+
+    @cython.cfunc
+    def can(self, number: cython.longlong) -> CanController:
+        return self.cans.at(number)
+
     # --- interrupts, time ---------------------------------------------------------------------------------
 
     @cython.ccall
@@ -372,7 +398,7 @@ class Calls:
         self.chip.vic.attach(
             it.kind,
             it.index,
-            Function(handler).serve,
+            function(handler).serve,
             it.cost,
             it.per_item,
             it.vic_slot,
@@ -445,50 +471,48 @@ class Calls:
     @cython.ccall
     def timer_start(self, timer: cython.longlong, period: cython.longlong, match_interrupt: cython.longlong) -> None:
         self.new(self.timers, timer)
-        self.timers[timer] = TimerCapture(
-            self.chip, timer, period, phase_ns=self.phase_ns, match_interrupt=match_interrupt != 0
+        self.timers.add(
+            timer,
+            TimerCapture(self.chip, timer, period, phase_ns=self.phase_ns, match_interrupt=match_interrupt != 0),
         )
 
     @cython.ccall
     def capture_connect(self, timer: cython.longlong, channel: cython.longlong, pin: cython.longlong) -> None:
-        device = self.timers[timer]
+        device = self.timer(timer)
         bits = device.CCR  # connecting arms a channel; here the program does
         device.use_channel(channel, pin)
         device.CCR = bits
 
     @cython.ccall
     def timer_CCR(self, timer: cython.longlong) -> cython.longlong:
-        return self.timers[timer].CCR
+        return self.timer(timer).CCR
 
     @cython.ccall
     def timer_write_CCR(self, timer: cython.longlong, value: cython.longlong) -> None:
-        self.timers[timer].CCR = value & 0xFFF
+        self.timer(timer).CCR = value & 0xFFF
 
     @cython.ccall
     def timer_CR(self, timer: cython.longlong, channel: cython.longlong) -> cython.longlong:
-        device: TimerCapture = self.timers[timer]
-        return device.CR(channel & 3)
+        return self.timer(timer).CR(channel & 3)
 
     @cython.ccall
     def timer_IR(self, timer: cython.longlong) -> cython.longlong:
-        return self.timers[timer].IR
+        return self.timer(timer).IR
 
     @cython.ccall
     def timer_clear_IR(self, timer: cython.longlong, mask: cython.longlong) -> None:
-        device: TimerCapture = self.timers[timer]
-        device.clear(mask)
+        self.timer(timer).clear(mask)
 
     @cython.ccall
     def timer_TC(self, timer: cython.longlong) -> cython.longlong:
-        device: TimerCapture = self.timers[timer]
-        return device.TC()
+        return self.timer(timer).TC()
 
     # --- PWM ----------------------------------------------------------------------------------------------
 
     @cython.ccall
     def pwm_start(self, period: cython.longlong) -> None:
         self.new(self.pwms, 0)
-        self.pwms[0] = Pwm(self.chip, period=period, phase_ns=self.phase_ns)
+        self.pwms.add(0, Pwm(self.chip, period=period, phase_ns=self.phase_ns))
 
     def match(self, number) -> str:
         """The name of a match register."""
@@ -498,20 +522,19 @@ class Calls:
 
     @cython.ccall
     def pwm_MR(self, match: cython.longlong) -> cython.longlong:
-        return getattr(self.pwms[0], self.match(match))
+        return getattr(self.pwm(), self.match(match))
 
     @cython.ccall
     def pwm_write_MR(self, match: cython.longlong, counts: cython.longlong) -> None:
-        setattr(self.pwms[0], self.match(match), counts)
+        setattr(self.pwm(), self.match(match), counts)
 
     @cython.ccall
     def pwm_latch(self, mask: cython.longlong) -> None:
-        self.pwms[0].latch(mask)
+        self.pwm().latch(mask)
 
     @cython.ccall
     def pwm_write(self, MR2: cython.longlong, MR6: cython.longlong) -> None:
-        device: Pwm = self.pwms[0]
-        device.write(MR2, MR6)
+        self.pwm().write(MR2, MR6)
 
     # --- converters ---------------------------------------------------------------------------------------
 
@@ -523,7 +546,7 @@ class Calls:
             self.chip, clkdiv=clkdiv, reference_V=it.reference_V, scale=it.scale, offset_counts=it.offset_counts
         )
         adc.inputs = [it.inputs.get(channel, channel) for channel in range(8)]
-        self.adcs[0] = adc
+        self.adcs.add(0, adc)
 
     @cython.ccall
     def channel(self, channel: cython.longlong) -> cython.longlong:
@@ -534,20 +557,19 @@ class Calls:
 
     @cython.ccall
     def adc_start(self, channel: cython.longlong) -> cython.longlong:
-        device: AdcInternal = self.adcs[0]
-        return device.start(self.channel(channel))
+        return self.adc().start(self.channel(channel))
 
     @cython.ccall
     def adc_result(self) -> cython.longlong:
-        return self.adcs[0].result
+        return self.adc().result
 
     @cython.ccall
     def adc_burst(self, mask: cython.longlong) -> None:
-        self.adcs[0].start_burst(*[channel for channel in range(8) if mask >> channel & 1])
+        self.adc().start_burst(*[channel for channel in range(8) if mask >> channel & 1])
 
     @cython.ccall
     def adc_DR(self, channel: cython.longlong) -> cython.longlong:
-        return self.adcs[0].DR(self.channel(channel))
+        return self.adc().DR(self.channel(channel))
 
     @cython.ccall
     def adcx_start_ssp(self) -> None:
@@ -559,21 +581,19 @@ class Calls:
             raise FirmwareError("the SSP is a master of words already, so the external converter cannot have it")
         adc = Ads7871(self.chip, it.eint, it.reference_V, it.conversion_ns, it.scale, it.offset_counts)
         adc.inputs = [it.inputs.get(code, code) for code in range(16)]
-        self.adcxs[0] = adc
+        self.adcxs.add(0, adc)
 
     @cython.ccall
     def adcx_write(self, register4: cython.longlong, later_ns: cython.longlong) -> cython.longlong:
-        device: Ads7871 = self.adcxs[0]
-        return device.write(register4, self.chip.now + later_ns)
+        return self.adcx().write(register4, self.chip.now + later_ns)
 
     @cython.ccall
     def adcx_busy(self) -> cython.longlong:
-        return self.adcxs[0].busy
+        return self.adcx().busy
 
     @cython.ccall
     def adcx_result(self) -> cython.longlong:
-        device: Ads7871 = self.adcxs[0]
-        return device.read_result()
+        return self.adcx().read_result()
 
     # --- serial ports -------------------------------------------------------------------------------------
 
@@ -583,26 +603,24 @@ class Calls:
         if number not in self.hardware.spi:
             raise FirmwareError(f"nothing hangs on SPI {number} of this board")
         it = self.hardware.spi[number]
-        self.spis[number] = SpiEncoder(self.chip, number, it.word, it.bits, it.bit_rate, it.value_bits)
+        self.spis.add(number, SpiEncoder(self.chip, number, it.word, it.bits, it.bit_rate, it.value_bits))
 
     @cython.ccall
     def spi_transfer(self, number: cython.longlong) -> cython.longlong:
-        device: SpiEncoder = self.spis[number]
-        return device.start()
+        return self.spi(number).start()
 
     @cython.ccall
     def spi_SPSR(self, number: cython.longlong) -> cython.longlong:
-        return self.spis[number].SPSR
+        return self.spi(number).SPSR
 
     @cython.ccall
     def spi_SPDR(self, number: cython.longlong) -> cython.longlong:
-        device: SpiEncoder = self.spis[number]
-        return device.read()
+        return self.spi(number).read()
 
     @cython.ccall
     def ssp_start(self, number: cython.longlong) -> None:
         self.new(self.ssps, number)
-        self.ssps[number] = SspPort(self.chip, number)
+        self.ssps.add(number, SspPort(self.chip, number))
 
     def posted_segment(self) -> object:
         """The half-words in the mail."""
@@ -612,15 +630,15 @@ class Calls:
 
     @cython.ccall
     def ssp_exchange(self, number: cython.longlong) -> None:
-        self.ssps[number].start(self.posted_segment())
+        self.ssps.at(number).start(self.posted_segment())
 
     @cython.ccall
     def ssp_load(self, number: cython.longlong) -> None:
-        self.ssps[number].load(self.posted_segment())
+        self.ssps.at(number).load(self.posted_segment())
 
     @cython.ccall
     def ssp_take(self, number: cython.longlong) -> cython.longlong:
-        segment = self.ssps[number].take()
+        segment = self.ssps.at(number).take()
         if segment is None:
             return 0
         for place, word in enumerate(segment.words):
@@ -637,11 +655,11 @@ class Calls:
         if divider % 2 or not 2 <= divider <= 512:
             raise FirmwareError(f"SSP: divider {divider}: even, 2 to 512 is possible")
         device = self.chip.panel.ssp if self.chip.panel is not None else SspDevice(self.chip)
-        self.masters[0] = SspMaster(self.chip, device, bits)
+        self.masters.add(0, SspMaster(self.chip, device, bits))
 
     @cython.ccall
     def ssp_word(self, word: cython.longlong) -> cython.longlong:
-        return self.masters[0].word(word)
+        return self.masters.at(0).word(word)
 
     @cython.ccall
     def uart_start(
@@ -653,23 +671,23 @@ class Calls:
         trigger: cython.longlong,
     ) -> None:
         self.new(self.uarts, number)
-        self.uarts[number] = Uart(self.chip, number, divisor, divaddval, mulval, trigger)
+        self.uarts.add(number, Uart(self.chip, number, divisor, divaddval, mulval, trigger))
 
     @cython.ccall
     def uart_RBR(self, number: cython.longlong) -> cython.longlong:
-        return self.uarts[number].RBR()
+        return self.uarts.at(number).RBR()
 
     @cython.ccall
     def uart_THR(self, number: cython.longlong, byte: cython.longlong) -> cython.longlong:
-        return self.uarts[number].THR(byte)
+        return self.uarts.at(number).THR(byte)
 
     @cython.ccall
     def uart_LSR(self, number: cython.longlong) -> cython.longlong:
-        return self.uarts[number].LSR()
+        return self.uarts.at(number).LSR()
 
     @cython.ccall
     def uart_IIR(self, number: cython.longlong) -> cython.longlong:
-        return self.uarts[number].IIR
+        return self.uarts.at(number).IIR
 
     # --- CAN ----------------------------------------------------------------------------------------------
 
@@ -678,9 +696,9 @@ class Calls:
         if self.hardware.can == "fd":
             raise FirmwareError("this board has CAN FD controllers: fw_canfd_start starts one")
         self.new(self.cans, controller)
-        self.cans[controller] = CanController(self.chip, controller, BTR, IER)
+        self.cans.add(controller, CanController(self.chip, controller, BTR, IER))
         if self.accepted is not None:
-            self.cans[controller].accept(*self.accepted[controller])
+            self.can(controller).accept(*self.accepted[controller])
 
     @cython.ccall
     def can_transmit(
@@ -693,8 +711,7 @@ class Calls:
     ) -> cython.longlong:
         # DLC in bits 16-19, RTR bit 30, FF bit 31; as the flags of foundation/events.py: bits 0-3, 4, 6
         flags: cython.longlong = TFI >> 16 & 15 | TFI >> 26 & 16 | TFI >> 25 & 64
-        can: CanController = self.cans[place >> 32]
-        return can.transmit_if_free(place & WORD, TID, flags, TDA, TDB)
+        return self.can(place >> 32).transmit_if_free(place & WORD, TID, flags, TDA, TDB)
 
     @cython.ccall
     def buffer(self, buffer: cython.longlong) -> cython.longlong:
@@ -705,16 +722,15 @@ class Calls:
 
     @cython.ccall
     def can_buffer_free(self, controller: cython.longlong, buffer: cython.longlong) -> cython.longlong:
-        can: CanController = self.cans[controller]
-        return can.buffer_free(self.buffer(buffer))
+        return self.can(controller).buffer_free(self.buffer(buffer))
 
     @cython.ccall
     def can_abort(self, controller: cython.longlong, buffer: cython.longlong) -> None:
-        self.cans[controller].write_CMR(CMR_AT | CMR_STB1 << self.buffer(buffer) - 1)
+        self.can(controller).write_CMR(CMR_AT | CMR_STB1 << self.buffer(buffer) - 1)
 
     @cython.ccall
     def can_read(self, controller: cython.longlong) -> None:
-        can: CanController = self.cans[controller]
+        can: CanController = self.can(controller)
         self.mail[0] = can.RFS
         self.mail[1] = can.RID
         self.mail[2] = can.RDA
@@ -722,42 +738,41 @@ class Calls:
 
     @cython.ccall
     def can_release(self, controller: cython.longlong) -> None:
-        can: CanController = self.cans[controller]
-        can.release()
+        self.can(controller).release()
 
     @cython.ccall
     def can_clear_overrun(self, controller: cython.longlong) -> None:
-        self.cans[controller].write_CMR(CMR_CDO)
+        self.can(controller).write_CMR(CMR_CDO)
 
     @cython.ccall
     def can_GSR(self, controller: cython.longlong) -> cython.longlong:
-        return self.cans[controller].GSR()
+        return self.can(controller).GSR()
 
     @cython.ccall
     def can_SR(self, controller: cython.longlong) -> cython.longlong:
-        return self.cans[controller].SR()
+        return self.can(controller).SR()
 
     @cython.ccall
     def can_ICR(self, controller: cython.longlong) -> cython.longlong:
-        return self.cans[controller].read_ICR()
+        return self.can(controller).read_ICR()
 
     @cython.ccall
     def can_MOD(self, controller: cython.longlong) -> cython.longlong:
-        return self.cans[controller].MOD
+        return self.can(controller).MOD
 
     @cython.ccall
     def can_write_MOD(self, controller: cython.longlong, value: cython.longlong) -> None:
-        self.cans[controller].write_MOD(value)
+        self.can(controller).write_MOD(value)
 
     @cython.ccall
     def can_write_IER(self, controller: cython.longlong, value: cython.longlong) -> None:
-        self.cans[controller].write_IER(value)
+        self.can(controller).write_IER(value)
 
     @cython.ccall
     def can_accept(self, address: cython.longlong, count: cython.longlong) -> cython.longlong:
         if count == 0:
             self.accepted = None
-            for can in (*self.cans.values(), *self.fds.values()):
+            for can in (*self.cans.by_number.values(), *self.fds.by_number.values()):
                 can.accept_all()
             return 1
         if count > TABLE_BYTES // 2:
@@ -765,7 +780,7 @@ class Calls:
         ranges = ffi.cast("fw_can_range *", address)
         rows = [(ranges[row].controller, ranges[row].first, ranges[row].last) for row in range(count)]
         self.accepted = accepted_by_controller(rows)
-        for number, can in (*self.cans.items(), *self.fds.items()):
+        for number, can in (*self.cans.by_number.items(), *self.fds.by_number.items()):
             can.accept(*self.accepted[number])
         return 1
 
@@ -778,13 +793,13 @@ class Calls:
                 "master table in firmware.toml, gives it CAN FD)"
             )
         self.new(self.fds, controller)
-        self.fds[controller] = CanFdController(self.chip, controller, bit_rate, data_bit_rate, IER)
+        self.fds.add(controller, CanFdController(self.chip, controller, bit_rate, data_bit_rate, IER))
         if self.accepted is not None:
-            self.fds[controller].accept(*self.accepted[controller])
+            self.fds.at(controller).accept(*self.accepted[controller])
 
     def canfd_transmit(self, controller, buffer) -> int:
         frame = self.canfd_mail
-        can: CanFdController = self.fds[controller]
+        can: CanFdController = self.fds.at(controller)
         if frame.flags & ~CANFD_FLAGS:
             raise FirmwareError(f"frame {frame.ID:#x}: flags {frame.flags:#x} do not exist")
         if frame.length > LONGEST:
@@ -795,7 +810,7 @@ class Calls:
         return int(can.transmit(self.buffer(buffer), frame.ID & ~(EXTENDED | REMOTE), flags, data))
 
     def canfd_receive(self, controller) -> int:
-        found = self.fds[controller].receive()
+        found = self.fds.at(controller).receive()
         if found is None:
             return 0
         identifier, flags, data = found

@@ -13,7 +13,7 @@ import cython
 
 from ranger_sim.firmware_sim.counters import CanCounters, ProgramCounters
 from ranger_sim.firmware_sim.microcontroller import Microcontroller
-from ranger_sim.firmware_sim.native.functions import Function
+from ranger_sim.firmware_sim.native.functions import Function, function
 from ranger_sim.firmware_sim.native.hardware import DEFAULT_HZ, Hardware
 from ranger_sim.firmware_sim.native.header_calls import Calls, connect
 from ranger_sim.firmware_sim.native.library import Library, ffi, text
@@ -206,7 +206,7 @@ class NativeBoard(Microcontroller):
             transmitters=transmitters,
         )
         hooks = {name: getattr(given, name) for name in ("on_tick", "on_overrun", "on_limit", "on_near_limit")}
-        called = {name: Function(hook) for name, hook in hooks.items() if hook != ffi.NULL}
+        called = {name: function(hook) for name, hook in hooks.items() if hook != ffi.NULL}
         if "on_tick" in called:
             self.on_timer_tick = called["on_tick"].hook
         if "on_overrun" in called:
@@ -216,7 +216,7 @@ class NativeBoard(Microcontroller):
         if "on_limit" in called:
             self.on_limit = called["on_limit"].notice
         steps = [given.steps[number] for number in range(given.step_count)]
-        self.start_up = StartUp(self, [(self.phase_ns + step.after_ns, Function(step.function).hook) for step in steps])
+        self.start_up = StartUp(self, [(self.phase_ns + step.after_ns, function(step.function).hook) for step in steps])
         self.start(schedule, self.phase_ns + given.first_slot_ns)
 
     def _tasks(self, given: Any, where: str) -> list[Task]:
@@ -228,8 +228,8 @@ class NativeBoard(Microcontroller):
             raise FirmwareError(f"{self.library.path}: schedule: {where} {text(given.name)!r} has no function")
         name = text(given.name) or where
         if given.kind == WAIT:
-            return Wait(Function(given.function).work, cost=given.cost, limit=given.limit, name=name)
-        return Task(Function(given.function).work, given.cost, given.limit, given.per_item, text(given.item), name)
+            return Wait(function(given.function).work, cost=given.cost, limit=given.limit, name=name)
+        return Task(function(given.function).work, given.cost, given.limit, given.per_item, text(given.item), name)
 
     # --- the main loop ------------------------------------------------------------------------------------
 
@@ -280,7 +280,8 @@ class NativeBoard(Microcontroller):
 
     def can_counters(self) -> list[CanCounters]:
         """Of each controller that the program has started."""
+        controllers = self.devices.cans.by_number | self.devices.fds.by_number
         return [
             CanCounters(number, can.received, can.sent, can.data_overruns, receive_lost=0, queue_full=0)
-            for number, can in sorted({**self.devices.cans, **self.devices.fds}.items())
+            for number, can in sorted(controllers.items())
         ]

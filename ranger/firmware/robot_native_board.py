@@ -43,7 +43,7 @@ class RobotNativeBoard(TableBoard):
         """The one device of a kind."""
         if 0 not in devices:
             raise FirmwareError(f"{self.name}: its program has not started the {devices.what}")
-        return devices[0]
+        return devices.at(0)
 
     def counters(self) -> object:
         """The board's counters; its program's own queues are not known."""
