@@ -1,14 +1,24 @@
 # The C twins of the functions in program.py.
 #
-# A program calls back on the thread that called it, which holds the interpreter's lock or has released it (cffi does):
-# the lock is taken for each call, which costs little where it is held.
+# A program calls back on the thread that called it, which holds the interpreter's lock or has released it (cffi does).
+# Taking the lock costs as much as most calls even where it is held, so that this is asked first.
 
 cdef extern from *:
     """
     #include <stdint.h>
     typedef long long (*rs_answering)(void *, long long, long long, long long, long long, long long, long long);
     static rs_answering rs_answer;
+    static inline int rs_has_lock(void) {
+    #if PY_VERSION_HEX >= 0x030D0000
+        return PyThreadState_GetUnchecked() != NULL;
+    #else
+        const PyThreadState *holder = _PyThreadState_UncheckedGet(); /* in 3.11 perhaps another thread's */
+        return holder != NULL && holder->thread_id == PyThread_get_thread_ident();
+    #endif
+    }
     static int64_t rs_answered(void *host, int64_t call, int64_t a, int64_t b, int64_t c, int64_t d, int64_t e) {
+        if (rs_has_lock())
+            return rs_answer(host, call, a, b, c, d, e);
         PyGILState_STATE state = PyGILState_Ensure();
         const int64_t answer = rs_answer(host, call, a, b, c, d, e);
         PyGILState_Release(state);
