@@ -50,6 +50,7 @@ WORD: Final = 0xFFFF_FFFF
 HOSTS: set[int] = set()  # addresses that programs may call with; those of ended boards stay, a number each
 _latest: cython.ulonglong = 0  # the address that was called with last: one of HOSTS
 USUAL_LATENCY: Final = -1
+TIMERS: Final = 2  # of the chip, in fw_timers
 # numbers of the calls, as in runtime.c
 CALL_ATTACH: Final = 0
 CALL_DETACH: Final = 1
@@ -148,6 +149,7 @@ class Calls:
     gpio: Gpio
     mail: cython.p_longlong
     phase_ns: cython.longlong
+    library: object
     hardware: object
     timers: Started
     pwms: Started
@@ -165,6 +167,7 @@ class Calls:
     def __init__(self, board, library: Library, hardware, phase_ns) -> None:
         self.board = board
         self.chip = board
+        self.library = library
         if cython.compiled:
             self.mail = cython.cast(cython.p_longlong, pointer(library.place("fw_mail")))
         else:
@@ -471,10 +474,15 @@ class Calls:
     @cython.ccall
     def timer_start(self, timer: cython.longlong, period: cython.longlong, match_interrupt: cython.longlong) -> None:
         self.new(self.timers, timer)
-        self.timers.add(
-            timer,
-            TimerCapture(self.chip, timer, period, phase_ns=self.phase_ns, match_interrupt=match_interrupt != 0),
+        device: TimerCapture = TimerCapture(
+            self.chip, timer, period, phase_ns=self.phase_ns, match_interrupt=match_interrupt != 0
         )
+        self.timers.add(timer, device)
+        if cython.compiled and timer < TIMERS and self.library.has("fw_timers"):
+            near = self.library.code.fw_timers[timer]
+            near.IR = ffi.cast("int64_t *", cython.cast(cython.ulonglong, cython.address(device.IR)))
+            near.CCR = ffi.cast("int64_t *", cython.cast(cython.ulonglong, cython.address(device.CCR)))
+            near.CR = ffi.cast("int64_t *", cython.cast(cython.ulonglong, cython.address(device.captures[0])))
 
     @cython.ccall
     def capture_connect(self, timer: cython.longlong, channel: cython.longlong, pin: cython.longlong) -> None:

@@ -58,6 +58,7 @@ extern const char *fw_call_names[];
 extern host_call fw_answer;
 extern void *fw_host;
 extern const int64_t *fw_pin_levels;
+extern struct { int64_t *IR; int64_t *CCR; const int64_t *CR; } fw_timers[2];
 extern int64_t fw_mail[32];
 extern fw_canfd_frame fw_canfd_mail;
 int64_t fw_turn(void);

@@ -57,6 +57,13 @@ EXPORTED const char *const fw_call_names[CALL_COUNT + 1] = {CALLS(NAME) NULL};
 EXPORTED host_call fw_answer;
 EXPORTED void *fw_host;
 EXPORTED const int64_t *fw_pin_levels; /* of the chip's 64 pins */
+#define TIMERS 2u
+/* Where the registers of a timer are that the program has started, where it can reach them without a call. */
+EXPORTED struct {
+    int64_t *IR;
+    int64_t *CCR;
+    const int64_t *CR;
+} fw_timers[TIMERS];
 EXPORTED int64_t fw_mail[32];          /* what does not fit into five numbers, both ways */
 EXPORTED fw_canfd_frame fw_canfd_mail; /* the same, of a CAN FD frame */
 
@@ -181,11 +188,36 @@ void fw_timer_start(uint32_t timer, uint32_t period, uint32_t match_interrupt)
     HOST3(timer_start, timer, period, match_interrupt);
 }
 void fw_capture_connect(uint32_t timer, uint32_t channel, uint32_t pin) { HOST3(capture_connect, timer, channel, pin); }
-uint32_t fw_timer_CCR(uint32_t timer) { return (uint32_t)HOST1(timer_CCR, timer); }
-void fw_timer_write_CCR(uint32_t timer, uint32_t value) { HOST2(timer_write_CCR, timer, value); }
-uint32_t fw_timer_CR(uint32_t timer, uint32_t channel) { return (uint32_t)HOST2(timer_CR, timer, channel); }
-uint32_t fw_timer_IR(uint32_t timer) { return (uint32_t)HOST1(timer_IR, timer); }
-void fw_timer_clear_IR(uint32_t timer, uint32_t mask) { HOST2(timer_clear_IR, timer, mask); }
+
+/* The handler of an edge does nearly nothing but this, and a call of the harness costs more than all of it. */
+static int is_near(uint32_t timer) { return timer < TIMERS && fw_timers[timer].IR != NULL; }
+
+uint32_t fw_timer_CCR(uint32_t timer)
+{
+    return (uint32_t)(is_near(timer) ? *fw_timers[timer].CCR : HOST1(timer_CCR, timer));
+}
+void fw_timer_write_CCR(uint32_t timer, uint32_t value)
+{
+    if (is_near(timer))
+        *fw_timers[timer].CCR = value & 0xFFFu;
+    else
+        HOST2(timer_write_CCR, timer, value);
+}
+uint32_t fw_timer_CR(uint32_t timer, uint32_t channel)
+{
+    return (uint32_t)(is_near(timer) ? fw_timers[timer].CR[channel & 3u] : HOST2(timer_CR, timer, channel));
+}
+uint32_t fw_timer_IR(uint32_t timer)
+{
+    return (uint32_t)(is_near(timer) ? *fw_timers[timer].IR : HOST1(timer_IR, timer));
+}
+void fw_timer_clear_IR(uint32_t timer, uint32_t mask)
+{
+    if (is_near(timer))
+        *fw_timers[timer].IR &= ~(int64_t)mask;
+    else
+        HOST2(timer_clear_IR, timer, mask);
+}
 uint32_t fw_timer_TC(uint32_t timer) { return (uint32_t)HOST1(timer_TC, timer); }
 
 void fw_pwm_start(uint32_t period) { HOST1(pwm_start, period); }
