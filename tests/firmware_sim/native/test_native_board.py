@@ -125,6 +125,42 @@ static const fw_schedule schedule = {.slot_ns = 500000, .every = FW_TASKS(every)
     assert board.pins[1] == board.pins[2] == 1
 
 
+def test_a_timers_registers_are_the_same_where_the_program_reaches_them_by_itself_and_by_a_call(tmp_path):
+    source = """
+#include <ranger_sim/firmware.h>
+static int32_t task(void)
+{
+    static const uint32_t timers[] = {1, 9}; /* the chip's second, and a number that the chip does not have */
+    for (uint32_t i = 0; i < 2; i++) {
+        const uint32_t timer = timers[i];
+        fw_spend(fw_timer_CCR(timer)), fw_spend(fw_timer_IR(timer)), fw_spend(fw_timer_CR(timer, 6));
+        fw_timer_clear_IR(timer, FW_IR_MR0);
+        fw_spend(fw_timer_IR(timer));
+        fw_timer_write_CCR(timer, 0xFFFFF1FFu);
+    }
+    return 0;
+}
+static const fw_task every[] = {{task, "task", 100}};
+static const fw_schedule schedule = {.slot_ns = 500000, .every = FW_TASKS(every), .tick_vic_slot = 4};
+void firmware_start(void)
+{
+    fw_timer_start(1, 6000, 1), fw_capture_connect(1, 2, FW_P0(17));
+    fw_timer_start(9, 6000, 1), fw_capture_connect(9, 2, FW_P0(18));
+}
+"""
+    board = NativeBoard("SMALL", library_of(folder_with(tmp_path / "small", source + SCHEDULE)))
+    task = board.scheduler.tasks[0]
+    for slot in range(1, 5):
+        for pin in (17, 18):
+            board.inbox.push(slot * 500_000 - 10_020, 0, PIN_EDGE, pin, slot % 2)
+        board.advance(slot * 500_000 + 400_000)
+        near, far = (board.devices.timers.at(timer) for timer in (1, 9))
+        assert (near.CCR, near.IR, near.CR2) == (far.CCR, far.IR, far.CR2)
+        # every edge is 10.02 us before a timer begins anew, at count 5398.8; the first is never cleared
+        assert (near.CCR, near.IR, near.CR2) == (0x1FF, 0x41, 5398)
+        assert task.last_cycles - 100 == 2 * (0x1FF + 0x41 + 5398 + 0x40)
+
+
 @pytest.mark.parametrize(
     ("call", "reported"),
     [
