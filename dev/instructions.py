@@ -18,7 +18,7 @@ import sys
 import tempfile
 from collections.abc import Mapping
 
-from ranger_sim.loading import IS_COMPILED
+from ranger_sim.loading import RUNS_COMPILED
 
 FIRST_S = 1.0  # of the robot, that both runs have: it stands up and begins to walk
 PROGRAM = "import sys; from ranger_sim import Ranger; Ranger().run_for(sys.argv[1])"
@@ -94,7 +94,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = command.parse_args(arguments)
     if not shutil.which("valgrind"):
         raise SystemExit("valgrind is not installed")
-    if not IS_COMPILED:
+    if not RUNS_COMPILED:
         raise SystemExit("the robot runs interpreted: its instructions would be Python's")
     with tempfile.TemporaryDirectory() as folder:
         first = counted(FIRST_S, pathlib.Path(folder))
