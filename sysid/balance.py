@@ -31,7 +31,7 @@ from ranger_sim.sysid.machine import PARAMETER, Columns, Effect, Equation, Known
 AT_REST = 0.01  # of the fastest rate: about it the sign of the rate turns
 SHARPER = 4.0  # times; the base mixes the two signs
 CLOSE = 1.0 - 1e-12  # of a sign that is not infinitely far from its middle
-SETTLED = (0.05, 0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
+SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
 PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
 LIMITS = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95)  # of the largest input: where it may saturate

@@ -30,7 +30,7 @@ SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess fal
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
 LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
-SETTLED = (0.05, 0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
+SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 DEAD = (0.002, 0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
 
 

@@ -102,14 +102,17 @@ def test_derivatives_by_differences_are_the_toy_s_own():
         "f_x": stacked((one, H * one), (-2.0 * H * one, 1.0 - 3.0 * H * 0.7 * V**2)),
         "f_u": stacked((0.1 * middle(D),), (H * one,)),
         "f_p": stacked((zero, zero), (-H * X, -H * V**3)),
-        # two of the toy's own, then the engine's: at both outputs, into both inputs
+        # two of the toy's own, then the engine's: at both outputs, into both inputs, of both parameters
         "f_q": stacked(
-            (zero, zero, zero, zero, 0.1 * middle(D), 0.1 * middle(U)), (H * one, zero, zero, zero, H * one, zero)
+            (zero, zero, zero, zero, 0.1 * middle(D), 0.1 * middle(U), zero, zero),
+            (H * one, zero, zero, zero, H * one, zero, -H * X, -H * V**3),
         ),
         "h_x": stacked((2.0 * one, zero), (zero, one)),
         "h_u": stacked((zero,), (0.5 * one,)),
         "h_p": stacked((X, zero), (zero, zero)),
-        "h_q": stacked((zero, one, one, zero, zero, zero), (zero, zero, zero, one, 0.5 * one, zero)),
+        "h_q": stacked(
+            (zero, one, one, zero, zero, zero, X, zero), (zero, zero, zero, one, 0.5 * one, zero, zero, zero)
+        ),
     }
     for name, matrix in wanted.items():
         assert getattr(lin, name).shape == matrix.shape
