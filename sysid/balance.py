@@ -31,7 +31,6 @@ from ranger_sim.sysid.machine import PARAMETER, Columns, Effect, Equation, Known
 AT_REST = 0.01  # of the fastest rate: about it the sign of the rate turns
 SHARPER = 4.0  # times; the base mixes the two signs
 CLOSE = 1.0 - 1e-12  # of a sign that is not infinitely far from its middle
-SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 SPEEDS = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the fastest rate
 PERIODS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0)  # per turn of the joint, or of the way that it travels
 LIMITS = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95)  # of the largest input: where it may saturate
@@ -226,22 +225,11 @@ class Balance(abc.ABC):
     def _of_parameters(self, recordings: Sequence[Recording]) -> list[Effect]:
         """Drifts of the parameters; one whose column is a constant drifts as the response's sensor does."""
         first = recordings[0].equations[self.response].columns
-        longest_s = max(float(np.ptp(each.table.time_s)) for each in recordings)
-        settled = [{"tau_s": share * longest_s} for share in SETTLED]
-        found = []
-        for name in (each.name for each in self.parameters if each.name in first and np.ptp(first[each.name]) > 0.0):
+        names = [each.name for each in self.parameters if each.name in first and np.ptp(first[each.name]) > 0.0]
+        return [self._effect("parameter_drift", name, ("per_s",), self._ramp(name)) for name in names]
 
-            def ramp(s: Signals, _: Shape, name: str = name) -> list[Array]:
-                return [self.columns(s)[name] * s["t"]]
-
-            def settling(s: Signals, p: Shape, name: str = name) -> list[Array]:
-                return [self.columns(s)[name] * -np.expm1(-s["t"] / p["tau_s"])]
-
-            found += [
-                self._effect("parameter_drift", name, ("per_s",), ramp, form="ramp"),
-                self._effect("parameter_drift", name, ("change",), settling, settled, form="settling", scale="tau_s"),
-            ]
-        return found
+    def _ramp(self, name: str) -> Made:
+        return lambda s, _: [self.columns(s)[name] * s["t"]]
 
     def _of_joint(self, recordings: Sequence[Recording]) -> list[Effect]:
         top = max(_top(each.signals["rate"]) for each in recordings)
