@@ -165,7 +165,7 @@ class Steps:
         wanted.replace(kept)
 
     def bytecode(self):
-        """Bytecode of all packages and of ours where Python is told to write none later: tests start many programs."""
+        """Bytecode of all packages and of ours where Python is set to write none later: tests start many programs."""
         [packages] = (self.venv / "lib").glob("python*/site-packages")
         ours = sorted({each.resolve() for each in (HERE / "ranger_sim").iterdir() if each.is_dir()})
         if sys.dont_write_bytecode:

@@ -40,7 +40,7 @@ from ranger_sim.sysid.three_numbers import Held, gained
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
 # Of the likeliest one's score: what explains less hardly moves where the simulator ends. Chosen by us
 SMALL = 0.2
-FEW_SHAPES = 4  # of a candidate that acts at all of them while a simulator is lost
+FEW_SHAPES = 7  # of a candidate that acts at all of them while a simulator is lost: limits have 7, lags more
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 # Times what numerics move it by: a named effect is at least so large. A lag is a stamp's, up to half a row, in one of
@@ -267,14 +267,9 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
     acting = [(each.effect, each.shape) for each in had]
     acting += [(each.effect, each.shape) for each in likeliest]
     kinds = dict.fromkeys(each.subsystem for each in effects)
-    families = [[(each, shape) for each in effects if each.subsystem == kind and _is_simple(each)
-                 for shape in each.shapes] for kind in kinds]  # fmt: skip
+    few = [each for each in effects if len(each.shapes) <= FEW_SHAPES]
+    families = [[(each, shape) for each in few if each.subsystem == kind for shape in each.shapes] for kind in kinds]
     return cast(Recording, machine.about_all(recording, acting, families))  # type: ignore[attr-defined]
-
-
-def _is_simple(effect: Effect) -> bool:
-    """True for an effect that can act next to others from the start: with few shapes, or the limits of an input."""
-    return len(effect.shapes) <= FEW_SHAPES or effect.cause in ("saturation", "dead_zone")
 
 
 def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequence[Named]) -> list[Effect]:

@@ -14,6 +14,7 @@ from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.free_simulation.fit import AWAY
 from ranger_sim.sysid.free_simulation.linearised import LinearisedRecording
 from ranger_sim.sysid.free_simulation.predictor import Predictor
+from ranger_sim.sysid.free_simulation.terms import Port
 from ranger_sim.sysid.machine import PARAMETER
 
 SIZES = (1.0, 6.0, 36.0)  # of the noise, in units of what doubles the errors' variance
@@ -22,9 +23,14 @@ ALIKE = 10.0  # of -2 log likelihood: ports by so much less likely than the best
 
 def subsystem(recordings: Sequence[LinearisedRecording]) -> str:
     """Of the likeliest port; of those that are alike, of the first one: the machine's own are in front."""
-    ports = [each for each in recordings[0].ports if each.subsystem != PARAMETER]
+    ports = places(recordings[0])
     scores = np.sum([surprises(recording) for recording in recordings], axis=0)
     return ports[int(np.flatnonzero(scores <= np.min(scores) + ALIKE)[0])].subsystem
+
+
+def places(recording: LinearisedRecording) -> list[Port]:
+    """Ports but those of parameters: what enters at one of these enters where the parameter acts."""
+    return [each for each in recording.ports if each.subsystem != PARAMETER]
 
 
 def surprises(recording: LinearisedRecording) -> list[float]:
@@ -32,9 +38,7 @@ def surprises(recording: LinearisedRecording) -> list[float]:
     found: list[float] = []
     forcings: list[tuple[Array, Array]] = []
     ones = np.ones(len(recording.table))
-    for port in recording.ports:
-        if port.subsystem == PARAMETER:
-            continue  # not a place of its own: what enters there enters where the parameter acts
+    for port in places(recording):
         forcing = recording.fit.simulator.forcing(recording.linear, recording.entering({port.name: ones}))
         same = (
             score
