@@ -75,7 +75,7 @@ class Balance(abc.ABC):
             raise UserError(f"{table.name}: {self.name} needs {', '.join(missing)} (available: {there})")
         table = signals.uniform(table)
         s = {each.name: table[each.name] for each in self.quantities if each.name in table}
-        s["t"] = table.time_s - table.time_s[0]
+        s["t"] = table.elapsed_s
         valid = np.ones(len(table), dtype=bool)
         if self.angle or self.rate:
             self._add_joint(table, s)

@@ -156,6 +156,7 @@ class Table:
     unmeasured: by channel (n,), True where its value is a straight line over samples that it lacks.
     counts: by channel whose rows are on straight lines between its samples, the step of the samples' own values, in its
     unit, 0 where they have none: such rows show it no more.
+    begin_s: start of the recording of which this is a part; None where it is the whole of it.
     """
 
     time_s: Array
@@ -165,6 +166,7 @@ class Table:
     resolution: dict[str, float] = dataclasses.field(default_factory=dict)
     unmeasured: dict[str, NDArray[np.bool_]] = dataclasses.field(default_factory=dict)
     counts: dict[str, float] = dataclasses.field(default_factory=dict)
+    begin_s: float | None = None
 
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
@@ -180,6 +182,11 @@ class Table:
         """Median distance of two samples."""
         return float(np.median(np.diff(self.time_s)))
 
+    @property
+    def elapsed_s(self) -> Array:
+        """(n,) since the start of the recording, which may lie before the first row."""
+        return np.asarray(self.time_s - (self.time_s[0] if self.begin_s is None else self.begin_s))
+
     def part(self, which: slice) -> "Table":
         """The rows of `which`, with the runs that lie in it."""
         start, stop, _ = which.indices(len(self))
@@ -192,6 +199,7 @@ class Table:
             self.resolution,
             {name: rows[which] for name, rows in self.unmeasured.items()},
             self.counts,
+            float(self.time_s[0]) if self.begin_s is None else self.begin_s,
         )
 
 

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ranger_sim.sysid import causes, naming, noise
+from ranger_sim.sysid import causes, intervals, naming, noise
 from ranger_sim.sysid.bands import fitted, least_squares, plain
 from ranger_sim.sysid.dataset import Array
 from ranger_sim.sysid.machine import Effect, Recording
@@ -258,7 +258,7 @@ def select(
         near = [each for each in ranked if abs(chosen[0] - each[0]) < naming.TIE and naming.possible(each[3])]
         within = max(naming.TIE, ALIKE * chosen[0])
         alike = [each for each in ranked if chosen[0] - each[0] < within and naming.possible(each[3])][:MOST_ALIKE]
-        options = [_named(each, ranked, near, chance) for each in alike]
+        options = [_between(_named(each, ranked, near, chance), regression) for each in alike]
         extensions = [naming.refit(base, [*named, each], [*fixed, *named, each]) for each in options]
         best = 0
         if len(options) > 1:
@@ -269,6 +269,10 @@ def select(
             best = int(np.argmin(errors))
             if best and regression.size * math.log(errors[0] / max(errors[best], 1e-300)) < naming.TIE:
                 best = 0  # no better there: the likeliest one here
+        if judge is not None and len(options) > 1:  # one that is not refused, the likeliest first
+            order = [best, *(number for number in range(len(options)) if number != best)]
+            allowed = (each for each in order if judge.accepts(named, options[each], regression, extensions[each]))
+            best = next(allowed, best)
         found, extended = options[best], extensions[best]
         in_doubt = _simpler_in_doubt(found, named, base, fixed, ranked, near, chance, threshold)
         if in_doubt is not found:
@@ -425,6 +429,16 @@ def _named(one: Scored, ranked: Sequence[Scored], near: Sequence[Scored], chance
         [each[3].effect for each in near if each is not one],
         [(each[3].effect, score - each[0]) for each in ranked if each is not one],
     )
+
+
+def _between(named: Named, regression: Regression) -> Named:
+    """The named effect at its best shape, which may lie between the grid's: other data judge it by its shape as well.
+
+    regression: without it.
+    """
+    if named.effect.scale is not None:
+        named.shape, _ = intervals.profile(named, regression)
+    return named
 
 
 def own_part(trial: Trial) -> float:

@@ -99,6 +99,7 @@ def uniform(table: Table) -> Table:
         table.resolution,
         {name: np.concatenate(parts) for name, parts in unmeasured.items()},
         {name: counts_of(table, name) for name in table.columns},
+        table.begin_s,
     )
 
 
@@ -291,4 +292,5 @@ def averaged(table: Table, count: int) -> Table:
         table.name,
         table.resolution,
         {name: np.concatenate(parts) for name, parts in unmeasured.items()},
+        begin_s=table.begin_s,
     )

@@ -89,7 +89,7 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
                f"{name} shows a constant too much: true value + offset_{unit}"),
         sensor("sensor_scale", "share", lambda table, seen: seen,
                f"{name} shows a multiple of what it measures: true value * (1 + share)"),
-        sensor("sensor_drift", f"drift_{unit}_per_s", lambda table, seen: table.time_s - table.time_s[0],
+        sensor("sensor_drift", f"drift_{unit}_per_s", lambda table, seen: table.elapsed_s,
                f"{name} drifts: true value + drift_{unit}_per_s * time since the recording's start"),
         lag("delay", "delay_s", delayed, f"{name} is late: it shows the true value of lag_s before"),
         lag("filter", "time_constant_s", filtered,
@@ -200,7 +200,7 @@ def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
              scale: str | None = None) -> Term:  # fmt: skip
         return Term(
             "parameter_drift", known.name, PARAMETER, (coefficient,),
-            lambda r, shape, values: {of(known.name): make(r.table.time_s - r.table.time_s[0], shape)}, shapes,
+            lambda r, shape, values: {of(known.name): make(r.table.elapsed_s, shape)}, shapes,
             meaning=f"{known.name} changes during the run: {words}", independent=True, form=form, scale=scale,
         )  # fmt: skip
 

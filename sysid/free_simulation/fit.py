@@ -181,7 +181,7 @@ class TrajectoryFit:
         entering = self.entering()
         for number, each in enumerate(machine.outputs, len(machine.ports)):
             along[sensed(each.channel)] = along[each.channel] - entering[:, number]
-        along["t"] = self.table.time_s - self.table.time_s[0]
+        along["t"] = self.table.elapsed_s
         along |= machine.extra_signals(along, self.table)
         return SimulatedRecording(self.table, along, {}, ports=simulator.ports)
 

@@ -841,7 +841,7 @@ def _signals(table: Table, runs: Sequence[Run]) -> dict[str, Array]:
     for run in runs:  # as the board reports the joint's rate
         s["rate"][run.rows] = run.shown(run.motion.w)[run.motion.rows]
         s["slope"][run.rows] = run.shown(run.motion.slopes[3])[run.motion.rows]
-    s["t"] = table.time_s - table.time_s[0]
+    s["t"] = table.elapsed_s
     return s
 
 

@@ -76,7 +76,7 @@ class Positioning:
         weak = WeakForm(table, q, HALF_S)
         v = weak.of_rate()
         sign = weak.of_rate(lambda rate: np.tanh(rate / (0.25 * NEAR_STANDSTILL * top)))
-        s = {"x": q, "v": v, "t": table.time_s - table.time_s[0], "a": weak.acceleration, "sgn_v": sign}
+        s = {"x": q, "v": v, "t": table.elapsed_s, "a": weak.acceleration, "sgn_v": sign}
         columns = {
             "mass_kg": s["a"],
             "viscous_friction_Ns_per_m": v,

@@ -101,7 +101,7 @@ class MotorBench:
             )
         table = signals.uniform(table)
         V, I, w, T = (table[each.name] for each in self.quantities[:4])  # noqa: E741  (the paper's letters)
-        s: dict[str, Array] = {"V": V, "t": table.time_s - table.time_s[0]}
+        s: dict[str, Array] = {"V": V, "t": table.elapsed_s}
         measured = "motor_angle_rad" in table
         s["angle"] = table["motor_angle_rad"] if measured else self.gear * signals.integral(table, w)
         if measured:

@@ -80,7 +80,7 @@ class Walk:
         table = signals.uniform(table)
         recording = WalkRecording(
             table,
-            {"t": table.time_s - table.time_s[0]},
+            {"t": table.elapsed_s},
             {},
             whitened=False,
             lags=(0,),
