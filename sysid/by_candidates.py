@@ -113,7 +113,7 @@ def diagnose(
         effects = _finer(effects, found, skews)
         linearised = [*recordings, *held]
         recordings = simulations.again(recordings, found.named, found.with_named)
-        held = simulations.again(held, found.named, found.with_named)
+        held = simulations.again(held, _lasting(found.named), found.with_named)
         if all(new is old for new, old in zip([*recordings, *held], linearised, strict=True)):
             break
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
@@ -123,7 +123,7 @@ def diagnose(
     while found.named and hasattr(machine, "numerical"):  # what is named instead of a small effect may be small as well
         progress("numerics", 0.7)
         recordings = simulations.again(recordings, found.named, found.with_named)
-        held = simulations.again(held, found.named, found.with_named)  # where the causes are judged
+        held = simulations.again(held, _lasting(found.named), found.with_named)  # where the causes are judged
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
         below = [each for each in found.named if _below(floor, found, each.effect)]
         if not below:
@@ -183,6 +183,11 @@ def diagnose(
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def _lasting(named: Sequence[Named]) -> list[Named]:
+    """The causes that other runs have as well."""
+    return [each for each in named if not each.effect.once]
 
 
 def _sure_names(
@@ -285,7 +290,16 @@ def _finer(effects: Sequence[Effect], found: likelihood.Selection, fixed: Sequen
         shapes = [*old.shapes, *(shape for shape in [each.shape, *intervals.between(each)] if shape not in old.shapes)]
         each.shape, _ = intervals.profile(each, base)
         each.effect = dataclasses.replace(old, shapes=shapes)
-        out = [each.effect if one is old else one for one in out]
+        # its rivals of the same kind as well: the one with the finer grid would win by it
+        kind = (old.cause, old.form, old.scale)
+        out = [
+            each.effect
+            if one is old
+            else dataclasses.replace(one, shapes=shapes)
+            if (one.cause, one.form, one.scale) == kind and one.shapes == old.shapes
+            else one
+            for one in out
+        ]
     if found.named:
         found.with_named = naming.refit(found.base, found.named, [*fixed, *found.named])
     return out

@@ -259,6 +259,7 @@ def select(
         within = max(naming.TIE, ALIKE * chosen[0])
         alike = [each for each in ranked if chosen[0] - each[0] < within and naming.possible(each[3])][:MOST_ALIKE]
         options = [_between(_named(each, ranked, near, chance), regression) for each in alike]
+        options.sort(key=lambda each: -each.bic)
         extensions = [naming.refit(base, [*named, each], [*fixed, *named, each]) for each in options]
         best = 0
         if len(options) > 1:
@@ -436,9 +437,11 @@ def _between(named: Named, regression: Regression) -> Named:
 
     regression: without it.
     """
-    if named.effect.scale is not None:
-        named.shape, _ = intervals.profile(named, regression)
-    return named
+    if named.effect.scale is None:
+        return named
+    shape, _ = intervals.profile(named, regression)
+    scored = ranking(naming.trials([named.effect], regression, [shape]), regression.size)
+    return dataclasses.replace(named, shape=shape, chi2=scored[0][1], bic=scored[0][0]) if scored else named
 
 
 def own_part(trial: Trial) -> float:

@@ -169,6 +169,7 @@ class Effect:
     forms: int = 1  # of this cause at this place, of which the best is taken: it counts as a shape on a grid does
     scale: str | None = None  # a shape, above 0, that may also lie between the grid's values: it is refined
     free: tuple[str, ...] = ()  # coefficients that another run does not share, as the state before it
+    once: bool = False  # it happens in one run, at its own time: another run may lack it, and does not judge it
     phase_is_free: bool = (
         False  # pairs of coefficients, cosine and sine, of an angle whose zero another run does not share
     )

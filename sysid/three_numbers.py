@@ -59,8 +59,10 @@ class Held:
     def shows(self, each: Named, values: Mapping[str, float], left: Mapping[str, Array]) -> bool:
         """True when the effect, as large as in training, moves the held-out rows enough to be judged by them.
 
-        left: errors there, of the causes before it.
+        What happens once is not judged by them. left: errors there, of the causes before it.
         """
+        if each.effect.once:
+            return False
         _, _, z, _ = self._stacked(None)
         columns = self._columns(each)
         moved = columns @ np.array([values[name] for name in each.coefficients])
@@ -173,6 +175,10 @@ def _learned(regression: Regression, trained: Mapping[str, Array], seen: Mapping
 
 def _adapted(each: Named, sizes: Array, columns: Array, y: Array, x: Array, z: Array) -> Array:
     """Coefficients of training, with what another run does not share fitted here."""
+    if each.effect.once:  # this run has it at the same time, or has it not
+        there = columns @ sizes
+        share = fitted(np.column_stack([z, there]), np.column_stack([x, there]), y)[-1]
+        return np.asarray(sizes * np.clip(share, 0.0, 1.0))
     if not each.effect.phase_is_free and not each.effect.free:
         return sizes
     if each.effect.phase_is_free:

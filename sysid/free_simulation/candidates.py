@@ -30,6 +30,7 @@ SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess fal
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
 LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
+JUMPED = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the longest recording: times at which a parameter jumps
 SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 DEAD = (0.002, 0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
 
@@ -197,11 +198,11 @@ def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
     longest_s = max(float(np.ptp(each.table.time_s)) for each in recordings)
 
     def term(form: str, coefficient: str, make: Callable[[Array, Shape], Array], words: str, shapes: Sequence[Shape],
-             scale: str | None = None) -> Term:  # fmt: skip
+             scale: str | None = None, once: bool = False) -> Term:  # fmt: skip
         return Term(
             "parameter_drift", known.name, PARAMETER, (coefficient,),
             lambda r, shape, values: {of(known.name): make(r.table.elapsed_s, shape)}, shapes,
-            meaning=f"{known.name} changes during the run: {words}", independent=True, form=form, scale=scale,
+            meaning=f"{known.name} changes during the run: {words}", independent=True, form=form, scale=scale, once=once,
         )  # fmt: skip
 
     drift, change = f"drift{unit}_per_s", f"change{unit}"
@@ -210,6 +211,9 @@ def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
         term("settling", change, lambda t, shape: -np.expm1(-t / shape["tau_s"]),
              f"value + {change} * (1 - exp(-time since the recording's start / tau_s))",
              [{"tau_s": share * longest_s} for share in SETTLED], "tau_s"),
+        term("jump", change, lambda t, shape: np.where(t < shape["at_s"], 0.0, 1.0),
+             f"value + {change} from at_s after the recording's start on",
+             [{"at_s": share * longest_s} for share in JUMPED], "at_s", once=True),
     ]  # fmt: skip
 
 

@@ -70,6 +70,7 @@ class SimulatedMachine(DeclaredMachine):
                 phase_is_free=term.phase_is_free,
                 form=term.form,
                 scale=term.scale,
+                once=term.once,
                 term=term,
             )
             for term in (*own, *free)

@@ -116,6 +116,7 @@ class Term:
     independent: bool = False
     form: str = ""
     scale: str | None = None
+    once: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

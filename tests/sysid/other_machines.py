@@ -51,6 +51,7 @@ def thrust_stand(cause, size, seed, seconds=20.0, rate_hz=200.0):
     def rates(state, v):
         speed, heat, lagging, clock_s = state
         bearing = 2.1e-5 * (1.0 + (size * math.exp(-clock_s / 3.0) if cause == "warming" else 0.0))
+        bearing *= 1.0 + (size if cause == "seizing" and clock_s > 0.43 * seconds else 0.0)
         i = current(speed, heat, v)
         torque = constant * i - bearing * speed - 1.15e-7 * speed * speed
         torque -= math.copysign(size, speed) if cause == "coulomb" else 0.0
@@ -82,6 +83,7 @@ def heated_rod(cause, size, seed, seconds=6000.0, step_s=5.0):
     def rates(state, watts):
         hot, cold, clock_s = state
         loss = 0.35 / (1.0 + (0.35 * size * clock_s if cause == "fouling" else 0.0))  # a layer grows, in series
+        loss *= 1.0 + (size if cause == "opening" and clock_s > 0.55 * seconds else 0.0)
         through = 1.6 * (hot - cold)
         given = watts * (1.0 - (size if cause == "heater" else 0.0)) - through - 0.25 * (hot - air)
         given -= size * ((hot + 273.15) ** 4 - (air + 273.15) ** 4) if cause == "radiation" else 0.0
@@ -117,7 +119,9 @@ def elastic_joint(cause, size, seed, seconds=20.0, rate_hz=250.0):
     def rates(state, given):
         motor, link, motor_rate, link_rate, clock_s = state
         twist = motor - link
-        through = (180.0 + (size * clock_s if cause == "softening" else 0.0)) * twist + 0.15 * (motor_rate - link_rate)
+        gear = 180.0 + (size * clock_s if cause == "softening" else 0.0)
+        gear += size if cause == "cracking" and clock_s > 0.31 * seconds else 0.0
+        through = gear * twist + 0.15 * (motor_rate - link_rate)
         through += size * twist**3 if cause == "cubic" else 0.0
         load = 0.06 * link_rate
         load += size * math.sin(link) if cause == "gravity" else 0.0
