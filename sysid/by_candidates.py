@@ -40,7 +40,7 @@ from ranger_sim.sysid.three_numbers import Held, gained
 MOST_ACTING = 8  # candidates in the simulator while it is linearised: the likeliest
 # Of the likeliest one's score: what explains less hardly moves where the simulator ends. Chosen by us
 SMALL = 0.2
-FEW_SHAPES = 7  # of a candidate that acts at all of them while a simulator is lost: limits have 7, lags more
+FEW_SHAPES = 9  # of a candidate that acts at all of them while a simulator is lost: jumps have 9, lags more
 AGAIN = 3  # simulations with the named effects, at most
 MOVED = 0.1  # standard errors that a coefficient may still move by from one of them to the next
 # Times what numerics move it by: a named effect is at least so large. A lag is a stamp's, up to half a row, in one of
@@ -113,7 +113,7 @@ def diagnose(
         effects = _finer(effects, found, skews)
         linearised = [*recordings, *held]
         recordings = simulations.again(recordings, found.named, found.with_named)
-        held = simulations.again(held, _lasting(found.named), found.with_named)
+        held = simulations.again(held, _there(found.named, held), found.with_named)
         if all(new is old for new, old in zip([*recordings, *held], linearised, strict=True)):
             break
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
@@ -123,7 +123,7 @@ def diagnose(
     while found.named and hasattr(machine, "numerical"):  # what is named instead of a small effect may be small as well
         progress("numerics", 0.7)
         recordings = simulations.again(recordings, found.named, found.with_named)
-        held = simulations.again(held, _lasting(found.named), found.with_named)  # where the causes are judged
+        held = simulations.again(held, _there(found.named, held), found.with_named)  # where the causes are judged
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
         below = [each for each in found.named if _below(floor, found, each.effect)]
         if not below:
@@ -185,9 +185,10 @@ def diagnose(
     )
 
 
-def _lasting(named: Sequence[Named]) -> list[Named]:
-    """The causes that other runs have as well."""
-    return [each for each in named if not each.effect.once]
+def _there(named: Sequence[Named], held: Sequence[Recording]) -> list[Named]:
+    """The causes that held-out recordings have as well: what happened once is in the last part of its recording."""
+    part = all(each.table.begin_s is not None for each in held)
+    return [each for each in named if part or not each.effect.once]
 
 
 def _sure_names(
@@ -201,7 +202,8 @@ def _sure_names(
     """(regression with the causes that stay, their profiles by name); found loses the others.
 
     A cause has no name with 0 in its interval, where parameters are impossible nearly as surely, and where all causes
-    together surely make held-out data worse; the least sure one goes first.
+    together surely make held-out data worse; nor has what happens once, which held-out data do not judge, where much is
+    left with it. The least sure one goes first.
     """
     profiles: dict[str, intervals.Intervals] = {}
     extended = found.with_named
@@ -215,10 +217,14 @@ def _sure_names(
         _add_numerics(extended, found.named, floor)
         absurd = plausibility.surest_beyond(machine.parameters, extended, found.named)
         least = SURER * absurd if absurd > intervals.Z95 else 0.0
+        floors = noise_floor.by_channels(extended)
+        far = any(noise_floor.far(each) for each in floors.values())
         unsure = [
             each
             for each in found.named
-            if not intervals.sign_is_known(each, intervals.whole(each, extended, profiles[each.effect.name]))
+            if each.effect.once
+            and far
+            or not intervals.sign_is_known(each, intervals.whole(each, extended, profiles[each.effect.name]))
             or _sure(extended, each) < least
         ]
         loses = False
@@ -270,7 +276,10 @@ def _about_all(machine: Machine, recording: Recording, effects: Sequence[Effect]
         tried = [each for each in seen if each is not chosen and not chosen.effect.excludes(each.effect)]
         naming.take(chosen, tried, base)
     acting = [(each.effect, each.shape) for each in had]
-    acting += [(each.effect, each.shape) for each in likeliest]
+    acting += [
+        (each.effect, intervals.finest(each.effect, each.shape, base) if each.effect.once else each.shape)
+        for each in likeliest
+    ]
     kinds = dict.fromkeys(each.subsystem for each in effects)
     few = [each for each in effects if len(each.shapes) <= FEW_SHAPES]
     families = [[(each, shape) for each in few if each.subsystem == kind for shape in each.shapes] for kind in kinds]

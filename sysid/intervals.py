@@ -5,15 +5,17 @@ A coefficient at the best shape of a grid is known better than the coefficient: 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ranger_sim.sysid.naming import Named, trials
+from ranger_sim.sysid.machine import Effect
+from ranger_sim.sysid.naming import Named, possible, trials
 from ranger_sim.sysid.regression import Regression
 
 CHI2 = 3.84  # 95 % of one degree of freedom
 Z95 = 1.96  # standard errors on each side of a 95 % interval
+ROUNDS = 4  # of finer steps, each a seventh of the one before
 BETWEEN = 6  # shapes between two neighbours of the grid, where a shape is on a scale
 
 Intervals = dict[str, tuple[float, float]]
@@ -88,13 +90,33 @@ def _shapes(each: Named) -> list[Mapping[str, float]]:
     return [*each.effect.shapes, *between(each)]
 
 
+def finest(effect: Effect, shape: Mapping[str, float], base: Regression) -> Mapping[str, float]:
+    """The likeliest shape about this one of the grid; in finer and finer steps for what happens at one time, of which a
+    row may be most. base: without the effect."""
+    tried = list(effect.shapes)
+    for _ in range(0 if effect.scale is None else ROUNDS if effect.once else 1):
+        near = [shape, *_between(effect, shape, tried)]
+        scored = [(float(each.product @ np.linalg.pinv(each.gram, rcond=1e-12) @ each.product) / each.inflation, each)
+                  for each in trials([effect], base, near) if possible(each)]  # fmt: skip
+        if scored:
+            shape = max(scored, key=lambda one: one[0])[1].shape
+        tried += near
+    return shape
+
+
 def between(each: Named) -> list[Mapping[str, float]]:
     """Shapes between the best and its neighbours; none where the shape is not on a scale."""
-    name = each.effect.scale
+    return _between(each.effect, each.shape, each.effect.shapes)
+
+
+def _between(
+    effect: Effect, shape: Mapping[str, float], shapes: Sequence[Mapping[str, float]]
+) -> list[Mapping[str, float]]:
+    name = effect.scale
     if name is None:
         return []
-    values = sorted({shape[name] for shape in each.effect.shapes})
-    place = int(np.argmin([abs(value - each.shape[name]) for value in values]))
+    values = sorted({each[name] for each in shapes})
+    place = int(np.argmin([abs(value - shape[name]) for value in values]))
     near = values[max(0, place - 1) : place + 2]
     more = [
         low * (high / low) ** (number / (BETWEEN + 1))
@@ -102,4 +124,4 @@ def between(each: Named) -> list[Mapping[str, float]]:
         if low > 0.0
         for number in range(1, BETWEEN + 1)
     ]
-    return [{**each.shape, name: value} for value in more]
+    return [{**shape, name: value} for value in more]

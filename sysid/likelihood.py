@@ -249,7 +249,7 @@ def select(
         chance = np.max(scores, axis=0)
         threshold = max(float(np.quantile(chance, 1.0 - LEVEL)), LEAST)
         thresholds.append(threshold)
-        ranked = ranking(tried, regression.size)
+        ranked = _in_time(ranking(tried, regression.size), regression)
         chosen = next((each for each in ranked if naming.possible(each[3])), None)
         if chosen is None or chosen[0] <= threshold or len(named) == most:
             return Selection(
@@ -258,7 +258,7 @@ def select(
         near = [each for each in ranked if abs(chosen[0] - each[0]) < naming.TIE and naming.possible(each[3])]
         within = max(naming.TIE, ALIKE * chosen[0])
         alike = [each for each in ranked if chosen[0] - each[0] < within and naming.possible(each[3])][:MOST_ALIKE]
-        options = [_between(_named(each, ranked, near, chance), regression) for each in alike]
+        options = [_named(_finest(each, regression), ranked, near, chance) for each in alike]
         options.sort(key=lambda each: -each.bic)
         extensions = [naming.refit(base, [*named, each], [*fixed, *named, each]) for each in options]
         best = 0
@@ -278,7 +278,8 @@ def select(
         in_doubt = _simpler_in_doubt(found, named, base, fixed, ranked, near, chance, threshold)
         if in_doubt is not found:
             found, extended = in_doubt, naming.refit(base, [*named, in_doubt], [*fixed, *named, in_doubt])
-        if not _predicts(regression, extended) or not _seen_with_refused(
+        lasts = not found.effect.once  # what happens once is in one of the blocks
+        if lasts and not _predicts(regression, extended) or not _seen_with_refused(
             found.effect, base, fixed, named, refused, threshold
         ):
             left_out.append(found.effect)
@@ -432,16 +433,26 @@ def _named(one: Scored, ranked: Sequence[Scored], near: Sequence[Scored], chance
     )
 
 
-def _between(named: Named, regression: Regression) -> Named:
-    """The named effect at its best shape, which may lie between the grid's: other data judge it by its shape as well.
+def _finest(one: Scored, regression: Regression) -> Scored:
+    """One of a ranking at its best shape, which may lie between the grid's: other data judge it by its shape as well."""
+    effect = one[3].effect
+    if effect.scale is None:
+        return one
+    shape = intervals.finest(effect, one[3].shape, regression)
+    scored = ranking(naming.trials([effect], regression, [shape]), regression.size)
+    return scored[0] if scored else one
 
-    regression: without it.
-    """
-    if named.effect.scale is None:
-        return named
-    shape, _ = intervals.profile(named, regression)
-    scored = ranking(naming.trials([named.effect], regression, [shape]), regression.size)
-    return dataclasses.replace(named, shape=shape, chi2=scored[0][1], bic=scored[0][0]) if scored else named
+
+def _in_time(ranked: Sequence[Scored], regression: Regression) -> list[Scored]:
+    """The ranking with the likeliest of what happens once at its own time, where a grid's may show next to nothing of
+    it; each of the finer steps counts as a shape."""
+    first = [each for each in ranked if each[3].effect.once][:MOST_ALIKE]
+    out = [each for each in ranked if all(each is not one for one in first)]
+    for each in first:
+        found = _finest(each, regression)
+        paid = found[0] - 2.0 * intervals.ROUNDS * math.log(intervals.BETWEEN + 1)
+        out.append((paid, *found[1:]) if paid > each[0] else each)
+    return sorted(out, key=lambda each: -each[0])
 
 
 def own_part(trial: Trial) -> float:

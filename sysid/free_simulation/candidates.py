@@ -30,7 +30,7 @@ SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess fal
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
 LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
-JUMPED = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the longest recording: times at which a parameter jumps
+JUMPED = (0.03, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 0.97)  # of the longest recording: when something jumps
 SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 DEAD = (0.002, 0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
 
@@ -70,6 +70,14 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
             lambda r, shape, values: {place: make(r.table, r.signals[sensed(name)])}, meaning=meaning, independent=True,
         )  # fmt: skip
 
+    def drift(form: str, coefficient: str, make: Callable[[Array, Shape], Array], words: str, shapes: Sequence[Shape],
+              scale: str | None = None, once: bool = False) -> Term:  # fmt: skip
+        return Term(
+            "sensor_drift", name, "sensor", (coefficient,),
+            lambda r, shape, values: {place: make(r.table.elapsed_s, shape)}, shapes,
+            meaning=f"{name} drifts: {words}", independent=True, form=form, scale=scale, once=once,
+        )  # fmt: skip
+
     def lag(form: str, time: str, late: Callable[[Table, Array, float], Array], meaning: str) -> Term:
         def make(r: Recording, shape: Shape, values: Mapping[str, float]) -> dict[str, Array]:
             seen, lag_s = r.signals[sensed(name)], shape[time]
@@ -90,8 +98,10 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
                f"{name} shows a constant too much: true value + offset_{unit}"),
         sensor("sensor_scale", "share", lambda table, seen: seen,
                f"{name} shows a multiple of what it measures: true value * (1 + share)"),
-        sensor("sensor_drift", f"drift_{unit}_per_s", lambda table, seen: table.elapsed_s,
-               f"{name} drifts: true value + drift_{unit}_per_s * time since the recording's start"),
+        drift("ramp", f"drift_{unit}_per_s", lambda t, _: t,
+              f"true value + drift_{unit}_per_s * time since the recording's start", [{}]),
+        drift("jump", f"change_{unit}", _jumped, f"true value + change_{unit} from at_s after the recording's start on",
+              _jumps(recordings), "at_s", once=True),
         lag("delay", "delay_s", delayed, f"{name} is late: it shows the true value of lag_s before"),
         lag("filter", "time_constant_s", filtered,
             f"{name} lags: it shows the true value behind a low-pass of first order with the time constant lag_s"),
@@ -195,7 +205,7 @@ def at_joint(joint: Joint, recordings: Sequence[Recording]) -> list[Term]:
 def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
     """A parameter that does not stay as it is: a wall that fouls, a friction that warms up, a battery that ages."""
     unit = f"_{_word(known.unit)}" if known.unit else ""
-    longest_s = max(float(np.ptp(each.table.time_s)) for each in recordings)
+    longest_s = _longest_s(recordings)
 
     def term(form: str, coefficient: str, make: Callable[[Array, Shape], Array], words: str, shapes: Sequence[Shape],
              scale: str | None = None, once: bool = False) -> Term:  # fmt: skip
@@ -211,9 +221,8 @@ def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
         term("settling", change, lambda t, shape: -np.expm1(-t / shape["tau_s"]),
              f"value + {change} * (1 - exp(-time since the recording's start / tau_s))",
              [{"tau_s": share * longest_s} for share in SETTLED], "tau_s"),
-        term("jump", change, lambda t, shape: np.where(t < shape["at_s"], 0.0, 1.0),
-             f"value + {change} from at_s after the recording's start on",
-             [{"at_s": share * longest_s} for share in JUMPED], "at_s", once=True),
+        term("jump", change, _jumped, f"value + {change} from at_s after the recording's start on",
+             _jumps(recordings), "at_s", once=True),
     ]  # fmt: skip
 
 
@@ -240,6 +249,20 @@ def filtered(table: Table, column: Array, lag_s: float) -> Array:
         first = through * column[run][:1]  # so that the first value is the column's own
         out[run], _ = lfilter([1.0 - through, through - kept], [1.0, -kept], column[run], zi=first)
     return out
+
+
+def _longest_s(recordings: Sequence[Recording]) -> float:
+    return max(float(np.ptp(each.table.time_s)) for each in recordings)
+
+
+def _jumps(recordings: Sequence[Recording]) -> list[Shape]:
+    """Grid of times at which something jumps."""
+    return [{"at_s": share * _longest_s(recordings)} for share in JUMPED]
+
+
+def _jumped(elapsed_s: Array, shape: Shape) -> Array:
+    """(n,) 0 before the jump and 1 from it on."""
+    return np.where(elapsed_s < shape["at_s"], 0.0, 1.0)
 
 
 def _lags(recordings: Sequence[Recording]) -> list[float]:

@@ -458,8 +458,10 @@ class TrajectoryFit:
                 with np.errstate(over="ignore", invalid="ignore"):  # far from a solution a machine may run away
                     step = self.round()
             except (UserError, np.linalg.LinAlgError):
-                if self.x is self.came_from[0]:
+                if self.x is self.began[0]:
                     raise
+                if self.x is self.came_from[0]:  # nothing leads on from where another simulator ended
+                    self.came_from = (*self.began[:2], self.p)
                 self.cost, self.predictor = np.inf, None
             if not self.cost < WORSE * best:
                 # too far: a part of the step from where it began, whose cost is another with the covariances of now

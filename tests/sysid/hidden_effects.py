@@ -67,6 +67,7 @@ CASES = (
     Case(*JOINT, "gravity", 0.5, (("once_per_turn", "link_rate"),), "sine_torque", -0.5),
     Case(*JOINT, "drag", 0.02, (("drag", "link_rate"),), "quadratic_torque_s2", 0.02),
     Case(*JOINT, "softening", -0.5, (("parameter_drift", "K"),), "drift_N_m_per_rad_per_s", -0.5),
+    Case(*JOINT, "slipping", 0.01, (("sensor_drift", "link_rad"),), "change_rad", 0.01),
     Case(*JOINT, "cracking", -4.0, (("parameter_drift", "K"),), "change_N_m_per_rad", -4.0),
     Case(*JOINT, "scale", 0.02, (("sensor_scale", "link_rad"),), "share", 0.02),
 )

@@ -131,6 +131,7 @@ def elastic_joint(cause, size, seed, seconds=20.0, rate_hz=250.0):
     done = integrated(rates, [0.0] * 5, torque.tolist(), 1.0 / rate_hz)
     angles = done[:, :2] + 2e-4 * draw.normal(size=(rows, 2))
     angles[:, 1] *= 1.0 + (size if cause == "scale" else 0.0)
+    angles[:, 1] += (size if cause == "slipping" else 0.0) * (fine_s[:-1:FINE] > 0.64 * seconds)
     count = 2.0 * np.pi / 16384
     motor, link = (np.round(angles / count) * count).T
     return table(
