@@ -30,7 +30,7 @@ from ranger_sim.sysid import (
     signals,
 )
 from ranger_sim.sysid.dataset import Table
-from ranger_sim.sysid.diagnosis import Diagnosis, KnownEffect, Visible
+from ranger_sim.sysid.diagnosis import LITTLE, Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of, simulated_outputs
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
@@ -58,6 +58,9 @@ LEARNED = 0.7  # of the held-out error: a black box that leaves less has learned
 # Times: causes are at least so much surer than parameters are beyond their limits, in standard errors, for what makes
 # these impossible may make those. Chosen by us: a robot joint's friction has 4.6 times, causes that it lacks 0.5 to 1.4
 SURER = 2.0
+DRIFTS = ("sensor_drift", "parameter_drift")
+# In -2 log likelihood: what happened once explains more by it than lasting causes do. Chosen by us
+SURELY_ONCE = 40.0
 HALF_SAMPLE = 0.5  # samples: lags below it are stamps, not causes
 
 
@@ -79,6 +82,64 @@ def diagnose(
     effects = machine.effects(recordings)
     had = [find(each, effects) for each in known]
     effects = [each for each in effects if all(each is not other.effect for other in had)]
+    begun = _Begun(machine, whole, recordings, held, band, predictor, had, known, seed)
+    lasting = [each for each in effects if not each.once]
+    found = _answered(begun, lasting, progress)
+    if len(lasting) == len(effects) or not _may_be_once(found, effects):
+        return found
+    other = _answered(begun, effects, progress)
+    return other if _was_once(other, found) else found
+
+
+@dataclasses.dataclass(frozen=True)
+class _Begun:
+    """What causes are sought in. whole: recordings as they are; recordings, held: in the band."""
+
+    machine: Machine
+    whole: Sequence[Recording]
+    recordings: Sequence[Recording]
+    held: Sequence[Recording]
+    band: bands.Band
+    predictor: predictability.Predictor
+    had: list[Named]
+    known: Sequence[KnownEffect]
+    seed: int
+
+
+def _may_be_once(found: Diagnosis, effects: Sequence[Effect]) -> bool:
+    """True where lasting causes leave what happened at one time: no name, a drift, or a jump in what they leave.
+
+    Held-out data do not judge what happened once, so that it is not sought where lasting causes explain everything.
+    """
+    if found.doubtful or any(each.effect.cause in DRIFTS for each in found.named):
+        return True
+    left = found.extended
+    ranked = likelihood.ranking(naming.trials([each for each in effects if each.once], left), left.size)
+    ranked = likelihood.in_time(ranked, left)
+    return bool(ranked) and ranked[0][0] > max(SURELY_ONCE, LITTLE * left.chi2)
+
+
+def _was_once(other: Diagnosis, lasting: Diagnosis) -> bool:
+    """True where causes of which one happened once explain surely more than the lasting ones."""
+    if other.doubtful or not any(each.effect.once for each in other.named):
+        return False
+    if lasting.doubtful:
+        return True
+    return _size(lasting.extended) - _size(other.extended) > SURELY_ONCE
+
+
+def _size(regression: Regression) -> float:
+    """-2 log likelihood, up to a constant, of what each equation leaves as it is."""
+    noises = likelihood.own_noise(regression).whitening
+    return sum(
+        2.0 * np.count_nonzero(regression.good[name]) * math.log(each.deviation) for name, each in noises.items()
+    )
+
+
+def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str, float], None]) -> Diagnosis:
+    """All findings with these candidates."""
+    machine, whole, recordings, held = begun.machine, begun.whole, begun.recordings, begun.held
+    band, predictor, had, known, seed = begun.band, begun.predictor, begun.had, begun.known, begun.seed
     progress("misfit", 0.2)
     if hasattr(machine, "about_all"):
         recordings, held = ([_about_all(machine, each, effects, had) for each in some] for some in (recordings, held))

@@ -249,7 +249,7 @@ def select(
         chance = np.max(scores, axis=0)
         threshold = max(float(np.quantile(chance, 1.0 - LEVEL)), LEAST)
         thresholds.append(threshold)
-        ranked = _in_time(ranking(tried, regression.size), regression)
+        ranked = in_time(ranking(tried, regression.size), regression)
         chosen = next((each for each in ranked if naming.possible(each[3])), None)
         if chosen is None or chosen[0] <= threshold or len(named) == most:
             return Selection(
@@ -279,8 +279,10 @@ def select(
         if in_doubt is not found:
             found, extended = in_doubt, naming.refit(base, [*named, in_doubt], [*fixed, *named, in_doubt])
         lasts = not found.effect.once  # what happens once is in one of the blocks
-        if lasts and not _predicts(regression, extended) or not _seen_with_refused(
-            found.effect, base, fixed, named, refused, threshold
+        if (
+            lasts
+            and not _predicts(regression, extended)
+            or not _seen_with_refused(found.effect, base, fixed, named, refused, threshold)
         ):
             left_out.append(found.effect)
         elif judge is not None and not judge.accepts(named, found, regression, extended):
@@ -434,7 +436,7 @@ def _named(one: Scored, ranked: Sequence[Scored], near: Sequence[Scored], chance
 
 
 def _finest(one: Scored, regression: Regression) -> Scored:
-    """One of a ranking at its best shape, which may lie between the grid's: other data judge it by its shape as well."""
+    """One of a ranking at its best shape, between the grid's as well: other data judge it by its shape, too."""
     effect = one[3].effect
     if effect.scale is None:
         return one
@@ -443,7 +445,7 @@ def _finest(one: Scored, regression: Regression) -> Scored:
     return scored[0] if scored else one
 
 
-def _in_time(ranked: Sequence[Scored], regression: Regression) -> list[Scored]:
+def in_time(ranked: Sequence[Scored], regression: Regression) -> list[Scored]:
     """The ranking with the likeliest of what happens once at its own time, where a grid's may show next to nothing of
     it; each of the finer steps counts as a shape."""
     first = [each for each in ranked if each[3].effect.once][:MOST_ALIKE]

@@ -186,7 +186,7 @@ class Effect:
     def excludes(self, other: "Effect") -> bool:
         """True when only one of them can be named: the same effect, or another form of it."""
         same = (self.cause, self.at) == (other.cause, other.at)
-        return self is other or (same and bool(self.form) and bool(other.form))
+        return self is other or (same and bool(self.form or other.form))
 
 
 class Machine(Protocol):

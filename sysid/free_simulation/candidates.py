@@ -98,7 +98,7 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
                f"{name} shows a constant too much: true value + offset_{unit}"),
         sensor("sensor_scale", "share", lambda table, seen: seen,
                f"{name} shows a multiple of what it measures: true value * (1 + share)"),
-        drift("ramp", f"drift_{unit}_per_s", lambda t, _: t,
+        drift("", f"drift_{unit}_per_s", lambda t, _: t,
               f"true value + drift_{unit}_per_s * time since the recording's start", [{}]),
         drift("jump", f"change_{unit}", _jumped, f"true value + change_{unit} from at_s after the recording's start on",
               _jumps(recordings), "at_s", once=True),
@@ -212,7 +212,8 @@ def at_parameter(known: Known, recordings: Sequence[Recording]) -> list[Term]:
         return Term(
             "parameter_drift", known.name, PARAMETER, (coefficient,),
             lambda r, shape, values: {of(known.name): make(r.table.elapsed_s, shape)}, shapes,
-            meaning=f"{known.name} changes during the run: {words}", independent=True, form=form, scale=scale, once=once,
+            meaning=f"{known.name} changes during the run: {words}",
+            independent=True, form=form, scale=scale, once=once,
         )  # fmt: skip
 
     drift, change = f"drift{unit}_per_s", f"change{unit}"
