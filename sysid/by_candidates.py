@@ -29,7 +29,7 @@ from ranger_sim.sysid import (
     rivals,
     signals,
 )
-from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.dataset import Finding, Table
 from ranger_sim.sysid.diagnosis import LITTLE, Diagnosis, KnownEffect, Visible
 from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of, simulated_outputs
 from ranger_sim.sysid.naming import Named, Trial
@@ -168,13 +168,13 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
     before = predictability.test(found.base, predictor.columns(recordings), seed)
     floor: dict[str, tuple[float, ...]] = {}
     small: list[str] = []
+    lost: list[Finding] = []
     for number in range(AGAIN if found.named and hasattr(machine, "again") else 0):
         progress("simulated again", 0.5 + 0.2 * number / AGAIN)
         previous = found
         effects = _finer(effects, found, skews)
         linearised = [*recordings, *held]
-        recordings = simulations.again(recordings, found.named, found.with_named)
-        held = simulations.again(held, _there(found.named, held), found.with_named)
+        recordings, held, lost = _simulated_again(simulations, recordings, held, found)
         if all(new is old for new, old in zip([*recordings, *held], linearised, strict=True)):
             break
         found = selected(recordings, held, 0.5 + 0.2 * number / AGAIN)
@@ -183,8 +183,9 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
                 break
     while found.named and hasattr(machine, "numerical"):  # what is named instead of a small effect may be small as well
         progress("numerics", 0.7)
-        recordings = simulations.again(recordings, found.named, found.with_named)
-        held = simulations.again(held, _there(found.named, held), found.with_named)  # where the causes are judged
+        recordings, held, lost = _simulated_again(simulations, recordings, held, found)  # where causes are judged
+        if lost:
+            break
         floor = _numerical_floor(machine, recordings, [*had, *found.named])
         below = [each for each in found.named if _below(floor, found, each.effect)]
         if not below:
@@ -207,7 +208,9 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
     floors = noise_floor.by_channels(extended)
     if judge is not None and not found.named:
         floors = noise_floor.farther(floors, noise_floor.by_channels(judge.base, judge.sizes, bool(held)))
+    other: list[Finding] = []
     if held and judge is not None:
+        other = plausibility.of_held_out(machine, judge.base)
         lasting = predictability.predictor(machine, recordings, seed, without=("t",))  # another run has its own time
         errors = judge.errors(found.named, extended, found.base, lasting, seed)
     return Diagnosis(
@@ -228,7 +231,7 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
             found.named,
             by_candidates=True,
             base=found.base,
-            more=own_model.of(machine, recordings, found.base),
+            more=[*own_model.of(machine, recordings, found.base), *lost, *other],
         ),
         level=LEVEL,
         band_hz=band.edge_hz,
@@ -244,6 +247,24 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
             _others(effects, skews), extended, found.thresholds[-1] if found.thresholds else likelihood.LEAST
         ),
     )
+
+
+def _simulated_again(
+    simulations: rivals.Simulations,
+    recordings: Sequence[Recording],
+    held: Sequence[Recording],
+    found: likelihood.Selection,
+) -> tuple[Sequence[Recording], Sequence[Recording], list[Finding]]:
+    """Both with the named causes in the simulator. Where it runs away with them they are as before, the causes have no
+    name, and a finding says so: their sizes are those of a first order about a fit that means little."""
+    try:
+        again = simulations.again(recordings, found.named, found.with_named)
+        return again, simulations.again(held, _there(found.named, held), found.with_named), []
+    except np.linalg.LinAlgError:
+        names = " and ".join(each.effect.name for each in found.named)
+        found.named, found.with_named = [], found.base
+        text = f"with {names} in it, which explains these data best at first order, the simulation runs away"
+        return recordings, held, [Finding("", "runs_away", 0.0, 0.0, 0.0, "", text)]
 
 
 def _there(named: Sequence[Named], held: Sequence[Recording]) -> list[Named]:

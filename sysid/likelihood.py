@@ -392,7 +392,8 @@ def _exchanged(
                 if not any(one.effect.excludes(each) for one in others)
                 and all(each is not one.effect for one in refused)
             ]
-            ranked = ranking(naming.trials(rest, regression), base.size)
+            tried = [each for each in naming.trials(rest, regression) if own_part(each) > HIDDEN]
+            ranked = ranking(tried, base.size)
             own = next((each for each in ranked if each[3].effect is old.effect), None)
             chosen = next((each for each in ranked if naming.possible(each[3])), None)
             if own is None or chosen is None or own[0] <= threshold:  # the others explain it

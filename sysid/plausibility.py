@@ -42,7 +42,7 @@ UNIT_TOLERANCE = 0.05  # of a factor that is reported as a unit's: friction and 
 # kinds of findings that forbid naming a cause
 FORBID = (
     "impossible", "unexplained", "contradiction", "slow", "too_many", "other_signal", "other_machine", "at_limit",
-    "too_coarse",
+    "too_coarse", "runs_away", "other_held_out",
 )  # fmt: skip
 # small compared with the rest, or of an instrument: a model error moves them by any factor
 MAY_BE_ANY = ("friction", "inductance", "lag", "filter", "gates", "zero", "offset", "bias")
@@ -128,6 +128,28 @@ def look(
             findings.append(_finding(name, "slow", new, "", text))
     findings += _contradictions(machine, regression if base is None else base)
     return Doubts(findings, any(each.kind in FORBID for each in findings))
+
+
+def of_held_out(machine: Machine, held: Regression) -> list[Finding]:
+    """Parameters that only the held-out recordings ask for and that no machine has: they are of another machine.
+
+    held: of balances, without causes; a value that merely differs may be another day's friction or another load.
+    """
+    if _of_a_simulator(held):
+        return []
+    found = []
+    for known in machine.parameters:
+        if known.name not in held.values or known.name in held.idle:
+            continue
+        value, number = held.values[known.name], held.names.index(known.name)
+        error = float(np.sqrt(max(0.0, float(held.covariance[number, number]))))
+        if absurd(known, value, error):
+            text = (
+                f"in the held-out recordings it comes out as {value:.4g} {known.unit}, which no machine has: another "
+                "machine, or a channel in another unit or with the other sign"
+            )
+            found.append(_finding(known.name, "other_held_out", value, known.unit, text))
+    return found
 
 
 def with_causes(regression: Regression, parameters: Sequence[Known], named: Sequence[Named]) -> dict[str, float]:

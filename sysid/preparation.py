@@ -42,6 +42,12 @@ def parted(data: Sequence[Prepared], part: float) -> tuple[list[Prepared], list[
     return first, last
 
 
+def _motions(machine: Machine) -> list[tuple[str, str]]:
+    """(angle, rate) of a balance's joint, which show one motion; none where it names only one of them."""
+    names = getattr(machine, "angle", ""), getattr(machine, "rate", "")
+    return [names] if all(names) else []
+
+
 def prepared(
     dataset: Dataset, machine: Machine, accepted: float = losses.ACCEPTED, asked: Collection[str] = ()
 ) -> Prepared:
@@ -66,7 +72,7 @@ def prepared(
     dataset.channels = {name: dataset.channels[name] for name in names}
     dataset.findings = [each for each in dataset.findings if each.channel in ("", *names)]
     dataset.repairs = [each for each in dataset.repairs if each.channel in ("", *names)]
-    findings = sanity.inspect(dataset)
+    findings = sanity.inspect(dataset, _motions(machine))
     sanity.stop_if_fatal(dataset.name, findings)
     inputs = inputs_of(machine) - set(asked)
     sanity.stop_if_input_is_clipped(dataset.name, findings, inputs)

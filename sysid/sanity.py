@@ -165,13 +165,16 @@ SMALLEST = 1e-12  # largest value of a channel in SI: no instrument of such mach
 LONGEST_STEP_S = 0.5  # median of the stamps: slower than any experiment here
 
 
-def inspect(dataset: Dataset) -> list[Finding]:
-    """All oddities: the reader's findings, each channel's stamps and values, channels against each other."""
+def inspect(dataset: Dataset, motions: Sequence[tuple[str, str]] = ()) -> list[Finding]:
+    """All oddities: the reader's findings, each channel's stamps and values, channels against each other.
+
+    motions: names of an angle and a rate that are to show the same motion, next to those of Ranger.
+    """
     with np.errstate(all="ignore"):  # checks report numbers near the largest; their overflows mean nothing more
-        return _inspected(dataset)
+        return _inspected(dataset, motions)
 
 
-def _inspected(dataset: Dataset) -> list[Finding]:
+def _inspected(dataset: Dataset, motions: Sequence[tuple[str, str]]) -> list[Finding]:
     found = list(dataset.findings)
     if not dataset.channels:
         found.append(Finding("", "empty", 0.0, 0.0, 0.0, "", "there is no channel", FATAL))
@@ -186,7 +189,7 @@ def _inspected(dataset: Dataset) -> list[Finding]:
     for channel in sound.values():
         found += _values(channel, sound)
         found += headlines.of_values(channel)
-    found += _between(sound)
+    found += _between(sound, [*DERIVATIVES, *motions])
     return found
 
 
@@ -569,11 +572,11 @@ def _rests_at(value: Array, limit: float) -> bool:
 # --- channels against each other ----------------------------------------------------------------------------
 
 
-def _between(channels: dict[str, Channel]) -> Iterator[Finding]:
+def _between(channels: dict[str, Channel], motions: Sequence[tuple[str, str]]) -> Iterator[Finding]:
     for channel in channels.values():
         yield from _clock(channel)
     yield from _noise(channels)
-    for angle, rate in DERIVATIVES:
+    for angle, rate in dict.fromkeys(motions):
         if angle in channels and rate in channels:
             yield from _derivative(channels[angle], channels[rate])
     for first, second in REDUNDANT:

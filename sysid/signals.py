@@ -5,6 +5,7 @@ before, and the derivative of the filtered signal is the filtered derivative: so
 derivative of the same Gaussian that smooths everything else.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 
@@ -25,6 +26,8 @@ JUMP, JUMPS_BY = 0.1, 8.0  # of the range, and times the median change: larger i
 # arrives there, and different numbers of a channel that has only states
 FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
 PASSED = 5.0  # counts, by the usual slope, over which the slope is taken at which it arrives. Chosen by us
+SHORTEST_WINDOW = 7  # rows
+COUNTED = 0.3  # of a channel's counts: below it these are not seen yet
 ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
 HELD_JUMPS = 0.2  # of the samples at most: a channel that changes at no more of them is held in between
 FEWEST_RETURNS = 5  # of rows that go to the next count and back, in a channel of counts. Chosen by us
@@ -212,9 +215,24 @@ def jumps(table: Table, column: Array) -> Array:
 def roughness(table: Table, column: Array, unmeasured: Rows | None = None) -> float:
     """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps.
 
+    The window is shorter where the departure grows faster than it: then it is motion, of a machine that is that fast.
+    Noise with a memory grows with the window's root at most, and counts of a slow channel show in long ones only.
     unmeasured: (n,) rows that do not count.
     """
-    size = max(7, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
+    longest = max(SHORTEST_WINDOW, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
+    sizes = itertools.takewhile(lambda size: size < longest, (SHORTEST_WINDOW * 2**n | 1 for n in itertools.count()))
+    counts = lattice_step(column)
+    found, before = 0.0, 0
+    for size in (*sizes, longest):
+        now = _off_parabola(table, column, unmeasured, size)
+        if before and found > COUNTED * counts and now > found * size / before:
+            break
+        found, before = now, size
+    return found
+
+
+def _off_parabola(table: Table, column: Array, unmeasured: Rows | None, size: int) -> float:
+    """Deviation from a parabola over so many rows; 0 where no run has as many."""
     parts = [savgol_filter(column[run], size, 2) - column[run] for run in table.runs if run.stop - run.start > size]
     if not parts:
         return 0.0

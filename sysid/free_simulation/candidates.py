@@ -29,7 +29,7 @@ MOST_LAG_SAMPLES, LAGS_IN_A_RECORDING = 400, 20.0  # a lag is shorter, and so ma
 SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess falls off
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
-LEAST_SHARE = 0.5  # of a dead zone or a saturation: a hard one has 1; much less is another effect's shadow
+LEAST_SHARE, MOST_SHARE = 0.5, 2.0  # of a dead zone or a saturation: a hard one has 1; others are another's shadow
 JUMPED = (0.03, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 0.97)  # of the longest recording: when something jumps
 SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
 DEAD = (0.002, 0.005, 0.02, 0.05, 0.1, 0.2, 0.4)  # of an input's largest size
@@ -117,10 +117,10 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
     limits = sorted({float(np.quantile(size, each)) for each in CLIPPED} - {largest, 0.0})
 
     def term(cause: str, coefficient: str, make: Signal, meaning: str, shapes: Sequence[Shape] = ({},)) -> Term:
-        least = LEAST_SHARE if coefficient == "share" else -np.inf
+        least, most = (LEAST_SHARE, MOST_SHARE) if coefficient == "share" else (-np.inf, np.inf)
         return Term(
             cause, name, "input", (coefficient,), lambda r, shape, values: {into(name): make(r.signals, shape)},
-            shapes, lambda found: found[coefficient] > least, meaning, independent=True,
+            shapes, lambda found: least < found[coefficient] < most, meaning, independent=True,
             scale="limit" if shapes[0] else None,
         )  # fmt: skip
 

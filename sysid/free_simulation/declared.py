@@ -37,7 +37,7 @@ class DeclaredMachine(abc.ABC):
     mean_inputs: Collection[str] = ()  # a row has the mean of the step that ends there, as an averaging logger writes
     parts: int = 2  # steps from one sample to the next, each with the inputs of its own middle
     horizon_s: float = float("inf")  # after this time the state is free again: shorter for a model with large errors
-    shortest_s: float = 2.0  # least duration of a usable recording
+    shortest_s: float | None = None  # least duration of a usable recording; None: 2 s, or of a fast one 400 rows
     window_s: float = 2.0  # over which the gain is measured in free simulation, or 50 samples
 
     @abc.abstractmethod

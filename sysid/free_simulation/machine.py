@@ -18,6 +18,7 @@ from ranger_sim.sysid.free_simulation.terms import Acting, Shape, SimulatedEffec
 from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
 
 MOST_ROWS = 12000  # of a recording; a longer one is averaged over neighbours
+SHORTEST_S, FEWEST_ROWS = 2.0, 400  # a recording is as long, or has as many rows, where its machine says nothing
 AGAIN = 12  # rounds with an effect in the simulator, at most: they start at the end of the fit without it
 SAME = 1.0 - 1e-6  # cosine of two responses: candidates of two names for one effect
 
@@ -33,10 +34,11 @@ class SimulatedMachine(DeclaredMachine):
             raise UserError(f"{table.name}: {self.name} needs {', '.join(missing)}; there are {there}")
         table = signals.uniform(table)
         longest_s = max((run.stop - run.start) * table.step_s for run in table.runs)
-        if longest_s < self.shortest_s:
+        needed_s = min(SHORTEST_S, FEWEST_ROWS * table.step_s) if self.shortest_s is None else self.shortest_s
+        if longest_s < needed_s:
             raise UserError(
                 f"{table.name}: the longest stretch without a gap is {longest_s:.3g} s, "
-                f"{self.name} needs {self.shortest_s:g} s"
+                f"{self.name} needs {needed_s:.3g} s (its shortest_s)"
             )
         fit = TrajectoryFit(self, table, -(-len(table) // MOST_ROWS))
         fit.settle(follow=True)

@@ -72,6 +72,8 @@ def seconds(
     """
     if unit is None and (dates := _compact_dates(dataset, name, stamps)) is not None:
         return dates
+    if unit is not None and unit.factor > 1.0:
+        dataset.clock_is_given = True  # minutes and hours are not written by mistake
     unit = unit or _assumed(dataset, path, name, stamps)
     if unit.numerator != ("s",) or unit.denominator:
         raise DataError(f"{dataset.name}: the time column {name} is in {unit.text or 'no unit'}, not in a time")

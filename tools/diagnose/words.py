@@ -34,7 +34,7 @@ def sentence(found: Diagnosis) -> str:
     names = " and ".join(f"{each['name']} at {each['at']}{_size(each)}" for each in answer["causes"])
     part = answer["subsystem"]
     what = "a parameter changes during the run" if part == PARAMETER else f"the {part} part is wrong"
-    return f"{name}: {what}: {names}{_gained(answer)}."
+    return f"{name}: {what}: {names}{_gained(answer)}{_more_left(answer)}."
 
 
 def _size(cause: dict[str, Any]) -> str:
@@ -53,6 +53,12 @@ def _gained(answer: dict[str, Any]) -> str:
         return ""
     name = min(errors, key=lambda each: errors[each]["after"] / max(errors[each]["before"], 1e-300))
     return f"; {_errors(name, errors[name], named=True)}"
+
+
+def _more_left(answer: dict[str, Any]) -> str:
+    """What is left far above the noise with the causes in the model, after a semicolon; "" where nothing is."""
+    above = answer["evidence"].get("above_noise_floor")
+    return f"; {'; '.join(_left(answer['evidence'], name) for name in above)}: more is missing" if above else ""
 
 
 def _errors(name: str, each: dict[str, Any], named: bool) -> str:
