@@ -234,6 +234,7 @@ def run_cases(
     kept: Kept,
 ) -> None:
     """Run cases with one golden run, in the order in which their faults begin."""
+    golden.subject.catalogue.load()  # here, once: every branch would import the modes and make the machine shown
     for case in cases:
         if not case["fault"]:
             emit(finished(case, functools.partial(sweep_run, case, golden, healthy, watch), watch))
