@@ -1,7 +1,8 @@
 """Each board's errors and their times, for any machine; and the place of a state machine's state."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+import cython
 
 from ranger_sim.foundation.row_stream import RowStream
 from ranger_sim.harness.step_watch import StepWatch
@@ -14,6 +15,8 @@ class StateWord(NamedTuple):
     states: dict[int, str]
 
 
+@cython.final
+@cython.cclass
 class ErrorRows(StepWatch):
     """Fills `rows`: time (ns), place of the board in `boards`, code, how often since the last check.
 
@@ -21,15 +24,21 @@ class ErrorRows(StepWatch):
     of the plant's step before which the error was recorded. Ranger's, compiled for its error modules: error_watch.py.
     """
 
-    def __init__(self, boards: Sequence[Any], codes: int) -> None:
+    boards: list
+    codes: cython.longlong
+    rows: RowStream
+    before: list
+    images: list
+
+    def __init__(self, boards, codes) -> None:
         StepWatch.__init__(self)
         self.boards = boards
         self.codes = codes
         self.rows = RowStream("q", 4, False)
         self.before = [list(board.error_totals(codes)) for board in boards]
-        self.images: list[bytes | None] = [None] * len(boards)
+        self.images = [None] * len(boards)
 
-    def before_step(self, now_ns: int) -> None:
+    def before_step(self, now_ns: cython.longlong) -> object:
         """Record the errors since the last step."""
         for place, board in enumerate(self.boards):
             if hasattr(board, "error_image"):  # of a program in C: cheaper to compare than the numbers
@@ -48,3 +57,4 @@ class ErrorRows(StepWatch):
                         self.rows.integers[at + column] = value
                     self.rows.finish_row(now_ns)
             self.before[place] = totals
+        return None
