@@ -41,12 +41,12 @@ import cython
 from ranger_sim.firmware_sim.arm7.decoding import (
     ADD,
     ADD_CONSTANT,
-    ADD_SHIFTED,
     ADDS,
     ADDS_CONSTANT,
     AMOUNT,
     AND,
     AND_CONSTANT,
+    ANDS,
     BRANCH,
     BRANCH_EXCHANGE,
     BRANCH_LINK,
@@ -71,12 +71,14 @@ from ranger_sim.firmware_sim.arm7.decoding import (
     MOVES_CONSTANT,
     OR,
     OR_CONSTANT,
+    ORS,
     REVERSE,
     REVERSE_CONSTANT,
     SECOND,
     SHIFT_LEFT,
     SHIFT_RIGHT,
     SHIFT_SIGNED,
+    SHIFTED,
     SHIFTS,
     STORE,
     STORE_BYTE,
@@ -86,9 +88,12 @@ from ranger_sim.firmware_sim.arm7.decoding import (
     SUBTRACT,
     TEST,
     TEST_CONSTANT,
+    TEST_EQUAL,
+    TEST_TURNED,
     WHOLE,
     XOR,
     XOR_CONSTANT,
+    XORS,
     decode_arm,
     decode_thumb,
 )
@@ -106,6 +111,7 @@ SYSTEM: Final = 0x1F
 # bits of Core.lines
 IRQ_LINE: Final = 1
 FIQ_LINE: Final = 2
+NO_LINE: Final = -(1 << 30)  # of flash
 STATE: Final = 53  # numbers of Core.state_into
 POLL_CYCLES: Final = 60_000  # between two polls of a debugger's endpoint; chosen by us: 1 ms of the robot's processors
 
@@ -150,6 +156,16 @@ def put(words, place, content) -> None:
     for i, byte in enumerate(content, place):
         turn = 8 * (i & 3)
         words[i >> 2] = words[i >> 2] & ~(0xFF << turn) | byte << turn
+
+
+def passing_flags(condition) -> int:
+    """Which of the 16 values of the flags N, Z, C, V (bits 3 ... 0) pass a condition: the bits of a number."""
+    passing = 0
+    for flags in range(16):
+        n, z, c, v = (bool(flags >> bit & 1) for bit in (3, 2, 1, 0))
+        even = (z, c, n, v, c and not z, n == v, n == v and not z, True)[condition >> 1]
+        passing |= (even != bool(condition & 1)) << flags  # 15 is "never" before ARMv5
+    return passing
 
 
 @cython.cclass
@@ -214,6 +230,7 @@ class Core:
     device_waits: cython.longlong
     bridge_base: cython.longlong
     cycles_per_instruction: cython.longlong
+    passing_flags: cython.longlong[::1]
     trail: cython.longlong[::1]
     ahead: cython.longlong[::1]
     ready: cython.longlong[::1]
@@ -258,12 +275,15 @@ class Core:
         self.ram_size = ram_size
         self.written = array.array("q", [1]) * ((ram_size >> WRITTEN_BITS) + 1)
         self.connect(device)
+        self.passing_flags = array.array("q", map(passing_flags, range(16)))
         self.device_waits = DEVICE_WAITS
         self.bridge_base = BRIDGE_BASE
         self.mam_mode = 2
         self.mam_timing = MAM_TIMING
-        self.trail = array.array("q", [-2, -2])  # of the even and of the odd bank: line in the branch trail buffer,
-        self.ahead = array.array("q", [-2, -2])  # line in the prefetch buffer,
+        self.trail = array.array(
+            "q", [NO_LINE, NO_LINE]
+        )  # of the even and of the odd bank: line in the branch trail buffer,
+        self.ahead = array.array("q", [NO_LINE, NO_LINE])  # line in the prefetch buffer,
         self.ready = array.array("q", [0, 0])  # and the cycle at which that one is there
         self.cycles_per_instruction = 0
         self.takes_aborts = False
@@ -318,9 +338,9 @@ class Core:
         self.forget_flash()
 
     def forget_flash(self) -> None:
-        self.line = self.data_line = -2
+        self.line = self.data_line = NO_LINE
         for bank in range(2):
-            self.trail[bank] = self.ahead[bank] = -2
+            self.trail[bank] = self.ahead[bank] = NO_LINE
 
     # ---- memory from outside: no cycles, no devices
 
@@ -462,18 +482,17 @@ class Core:
     @cython.cfunc
     @cython.exceptval(check=False)
     @cython.locals(begun=cython.longlong, bank=cython.longlong)
-    def fetch_line(self, line: cython.longlong) -> cython.int:
-        """Waits of a fetch from another line of flash than the last fetch."""
-        begun = self.cycles
+    def fetch_line(self, line: cython.longlong, cycles: cython.longlong) -> cython.longlong:
+        """`cycles` after the waits of a fetch from another line of flash than the last fetch."""
         if self.mam_mode == 0:
-            self.cycles += self.mam_timing - 1
-            return 0
+            return cycles + self.mam_timing - 1
+        begun = cycles
         bank = line & 1
         if line == self.ahead[bank] and (self.mam_mode == 2 or line == self.line + 1):
             if self.ready[bank] > begun:
-                self.cycles = self.ready[bank]
+                cycles = self.ready[bank]
         elif self.mam_mode == 1 or line != self.trail[bank]:
-            self.cycles += self.mam_timing - 1
+            cycles += self.mam_timing - 1
             self.trail[bank] = line
         self.line = line
         line += 1
@@ -481,19 +500,19 @@ class Core:
         if line != self.ahead[bank] and line != self.trail[bank]:
             self.ahead[bank] = line
             self.ready[bank] = begun + self.mam_timing
-        return 0
+        return cycles
 
     @cython.cfunc
     @cython.exceptval(check=False)
-    def read_flash(self, line: cython.longlong) -> cython.int:
-        """Waits of a datum in flash."""
+    def read_flash(self, line: cython.longlong, cycles: cython.longlong) -> cython.longlong:
+        """`cycles` after the waits of a datum in flash."""
         if line != self.data_line:
-            if self.ready[line & 1] > self.cycles:
-                self.ready[line & 1] = self.cycles + 2 * self.mam_timing - 1
-            self.cycles += self.mam_timing - 1
+            if self.ready[line & 1] > cycles:
+                self.ready[line & 1] = cycles + 2 * self.mam_timing - 1
+            cycles += self.mam_timing - 1
             if self.mam_mode == 2:
                 self.data_line = line
-        return 0
+        return cycles
 
     @cython.cfunc
     def nothing(self, address: cython.longlong, size: cython.longlong, writing: cython.bint) -> cython.int:
@@ -519,7 +538,7 @@ class Core:
             place = address - self.flash_base
             if not 0 <= place < self.flash_open:
                 return self.load_elsewhere(address, size)
-            self.read_flash(place >> 4)
+            self.cycles = self.read_flash(place >> 4, self.cycles)
             value = self.flash[place >> 2]
         if size == 4:
             return value
@@ -557,7 +576,7 @@ class Core:
     def store(self, address: cython.longlong, size: cython.longlong, value: cython.longlong) -> cython.int:
         self.cycles += 1
         if self.mam_mode == 1:
-            self.line = -2  # the fetch after a store is an N cycle
+            self.line = NO_LINE  # the fetch after a store is an N cycle
         place = address - self.ram_base
         if 0 <= place < self.ram_open:
             self.written[place >> WRITTEN_BITS] = 1
@@ -627,41 +646,8 @@ class Core:
         self.following = address & (_MASK - 1 if self.control & 0x20 else _MASK - 3)
         self.cycles += 2
         if self.mam_mode == 1:
-            self.line = -2
+            self.line = NO_LINE
         return 0
-
-    @cython.cfunc
-    @cython.exceptval(check=False)
-    def passes(self, condition: cython.longlong) -> cython.bint:
-        if condition == 0:
-            return self.z == 1
-        elif condition == 1:
-            return self.z == 0
-        elif condition == 2:
-            return self.c == 1
-        elif condition == 3:
-            return self.c == 0
-        elif condition == 4:
-            return self.n == 1
-        elif condition == 5:
-            return self.n == 0
-        elif condition == 6:
-            return self.v == 1
-        elif condition == 7:
-            return self.v == 0
-        elif condition == 8:
-            return self.c == 1 and self.z == 0
-        elif condition == 9:
-            return self.c == 0 or self.z == 1
-        elif condition == 10:
-            return self.n == self.v
-        elif condition == 11:
-            return self.n != self.v
-        elif condition == 12:
-            return self.z == 0 and self.n == self.v
-        elif condition == 13:
-            return self.z == 1 or self.n != self.v
-        return condition == 14  # 15 is "never" before ARMv5
 
     @cython.cfunc
     @cython.exceptval(check=False)
@@ -745,7 +731,7 @@ class Core:
         while self.cycles < until and not self.stopped:
             if self.lines and self.interrupt():
                 continue  # the entry's cycles may have reached `until`
-            self.execute(until, _NEVER)
+            self.execute(until)
         return 0
 
     @cython.ccall
@@ -910,95 +896,129 @@ class Core:
 
     @cython.cfunc
     def one(self) -> cython.int:
-        return self.execute(_NEVER, 1)
+        return self.execute(self.cycles + 1)  # each takes one at least
 
     @cython.cfunc
     @cython.locals(
         pc=cython.longlong,
         cycles=cython.longlong,
         began=cython.longlong,
-        first=cython.longlong,
+        count=cython.longlong,
         place=cython.longlong,
         entry=cython.longlong,
         size=cython.longlong,
+        usual=cython.longlong,
         condition=cython.longlong,
+        amount=cython.longlong,
         kind=cython.longlong,
         rd=cython.longlong,
         word=cython.longlong,
         a=cython.longlong,
         b=cython.longlong,
     )
-    def execute(self, until: cython.longlong, most: cython.longlong) -> cython.int:
-        """Instructions until `cycles` has reached `until`, `most` of them at the most; ends earlier after one that
-        stopped the run, and after one that may have changed whether an interrupt is to be entered.
+    def execute(self, until: cython.longlong) -> cython.int:
+        """Instructions until `cycles` has reached `until`; ends earlier after one that stopped the run, and after one
+        that may have changed whether an interrupt is to be entered.
 
-        Program counter and cycles are local as long as no instruction needs more than registers, flags and RAM: those
-        that do are `execute_whole`. The function is long because all kinds are cases of one switch around these locals.
+        Program counter and cycles are local as long as no instruction needs more than registers, flags and memory:
+        those that do are `execute_whole`. The function is long because all kinds are cases of one switch around these
+        locals. Beyond the present line of flash nothing has been checked: not that there is memory, nor that the
+        program counter has not passed the end of the address space.
         """
         pc = self.pc
         cycles = self.cycles
         began = self.began
-        first = self.instructions
-        most += first
+        count = self.instructions
         size = 2 if self.control & 0x20 else 4
-        while first < most and cycles < until:
-            first += 1
+        usual = 28 | self.control >> 5 & 1  # condition and state of most entries
+        while cycles < until:
+            count += 1
             began = cycles
             cycles += 1
             place = pc - self.flash_base
-            if 0 <= place < self.flash_size:
-                if place >> 4 != self.line:
-                    self.cycles = cycles
-                    self.fetch_line(place >> 4)
-                    cycles = self.cycles
+            if place >> 4 == self.line:
                 entry = self.decoded[place >> 1]
-                if entry == 0 or (entry >> IN_THUMB & 1) == size >> 2:
-                    entry = self.decoded[place >> 1] = self.decode(self.flash[place >> 2], pc)
             else:
-                place = pc - self.ram_base
-                self.line = -2
-                if not 0 <= place < self.ram_size:
-                    self.pc = pc
-                    self.cycles = cycles
-                    self.began = began
-                    self.instructions = first
-                    return self.abort_fetch()
-                entry = self.decode(self.ram[place >> 2], pc)
-            condition = entry >> CONDITION & 15
-            if condition != 14 and not self.passes(condition):
-                pc = pc + size & _MASK
-                if self.cycles_per_instruction:
-                    cycles = began + self.cycles_per_instruction
-                continue
-            self.r[15] = pc + 2 * size & _MASK
+                pc &= _MASK
+                place = pc - self.flash_base
+                if 0 <= place < self.flash_size:
+                    cycles = self.fetch_line(place >> 4, cycles)
+                    entry = self.decoded[place >> 1]
+                else:
+                    place = pc - self.ram_base
+                    self.line = NO_LINE
+                    if not 0 <= place < self.ram_size:
+                        self.pc = pc
+                        self.cycles = cycles
+                        self.began = began
+                        self.instructions = count
+                        return self.abort_fetch()
+                    entry = self.decode(self.ram[place >> 2], pc)
+            condition = entry >> IN_THUMB & 31
+            if condition != usual:
+                if entry == 0 or (condition ^ usual) & 1:
+                    entry = self.decoded[place >> 1] = self.decode(self.flash[place >> 2], pc)
+                condition = entry >> CONDITION & 15
+                if not self.passing_flags[condition] >> (self.n << 3 | self.z << 2 | self.c << 1 | self.v) & 1:
+                    pc += size
+                    if self.cycles_per_instruction:
+                        cycles = began + self.cycles_per_instruction
+                    continue
+            pc += size
+            self.r[15] = pc + size & _MASK
             kind = entry >> KIND
             word = entry & _MASK
             rd = entry >> DESTINATION & 15
             a = self.r[entry >> FIRST & 15]
             b = self.r[entry >> SECOND & 15]
-            if kind >= LOAD:
-                if kind >= INDEXED:
-                    kind -= INDEXED - LOAD
-                    word = b << (entry >> AMOUNT & 31)
-                word = a + word & _MASK
-                place = word - self.ram_base
-                if not 0 <= place < self.ram_open or word & (3 if kind <= STORE else 1) and kind <= STORE_HALF:
-                    kind += INDEXED  # by way of `execute_whole`
+            if kind >= LOAD_CONSTANT:
+                amount = entry >> AMOUNT & 31
+                if kind >= SHIFTED:
+                    kind -= SHIFTED - MOVE
+                    if entry >> (AMOUNT + 5) & 3 == 0:
+                        b = b << amount & _MASK
+                    elif entry >> (AMOUNT + 5) & 3 == 1:
+                        b >>= amount
+                    else:
+                        b = (b ^ _SIGN) - _SIGN >> amount & _MASK
+                elif kind == LOAD_CONSTANT:
+                    place = word - self.flash_base
+                    if not 0 <= place < self.flash_open:
+                        kind = INDEXED + LOAD  # by way of `execute_whole`
+                else:
+                    if kind >= INDEXED:
+                        kind -= INDEXED - LOAD
+                        word = b << amount
+                    word = a + word & _MASK
+                    place = word - self.ram_base
+                    if not 0 <= place < self.ram_open or word & (3 if kind <= STORE else 1) and kind <= STORE_HALF:
+                        kind += INDEXED
             if kind == BRANCH:
-                pc = word - size
+                pc = word
                 cycles += 2
-                self.line = -2 if self.mam_mode == 1 else self.line
+                if self.mam_mode == 1:
+                    self.line = NO_LINE
             elif kind == BRANCH_LINK:
-                self.r[14] = pc + size & _MASK
-                pc = word - size
+                self.r[14] = pc & _MASK
+                pc = word
                 cycles += 2
-                self.line = -2 if self.mam_mode == 1 else self.line
+                if self.mam_mode == 1:
+                    self.line = NO_LINE
             elif kind == BRANCH_LINK_LOW:
                 word = self.r[14] + word & _MASK - 1
-                self.r[14] = pc + size & _MASK | 1
-                pc = word - size
+                self.r[14] = pc & _MASK | 1
+                pc = word
                 cycles += 2
-                self.line = -2 if self.mam_mode == 1 else self.line
+                if self.mam_mode == 1:
+                    self.line = NO_LINE
+            elif kind == BRANCH_EXCHANGE:
+                self.control = self.control & 0xDF | (b & 1) << 5
+                size = 2 if b & 1 else 4
+                usual = 28 | b & 1
+                pc = b & -size
+                cycles += 2
+                if self.mam_mode == 1:
+                    self.line = NO_LINE
             elif kind == MOVE_CONSTANT:
                 self.r[rd] = word
             elif kind == ADD_CONSTANT:
@@ -1022,6 +1042,9 @@ class Core:
                 self.mark(word)
             elif kind == TEST_CONSTANT:
                 self.mark(a & word)
+            elif kind == TEST_TURNED:
+                self.mark(a & word)
+                self.c = word >> 31
             elif kind == MOVE:
                 self.r[rd] = b
             elif kind == ADD:
@@ -1047,8 +1070,19 @@ class Core:
             elif kind == MOVES:
                 self.r[rd] = b
                 self.mark(b)
+            elif kind == ANDS:
+                self.r[rd] = a & b
+                self.mark(a & b)
+            elif kind == ORS:
+                self.r[rd] = a | b
+                self.mark(a | b)
+            elif kind == XORS:
+                self.r[rd] = a ^ b
+                self.mark(a ^ b)
             elif kind == TEST:
                 self.mark(a & b)
+            elif kind == TEST_EQUAL:
+                self.mark(a ^ b)
             elif kind == SHIFT_LEFT:
                 self.r[rd] = b << (entry >> AMOUNT & 31) & _MASK
             elif kind == SHIFT_RIGHT:
@@ -1060,10 +1094,11 @@ class Core:
                 self.r[rd] = b
                 self.mark(b)
                 self.c = self.carry
-            elif kind == ADD_SHIFTED:
-                self.r[rd] = a + (b << (entry >> AMOUNT & 31)) & _MASK
             elif kind == DATA:
                 self.data(word)
+            elif kind == LOAD_CONSTANT:
+                cycles = self.read_flash(place >> 4, cycles + 1) + 1
+                self.r[rd] = self.flash[place >> 2]
             elif kind == LOAD:
                 self.r[rd] = self.ram[place >> 2]
                 cycles += 2
@@ -1077,17 +1112,18 @@ class Core:
                 self.written[place >> WRITTEN_BITS] = 1
                 self.ram[place >> 2] = self.r[rd]
                 cycles += 1
-                self.line = -2 if self.mam_mode == 1 else self.line
+                if self.mam_mode == 1:
+                    self.line = NO_LINE
             elif kind == STORE_HALF or kind == STORE_BYTE:
                 self.store(word, 2 if kind == STORE_HALF else 1, self.r[rd])
                 cycles += 1
             else:
-                self.pc = pc
-                self.following = pc + size & _MASK
+                self.pc = pc - size
+                self.following = pc & _MASK
                 self.cycles = cycles
                 self.began = began
-                self.instructions = first
-                self.execute_whole(kind, rd, word, b)
+                self.instructions = count
+                self.execute_whole(kind, rd, word)
                 if self.cycles_per_instruction:
                     self.cycles = began + self.cycles_per_instruction
                 if self.faulted:
@@ -1097,28 +1133,23 @@ class Core:
                 if self.stopped or self.lines:
                     return 0
                 size = 2 if self.control & 0x20 else 4
+                usual = 28 | self.control >> 5 & 1
                 continue
-            pc = pc + size & _MASK
             if self.cycles_per_instruction:
                 cycles = began + self.cycles_per_instruction
-        self.pc = pc
+        self.pc = pc & _MASK
         self.cycles = cycles
         self.began = began
-        self.instructions = first
+        self.instructions = count
         return 0
 
     @cython.cfunc
-    def execute_whole(
-        self, kind: cython.longlong, rd: cython.longlong, word: cython.longlong, b: cython.longlong
-    ) -> cython.int:
+    def execute_whole(self, kind: cython.longlong, rd: cython.longlong, word: cython.longlong) -> cython.int:
         """An instruction that may end in an exception, another state or mode, or with a device; INDEXED in `kind`:
         loads and stores at the address `word`."""
         if kind == WHOLE:
             return self.arm(word)
-        elif kind == BRANCH_EXCHANGE:
-            self.control = self.control & 0xDF | (b & 1) << 5
-            return self.jump(b)
-        elif kind == LOAD_CONSTANT or kind == INDEXED + LOAD:
+        elif kind == INDEXED + LOAD:
             return self.finish_load(rd, self.load_word(word))
         elif kind == INDEXED + STORE:
             return self.store(word & -4, 4, self.r[rd])

@@ -30,37 +30,43 @@ ADDS_CONSTANT: Final = 13
 SUBS_CONSTANT: Final = 14
 MOVES_CONSTANT: Final = 15  # carry unchanged, here and in all that follow, but SHIFTS
 TEST_CONSTANT: Final = 16
+TEST_TURNED: Final = 17  # carry is the constant's highest bit
 # the operand is the second register as it is
-MOVE: Final = 17
-ADD: Final = 18
-SUBTRACT: Final = 19
-REVERSE: Final = 20
-AND: Final = 21
-OR: Final = 22
-XOR: Final = 23
-CLEAR: Final = 24  # BIC
-COMPARE: Final = 25
-ADDS: Final = 26
-SUBS: Final = 27
-MOVES: Final = 28
-TEST: Final = 29
+MOVE: Final = 18
+ADD: Final = 19
+SUBTRACT: Final = 20
+REVERSE: Final = 21
+AND: Final = 22
+OR: Final = 23
+XOR: Final = 24
+CLEAR: Final = 25  # BIC
+COMPARE: Final = 26
+ADDS: Final = 27
+SUBS: Final = 28
+MOVES: Final = 29
+ANDS: Final = 30
+ORS: Final = 31
+XORS: Final = 32
+TEST: Final = 33
+TEST_EQUAL: Final = 34  # TEQ
 # the operand is the second register, shifted
-SHIFT_LEFT: Final = 30
-SHIFT_RIGHT: Final = 31
-SHIFT_SIGNED: Final = 32
-SHIFTS: Final = 33  # with flags, of any type
-ADD_SHIFTED: Final = 34  # shifted left
-DATA: Final = 35  # every other operation on registers that takes one cycle; the word is the instruction
-LOAD_CONSTANT: Final = 36  # the word is the address
+SHIFT_LEFT: Final = 35
+SHIFT_RIGHT: Final = 36
+SHIFT_SIGNED: Final = 37
+SHIFTS: Final = 38  # with flags, of any type
+DATA: Final = 39  # every other operation on registers that takes one cycle; the word is the instruction
+LOAD_CONSTANT: Final = 40  # the word is the address
 # loads and stores without write-back, of first register and word
-LOAD: Final = 37
-STORE: Final = 38
-LOAD_HALF: Final = 39
-STORE_HALF: Final = 40
-LOAD_BYTE: Final = 41
-STORE_BYTE: Final = 42
+LOAD: Final = 41
+STORE: Final = 42
+LOAD_HALF: Final = 43
+STORE_HALF: Final = 44
+LOAD_BYTE: Final = 45
+STORE_BYTE: Final = 46
 # the same six of first and second register, that one shifted left
-INDEXED: Final = 43
+INDEXED: Final = 47
+# MOVE to SUBS of first and second register, that one shifted; not by ROR, nor by 32
+SHIFTED: Final = 53
 
 DESTINATION: Final = 32
 FIRST: Final = 36
@@ -263,7 +269,7 @@ def decode_transfer(op: cython.longlong, pc: cython.longlong) -> cython.longlong
         return kind | _ONE * (op >> 7 & 31 if op & 0x02000000 else 0) << AMOUNT
     if not op & 0x800000:
         word = -word
-    if kind == LOAD and op >> 16 & 15 == 15:
+    if kind == LOAD and op >> 16 & 15 == 15 and pc + word & 3 == 0:
         return entry_of(LOAD_CONSTANT, op >> 12 & 15, 0, 0, pc + 8 + word)
     return entry_of(kind, op >> 12 & 15, op >> 16 & 15, 0, word)
 
@@ -287,8 +293,8 @@ def decode_constant(op: cython.longlong) -> cython.longlong:
         elif code == 10:
             kind = COMPARE_CONSTANT
             word = ~word
-        elif code == 8 and turn == 0:
-            kind = TEST_CONSTANT
+        elif code == 8:
+            kind = TEST_TURNED if turn else TEST_CONSTANT
         elif code == 13 and turn == 0:
             kind = MOVES_CONSTANT
     elif code == 0:
@@ -327,22 +333,27 @@ def decode_register(op: cython.longlong) -> cython.longlong:
     type = op >> 5 & 3
     sets = op & 0x100000 != 0
     kind = 0
-    if amount or type:
-        if code == 13 and sets:
-            kind = SHIFTS
-        elif code == 13 and amount and type < 3:
-            kind = SHIFT_LEFT + type
-        elif code == 4 and not sets and type == 0:
-            kind = ADD_SHIFTED
+    if code == 13 and (amount or type) and (sets or amount and type < 3):
+        kind = SHIFTS if sets else SHIFT_LEFT + type
     elif sets:
         if code == 2:
             kind = SUBS
         elif code == 4:
             kind = ADDS
-        elif code == 8:
-            kind = TEST
         elif code == 10:
             kind = COMPARE
+        elif amount or type:  # the shifter gives the carry
+            return 0
+        elif code == 0:
+            kind = ANDS
+        elif code == 1:
+            kind = XORS
+        elif code == 8:
+            kind = TEST
+        elif code == 9:
+            kind = TEST_EQUAL
+        elif code == 12:
+            kind = ORS
         elif code == 13:
             kind = MOVES
     elif code == 0:
@@ -361,6 +372,10 @@ def decode_register(op: cython.longlong) -> cython.longlong:
         kind = MOVE
     elif code == 14:
         kind = CLEAR
+    if kind < SHIFT_LEFT and (amount or type):
+        if kind == 0 or amount == 0 or type == 3:
+            return 0
+        kind += SHIFTED - MOVE
     if kind == 0:
         return 0
     return entry_of(kind, op >> 12 & 15, op >> 16 & 15, op & 15, 0) | _ONE * (type << 5 | amount) << AMOUNT
