@@ -965,7 +965,6 @@ class Core:
                         cycles = began + self.cycles_per_instruction
                     continue
             pc += size
-            self.r[15] = pc + size & _MASK
             kind = entry >> KIND
             word = entry & _MASK
             rd = entry >> DESTINATION & 15
@@ -1095,6 +1094,7 @@ class Core:
                 self.mark(b)
                 self.c = self.carry
             elif kind == DATA:
+                self.r[15] = pc + size & _MASK
                 self.data(word)
             elif kind == LOAD_CONSTANT:
                 cycles = self.read_flash(place >> 4, cycles + 1) + 1
@@ -1120,6 +1120,7 @@ class Core:
             else:
                 self.pc = pc - size
                 self.following = pc & _MASK
+                self.r[15] = pc + size & _MASK
                 self.cycles = cycles
                 self.began = began
                 self.instructions = count
@@ -1318,7 +1319,10 @@ class Core:
     @cython.cfunc
     @cython.locals(value=cython.longlong, mask=cython.longlong, turn=cython.longlong)
     def status(self, op: cython.longlong) -> cython.int:
-        """MRS and MSR; what else has this form belongs to later architectures."""
+        """MRS, MSR, and BX to the program counter; what else has this form belongs to later architectures."""
+        if op & 0x0FFFFFF0 == 0x012FFF10:
+            self.control = self.control & 0xDF | (self.r[op & 15] & 1) << 5
+            return self.jump(self.r[op & 15])
         if op & 0x0FBF0FFF == 0x010F0000:
             self.r[op >> 12 & 15] = self.spsr() if op & 0x400000 else self.cpsr()
             return 0

@@ -1,7 +1,7 @@
 """Decoding: what an ARM or Thumb instruction does, as one number that the core executes.
 
 An instruction's number has, from bit 0, a word (constant, offset or target), three registers of four bits at
-DESTINATION, FIRST and SECOND, an amount of shift at AMOUNT with its type after it, the state that it was decoded for at
+DESTINATION, FIRST and SECOND (the program counter only in DATA and WHOLE), an amount of shift at AMOUNT with its type after it, the state that it was decoded for at
 IN_THUMB, its condition, and its kind. A kind is a frequent instruction in its simplest form; WHOLE is every other one,
 with the ARM instruction as its word. Constants that depend on the instruction's address are computed here.
 
@@ -114,8 +114,6 @@ def decode_thumb(op: cython.longlong, pc: cython.longlong) -> cython.longlong:
         op = entry_of(LOAD_CONSTANT, op >> 8 & 7, 0, 0, (pc + 4 & -4) + ((op & 0xFF) << 2))
     elif kind == 20:
         op = entry_of(MOVE_CONSTANT, op >> 8 & 7, 0, 0, (pc + 4 & -4) + ((op & 0xFF) << 2))
-    elif op & 0xFF00 == 0x4700:
-        op = entry_of(BRANCH_EXCHANGE, 0, 0, op >> 3 & 15, 0)
     elif op & 0xF000 == 0xD000 and op & 0x0E00 != 0x0E00:
         offset = (op & 0xFF) << 1
         kind = op >> 8 & 15
@@ -161,6 +159,8 @@ def arm_of_thumb(op: cython.longlong) -> cython.longlong:
             return 0x00800000 | rd << 16 | rd << 12 | op >> 3 & 15
         if code == 1:
             return 0x01500000 | rd << 16 | op >> 3 & 15
+        if code == 3:
+            return 0x012FFF10 | op >> 3 & 15
         return 0x01A00000 | rd << 12 | op >> 3 & 15
     if kind == 8:
         rd = op & 7
@@ -237,13 +237,11 @@ def decode_arm(op: cython.longlong, pc: cython.longlong) -> cython.longlong:
         if op >> 12 & 15 != 15 and op & 0x01200000 == 0x01000000:
             entry = decode_transfer(op, pc)
     elif op >> 26 & 3 == 0 and op & 0x01900000 != 0x01000000 and (op >> 12 & 15 != 15 or op & 0x01800000 == 0x01000000):
-        if op & 0x02000000:
-            entry = decode_constant(op)
-        elif op & 0x10 == 0:
-            entry = decode_register(op)
-        if entry == 0 and (op & 0x02000000 or op & 0x10 == 0):
-            entry = entry_of(DATA, 0, 0, 0, op)
-    if entry == 0:
+        if op & 0x02000000 or op & 0x10 == 0:
+            entry = decode_constant(op) if op & 0x02000000 else decode_register(op)
+            if entry == 0 or entry >> FIRST & 15 == 15 or entry >> SECOND & 15 == 15:
+                entry = entry_of(DATA, 0, 0, 0, op)
+    if entry == 0 or entry >> FIRST & 15 == 15 or entry >> SECOND & 15 == 15:
         entry = entry_of(WHOLE, 0, 0, 0, op)
     return entry & ~(_ONE * 15 << CONDITION) | (op >> 28) << CONDITION
 
