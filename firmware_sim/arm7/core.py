@@ -1508,6 +1508,9 @@ class Core:
         i=cython.longlong,
         count=cython.longlong,
         chosen=cython.longlong,
+        rest=cython.longlong,
+        place=cython.longlong,
+        inside=cython.bint,
         first=cython.bint,
         user=cython.bint,
     )
@@ -1516,8 +1519,10 @@ class Core:
         rn = op >> 16 & 15
         chosen = op & 0xFFFF
         count = 0
-        for i in range(16):
-            count += chosen >> i & 1
+        rest = chosen
+        while rest:
+            rest &= rest - 1
+            count += 1
         if chosen == 0:
             chosen = 0x8000
             count = 16
@@ -1529,6 +1534,10 @@ class Core:
             last = base - 4 * count & _MASK
             address = last if op & 0x01000000 else last + 4
         user = op & 0x400000 != 0 and not (op & 0x100000 and chosen & 0x8000)
+        address = address & _MASK & -4
+        place = address - self.ram_base
+        # all of a list in RAM: nothing is left to do but to move words
+        inside = op & 0xFFFF != 0 and 0 <= place and place + 4 * count <= self.ram_open
         if not op & 0x100000:
             first = True
             for i in range(16):
@@ -1536,25 +1545,38 @@ class Core:
                     value = self.get_user(i) if user else self.r[i]
                     if i == 15:  # one fetch further on
                         value = value + (2 if self.control & 0x20 else 4) & _MASK
-                    self.store(address & _MASK & -4, 4, value)
-                    address += 4
+                    if inside:
+                        self.written[place >> WRITTEN_BITS] = 1
+                        self.ram[place >> 2] = value
+                        place += 4
+                    else:
+                        self.store(address & _MASK, 4, value)
+                        address += 4
                     # the base changes after the first transfer: lowest in the list it is stored as it was
                     if first and op & 0x200000:
                         self.r[rn] = last
                     first = False
+            if inside:
+                self.cycles += count
+                if self.mam_mode == 1:
+                    self.line = NO_LINE
             return 0
-        self.cycles += 1
+        self.cycles += count + 1 if inside else 1
         if op & 0x200000:
             self.r[rn] = last
         else:
             last = base
         for i in range(16):
             if chosen >> i & 1:
-                value = self.load(address & _MASK & -4, 4)
-                address += 4
-                if self.faulted:
-                    self.r[rn] = last
-                    return 0
+                if inside:
+                    value = self.ram[place >> 2]
+                    place += 4
+                else:
+                    value = self.load(address & _MASK, 4)
+                    address += 4
+                    if self.faulted:
+                        self.r[rn] = last
+                        return 0
                 if user:
                     self.set_user(i, value)
                 elif i == 15:

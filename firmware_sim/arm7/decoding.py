@@ -1,9 +1,10 @@
 """Decoding: what an ARM or Thumb instruction does, as one number that the core executes.
 
 An instruction's number has, from bit 0, a word (constant, offset or target), three registers of four bits at
-DESTINATION, FIRST and SECOND (the program counter only in DATA and WHOLE), an amount of shift at AMOUNT with its type after it, the state that it was decoded for at
-IN_THUMB, its condition, and its kind. A kind is a frequent instruction in its simplest form; WHOLE is every other one,
-with the ARM instruction as its word. Constants that depend on the instruction's address are computed here.
+DESTINATION, FIRST and SECOND, an amount of shift at AMOUNT with its type after it, the state that it was decoded for at
+IN_THUMB, its condition, and its kind. A kind is a frequent instruction in its simplest form; DATA and WHOLE are all
+others, with the ARM instruction as their word, and those that have the program counter in a register. Constants that
+depend on the instruction's address are computed here.
 
 Every Thumb instruction but those that branch or reach the program counter is an ARM instruction (ARM Architecture
 Reference Manual, DDI 0100, chapter A7: "equivalent ARM syntax and encoding"); `arm_of_thumb` returns that one.
