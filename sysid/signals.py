@@ -5,13 +5,15 @@ before, and the derivative of the filtered signal is the filtered derivative: so
 derivative of the same Gaussian that smooths everything else.
 """
 
+import dataclasses
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter, savgol_filter
 
 from ranger_sim.sysid.dataset import Array, Table
@@ -26,6 +28,8 @@ JUMP, JUMPS_BY = 0.1, 8.0  # of the range, and times the median change: larger i
 # arrives there, and different numbers of a channel that has only states
 FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
 PASSED = 5.0  # counts, by the usual slope, over which the slope is taken at which it arrives. Chosen by us
+NEAR = 0.25  # steps: a row so near to a recorded one is that
+LOST = 1.5  # steps: rows farther apart lack one between them
 SHORTEST_WINDOW = 7  # rows
 COUNTED = 0.3  # of a channel's counts: below it these are not seen yet
 ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
@@ -74,24 +78,36 @@ def integral(table: Table, column: Array) -> Array:
 
 
 def uniform(table: Table) -> Table:
-    """The table on even stamps, run by run, each column by straight lines; itself when they are even already."""
+    """The table on even stamps, run by run, each column by straight lines; itself when they are even already.
+
+    A lost row is unmeasured, and on a cubic where the column is smooth: an input is needed there all the same.
+    """
     step_s = table.step_s
     if np.max(np.abs(np.diff(table.time_s) - step_s), initial=0.0, where=_inside(table)) < 0.01 * step_s:
         return table
     stamps: list[Array] = []
     columns: dict[str, list[Array]] = {name: [] for name in table.columns}
-    unmeasured: dict[str, list[Rows]] = {name: [] for name in table.unmeasured}
     runs: list[slice] = []
     start = 0
+    losses = bool(np.any(np.diff(table.time_s) > LOST * step_s))
+    smooth = [name for name, column in table.columns.items() if losses and is_smooth(table, column)]
+    before = {name: table.unmeasured.get(name, np.zeros(len(table), dtype=bool)) for name in table.columns}
+    unmeasured: dict[str, list[Rows]] = {name: [] for name in (before if losses else table.unmeasured)}
     for run in table.runs:
         time_s = table.time_s[run]
         even = time_s[0] + step_s * np.arange(int((time_s[-1] - time_s[0]) / step_s + 0.5) + 1)
         even = even[even <= time_s[-1] + 1e-9]
         stamps.append(even)
+        place = np.clip(np.searchsorted(time_s, even), 1, len(time_s) - 1)
+        near = np.minimum(np.abs(even - time_s[place - 1]), np.abs(time_s[place] - even))
+        lost = (time_s[place] - time_s[place - 1] > LOST * step_s) & (near > NEAR * step_s)
         for name, column in table.columns.items():
-            columns[name].append(np.interp(even, time_s, column[run]))
-        for name, rows in table.unmeasured.items():
-            unmeasured[name].append(np.interp(even, time_s, rows[run]) > 0.0)
+            values = np.interp(even, time_s, column[run])
+            if name in smooth and np.any(lost):
+                values[lost] = CubicSpline(time_s, column[run])(even[lost])
+            columns[name].append(values)
+        for name, parts in unmeasured.items():
+            parts.append((np.interp(even, time_s, before[name][run]) > 0.0) | lost)
         runs.append(slice(start, start + len(even)))
         start += len(even)
     return Table(
@@ -104,6 +120,24 @@ def uniform(table: Table) -> Table:
         {name: counts_of(table, name) for name in table.columns},
         table.begin_s,
     )
+
+
+def cut_where_lost(table: Table, names: Collection[str], held: bool) -> Table:
+    """The table with a new run after each lost row over which one of these channels changes.
+
+    held: smooth ones as well. What a held value was in a row that is lost, and when it changed, is not known; a simulator that goes on through it
+    has an error from there on.
+    """
+    lost = np.diff(table.time_s) > LOST * table.step_s
+    abrupt = [table[name] for name in names if name in table and (held or not is_smooth(table, table[name]))]
+    cuts = np.flatnonzero(lost & np.any([np.diff(column) != 0.0 for column in abrupt], axis=0)) + 1 if abrupt else []
+    ends = np.union1d(cuts, [run.start for run in table.runs] + [run.stop for run in table.runs]).astype(int).tolist()
+    runs = tuple(
+        slice(first, last)
+        for first, last in itertools.pairwise(ends)
+        if any(run.start <= first and last <= run.stop for run in table.runs)
+    )
+    return dataclasses.replace(table, runs=runs)
 
 
 def counts_of(table: Table, name: str) -> float:

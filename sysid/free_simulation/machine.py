@@ -15,7 +15,7 @@ from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.fit import TrajectoryFit
 from ranger_sim.sysid.free_simulation.linearised import LinearisedRecording
 from ranger_sim.sysid.free_simulation.terms import Acting, Shape, SimulatedEffect, Term
-from ranger_sim.sysid.machine import Columns, Effect, Recording, Values
+from ranger_sim.sysid.machine import Columns, Effect, Recording, Values, inputs_of
 
 MOST_ROWS = 12000  # of a recording; a longer one is averaged over neighbours
 SHORTEST_S, FEWEST_ROWS = 2.0, 400  # a recording is as long, or has as many rows, where its machine says nothing
@@ -32,7 +32,7 @@ class SimulatedMachine(DeclaredMachine):
         if missing:
             there = ", ".join(table.columns)
             raise UserError(f"{table.name}: {self.name} needs {', '.join(missing)}; there are {there}")
-        table = signals.uniform(table)
+        table = signals.uniform(signals.cut_where_lost(table, inputs_of(self), bool(self.held_inputs)))
         longest_s = max((run.stop - run.start) * table.step_s for run in table.runs)
         needed_s = min(SHORTEST_S, FEWEST_ROWS * table.step_s) if self.shortest_s is None else self.shortest_s
         if longest_s < needed_s:
