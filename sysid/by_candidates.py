@@ -120,12 +120,15 @@ def _may_be_once(found: Diagnosis, effects: Sequence[Effect]) -> bool:
 
 
 def _was_once(other: Diagnosis, lasting: Diagnosis) -> bool:
-    """True where causes of which one happened once explain surely more than the lasting ones."""
-    if other.doubtful or not any(each.effect.once for each in other.named):
+    """True where causes of which one happened once explain surely more than the lasting ones, or any explain it where
+    these alone do not."""
+    if other.doubtful or not other.named:
         return False
     if lasting.doubtful:
         return True
-    return _size(lasting.extended) - _size(other.extended) > SURELY_ONCE
+    return (
+        any(each.effect.once for each in other.named) and _size(lasting.extended) - _size(other.extended) > SURELY_ONCE
+    )
 
 
 def _size(regression: Regression) -> float:

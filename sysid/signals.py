@@ -8,7 +8,7 @@ derivative of the same Gaussian that smooths everything else.
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ PASSED = 5.0  # counts, by the usual slope, over which the slope is taken at whi
 NEAR = 0.25  # steps: a row so near to a recorded one is that
 LOST = 1.5  # steps: rows farther apart lack one between them
 SHORTEST_WINDOW = 7  # rows
+GROWS = 0.75  # power of the window; a random walk's departure grows with its root, a motion's with its cube
 COUNTED = 0.3  # of a channel's counts: below it these are not seen yet
 ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
 HELD_JUMPS = 0.2  # of the samples at most: a channel that changes at no more of them is held in between
@@ -87,57 +88,69 @@ def uniform(table: Table) -> Table:
         return table
     stamps: list[Array] = []
     columns: dict[str, list[Array]] = {name: [] for name in table.columns}
+    unmeasured: dict[str, list[Rows]] = {name: [] for name in table.unmeasured}
+    losses: list[Rows] = []
     runs: list[slice] = []
     start = 0
-    losses = bool(np.any(np.diff(table.time_s) > LOST * step_s))
-    smooth = [name for name, column in table.columns.items() if losses and is_smooth(table, column)]
-    before = {name: table.unmeasured.get(name, np.zeros(len(table), dtype=bool)) for name in table.columns}
-    unmeasured: dict[str, list[Rows]] = {name: [] for name in (before if losses else table.unmeasured)}
     for run in table.runs:
         time_s = table.time_s[run]
         even = time_s[0] + step_s * np.arange(int((time_s[-1] - time_s[0]) / step_s + 0.5) + 1)
         even = even[even <= time_s[-1] + 1e-9]
         stamps.append(even)
-        place = np.clip(np.searchsorted(time_s, even), 1, len(time_s) - 1)
-        near = np.minimum(np.abs(even - time_s[place - 1]), np.abs(time_s[place] - even))
-        lost = (time_s[place] - time_s[place - 1] > LOST * step_s) & (near > NEAR * step_s)
         for name, column in table.columns.items():
-            values = np.interp(even, time_s, column[run])
-            if name in smooth and np.any(lost):
-                values[lost] = CubicSpline(time_s, column[run])(even[lost])
-            columns[name].append(values)
-        for name, parts in unmeasured.items():
-            parts.append((np.interp(even, time_s, before[name][run]) > 0.0) | lost)
+            columns[name].append(np.interp(even, time_s, column[run]))
+        for name, rows in table.unmeasured.items():
+            unmeasured[name].append(np.interp(even, time_s, rows[run]) > 0.0)
+        losses.append(_lost(even, time_s, step_s))
         runs.append(slice(start, start + len(even)))
         start += len(even)
-    return Table(
+    lost = np.concatenate(losses)
+    made = Table(
         np.concatenate(stamps),
         {name: np.concatenate(parts) for name, parts in columns.items()},
         tuple(runs),
         table.name,
         table.resolution,
-        {name: np.concatenate(parts) for name, parts in unmeasured.items()},
+        {name: np.concatenate(parts) | lost for name, parts in unmeasured.items()},
         {name: counts_of(table, name) for name in table.columns},
         table.begin_s,
     )
+    if np.any(lost):
+        made.unmeasured = {name: made.unmeasured.get(name, lost) for name in made.columns}
+        for column in made.columns.values():
+            if is_smooth(made, column):
+                known = made.time_s[~lost], column[~lost]
+                column[lost] = CubicSpline(*known)(made.time_s[lost])
+    return made
+
+
+def _lost(even: Array, time_s: Array, step_s: float) -> Rows:
+    """(n,) True for even stamps between two recorded ones that lack a row between them."""
+    place = np.clip(np.searchsorted(time_s, even), 1, max(1, len(time_s) - 1))
+    if len(time_s) < 2:
+        return np.zeros(len(even), dtype=bool)
+    near = np.minimum(np.abs(even - time_s[place - 1]), np.abs(time_s[place] - even))
+    return np.asarray((time_s[place] - time_s[place - 1] > LOST * step_s) & (near > NEAR * step_s))
 
 
 def cut_where_lost(table: Table, names: Collection[str], held: bool) -> Table:
     """The table with a new run after each lost row over which one of these channels changes.
 
-    held: smooth ones as well. What a held value was in a row that is lost, and when it changed, is not known; a simulator that goes on through it
-    has an error from there on.
+    held: smooth ones as well. What a held value was in a row that is lost, and when it changed, is not known; a
+    simulator that goes on through it has an error from there on.
     """
-    lost = np.diff(table.time_s) > LOST * table.step_s
-    abrupt = [table[name] for name in names if name in table and (held or not is_smooth(table, table[name]))]
-    cuts = np.flatnonzero(lost & np.any([np.diff(column) != 0.0 for column in abrupt], axis=0)) + 1 if abrupt else []
-    ends = np.union1d(cuts, [run.start for run in table.runs] + [run.stop for run in table.runs]).astype(int).tolist()
-    runs = tuple(
-        slice(first, last)
-        for first, last in itertools.pairwise(ends)
-        if any(run.start <= first and last <= run.stop for run in table.runs)
-    )
-    return dataclasses.replace(table, runs=runs)
+    lost = np.flatnonzero(np.diff(table.time_s) > LOST * table.step_s) + 1
+    whole = _cut(table, lost)
+    abrupt = [table[name] for name in names if name in table and (held or not is_smooth(whole, table[name]))]
+    return _cut(table, [row for row in lost if any(column[row] != column[row - 1] for column in abrupt)])
+
+
+def _cut(table: Table, rows: Iterable[int]) -> Table:
+    """The table with a new run at each of these rows as well."""
+    ends = sorted({*(int(row) for row in rows), *(end for run in table.runs for end in (run.start, run.stop))})
+    runs = [slice(first, last) for first, last in itertools.pairwise(ends)]
+    inside = [each for each in runs if any(run.start <= each.start and each.stop <= run.stop for run in table.runs)]
+    return dataclasses.replace(table, runs=tuple(inside))
 
 
 def counts_of(table: Table, name: str) -> float:
@@ -249,8 +262,8 @@ def jumps(table: Table, column: Array) -> Array:
 def roughness(table: Table, column: Array, unmeasured: Rows | None = None) -> float:
     """Deviation of a channel's own noise: its departure from a parabola over a tenth of a second, without jumps.
 
-    The window is shorter where the departure grows faster than it: then it is motion, of a machine that is that fast.
-    Noise with a memory grows with the window's root at most, and counts of a slow channel show in long ones only.
+    The window is shorter where the departure grows nearly as fast as it: then it is motion, of a machine that is that
+    fast. Noise with a memory grows with the window's root at most, and counts of a slow channel show in long ones only.
     unmeasured: (n,) rows that do not count.
     """
     longest = max(SHORTEST_WINDOW, 2 * round(0.5 * ROUGH_S / table.step_s) + 1)
@@ -259,7 +272,7 @@ def roughness(table: Table, column: Array, unmeasured: Rows | None = None) -> fl
     found, before = 0.0, 0
     for size in (*sizes, longest):
         now = _off_parabola(table, column, unmeasured, size)
-        if before and found > COUNTED * counts and now > found * size / before:
+        if before and found > COUNTED * counts and now > found * (size / before) ** GROWS:
             break
         found, before = now, size
     return found

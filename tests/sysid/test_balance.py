@@ -189,3 +189,12 @@ def test_a_coupling_is_found_where_another_joints_rate_is_noisy():
     assert np.corrcoef(stand_ins["coupling"], accelerations[0])[0, 1] > 0.8  # 0.2 of the column itself
     found = diagnose(Elbow(), [table]).result
     assert not found.causes and found.evidence.parameters["coupling"].value == pytest.approx(0.05, rel=0.1)
+
+
+def test_held_out_data_of_a_machine_with_the_other_sign_are_found():
+    """Its parameters are fitted there anew; without a look at them this was a sound answer."""
+    other = stand(4)
+    other.columns["thrust_N"] *= -1.0
+    result = diagnose(ThrustStand(), [stand(3)], [other]).result
+    assert [(each.channel, each.kind) for each in result.data_findings] == [("thrust_per_rate2", "other_held_out")]
+    assert result.detected and not result.causes

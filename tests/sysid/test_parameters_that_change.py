@@ -10,6 +10,7 @@ from ranger_sim.sysid.balance import Balance
 from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.machine import PARAMETER, Known, Quantity
 from ranger_sim.sysid.pipeline import diagnose
+from ranger_sim.sysid.preparation import Prepared, parted
 from tests.sysid.hidden_effects import CASES, SHORT
 
 
@@ -41,6 +42,40 @@ def test_a_wall_that_fouls_is_named_and_a_thermometer_that_drifts_is_not_taken_f
     fouled, drifted = _found("heated-rod fouling", 1e-4).result.causes, _found("heated-rod drift", 1.0).result.causes
     assert [(each.name, each.at) for each in fouled] == [("parameter_drift", "h2")]
     assert [(each.name, each.at) for each in drifted] == [("sensor_drift", "cold_C")]
+
+
+@pytest.mark.parametrize("held_out", ["without it", "with it"])
+@pytest.mark.parametrize(
+    ("title", "size", "at", "coefficient", "at_s"),
+    [
+        ("thrust-stand seizing", 0.02, "b", "change_1e-5Nms", 4.3),
+        ("heated-rod opening", 0.02, "h2", "change_W_per_K", 3300.0),
+        ("elastic-joint cracking", -60.0, "K", "change_Nm_per_rad", 1.86),
+        ("elastic-joint slipping", 0.01, "link_rad", "change_rad", 3.84),
+    ],
+)
+def test_what_jumps_is_named_with_its_time(title, size, at, coefficient, at_s, held_out):
+    """At 0.43, 0.55, 0.31 and 0.64 of runs of 10, 6000, 6 and 6 s; another run may have it at the same time or not."""
+    case = next(each for each in CASES if each.title == title)
+    more = SHORT[case.machine.name]
+    cause = case.cause if held_out == "with it" else "none"
+    run, other = case.make(case.cause, size, 1, **more), case.make(cause, size, 101, **more)
+    causes = diagnose(case.machine(), [run], [other]).result.causes
+    assert [(each.at, each.form) for each in causes] == [(at, "jump")]
+    true = {"b": 2.1 * size, "h2": 0.35 * size}.get(at, size)
+    assert _holds(causes[0], coefficient, true)
+    assert _holds(causes[0], "at_s", at_s)
+
+
+@pytest.mark.parametrize("title", ["thrust-stand warming", "heated-rod drift", "thrust-stand seizing"])
+def test_a_held_out_part_goes_on_with_the_time_of_its_recording(title):
+    """It begins when most of a settling is over, with the drift that there is by then, after the jump."""
+    case = next(each for each in CASES if each.title == title)
+    more = {"seconds": 14.0} if case.machine.name == "thrust-stand" else {}
+    first, last = parted([Prepared(case.make(case.cause, case.size, 1, **more), [], [], {})], 0.3)
+    assert last[0].table.elapsed_s[0] == pytest.approx(first[0].table.time_s[-1], rel=0.01)
+    causes = diagnose(case.machine(), [first[0].table], [last[0].table]).result.causes
+    assert [(each.name, each.at) for each in causes] == list(case.names)
 
 
 class Stand(Balance):

@@ -26,6 +26,7 @@ from ranger_sim.sysid.reading import open_recording, read
 from ranger_sim.sysid.recipe import Recipe
 from ranger_sim.tools.cli import main
 from tests.boards.original_images import DATA
+from tests.sysid.robot_joint import Joint
 
 CASES = DATA.parent / "cases"
 needs_cases = pytest.mark.skipif(not CASES.exists(), reason=f"no cases in {CASES.name}/")
@@ -615,6 +616,22 @@ def test_the_unit_in_a_columns_name_is_questioned_and_dates_are_not(written):
     rows = "".join(f"2026-11-05 09:{k // 60:02d}:{k % 60:02d},{k % 7 / 7}\n" for k in range(100))
     (found,) = [each for each in read(written("time,a_V\n" + rows)).findings if each.kind == "slow_samples"]
     assert found.severity == sanity.NOTE and not sanity.doubts([found])
+
+
+def test_minutes_in_a_columns_name_are_meant(written):
+    rows = "".join(f"{k / 12:.6f},{k % 7 / 7}\n" for k in range(100))
+    (found,) = [each for each in read(written("t [min],a_V\n" + rows)).findings if each.kind == "slow_samples"]
+    assert found.severity == sanity.NOTE and "probably" not in found.text
+
+
+def test_a_rate_that_is_no_slope_of_its_angle_is_found(written):
+    """deg/s under the heading rpm is 6 times the slope; nothing of a joint can be concluded from both."""
+    t = 0.01 * np.arange(2000)
+    rows = np.column_stack([t, np.sin(t), np.degrees(np.cos(t)), np.cos(t) + 0.1 * np.sin(3.0 * t)])
+    text = "\n".join(",".join(f"{each:.6f}" for each in row) for row in rows)
+    path = written("t_s,angle_rad,rate_rpm,current_A\n" + text)
+    with pytest.raises(UserError, match="rate_rad_per_s: it is 6 times the derivative of angle_rad"):
+        prepared(open_recording(path), Joint())
 
 
 def prepared_run(written, names, data, **how):
