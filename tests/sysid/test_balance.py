@@ -192,7 +192,7 @@ def test_a_coupling_is_found_where_another_joints_rate_is_noisy():
 
 
 def test_held_out_data_of_a_machine_with_the_other_sign_are_found():
-    """Its parameters are fitted there anew; without a look at them this was a sound answer."""
+    """Its parameters are fitted there anew; without checking them this was a sound answer."""
     other = stand(4)
     other.columns["thrust_N"] *= -1.0
     result = diagnose(ThrustStand(), [stand(3)], [other]).result

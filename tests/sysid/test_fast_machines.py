@@ -18,7 +18,7 @@ def _table(**columns):
 @pytest.mark.parametrize(
     ("hertz", "noise"), [(0.5, 0.01), (5.0, 0.01), (30.0, 0.01), (100.0, 0.01), (0.5, 1e-4), (5.0, 1e-4), (30.0, 1e-4)]
 )
-def test_noise_is_no_motion_of_any_frequency(hertz, noise):
+def test_noise_is_measured_next_to_a_motion_of_any_frequency(hertz, noise):
     """Within 60 %: of a motion, what is less than the noise counts as noise. Over 0.1 s all is 0.02 to 1."""
     column = np.sin(2.0 * np.pi * hertz * TIME_s) + noise * generator(1, "fast").normal(size=len(TIME_s))
     assert signals.roughness(_table(a=column), column) == pytest.approx(noise, rel=0.6)
