@@ -126,8 +126,14 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
             scale="limit" if shapes[0] else None,
         )  # fmt: skip
 
+    slips = Term(
+        "input_offset", name, "input", ("change",),
+        lambda r, shape, values: {into(name): _jumped(r.table.elapsed_s, shape)}, _jumps(recordings),
+        meaning=f"the machine gets {name} + change from at_s after the recording's start on",
+        independent=True, form="jump", scale="at_s", once=True,
+    )  # fmt: skip
     made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]),
-                 f"the machine gets {name} + offset")]  # fmt: skip
+                 f"the machine gets {name} + offset"), slips]  # fmt: skip
     if limits:
         beyond: Signal = lambda s, shape: np.clip(s[name], -shape["limit"], shape["limit"]) - s[name]  # noqa: E731
         made.append(

@@ -54,8 +54,8 @@ CASES = (
     Case(*STAND, "lag", 0.05, (("sensor_lag", "thrust_N"),), "lag_s", 0.05),
     Case(*STAND, "offset", 0.1, (("sensor_offset", "thrust_N"),), "offset_N", 0.1),
     Case(*STAND, "coulomb", 0.004, (("coulomb_friction", "w"), ("direction_friction", "w")), "coulomb_torque", 0.004),
-    Case(*STAND, "warming", 1.0, (("parameter_drift", "b"),), "change_1e_m5_N_m_s", -2.1),
-    Case(*STAND, "seizing", 0.5, (("parameter_drift", "b"),), "change_1e_m5_N_m_s", 1.05),
+    Case(*STAND, "warming", 1.0, (("parameter_drift", "b"),), "change_1e-5Nms", -2.1),
+    Case(*STAND, "seizing", 0.5, (("parameter_drift", "b"),), "change_1e-5Nms", 1.05),
     Case(*ROD, "none", 0.0, ()),
     Case(*ROD, "radiation", 2e-9, (("radiation", "hot end"),), "nW_per_K4", 2.0),
     Case(*ROD, "heater", 0.05, ()),  # what scales heater, capacities and conductances alike cannot be seen
@@ -66,9 +66,10 @@ CASES = (
     Case(*JOINT, "cubic", 3000.0, (("stiffening", "gear"),), "Nm_per_rad3", 3000.0),
     Case(*JOINT, "gravity", 0.5, (("once_per_turn", "link_rate"),), "sine_torque", -0.5),
     Case(*JOINT, "drag", 0.02, (("drag", "link_rate"),), "quadratic_torque_s2", 0.02),
-    Case(*JOINT, "softening", -0.5, (("parameter_drift", "K"),), "drift_N_m_per_rad_per_s", -0.5),
+    Case(*JOINT, "softening", -0.5, (("parameter_drift", "K"),), "drift_Nm_per_rad_per_s", -0.5),
     Case(*JOINT, "slipping", 0.01, (("sensor_drift", "link_rad"),), "change_rad", 0.01),
-    Case(*JOINT, "cracking", -4.0, (("parameter_drift", "K"),), "change_N_m_per_rad", -4.0),
+    Case(*JOINT, "leaning", 0.0005, (("input_offset", "u"),), "change", 0.0005),
+    Case(*JOINT, "cracking", -4.0, (("parameter_drift", "K"),), "change_Nm_per_rad", -4.0),
     Case(*JOINT, "scale", 0.02, (("sensor_scale", "link_rad"),), "share", 0.02),
 )
 

@@ -123,6 +123,7 @@ def elastic_joint(cause, size, seed, seconds=20.0, rate_hz=250.0):
         gear += size if cause == "cracking" and clock_s > 0.31 * seconds else 0.0
         through = gear * twist + 0.15 * (motor_rate - link_rate)
         through += size * twist**3 if cause == "cubic" else 0.0
+        given += size if cause == "leaning" and clock_s > 0.57 * seconds else 0.0
         load = 0.06 * link_rate
         load += size * math.sin(link) if cause == "gravity" else 0.0
         load += size * link_rate * abs(link_rate) if cause == "drag" else 0.0

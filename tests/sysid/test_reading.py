@@ -630,7 +630,7 @@ def test_a_rate_that_is_not_the_slope_of_its_angle_is_found(written):
     rows = np.column_stack([t, np.sin(t), np.degrees(np.cos(t)), np.cos(t) + 0.1 * np.sin(3.0 * t)])
     text = "\n".join(",".join(f"{each:.6f}" for each in row) for row in rows)
     path = written("t_s,angle_rad,rate_rpm,current_A\n" + text)
-    with pytest.raises(UserError, match="rate_rad_per_s: it is 6\.001 times the derivative of angle_rad"):
+    with pytest.raises(UserError, match="rate_rad_per_s: it is 6.001 times the derivative of angle_rad"):
         prepared(open_recording(path), Joint())
 
 
