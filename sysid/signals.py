@@ -139,7 +139,7 @@ def cut_where_lost(table: Table, names: Collection[str], held: bool) -> Table:
     held: smooth ones as well. What a held value was in a row that is lost, and when it changed, is not known; a
     simulator that goes on through it has an error from there on.
     """
-    lost = np.flatnonzero(np.diff(table.time_s) > LOST * table.step_s) + 1
+    lost = (np.flatnonzero(np.diff(table.time_s) > LOST * table.step_s) + 1).tolist()
     whole = _cut(table, lost)
     abrupt = [table[name] for name in names if name in table and (held or not is_smooth(whole, table[name]))]
     return _cut(table, [row for row in lost if any(column[row] != column[row - 1] for column in abrupt)])
@@ -147,7 +147,7 @@ def cut_where_lost(table: Table, names: Collection[str], held: bool) -> Table:
 
 def _cut(table: Table, rows: Iterable[int]) -> Table:
     """The table with a new run at each of these rows as well."""
-    ends = sorted({*(int(row) for row in rows), *(end for run in table.runs for end in (run.start, run.stop))})
+    ends = sorted({*rows, *(end for run in table.runs for end in (run.start, run.stop))})
     runs = [slice(first, last) for first, last in itertools.pairwise(ends)]
     inside = [each for each in runs if any(run.start <= each.start and each.stop <= run.stop for run in table.runs)]
     return dataclasses.replace(table, runs=tuple(inside))

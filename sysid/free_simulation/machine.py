@@ -32,14 +32,14 @@ class SimulatedMachine(DeclaredMachine):
         if missing:
             there = ", ".join(table.columns)
             raise UserError(f"{table.name}: {self.name} needs {', '.join(missing)}; there are {there}")
-        table = signals.uniform(signals.cut_where_lost(table, inputs_of(self), bool(self.held_inputs)))
-        longest_s = max((run.stop - run.start) * table.step_s for run in table.runs)
+        longest_s = max(float(np.ptp(table.time_s[run])) for run in table.runs) + table.step_s
         needed_s = min(SHORTEST_S, FEWEST_ROWS * table.step_s) if self.shortest_s is None else self.shortest_s
         if longest_s < needed_s:
             raise UserError(
                 f"{table.name}: the longest stretch without a gap is {longest_s:.3g} s, "
                 f"{self.name} needs {needed_s:.3g} s (its shortest_s)"
             )
+        table = signals.uniform(signals.cut_where_lost(table, inputs_of(self), bool(self.held_inputs)))
         fit = TrajectoryFit(self, table, -(-len(table) // MOST_ROWS))
         fit.settle(follow=True)
         _chosen(fit)

@@ -6,6 +6,9 @@ import pytest
 from ranger_sim.foundation.random_arrays import generator
 from ranger_sim.sysid import signals
 from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.pipeline import diagnose
+from tests.sysid.machines_of_a_user import ElasticJoint
+from tests.sysid.other_machines import elastic_joint
 
 STEP_s = 2.5e-4
 TIME_s = STEP_s * np.arange(8000)
@@ -66,3 +69,14 @@ def test_a_smooth_input_goes_on_over_a_lost_row_unless_it_is_held():
     table = _without([1020], u=np.sin(2.0 * np.pi * 20.0 * TIME_s))
     assert len(signals.cut_where_lost(table, ["u"], held=False).runs) == 1
     assert len(signals.cut_where_lost(table, ["u"], held=True).runs) == 2
+
+
+def test_a_sound_joint_of_which_a_twelfth_of_the_rows_is_lost_is_silent():
+    runs = []
+    for seed in (1, 101):
+        whole = elastic_joint("none", 0.0, seed, seconds=6.0)
+        kept = np.flatnonzero(generator(seed, "lost").uniform(size=len(whole)) > 1.0 / 12.0)
+        columns = {name: column[kept] for name, column in whole.columns.items()}
+        table = Table(whole.time_s[kept], columns, (slice(0, len(kept)),), whole.name, whole.resolution)
+        runs.append(table)
+    assert not diagnose(ElasticJoint(), [runs[0]], [runs[1]]).result.detected
