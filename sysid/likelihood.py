@@ -431,8 +431,8 @@ def _named(one: Scored, ranked: Sequence[Scored], near: Sequence[Scored], chance
         freedom,
         (1.0 + float(np.count_nonzero(chance >= score))) / (1.0 + len(chance)),
         score,
-        [each[3].effect for each in near if each is not one],
-        [(each[3].effect, score - each[0]) for each in ranked if each is not one],
+        [each[3].effect for each in near if each[3].effect is not trial.effect],
+        [(each[3].effect, score - each[0]) for each in ranked if each[3].effect is not trial.effect],
     )
 
 
