@@ -15,7 +15,7 @@ from ranger_sim.sysid.regression import Regression
 
 CHI2 = 3.84  # 95 % of one degree of freedom
 Z95 = 1.96  # standard errors on each side of a 95 % interval
-ROUNDS = 4  # of finer steps, each a seventh of the one before
+ROUNDS = 4  # of finer steps, each a seventh of the one before: an eighth of 6000 rows comes down to a row
 BETWEEN = 6  # shapes between two neighbours of the grid, where a shape is on a scale
 
 Intervals = dict[str, tuple[float, float]]

@@ -435,10 +435,7 @@ class Regression:
         kept = np.sort(pivot[:rank])
         self.z = self.stand_in[:, kept] / scale[kept]
         self.phi = self.measured[:, kept] / scale[kept]
-        try:
-            self.inverse = np.linalg.inv(self.z.T @ self.phi)
-        except np.linalg.LinAlgError:  # a column with which its stand-in has nothing in common
-            self.inverse = np.linalg.pinv(self.z.T @ self.phi)
+        self.inverse = np.linalg.inv(self.z.T @ self.phi)
         solved = np.zeros(self.count)
         solved[kept] = self.inverse @ (self.z.T @ self.response) / scale[kept]
         self._face()

@@ -28,11 +28,13 @@ JUMP, JUMPS_BY = 0.1, 8.0  # of the range, and times the median change: larger i
 # arrives there, and different numbers of a channel that has only states
 FLAT, FEWEST_FLATS, STEEP, FEW_NUMBERS = 3, 2, 0.2, 20
 PASSED = 5.0  # counts, by the usual slope, over which the slope is taken at which it arrives. Chosen by us
-NEAR = 0.25  # steps: a row so near to a recorded one is that
-LOST = 1.5  # steps: rows farther apart lack one between them
+NEAR = 0.25  # steps: a row so near to a recorded one is that. Chosen by us
+LOST = 1.5  # steps: rows farther apart lack one between them. Chosen by us
 SHORTEST_WINDOW = 7  # rows
-GROWS = 0.75  # power of the window; a random walk's departure grows with its root, a motion's with its cube
-COUNTED = 0.3  # of a channel's counts: below it these are not seen yet
+# Power of the window: a random walk's departure grows with 0.5, a motion's with 3. Chosen by us, so that what counts as
+# noise is at most 1.6 times too large next to a sine
+GROWS = 0.75
+COUNTED = 0.3  # of a channel's counts: below it these are not seen yet; rounding alone is 0.29 of one
 ROUGH_S = 0.1  # window in which a parabola separates a channel's own noise from its course
 HELD_JUMPS = 0.2  # of the samples at most: a channel that changes at no more of them is held in between
 FEWEST_RETURNS = 5  # of rows that go to the next count and back, in a channel of counts. Chosen by us

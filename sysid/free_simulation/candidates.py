@@ -30,7 +30,7 @@ SPEEDS = (0.05, 0.15, 0.5)  # of a rate's rms: about which Stribeck's excess fal
 SLOW = 0.01  # of a rate's rms: about which a smoothed sign turns, where the joint does not say
 CLIPPED = (0.2, 0.35, 0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of an input's size at which it may saturate
 # Of a dead zone or a saturation: a hard one has 1, at the right limit. At the grid's limit near it the share may be a
-# multiple; much less or more is another effect's shadow
+# multiple; much less or more is another effect's shadow (131 in a ship's zigzag). Chosen by us
 LEAST_SHARE, MOST_SHARE = 0.5, 20.0
 JUMPED = (0.03, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 0.97)  # of the longest recording: when something jumps
 SETTLED = (0.15, 0.5, 1.5, 5.0)  # of the longest recording: time constants of a parameter that settles
