@@ -31,7 +31,7 @@ from ranger_sim.sysid import (
 )
 from ranger_sim.sysid.dataset import Finding, Table
 from ranger_sim.sysid.diagnosis import LITTLE, Diagnosis, KnownEffect, Visible
-from ranger_sim.sysid.machine import Effect, Machine, Recording, inputs_of, simulated_outputs
+from ranger_sim.sysid.machine import LAGS, Effect, Machine, Recording, inputs_of, simulated_outputs
 from ranger_sim.sysid.naming import Named, Trial
 from ranger_sim.sysid.regression import Regression, kept_rows
 from ranger_sim.sysid.results import DiagnosisEvidence, HeldOutError
@@ -195,7 +195,7 @@ def _answered(begun: _Begun, effects: Sequence[Effect], progress: Callable[[str,
             break
         small += [each.effect.name for each in below]
         effects = [each for each in effects if not any(one.effect.excludes(each) for one in below)]  # in all its forms
-        lags = [each for each in below if each.effect.cause == "sensor_lag"]
+        lags = [each for each in below if each.effect.cause in LAGS]
         skews.extend(lags)  # of the sensor or of the input's way to the machine: it is there
         found = selected(recordings, held, 0.7)
         before = predictability.test(found.base, predictor.columns(recordings), seed) if lags else before
@@ -263,7 +263,7 @@ def _simulated_again(
     try:
         again = simulations.again(recordings, found.named, found.with_named)
         return again, simulations.again(held, _there(found.named, held), found.with_named), []
-    except np.linalg.LinAlgError:
+    except (UserError, np.linalg.LinAlgError):
         names = " and ".join(each.effect.name for each in found.named)
         found.named, found.with_named = [], found.base
         text = f"with {names} in it, which explains these data best at first order, the simulation runs away"
@@ -417,7 +417,7 @@ def _below(floor: Mapping[str, tuple[float, ...]], found: likelihood.Selection, 
     for each in found.named:
         if each.effect is effect and effect.name in floor:
             size = math.hypot(*(found.with_named.values[name] for name in each.coefficients))
-            times = LAG_ABOVE_NUMERICS if effect.cause == "sensor_lag" else ABOVE_NUMERICS
+            times = LAG_ABOVE_NUMERICS if effect.cause in LAGS else ABOVE_NUMERICS
             return size < times * math.hypot(*floor[effect.name])
     return False
 
@@ -483,13 +483,13 @@ def _stamps(found: likelihood.Selection) -> list[Named]:
     """
     step_s = found.base.recordings[0].table.step_s
     simulated = any(each.entries for each in found.base.recordings)
-    refused = [each for each in found.refused if simulated and each.effect.cause == "sensor_lag"]
+    refused = [each for each in found.refused if simulated and each.effect.cause in LAGS]
     with_refused = naming.refit(found.base, [*found.named, *refused])
     return [
         each
         for share, lags, values in ((HALF_SAMPLE, found.named, found.with_named), (1.0, refused, with_refused))
         for each in lags
-        if each.effect.cause == "sensor_lag" and abs(values.values[each.coefficients[0]]) < share * step_s
+        if each.effect.cause in LAGS and abs(values.values[each.coefficients[0]]) < share * step_s
     ]
 
 

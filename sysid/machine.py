@@ -21,6 +21,7 @@ from ranger_sim.sysid.dataset import Array, Finding, Table
 DRIVING = ("command", "cmd", "target", "reference", "setpoint", "input")  # words in the names of inputs
 
 PARAMETER = "parameter"  # subsystem of a parameter that does not stay as it is
+LAGS = ("sensor_lag", "input_lag")  # causes that may be stamps, or a part of how an input goes between its rows
 
 Values = Mapping[str, float]
 Columns = dict[str, Array]  # by equation, each of shape (n, k): k coefficients

@@ -1,7 +1,7 @@
 """Candidate causes that every machine given by its simulator has, without a line of the user's.
 
-At every output an offset, a scale, a drift and a lag, as a pure delay or as a filter; at every input an offset, a
-saturation and a dead zone; at every joint that the machine declares viscous, Coulomb and Stribeck friction, friction
+At every output an offset, a scale, a drift and a lag, as a pure delay or as a filter; at every input an offset, a lag,
+a saturation and a dead zone; at every joint that the machine declares viscous, Coulomb and Stribeck friction, friction
 that differs between the directions or grows with the load, drag, and what is periodic in the position; at every
 parameter a drift. Lags, speeds,
 limits and periods are on grids that suit the recordings. They enter at places that the engine adds to the simulator
@@ -20,8 +20,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from ranger_sim.sysid.dataset import Array, Table
-from ranger_sim.sysid.free_simulation.terms import Joint, Output, Shape, Term, into, of, on, sensed, shown
-from ranger_sim.sysid.machine import PARAMETER, Known, Recording
+from ranger_sim.sysid.free_simulation.recording import SimulatedRecording, Way
+from ranger_sim.sysid.free_simulation.terms import Joint, Output, Ports, Shape, Term, into, of, on, sensed, shown
+from ranger_sim.sysid.machine import PARAMETER, Known, Recording, Values
 
 FINEST_LAG, COARSER = 0.5, 1.6  # samples; from one lag of the grid to the next
 NEAR = 2.0  # times a lag of the grid: what a lag made with it may come out as, but for the shortest
@@ -85,15 +86,7 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
             seen, lag_s = r.signals[sensed(name)], shape[time]
             return {place: (late(r.table, seen, lag_s) - seen) / lag_s}
 
-        grid = _lags(recordings)
-
-        def fits(found: Mapping[str, float]) -> bool:
-            return found[time] <= grid[0] or 1.0 / NEAR < found["lag_s"] / found[time] < NEAR
-
-        return Term(
-            "sensor_lag", name, "sensor", ("lag_s",), make, [{time: each} for each in grid], fits,
-            meaning=meaning, independent=True, form=form, scale=time,
-        )  # fmt: skip
+        return _lag("sensor_lag", name, "sensor", form, time, make, meaning, recordings)
 
     return [
         sensor("sensor_offset", f"offset_{unit}", lambda table, seen: np.ones(len(table)),
@@ -111,7 +104,7 @@ def at_output(output: Output, recordings: Sequence[Recording]) -> list[Term]:
 
 
 def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
-    """An input's offset, saturation and dead zone: a share of 1 is a hard one."""
+    """An input's offset, lag, saturation and dead zone: a share of 1 is a hard one."""
     size = np.concatenate([np.abs(each.signals[name]) for each in recordings])
     largest = float(np.max(size, initial=0.0))
     if not largest > 0.0 or np.ptp(size) == 0.0 and len(set(np.sign(recordings[0].signals[name]))) == 1:
@@ -134,6 +127,19 @@ def at_input(name: str, recordings: Sequence[Recording]) -> list[Term]:
     )  # fmt: skip
     made = [term("input_offset", "offset", lambda s, _: np.ones_like(s[name]),
                  f"the machine gets {name} + offset"), slips]  # fmt: skip
+
+    def lag(form: str, time: str, late: Callable[[Table, Array, float, Way], Array], meaning: str) -> Term:
+        def make(r: SimulatedRecording, shape: Shape, values: Mapping[str, float]) -> dict[str, Array]:
+            given, lag_s = r.signals[name], shape[time]
+            return {into(name): (late(r.table, given, lag_s, r.ways[name]) - given) / lag_s}
+
+        return _lag("input_lag", name, "input", form, time, make, meaning, recordings)
+
+    made += [
+        lag("delay", "delay_s", given_late, f"the machine gets {name} late: its value of lag_s before"),
+        lag("filter", "time_constant_s", given_slowly,
+            f"the machine gets {name} behind a low-pass of first order with the time constant lag_s"),
+    ]  # fmt: skip
     if limits:
         beyond: Signal = lambda s, shape: np.clip(s[name], -shape["limit"], shape["limit"]) - s[name]  # noqa: E731
         made.append(
@@ -258,6 +264,52 @@ def filtered(table: Table, column: Array, lag_s: float) -> Array:
         first = through * column[run][:1]  # so that the first value is the column's own
         out[run], _ = lfilter([1.0 - through, through - kept], [1.0, -kept], column[run], zi=first)
     return out
+
+
+def given_late(table: Table, column: Array, lag_s: float, way: Way) -> Array:
+    """An input (n,) as it was `lag_s` before. One that is held, or a mean, has its mean over a step."""
+    if way is Way.CUBIC:
+        return delayed(table, column, lag_s)
+    out = np.empty_like(column)
+    for run in table.runs:
+        out[run] = np.interp(table.time_s[run] - lag_s, table.time_s[run], column[run])
+    return out
+
+
+def given_slowly(table: Table, column: Array, lag_s: float, way: Way) -> Array:
+    """An input (n,) behind a low-pass of first order. One that is held, or a mean, has its mean over a step."""
+    if way in (Way.CUBIC, Way.LINE):
+        return filtered(table, column, lag_s)
+    ratio = table.step_s / lag_s
+    kept = float(np.exp(-ratio))
+    out = np.empty_like(column)
+    for run in table.runs:
+        given = column[run]
+        before, _ = lfilter([0.0, 1.0 - kept], [1.0, -kept], given, zi=given[:1])  # at the begin of each row's step
+        out[run] = given + (before - given) * (1.0 - kept) / ratio
+    return out
+
+
+def _lag(
+    cause: str,
+    at: str,
+    subsystem: str,
+    form: str,
+    time: str,
+    make: Callable[[SimulatedRecording, Shape, Values], Ports],
+    meaning: str,
+    recordings: Sequence[Recording],
+) -> Term:
+    """A lag on the grid; time: its name there."""
+    grid = _lags(recordings)
+
+    def fits(found: Mapping[str, float]) -> bool:
+        return found[time] <= grid[0] or 1.0 / NEAR < found["lag_s"] / found[time] < NEAR
+
+    return Term(
+        cause, at, subsystem, ("lag_s",), make, [{time: each} for each in grid], fits,
+        meaning=meaning, independent=True, form=form, scale=time,
+    )  # fmt: skip
 
 
 def _longest_s(recordings: Sequence[Recording]) -> float:

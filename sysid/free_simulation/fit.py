@@ -183,7 +183,8 @@ class TrajectoryFit:
             along[sensed(each.channel)] = along[each.channel] - entering[:, number]
         along["t"] = self.table.elapsed_s
         along |= machine.extra_signals(along, self.table)
-        return SimulatedRecording(self.table, along, {}, ports=simulator.ports)
+        ways = {name: simulator.numerics.between(name) for name in simulator.inputs}
+        return SimulatedRecording(self.table, along, {}, ports=simulator.ports, ways=ways)
 
     def _coefficients(self) -> list[Array]:
         """Of each effect that acts."""
@@ -222,15 +223,11 @@ class TrajectoryFit:
             {number for each in self.enter for number in each} | set(self._ports(self.simulator.numerics.open_jumps))
         )
         sizes = self.size_x, self.size_u, self.size_p[: self.count]
-        lin = simulator.linearised(
-            self.x,
-            self.u,
-            self.p,
-            self.entering(),
-            sizes,
-            range(len(simulator.ports)) if final else there,
-            final or not self.acting,
-        )
+        ports = range(len(simulator.ports)) if final else there
+        with np.errstate(over="ignore", invalid="ignore"):  # a machine that runs away is refused below
+            lin = simulator.linearised(
+                self.x, self.u, self.p, self.entering(), sizes, ports, final or not self.acting
+            )  # fmt: skip
         back = np.zeros((len(self.x), len(simulator.ports), len(states)))
         for each, enter, own in zip(self.acting, self.enter, self._coefficients(), strict=True):
             assert seen is not None

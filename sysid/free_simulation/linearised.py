@@ -134,7 +134,8 @@ def _by_noise(fit: TrajectoryFit, predictor: Predictor) -> Array:
 def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Array, noise: Array) -> LinearisedRecording:
     """The recording whose equations are a predictor's errors, (n, o), with columns (n, o, parameters). noise: (o,)."""
     machine, table, names = fit.machine, fit.table, fit.simulator.names
-    along = fit.seen().signals
+    seen = fit.seen()
+    along = seen.signals
     counts = machine.counts(along, table)
     equations = {}
     widths = _standstill(fit, predictor)
@@ -154,7 +155,8 @@ def _made(fit: TrajectoryFit, predictor: Predictor, missed: Array, columns: Arra
         fitted=dict(zip(names, (float(each) for each in fit.p_at), strict=False)),
         linear=fit.lin,
         predictor=predictor,
-        ports=fit.simulator.ports,
+        ports=seen.ports,
+        ways=seen.ways,
         outputs=tuple(each.channel for each in machine.outputs),
         fit=fit,
     )

@@ -89,9 +89,12 @@ def _held_otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
     of its new size.
     """
     now = fit.simulator.numerics
-    lags = [each for each in fit.acting if each.term.cause == "sensor_lag"]
     made = []
-    for name, same_shape in itertools.product(sorted(fit.simulator.curving) if lags else (), (True, False)):
+    for name, same_shape in itertools.product(sorted(fit.simulator.curving), (True, False)):
+        lags = [each for each in fit.acting if each.term.cause == "sensor_lag"
+                or (each.term.cause, each.term.at) == ("input_lag", name)]  # fmt: skip
+        if not lags:
+            continue
         other = _with(fit, dataclasses.replace(now, held=now.held ^ {name}))
         later_s = (0.5 if name in now.held else -0.5) * fit.step_s
         other.acting, other.p = [], fit.p.copy()

@@ -11,6 +11,7 @@ from ranger_sim.sysid.dataset import Array, Table
 from ranger_sim.sysid.free_simulation.declared import DeclaredMachine
 from ranger_sim.sysid.free_simulation.integration import Quantities
 from ranger_sim.sysid.free_simulation.predictor import Jacobians, forcing
+from ranger_sim.sysid.free_simulation.recording import Way
 from ranger_sim.sysid.free_simulation.terms import Joint, Port, into, of, on, shown
 from ranger_sim.sysid.machine import PARAMETER
 
@@ -46,10 +47,14 @@ class Numerics:
         """Inputs of which a jump's place or row is not known."""
         return self.unsure | self.apart
 
+    def between(self, name: str) -> Way:
+        """How an input goes from a row to the next."""
+        ways = ((self.held, Way.HELD), (self.means, Way.MEAN), (self.curved, Way.CUBIC))
+        return next((way for names, way in ways if name in names), Way.LINE)
+
     def way(self, name: str) -> str:
-        """How an input goes from a row to the next, in words."""
-        ways = ((self.held, "held"), (self.means, "mean of the step before the row"), (self.curved, "cubic"))
-        found = next((words for names, words in ways if name in names), "straight line")
+        """The same in words, with what is not known of its jumps."""
+        found = self.between(name).value
         found += ", jumps anywhere inside a step" if name in self.unsure else ""
         return found + (", jumps a row earlier or later than the outputs" if name in self.apart else "")
 

@@ -1,0 +1,120 @@
+"""Inputs that reach the machine late: behind a delay or a low-pass, smooth or held."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from ranger_sim.foundation.random_arrays import generator
+from ranger_sim.foundation.user_error import UserError
+from ranger_sim.sysid.dataset import Table
+from ranger_sim.sysid.free_simulation.candidates import given_late, given_slowly
+from ranger_sim.sysid.free_simulation.recording import Way
+from ranger_sim.sysid.pipeline import diagnose
+from tests.sysid.test_input_limits import FINER, Pendulum, STEP_s, swung
+
+FINE = 200  # values in a row's step
+
+
+def _late(lag_s, finer=STEP_s / FINER):
+    """A delay by whole steps of the integration."""
+    steps = round(lag_s / finer)
+    return lambda given: np.concatenate((np.full(steps, given[0]), given))[: len(given)]
+
+
+def _slow(lag_s):
+    kept = np.exp(-STEP_s / FINER / lag_s)
+    return lambda given: lfilter([1.0 - kept], [1.0, -kept], given, zi=[kept * given[0]])[0]
+
+
+def _held(given):
+    """Each row's value until the next row."""
+    return np.repeat(given[::FINER], FINER)
+
+
+@pytest.mark.parametrize(
+    ("form", "lag_s", "bend"),
+    [("delay", 0.033, _late(0.033)), ("filter", 0.08, _slow(0.08)), ("delay", 0.4, _late(0.4))],
+    ids=["a delay of three rows", "a low-pass of eight rows", "a delay of forty rows"],
+)
+def test_a_torque_that_comes_late_is_named_with_its_lag(form, lag_s, bend):
+    result = diagnose(Pendulum(), [swung(13, bend)], [swung(14, bend)]).result
+    (found,) = result.causes
+    assert (found.name, found.at) == ("input_lag", "torque")
+    assert set(found.parameters) == {"lag_s", {"delay": "delay_s", "filter": "time_constant_s"}[form]}
+    value = found.parameters["lag_s"]
+    assert value.ci95[0] <= lag_s <= value.ci95[1]
+    assert value.value == pytest.approx(lag_s, rel=0.02)
+    assert result.gain.fraction_of_achievable > 0.95
+
+
+def test_a_held_torque_that_comes_late_is_late_by_its_delay_alone():
+    """Held values are half a row late on average, which is not the delay's."""
+
+    def bend(given):
+        return _late(0.025)(_held(given))
+
+    result = diagnose(Pendulum(), [swung(13, bend)], [swung(14, bend)]).result
+    (found,) = result.causes
+    assert (found.name, found.at) == ("input_lag", "torque")
+    value = found.parameters["lag_s"]
+    assert value.ci95[0] <= 0.025 <= value.ci95[1]
+
+
+def _steps():
+    """(table, given by row) of values that stay for several rows each."""
+    levels = generator(1, "held input").uniform(-1.0, 1.0, 12)
+    given = np.repeat(levels, 9)
+    time_s = STEP_s * np.arange(len(given))
+    return Table(time_s, {"u": given}, (slice(0, len(given)),), "steps"), given
+
+
+def _mean_of_each_step(fine):
+    return fine.reshape(-1, FINE).mean(axis=1)
+
+
+@pytest.mark.parametrize("lag_s", [0.003, 0.01, 0.034])
+def test_a_held_input_that_is_late_has_its_mean_over_each_step(lag_s):
+    table, given = _steps()
+    fine = _late(lag_s, STEP_s / FINE)(np.repeat(given, FINE))
+    assert given_late(table, given, lag_s, Way.HELD) == pytest.approx(_mean_of_each_step(fine), abs=1e-9)
+
+
+@pytest.mark.parametrize("lag_s", [0.003, 0.01, 0.034])
+def test_a_held_input_behind_a_low_pass_has_its_mean_over_each_step(lag_s):
+    table, given = _steps()
+    kept = np.exp(-STEP_s / FINE / lag_s)
+    behind, _ = lfilter([0.0, 1.0 - kept], [1.0, -kept], np.repeat(given, FINE), zi=[given[0]])
+    # the sum of FINE values is right to half of the change in one of them: 1 / (2 FINE) of a time constant's part
+    assert given_slowly(table, given, lag_s, Way.HELD) == pytest.approx(_mean_of_each_step(behind), abs=5e-3)
+
+
+def test_means_behind_a_low_pass_are_those_of_the_step_that_ends_at_the_row():
+    table, given = _steps()
+    held = given_slowly(table, given, 0.02, Way.HELD)
+    assert given_slowly(table, given, 0.02, Way.MEAN) == pytest.approx(held, abs=1e-12)
+
+
+def test_a_smooth_input_that_is_late_is_what_it_was_before():
+    time_s = STEP_s * np.arange(300)
+    table = Table(time_s, {}, (slice(0, 300),), "smooth")
+    late = given_late(table, np.sin(5.0 * time_s), 0.0137, Way.CUBIC)
+    assert late[5:] == pytest.approx(np.sin(5.0 * (time_s - 0.0137))[5:], abs=1e-5)
+    slow = given_slowly(table, np.sin(5.0 * time_s), 0.02, Way.CUBIC)
+    phase = np.arctan(5.0 * 0.02)
+    # from some time constants on, to the straight lines between rows: (5 * 0.01)^2 / 8
+    assert slow[100:] == pytest.approx(np.cos(phase) * np.sin(5.0 * time_s[100:] - phase), abs=4e-4)
+
+
+class LostPendulum(Pendulum):
+    """It gives no numbers with any cause in it."""
+
+    def again(self, recording, acting, fixed=False):
+        raise UserError(f"{recording.table.name}: the simulator of {self.name} gives no numbers on this recording")
+
+
+def test_a_cause_with_which_the_simulator_gives_no_numbers_is_a_finding_without_a_name():
+    result = diagnose(LostPendulum(), [swung(13, _slow(0.08))], [swung(14, _slow(0.08))]).result
+    assert result.causes == ()
+    assert result.detected
+    (lost,) = (each for each in result.data_findings if each.kind == "runs_away")
+    assert "input_lag" in lost.text and lost.text.endswith("the simulation runs away")
