@@ -69,6 +69,19 @@ def take_finer_steps(fit: TrajectoryFit, rounds: int) -> bool:
     return fit.simulator.numerics.parts > before
 
 
+def likelier_held(fit: TrajectoryFit) -> TrajectoryFit:
+    """The fit, or where a lag acts one with an input held otherwise, if it is surely likelier.
+
+    Without its lag a heater that was held looked like one that jumps inside its steps.
+    """
+    best = fit
+    for other in _held_otherwise(fit):
+        other.settle(MORE_ROUNDS)
+        if other.surprise < best.surprise - CHOSEN:
+            best = other
+    return best
+
+
 def _otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
     """Fits that continue from here with other numerics: half the step; inputs on straight lines instead of cubics, or
     on straight lines instead of held where they seem to stay; a quarter of what is open at standstill."""
@@ -83,19 +96,22 @@ def _otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
 
 
 def _held_otherwise(fit: TrajectoryFit) -> list[TrajectoryFit]:
-    """Where a lag acts, fits with a smooth input held from row to row, or on its cubic where it is held now.
+    """Where a lag acts, fits with a smooth input held from row to row, or on its cubic where it is held now; and with
+    one that stays at values and jumps held, or jumping anywhere inside the step before the row.
 
     What is held is late by half a row, so that the lag starts with half a row less, or more; at its shape, and at that
     of its new size.
     """
     now = fit.simulator.numerics
     made = []
-    for name, same_shape in itertools.product(sorted(fit.simulator.curving), (True, False)):
+    for name, same_shape in itertools.product(sorted(fit.simulator.curving | fit.simulator.staying), (True, False)):
         lags = [each for each in fit.acting if each.term.cause == "sensor_lag"
                 or (each.term.cause, each.term.at) == ("input_lag", name)]  # fmt: skip
         if not lags:
             continue
-        other = _with(fit, dataclasses.replace(now, held=now.held ^ {name}))
+        held = now.held ^ {name}
+        unsure = now.unsure - {name} if name in held or name in fit.simulator.curving else now.unsure | {name}
+        other = _with(fit, dataclasses.replace(now, held=held, unsure=unsure))
         later_s = (0.5 if name in now.held else -0.5) * fit.step_s
         other.acting, other.p = [], fit.p.copy()
         first = len(fit.simulator.names)

@@ -62,6 +62,8 @@ CASES = (
     Case(*ROD, "drift", 1.0, (("sensor_drift", "cold_C"),), "drift_C_per_s", 1.0 / 6000.0),
     Case(*ROD, "fouling", 1e-4, (("parameter_drift", "h2"),)),
     Case(*ROD, "opening", 0.2, (("parameter_drift", "h2"),), "change_W_per_K", 0.07),
+    Case(*ROD, "late", 10.0, (("input_lag", "P"),), "lag_s", 10.0),
+    Case(*ROD, "late", 60.0, (("input_lag", "P"),), "lag_s", 60.0),
     Case(*JOINT, "none", 0.0, ()),
     Case(*JOINT, "cubic", 3000.0, (("stiffening", "gear"),), "Nm_per_rad3", 3000.0),
     Case(*JOINT, "gravity", 0.5, (("once_per_turn", "link_rate"),), "sine_torque", -0.5),

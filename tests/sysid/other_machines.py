@@ -90,6 +90,9 @@ def heated_rod(cause, size, seed, seconds=6000.0, step_s=5.0):
         return given / 150.0, (through - loss * (cold - air)) / 220.0, 1.0
 
     held = np.repeat(power, FINE)
+    if cause == "late":
+        after = round(size / step_s * FINE)
+        held = np.concatenate((held[:1].repeat(after), held))[: len(held)]
     out, state = [], [air, air, 0.0]
     for number in range(rows):  # the power of a sample until the next
         part = held[number * FINE : (number + 1) * FINE].tolist()

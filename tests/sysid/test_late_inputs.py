@@ -10,6 +10,8 @@ from ranger_sim.sysid.dataset import Table
 from ranger_sim.sysid.free_simulation.candidates import given_late, given_slowly
 from ranger_sim.sysid.free_simulation.recording import Way
 from ranger_sim.sysid.pipeline import diagnose
+from tests.sysid.hidden_effects import CASES
+from tests.sysid.machines_of_a_user import HeatedRod
 from tests.sysid.test_input_limits import FINER, Pendulum, STEP_s, swung
 
 FINE = 200  # values in a row's step
@@ -58,6 +60,17 @@ def test_a_held_torque_that_comes_late_is_late_by_its_delay_alone():
     assert (found.name, found.at) == ("input_lag", "torque")
     value = found.parameters["lag_s"]
     assert value.ci95[0] <= 0.025 <= value.ci95[1]
+
+
+@pytest.mark.parametrize("lag_s", [10.0, 60.0])
+def test_a_heater_that_comes_late_is_held_and_has_a_half_row_in_its_interval(lag_s):
+    """A row is 5 s. Without the lag it looks like a heater that jumps inside of its steps, half a row before."""
+    (case,) = (each for each in CASES if each.machine is HeatedRod and (each.cause, each.size) == ("late", lag_s))
+    (found,) = case.found(1).result.causes
+    assert (found.name, found.at) == ("input_lag", "P")
+    value = found.parameters["lag_s"]
+    assert value.ci95[0] <= lag_s <= value.ci95[1]
+    assert value.value == pytest.approx(lag_s, rel=0.02)
 
 
 def _steps():
