@@ -122,12 +122,12 @@ class Averaged(Disc):
     impossible = ("sensor_lag",)
 
     def terms(self, recordings):
-        """A lag of 50 ms of what drives it, independent of the parameters as a free candidate is."""
+        """A lag of 50 ms of what drives it, in place of the free candidate, which tries others as well."""
 
         def make(r, shape, values):
             return {into("voltage"): (filtered(r.table, r.signals["voltage"], 0.05) - r.signals["voltage"]) / 0.05}
 
-        return [Term("actuator_lag", "disc", "input", ("lag_s",), make, independent=True)]
+        return [Term("input_lag", "voltage", "input", ("lag_s",), make, independent=True)]
 
 
 def test_a_declared_mean_is_not_chosen_and_stays_one_where_the_input_is_smooth():
@@ -154,7 +154,7 @@ def test_a_lag_of_the_drive_is_named_where_the_sensor_is_known_to_have_none():
         return Table(table.time_s, shown, table.runs, f"lag {seed}", {})
 
     found = diagnose(Averaged(), [lagging(3)], [lagging(4)]).result
-    assert [each.name for each in found.causes] == ["actuator_lag"]
+    assert [each.name for each in found.causes] == ["input_lag"]
     low, high = found.causes[0].parameters["lag_s"].ci95
     assert low < 0.05 < high < 1.02 * low
 
