@@ -1,6 +1,5 @@
 """A library that a command needs and that is not installed: its name, and how to install it here."""
 
-import importlib.metadata
 import os
 import pathlib
 import re
@@ -64,6 +63,8 @@ def _requirement(package: str) -> tuple[str, list[str]]:
 
 def _listed() -> list[str]:
     """The requirements of this package, with their extras, in the order of pyproject.toml."""
+    import importlib.metadata  # takes as long as the rest of a command's start, and few commands lack a library
+
     try:
         return importlib.metadata.requires("ranger-sim") or []
     except importlib.metadata.PackageNotFoundError:
