@@ -13,6 +13,10 @@ from tests.examples import register_profiles
 
 register_profiles()
 
+# A thread of linear algebra for each test and each program that it starts: two threads of two tests side by side wait
+# for each other, and a diagnosis takes up to twice the processor time. Read when numpy is first imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 COMPILERS = ("cc", "gcc", "clang")
 CROSS_COMPILERS = ("arm-none-eabi-gcc",)
