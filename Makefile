@@ -10,6 +10,8 @@ PYTHON ?= python3
 VENV   ?= .venv
 STEPS  ?= 100
 RUN    := $(VENV)/bin/python
+# What pytest makes of a file is kept for the next run, also where Python is set to write no bytecode.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(RUN) -m pytest -q
 SOURCES := $(shell find -L ranger_sim \( -name '*.py' -o -name '*.pxd' \) -not -name '_*' 2>/dev/null) dev/declarations.py
 
 .PHONY: walk test test-interpreted test-blind test-suites test-vm docs lint setup bench lock clean
@@ -32,8 +34,8 @@ ALONE = $(filter tests/tools/panel/% tests/test_watched.py,$(WITH_A_CLOCK))
 PAGES = tests/pages
 
 test: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways and not blind" $(addprefix --ignore=,$(ALONE) $(PAGES))
-	$(RUN) -m pytest -q -rs $(ALONE)
+	$(PYTEST) -rs -n 2 --dist loadfile --no-loadscope-reorder -m "not both_ways and not blind" $(addprefix --ignore=,$(ALONE) $(PAGES))
+	$(PYTEST) -rs $(ALONE)
 
 # The packages' own tests interpreted: what is compiled must be right as plain Python, too. Left out are walks, which take
 # minutes so, programs that keep a pace, and what compares both modes already.
@@ -43,17 +45,17 @@ NOT_PLAIN = $(addprefix tests/,can_bus/test_can_programs.py boards/test_head_201
 	boards/test_main_brain_runs_alike_compiled_and_interpreted.py plant/walking/test_walking.py)
 
 test-interpreted: $(VENV)/.all
-	RANGER_SIM_INTERPRETED=1 $(RUN) -m pytest -q -rs -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
-	$(RUN) -m pytest -q -rs -n 2 -m both_ways tests/system/test_determinism.py
+	RANGER_SIM_INTERPRETED=1 $(PYTEST) -rs -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(NOT_PLAIN)) $(PLAIN)
+	$(PYTEST) -rs -n 2 -m both_ways tests/system/test_determinism.py
 
 docs: $(VENV)/.all
 	$(RUN) -m sphinx -W --keep-going -q -b html -c docs . build/site
-	$(RUN) -m pytest -q -n 2 $(PAGES)
+	$(PYTEST) -n 2 $(PAGES)
 	$(RUN) -m dev.readme
 	@echo "build/site/docs/index.html"
 
 test-blind: $(VENV)/.all
-	$(RUN) -m pytest -q -rs -m blind tests/blind
+	$(PYTEST) -rs -m blind tests/blind
 
 test-suites: $(VENV)/.all
 	$(RUN) -m dev.suites
