@@ -3,6 +3,7 @@
 A force on the cart accelerates the pole as well, so that what is missing there is found only where the drive enters.
 """
 
+import functools
 import re
 
 import numpy as np
@@ -67,6 +68,7 @@ class Cart(SimulatedMachine):
         return {"way_m": x["way"], "angle_rad": x["angle"]}
 
 
+@functools.cache
 def pushed(seed, drag):
     """The cart with a drag, N s^2/m^2, that its model lacks; numpy solves the mass matrix in 20 parts of a row."""
     random = generator(seed, "cart and pole")
@@ -77,9 +79,8 @@ def pushed(seed, drag):
     for k in range(ROWS * FINER):
         if k % FINER == 0:
             rows[k // FINER] = x
-        here = np.interp(
-            (k + 0.5) / FINER, (k // FINER, k // FINER + 1), force[[k // FINER, min(k // FINER + 1, ROWS - 1)]]
-        )
+        before, after = force[k // FINER], force[min(k // FINER + 1, ROWS - 1)]
+        here = before + ((k % FINER + 0.5) / FINER) * (after - before)
         c, s = FIRST * np.cos(x[1]), FIRST * np.sin(x[1])
         torques = [here - CART * v[0] - drag * v[0] * abs(v[0]) + s * v[1] ** 2, -POLE * v[1] - 9.81 * s]
         v = v + np.linalg.solve([[MASS, c], [c, SECOND]], torques) * STEP_s / FINER
